@@ -34,7 +34,7 @@ function hit(scene: Scene, x: number): string | undefined {
   return first && (first.object.userData.batch as (index: number) => string)(first.instanceId as number);
 }
 
-test("balls that are painted are squares at their places, as large as they are, and met as balls", () => {
+test("spheres drawn as squares keep position and size and are picked as spheres", () => {
   const scene = new Scene();
   const batches = new Batches(scene, true);
   const batch = batches.of("ball", () => [new SphereGeometry(0.1, 8, 6), new MeshLambertMaterial()], 0.1);
@@ -55,7 +55,7 @@ test("balls that are painted are squares at their places, as large as they are, 
   expect([hit(scene, 1), hit(scene, 2)]).toEqual([undefined, "other"]);
 });
 
-test("shapes are written out at their places, for more than there was room for", () => {
+test("shapes are merged at their poses, also beyond the reserved space", () => {
   const scene = new Scene();
   const batches = new Batches(scene, true);
   const shape = new SphereGeometry(0.1, 8, 6);

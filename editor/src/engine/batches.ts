@@ -2,6 +2,7 @@
 
 import { type BufferGeometry, Color, DynamicDrawUsage, InstancedMesh, type Material, Matrix4, type Scene } from "three";
 import { Baked, type Instance } from "./baked";
+import { LinkLines } from "./linkLines";
 
 const FIRST_SIZE = 64;
 const matrix = new Matrix4();
@@ -71,12 +72,15 @@ export class Batch {
 
 /** The batches by name; the first user of a name creates the batch. */
 export class Batches {
+  readonly links: LinkLines;
   private readonly byName = new Map<string, Batch>();
 
   constructor(
     private readonly scene: Scene,
     private readonly cheap: boolean,
-  ) {}
+  ) {
+    this.links = new LinkLines(scene);
+  }
 
   /** At low quality, spheres with a radius of `ball`, m, are drawn as squares. */
   of(name: string, make: () => [BufferGeometry, Material], ball = 0): Batch {
@@ -90,10 +94,12 @@ export class Batches {
   }
 
   refresh(): void {
+    this.links.refresh();
     for (const batch of this.byName.values()) batch.refresh();
   }
 
   dispose(): void {
+    this.links.dispose();
     for (const batch of this.byName.values()) batch.dispose();
     this.byName.clear();
   }

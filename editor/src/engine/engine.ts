@@ -8,7 +8,7 @@ import { DropLine, heightWords } from "./dropLine";
 import { Floor, lowest } from "./floor";
 import { corners } from "./framing";
 import type { Item } from "./items";
-import { labelsOf } from "./labelling";
+import { labelsOf, placeConditions } from "./labelling";
 import { Labels } from "./labels";
 import { LazyGizmo } from "./lazyGizmo";
 import { LazyPath } from "./lazyPath";
@@ -85,7 +85,7 @@ export class Engine {
     this.renderer = rendererOf(canvas, quality);
     this.view = new View(canvas, () => this.draw());
     this.batches = new Batches(this.scene, quality === "low");
-    this.labels = new Labels(options.labels);
+    this.labels = new Labels(options.labels, () => this.draw());
     this.context = {
       telemetry: options.telemetry,
       palette: this.palette,
@@ -363,14 +363,12 @@ export class Engine {
     this.place();
     this.gizmo.place();
     this.tellHeight();
-    this.renderer.render(this.scene, this.view.camera);
+    const { camera } = this.view;
+    camera.updateMatrixWorld();
+    this.labels.show(labelsOf(this.things, this.hovered, this.notes, camera.position), camera, this.width, this.height);
+    placeConditions(this.things, this.labels, camera, this.width, this.height);
+    this.renderer.render(this.scene, camera);
     this.frames++;
-    this.labels.show(
-      labelsOf(this.things, this.hovered, this.notes, this.view.camera.position),
-      this.view.camera,
-      this.width,
-      this.height,
-    );
     for (const watcher of this.watchers) watcher();
     if (this.movedRobots.size > 0) this.draw();
   }

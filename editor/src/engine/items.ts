@@ -7,8 +7,8 @@ export type Shape =
   | { kind: "cylinder"; radius: number; height: number }
   | { kind: "sphere"; radius: number }
   | { kind: "mesh"; asset: string }
-  /** Without a model: a marker. */
-  | { kind: "none" };
+  /** Without a collision model: a device by the icon of its type, else a marker. */
+  | { kind: "none"; icon?: string };
 
 interface Base {
   id: string;
@@ -20,6 +20,8 @@ interface Base {
   lockedBy: string;
   /** Transparency from 0, opaque, to 1, invisible. */
   faint: number;
+  /** Drawn pale, because another part of the program is selected. */
+  dim?: boolean;
 }
 
 export interface ObjectItem extends Base {
@@ -72,6 +74,8 @@ export interface PuckItem extends Base {
   level: number;
   /** Number of these pucks. */
   count: number;
+  /** The pucks of the point lie around it; else they are stacked, and the uppermost shows their number. */
+  open: boolean;
   role: "action" | "start" | "end";
   running: boolean;
   breakpoint: boolean;
@@ -85,6 +89,8 @@ export interface LinkItem extends Base {
   kind: "logic";
   from: string;
   to: string;
+  /** Both ends are in one closed stack: it is not drawn. */
+  inside: boolean;
   /** Text at the line; empty for an unconditional connection. */
   condition: string;
   branch: "always" | "true" | "false" | "value";

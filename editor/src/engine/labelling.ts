@@ -1,9 +1,10 @@
 /** Which items have a label, how important it is, and the text next to the name. */
 
-import { Vector3 } from "three";
+import { type PerspectiveCamera, Vector3 } from "three";
 import type { Item } from "./items";
-import type { Label } from "./labels";
+import type { Label, Labels } from "./labels";
 import type { Thing } from "./thing";
+import { LinkThing } from "./things/link";
 
 const WEIGHTS: Record<Item["kind"], number> = {
   robot: 40,
@@ -17,6 +18,26 @@ const WEIGHTS: Record<Item["kind"], number> = {
 /** Distance from the camera within which points and actions are labelled, m. */
 const NEAR = 0.9;
 const place = new Vector3();
+
+/** Show the conditions of steps where they cover neither a name nor another condition. */
+export function placeConditions(
+  things: Map<string, Thing>,
+  labels: Labels,
+  camera: PerspectiveCamera,
+  width: number,
+  height: number,
+): void {
+  for (const thing of things.values()) {
+    const plate = thing instanceof LinkThing ? thing.plate : null;
+    if (!plate) continue;
+    const { label, at } = plate;
+    const pixels = height / (2 * place.copy(at).distanceTo(camera.position) * Math.tan((camera.fov * Math.PI) / 360));
+    place.copy(at).project(camera);
+    const [x, y] = [((place.x + 1) / 2) * width, ((1 - place.y) / 2) * height];
+    const [w, h] = [(label.scale.x * pixels) / 2, (label.scale.y * pixels) / 2];
+    label.visible = labels.reserve({ left: x - w, right: x + w, top: y - h, bottom: y + h });
+  }
+}
 
 /** Priority: selected, under the pointer or crosshair, with a badge, near. */
 export function labelsOf(
@@ -32,7 +53,11 @@ export function labelsOf(
     const note = notes.get(id) ?? "";
     const under = id === hovered;
     if (item.faint >= 1) continue;
+    // A stack has one label, with the number of its actions.
+    const stack = item.kind === "action" && !item.open && item.count > 1 && !under;
+    if (stack && item.level > 0) continue;
     const always =
+      stack ||
       item.kind === "robot" ||
       item.kind === "object" ||
       (item.kind === "action" && (item.running || item.role !== "action"));
@@ -47,11 +72,12 @@ export function labelsOf(
       (under ? 500 : 0) +
       (badge ? 100 : 0) +
       WEIGHTS[item.kind] +
+      (item.kind === "action" && item.role !== "action" ? 15 : 0) +
       faded +
       20 / (1 + distance);
     found.push({
       id,
-      text: item.name,
+      text: stack ? `${things.get(item.parent ?? "")?.item.name ?? ""} ×${item.count}` : item.name,
       badge,
       note,
       selected: item.selected,

@@ -10,6 +10,13 @@ const MOST_TRIED = 24;
 /** Distance between two labels, pixels. */
 const GAP = 3;
 
+export interface Rect {
+  left: number;
+  top: number;
+  right: number;
+  bottom: number;
+}
+
 export interface Label {
   id: string;
   text: string;
@@ -26,12 +33,22 @@ const at = new Vector3();
 
 export class Labels {
   private readonly elements = new Map<string, HTMLElement>();
+  private placed: Rect[] = [];
 
-  constructor(private readonly host: HTMLElement) {}
+  private readonly sizes: ResizeObserver;
+
+  /** `draw` requests a new frame: the size of labels changes with the font and the text size of the page. */
+  constructor(
+    private readonly host: HTMLElement,
+    draw: () => void,
+  ) {
+    this.sizes = new ResizeObserver(draw);
+  }
 
   /** Move the labels to the items as drawn. */
   show(labels: Label[], camera: PerspectiveCamera, width: number, height: number): void {
-    const placed: { left: number; top: number; right: number; bottom: number }[] = [];
+    const placed: Rect[] = [];
+    this.placed = placed;
     const tried = new Set<string>();
     const wanted = [...labels].sort((a, b) => b.weight - a.weight);
     for (const label of wanted) {
@@ -45,9 +62,12 @@ export class Labels {
       const half = element.offsetWidth / 2;
       // Keep the label inside the view.
       const centre = Math.min(Math.max(x, half + 4), Math.max(half + 4, width - half - 4));
-      const top = Math.max(4, y - element.offsetHeight - 8);
-      const box = { left: centre - half, right: centre + half, top, bottom: top + element.offsetHeight };
-      if (placed.some((other) => overlap(box, other))) {
+      // Above the item, else below it.
+      const box = [y - element.offsetHeight - 8, y + 12]
+        .map((edge) => Math.max(4, edge))
+        .map((top) => ({ left: centre - half, right: centre + half, top, bottom: top + element.offsetHeight }))
+        .find((each) => !placed.some((other) => overlap(each, other)));
+      if (!box) {
         element.style.visibility = "hidden";
         continue;
       }
@@ -57,12 +77,21 @@ export class Labels {
     }
     for (const [id, element] of this.elements) {
       if (tried.has(id)) continue;
+      this.sizes.unobserve(element);
       element.remove();
       this.elements.delete(id);
     }
   }
 
+  /** Reserve the place of something drawn in the view, pixels; return whether it overlaps nothing. */
+  reserve(box: Rect): boolean {
+    if (this.placed.some((other) => overlap(box, other))) return false;
+    this.placed.push(box);
+    return true;
+  }
+
   dispose(): void {
+    this.sizes.disconnect();
     for (const element of this.elements.values()) element.remove();
     this.elements.clear();
   }
@@ -75,6 +104,7 @@ export class Labels {
       element.append(document.createElement("span"), document.createElement("small"), document.createElement("em"));
       this.elements.set(label.id, element);
       this.host.append(element);
+      this.sizes.observe(element);
     }
     const [name, badge, note] = element.children as unknown as [HTMLElement, HTMLElement, HTMLElement];
     if (name.textContent !== label.text) name.textContent = label.text;
@@ -87,6 +117,6 @@ export class Labels {
   }
 }
 
-function overlap(a: { left: number; top: number; right: number; bottom: number }, b: typeof a): boolean {
+function overlap(a: Rect, b: Rect): boolean {
   return a.left < b.right + GAP && b.left < a.right + GAP && a.top < b.bottom + GAP && b.top < a.bottom + GAP;
 }

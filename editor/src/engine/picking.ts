@@ -20,6 +20,7 @@ const AROUND: [number, number][] = [0, 1, 2, 3, 4, 5, 6, 7].map((n) => [
 
 const caster = new Raycaster();
 caster.params.Line.threshold = 0.002; // Tolerance for lines, m; the default of three.js is 1 m
+caster.layers.enable(1); // connections, which are drawn together
 const place = new Vector2();
 
 export interface Size {

@@ -1,26 +1,27 @@
 /** From the state to the items of the 3D view. Pure functions that return the same item while nothing changed. */
 
 import { t } from "@lingui/core/macro";
-import type { Item, LinkItem, RobotItem, Shape } from "../engine/items";
+import type { Item, LinkItem, RobotItem } from "../engine/items";
 import { decimal } from "../formats";
 import { reachOfAction, worse } from "../program/reach";
-import type { LogicItem, ObjectTypeMeta, Pose, Position, Reach } from "../protocol/types";
+import type { LogicItem, Pose, Position, Reach } from "../protocol/types";
 import { isRunning } from "../store/selectors";
 import type { OpenDocument, State } from "../store/state";
 import type { Draft, Ghost } from "../store/ui";
+import { borders, isDim, isOpen } from "./program";
+import { shapeOf } from "./shapes";
 import { faintness } from "./visibility";
 
 export const START = "START";
 export const END = "END";
 
-/** Default positions of START and END. */
-const PLACES: Record<string, Position> = { START: { x: -0.3, y: -0.3, z: 0.02 }, END: { x: -0.3, y: 0.3, z: 0.02 } };
 const NO_PLACE = { x: 0, y: 0, z: 0 };
 const UPRIGHT = { position: NO_PLACE, orientation: { x: 0, y: 0, z: 0, w: 1 } };
 
 /** Create the items of successive states. */
 export class ItemMaker {
   private known = new Map<string, { inputs: unknown[]; item: Item }>();
+  private bordersOf: { inputs: unknown[]; places: ReturnType<typeof borders> } | null = null;
 
   items(state: State): Item[] {
     const { doc } = state;
@@ -56,20 +57,20 @@ export class ItemMaker {
       const type = state.types.byName[object.type];
       const robot = state.types.robots[object.type];
       if (!object.pose && !robot) continue; // shown in lists only
-      const trouble = isTrouble(state, object.id);
+      const fault = hasFault(state, object.id);
       const online = state.live.state === "started" || isRunning(state);
       const preview = drafted(draft, object) ?? state.previews[object.id];
       const model = type && draft?.type === type ? draft.model : undefined;
       const ghost = state.ui.ghost?.robotId === object.id ? state.ui.ghost : null;
       add(
         object.id,
-        [object, type, robot, trouble, robot && online, preview, model, ghost, robot && axes, ...notify(object.id)],
+        [object, type, robot, fault, robot && online, preview, model, ghost, robot && axes, ...notify(object.id)],
         () => {
           const pose = {
             position: preview?.position ?? object.pose?.position ?? NO_PLACE,
             orientation: preview?.orientation ?? object.pose?.orientation ?? UPRIGHT.orientation,
           };
-          const base = { ...common(object.id, object.name), pose, trouble };
+          const base = { ...common(object.id, object.name), pose, fault };
           if (robot)
             return {
               ...base,
@@ -112,8 +113,18 @@ export class ItemMaker {
     }
     this.pucks(state, doc, add, common, notify);
     if (state.view.user.hide_steps === true && state.ui.connecting === null) return found;
+    const open = isOpen(state);
+    const dim = isDim(state);
     for (const item of Object.values(doc.logic)) {
-      add(item.id, [item, ...notify(item.id)], () => link(item, common(item.id, "")));
+      const [from, to] = [item.start, item.end].map((id) => doc.actions[id]?.pointId);
+      const moved = [item.start, item.end].some((id) => isPosition(state.view.shared[`place/${id}`]));
+      const inside = from !== undefined && from === to && !moved && !open(from);
+      const pale = dim(item.id);
+      add(item.id, [item, inside, pale, ...notify(item.id)], () => ({
+        ...link(item, common(item.id, "")),
+        inside,
+        dim: pale,
+      }));
     }
     return found;
   }
@@ -128,6 +139,8 @@ export class ItemMaker {
     ) => Omit<Item, "kind"> & { id: string; name: string; selected: boolean; lockedBy: string; faint: number },
     notify: (id: string) => unknown[],
   ): void {
+    const opened = isOpen(state);
+    const dim = isDim(state);
     const levels = new Map<string, number>();
     const counts = new Map<string, number>();
     for (const { pointId } of Object.values(doc.actions)) counts.set(pointId, (counts.get(pointId) ?? 0) + 1);
@@ -140,32 +153,44 @@ export class ItemMaker {
       const breakpoint = action.id in state.breakpoints;
       const colour = Math.max(0, colours.indexOf(action.type.split("/")[0] ?? ""));
       const place = state.view.shared[`place/${action.id}`];
+      const open = opened(action.pointId);
+      const pale = dim(action.id);
       const reach = reachOfAction(action, state.reach)?.reach ?? "";
-      add(action.id, [action, level, count, running, breakpoint, colour, place, reach, ...notify(action.id)], () => ({
-        ...common(action.id, action.name),
-        kind: "action",
-        ...(isPosition(place) ? { position: place } : { parent: action.pointId }),
-        level,
-        count,
-        role: "action",
-        running,
-        breakpoint,
-        colour,
-        reach,
-      }));
+      add(
+        action.id,
+        [action, level, count, open, pale, running, breakpoint, colour, place, reach, ...notify(action.id)],
+        () => ({
+          ...common(action.id, action.name),
+          kind: "action",
+          ...(isPosition(place) ? { position: place } : { parent: action.pointId }),
+          level,
+          count,
+          open,
+          dim: pale,
+          role: "action",
+          running,
+          breakpoint,
+          colour,
+          reach,
+        }),
+      );
     }
     if (!doc.project?.has_logic) return;
+    const places = this.borders(state, doc);
     for (const [id, role] of [
       [START, "start"],
       [END, "end"],
     ] as const) {
       const place = state.view.shared[`place/${id}`];
-      add(id, [place, ...notify(id)], () => ({
+      const pale = dim(id);
+      add(id, [place, places, pale, ...notify(id)], () => ({
         ...common(id, role === "start" ? t`Start` : t`End`),
         kind: "action",
-        position: isPosition(place) ? place : (PLACES[id] ?? NO_PLACE),
+        position: isPosition(place) ? place : places[id],
         level: 0,
         count: 1,
+        open: true,
+        dim: pale,
         role,
         running: false,
         breakpoint: false,
@@ -173,6 +198,13 @@ export class ItemMaker {
         reach: "",
       }));
     }
+  }
+
+  private borders({ types }: State, doc: OpenDocument): ReturnType<typeof borders> {
+    const inputs = [doc.objects, doc.points, doc.actions, doc.logic, types];
+    if (!this.bordersOf || this.bordersOf.inputs.some((each, n) => each !== inputs[n]))
+      this.bordersOf = { inputs, places: borders(doc, types) };
+    return this.bordersOf.places;
   }
 }
 
@@ -204,19 +236,10 @@ function lockedBy(state: State, id: string, me: string): string {
   return owner && owner !== me ? owner : "";
 }
 
-function isTrouble(state: State, id: string): boolean {
+function hasFault(state: State, id: string): boolean {
   const connection = state.live.objects[id]?.state;
   const health = state.live.health[id]?.health;
   return connection === "lost" || connection === "failed" || health === "failure";
-}
-
-export function shapeOf(type: ObjectTypeMeta | undefined): Shape {
-  const model = type?.object_model;
-  if (model?.box) return { kind: "box", size: [model.box.size_x, model.box.size_y, model.box.size_z] };
-  if (model?.cylinder) return { kind: "cylinder", radius: model.cylinder.radius, height: model.cylinder.height };
-  if (model?.sphere) return { kind: "sphere", radius: model.sphere.radius };
-  if (model?.mesh) return { kind: "mesh", asset: model.mesh.asset_id };
-  return { kind: "none" };
 }
 
 /** Return the reachability of an orientation by the best robot. */
@@ -231,7 +254,9 @@ function bestReach(state: State): Record<string, Reach> {
   return best;
 }
 
-function link(item: LogicItem, base: Omit<LinkItem, "kind" | "from" | "to" | "condition" | "branch">): LinkItem {
+type Own = "kind" | "from" | "to" | "inside" | "condition" | "branch";
+
+function link(item: LogicItem, base: Omit<LinkItem, Own>): Omit<LinkItem, "inside"> {
   const { condition } = item;
   const branch = !condition
     ? "always"

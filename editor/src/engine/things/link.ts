@@ -3,6 +3,7 @@
 import {
   type BufferGeometry,
   CanvasTexture,
+  Color,
   ConeGeometry,
   Group,
   LinearFilter,
@@ -20,8 +21,15 @@ import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js
 import type { LinkItem } from "../items";
 import { type Context, ownedBy, Thing } from "../thing";
 
-/** Dimensions, m. */
-const RADIUS = 0.0028;
+/** Thickness of lines, half, pixels, and its limits, m; in steps, since lines are rebuilt with each. */
+const HALF = 1.1;
+const THINNEST = 0.0006;
+const THICKEST = 0.006;
+/** Part of the background in the colour of pale lines, and opacity of their conditions. */
+const PALE = 0.75;
+const DIM = 0.25;
+/** Layer of what is picked but drawn by `LinkLines`. */
+export const PICKED = 1;
 /** Lengths of dash and gap, m; empty: solid. */
 const DASHES: Record<LinkItem["branch"], [number, number] | null> = {
   always: null,
@@ -38,18 +46,20 @@ const MOST = 30;
 export class LinkThing extends Thing<LinkItem> {
   readonly root = new Group();
   item: LinkItem;
-  private readonly material = new MeshBasicMaterial();
-  private readonly line = new Mesh(undefined, this.material);
+  private readonly color = new Color();
+  private readonly line = new Mesh(undefined, new MeshBasicMaterial());
   private label: Sprite | null = null;
   private labelled = "";
   private drawn = "";
   private readonly from = new Vector3();
   private readonly to = new Vector3();
   private readonly middle = new Vector3();
+  private radius = 0.002;
 
   constructor(item: LinkItem, context: Context) {
     super(context);
     this.item = item;
+    this.line.layers.set(PICKED);
     this.root.add(this.line);
     ownedBy(this.root, item.id);
   }
@@ -58,7 +68,9 @@ export class LinkThing extends Thing<LinkItem> {
     this.item = item;
     const { palette } = this.context;
     const color = item.selected ? palette.selected : palette.link[item.branch];
-    this.material.color.copy(color);
+    this.color.copy(color);
+    if (item.dim) this.color.lerp(palette.background, PALE);
+    if (this.label) this.label.material.opacity = item.dim ? DIM : 1;
     const label = `${item.condition}#${color.getHexString()}`;
     if (label !== this.labelled) {
       this.labelled = label;
@@ -80,8 +92,8 @@ export class LinkThing extends Thing<LinkItem> {
     const { from, to } = this.item;
     const start = this.context.thing(from);
     const end = this.context.thing(to);
-    this.root.visible = start !== undefined && end !== undefined && this.item.faint < 1;
-    if (!start || !end) return;
+    this.root.visible = start !== undefined && end !== undefined && this.item.faint < 1 && !this.item.inside;
+    if (!start || !end || !this.root.visible) return this.context.batches.links.set(this.item.id, null, this.color);
     start.anchor(this.from);
     end.anchor(this.to);
     const drawn =
@@ -98,11 +110,15 @@ export class LinkThing extends Thing<LinkItem> {
   }
 
   override resized(): boolean {
-    if (!this.label) return false;
+    if (!this.root.visible) return false;
     const pixel = this.context.metresPerPixel(this.middle);
+    const wanted = Math.min(THICKEST, Math.max(THINNEST, 2 ** (Math.round(Math.log2(HALF * pixel) * 2) / 2)));
+    const changed = wanted !== this.radius;
+    this.radius = wanted;
+    if (!this.label) return changed;
     const height = Math.min(MOST * pixel, Math.max(LEAST * pixel, PLATE));
     this.label.scale.multiplyScalar(height / this.label.scale.y).setZ(1);
-    return false; // drawn at the same position as nothing else
+    return changed;
   }
 
   override anchor(target: Vector3): Vector3 {
@@ -110,21 +126,27 @@ export class LinkThing extends Thing<LinkItem> {
   }
 
   override dispose(): void {
+    this.context.batches.links.set(this.item.id, null, this.color);
     this.label?.material.map?.dispose();
     super.dispose();
+  }
+
+  /** The label of its condition with its height, m; null without one. */
+  get plate(): { label: Sprite; at: Vector3 } | null {
+    return this.label && this.root.visible ? { label: this.label, at: this.middle } : null;
   }
 
   private bow(): BufferGeometry {
     const length = Math.max(1e-3, this.from.distanceTo(this.to));
     const control = new Vector3().addVectors(this.from, this.to).multiplyScalar(0.5);
     control.z += Math.min(0.25, 0.03 + length * 0.3);
-    const around = this.context.quality === "low" ? 3 : 5;
+    const [around, along] = this.context.quality === "low" ? [3, 8] : [5, 14];
     const curve = new QuadraticBezierCurve3(this.from.clone(), control, this.to.clone());
     curve.getPoint(0.5, this.middle);
     const pieces: BufferGeometry[] = [];
     const dash = DASHES[this.item.branch];
     const full = curve.getLength();
-    if (!dash) pieces.push(new TubeGeometry(curve, 14, RADIUS, around));
+    if (!dash) pieces.push(new TubeGeometry(curve, along, this.radius, around));
     else {
       const [on, off] = dash;
       const most = Math.max(on + off, full / 40); // long lines have longer dashes, not more of them
@@ -132,10 +154,10 @@ export class LinkThing extends Thing<LinkItem> {
         const from = at / full;
         const to = Math.min(1, (at + (most * on) / (on + off)) / full);
         const part = new QuadraticBezierCurve3(...subdivided(curve, from, to));
-        pieces.push(new TubeGeometry(part, 3, RADIUS, around));
+        pieces.push(new TubeGeometry(part, 3, this.radius, around));
       }
     }
-    const head = new ConeGeometry(0.008, 0.022, 8);
+    const head = new ConeGeometry(this.radius * 3.6, this.radius * 11, around + 1);
     head.applyQuaternion(new Quaternion().setFromUnitVectors(Z, curve.getTangentAt(0.86)));
     const at = curve.getPointAt(0.86);
     pieces.push(head.translate(at.x, at.y, at.z));

@@ -7,6 +7,7 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import {
   type BufferGeometry,
+  Color,
   CylinderGeometry,
   Matrix4,
   MeshLambertMaterial,
@@ -27,10 +28,15 @@ const RADIUS = 0.018;
 const BORDER = 0.03;
 const FIRST = 0.035;
 const NEXT = 0.006;
+/** Thickness of a puck, and distance of the pucks in a stack, m. */
+const THICK = 0.007;
+const STACKED = 0.0085;
 /** Smallest radius on the screen, pixels. */
 const LEAST = 9;
 /** Largest magnification; in steps, since the lines between pucks are redrawn with each. */
 const MOST = 4;
+/** Part of the background in the colour of pale pucks. */
+const PALE = 0.65;
 const up = new Vector3();
 
 /** Height of the reachability symbol above the middle of the puck, m. */
@@ -62,6 +68,7 @@ export class PuckThing extends Thing<PuckItem> {
   private readonly batch: Batch;
   private readonly instance: Instance;
   private grown = 1;
+  private readonly pale = new Color();
   private signs: Batch | null = null;
   private readonly above: Instance;
 
@@ -70,9 +77,10 @@ export class PuckThing extends Thing<PuckItem> {
     this.item = item;
     const edge = item.role === "action";
     this.batch = context.batches.of(edge ? "puck" : "start and end", () => [
-      (edge ? new CylinderGeometry(RADIUS, RADIUS, 0.01, 24) : new CylinderGeometry(BORDER, BORDER, 0.014, 6)).rotateX(
-        Math.PI / 2,
-      ),
+      (edge
+        ? new CylinderGeometry(RADIUS, RADIUS, THICK, context.quality === "low" ? 12 : 24)
+        : new CylinderGeometry(BORDER, BORDER, 0.014, 6)
+      ).rotateX(Math.PI / 2),
       new MeshLambertMaterial(),
     ]);
     this.instance = { id: item.id, frame: this.root, offset: new Matrix4(), color: context.palette.point };
@@ -100,6 +108,8 @@ export class PuckThing extends Thing<PuckItem> {
               : item.lockedBy
                 ? palette.locked
                 : (palette.actions[item.colour % palette.actions.length] ?? palette.point);
+    if (item.dim && !item.running)
+      this.instance.color = this.pale.lerpColors(this.instance.color, palette.background, PALE);
     this.showReach();
     this.scale();
   }
@@ -108,7 +118,10 @@ export class PuckThing extends Thing<PuckItem> {
   private showReach(): void {
     const { reach } = this.item;
     const make = SIGNS[reach];
-    const signs = make ? this.context.batches.of(`puck ${reach}`, () => [make(), new MeshLambertMaterial()]) : null;
+    const signs =
+      make && (this.item.open || this.item.count === 1)
+        ? this.context.batches.of(`puck ${reach}`, () => [make(), new MeshLambertMaterial()])
+        : null;
     if (reach) this.above.color = this.context.palette.reach[reach];
     if (signs === this.signs) return;
     this.signs?.remove(this.above);
@@ -137,11 +150,19 @@ export class PuckThing extends Thing<PuckItem> {
   override placed(): void {
     if (this.item.position || !this.root.parent) return;
     const { level, count } = this.item;
+    if (!this.item.open) {
+      this.root.parent.getWorldPosition(up).z += (FIRST + (count - 1 - level) * STACKED) * this.grown;
+      return this.put();
+    }
     const around = count > 1 ? (1.15 * RADIUS * this.grown) / Math.sin(Math.PI / count) : 0;
     const angle = (2 * Math.PI * level) / count;
     this.root.parent.getWorldPosition(up).z += (FIRST + level * NEXT) * this.grown;
     up.x += around * Math.cos(angle);
     up.y += around * Math.sin(angle);
+    this.put();
+  }
+
+  private put(): void {
     this.root.matrixAutoUpdate = false;
     this.root.matrixWorldAutoUpdate = false;
     this.root.matrixWorld.makeTranslation(up);
