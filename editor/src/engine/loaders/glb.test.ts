@@ -52,7 +52,7 @@ function file(names: string[], extras: object, coloured: string[] = []): ArrayBu
   return whole.buffer;
 }
 
-describe("what the server makes of meshes", () => {
+describe("a mesh converted by the server", () => {
   it("has positions, normals, colours and triangles", () => {
     const geometry = readMesh(file(["box.stl"], {}, ["box.stl"]));
     expect([...geometry.getAttribute("position").array]).toEqual([0, 0, 0, 1, 0, 0, 0, 1, 2]);
@@ -64,7 +64,7 @@ describe("what the server makes of meshes", () => {
     expect([...(geometry.index?.array ?? [])]).toEqual([0, 1, 2]);
   });
 
-  it("says what it is not", () => {
+  it("is refused with a reason if it is invalid", () => {
     expect(() => readGlb(new TextEncoder().encode("solid something that is no glTF").buffer)).toThrow(
       "not a binary glTF",
     );

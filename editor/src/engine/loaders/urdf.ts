@@ -1,9 +1,9 @@
 /** Load a robot prepared by the server: its URDF with meshes. A separate chunk. */
 
 import { t } from "@lingui/core/macro";
-import { LoadingManager, type Material, Mesh, type Object3D, SphereGeometry } from "three";
-import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
+import { LoadingManager, type Material, Mesh, type Object3D } from "three";
 import URDFLoader, { type URDFLink, type URDFRobot, type URDFVisual } from "urdf-loader";
+import { axesOf, dressed } from "../dress";
 import { readGlb } from "./glb";
 
 /** Materials: for coloured surfaces, and for all others. */
@@ -51,14 +51,10 @@ function joinShapes(link: URDFLink): void {
   for (const each of link.children)
     if ((each as Partial<URDFVisual>).isURDFVisual) each.traverse((one) => void (isShape(one) && pieces.push(one)));
   if (pieces.length === 0) return;
-  const shapes = pieces.map(({ geometry, matrixWorld }) => {
-    // The loader's spheres have too many triangles.
-    const shape = geometry instanceof SphereGeometry ? new SphereGeometry(1, 18, 10) : geometry;
-    shape.deleteAttribute("uv");
-    return shape.applyMatrix4(base.clone().multiply(matrixWorld));
-  });
+  const shapes = pieces.map((mesh) => ({ mesh, matrix: base.clone().multiply(mesh.matrixWorld) }));
+  const geometry = dressed(shapes, axesOf(link));
   for (const piece of pieces) piece.removeFromParent();
-  link.add(new Mesh(mergeGeometries(shapes)));
+  link.add(new Mesh(geometry));
 }
 
 /** Return whether it is a URDF primitive; meshes have no geometry type. */

@@ -58,7 +58,7 @@ export class ObjectThing extends Thing<ObjectItem> {
     if (color || !this.coloured) this.material.color.copy(color ?? palette.object);
     else this.material.color.setRGB(1, 1, 1);
     this.edges.color.copy(item.selected ? palette.selected : palette.gridStrong);
-    seenThrough(this.material, item.faint > 0 || item.shape.kind === "none");
+    seenThrough(this.material, item.faint > 0);
     this.material.opacity = 1 - item.faint;
     this.material.depthWrite = item.faint < 0.5;
     this.root.visible = item.faint < 1;
@@ -101,14 +101,31 @@ export class ObjectThing extends Thing<ObjectItem> {
       case "sphere":
         return this.show(new SphereGeometry(shape.radius, 32, 20));
       case "none": {
-        const axes = new AxesHelper(0.08);
-        ownedBy(axes, this.item.id);
-        this.root.add(axes);
-        return this.show(new OctahedronGeometry(0.03));
+        if (shape.icon) return void this.device(shape.icon, mine);
+        return this.marker();
       }
       case "mesh":
         void this.load(shape.asset, mine);
     }
+  }
+
+  private marker(): void {
+    const axes = new AxesHelper(0.08);
+    ownedBy(axes, this.item.id);
+    this.root.add(axes);
+    this.show(new OctahedronGeometry(0.03));
+  }
+
+  /** Show the model for an icon; a marker if there is none. */
+  private async device(icon: string, mine: number): Promise<void> {
+    const geometry = await import("../models").then(
+      ({ modelOf }) => modelOf(icon),
+      () => null,
+    );
+    if (mine !== this.loading) return geometry?.dispose();
+    if (geometry) this.show(geometry);
+    else this.marker();
+    this.context.loaded(this.item.id);
   }
 
   private async load(asset: string, mine: number): Promise<void> {
@@ -116,7 +133,7 @@ export class ObjectThing extends Thing<ObjectItem> {
       const geometry = readMesh(await this.context.asset(asset));
       if (mine !== this.loading) return geometry.dispose();
       this.show(geometry);
-      this.context.loaded();
+      this.context.loaded(this.item.id);
     } catch (error) {
       if (mine !== this.loading) return;
       this.reason = error instanceof Error ? error.message : String(error);
@@ -135,7 +152,9 @@ export class ObjectThing extends Thing<ObjectItem> {
     const mesh = new Mesh(geometry, this.material);
     mesh.castShadow = mesh.receiveShadow = true;
     geometry.computeBoundingBox();
-    this.height = Math.max(0.02, geometry.boundingBox?.max.z ?? 0);
+    // A tap on the label's place hits the surface.
+    const top = geometry.userData.top as number | undefined;
+    this.height = top ?? Math.max(0.02, geometry.boundingBox?.max.z ?? 0);
     const count = geometry.index?.count ?? geometry.getAttribute("position").count;
     // Edges make shapes readable without shadows; dense meshes would have too many.
     if (count < 3000) mesh.add(new LineSegments(new EdgesGeometry(geometry, 30), this.edges));

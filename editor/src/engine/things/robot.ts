@@ -18,6 +18,8 @@ export interface JointLimit {
   prismatic: boolean;
 }
 
+/** Brightness of a robot whose joints are unknown. */
+const GREY = 0.72;
 const inverse = new Matrix4();
 const tip = new Vector3();
 
@@ -147,11 +149,12 @@ export class RobotThing extends Thing<RobotItem> {
     this.material.color.copy(highlight ?? palette.robot);
     if (highlight) this.coloured.color.copy(highlight);
     else this.coloured.color.setRGB(1, 1, 1);
-    // Its joints are unknown: only its base is shown.
+    // Its joints are unknown: it is grey. Transparent parts would show through each other.
     const vague = this.stale || (this.robot !== null && this.shown.size === 0);
     for (const material of [this.material, this.coloured]) {
-      seenThrough(material, faint > 0 || vague);
-      material.opacity = (1 - faint) * (vague ? 0.5 : 1);
+      if (vague) material.color.multiplyScalar(GREY);
+      seenThrough(material, faint > 0);
+      material.opacity = 1 - faint;
     }
   }
 
@@ -218,7 +221,7 @@ export class RobotThing extends Thing<RobotItem> {
     this.body.add(robot ?? this.standIn());
     ownedBy(this.body, this.item.id);
     this.paint();
-    this.context.loaded();
+    this.context.loaded(this.item.id);
   }
 
   /** A foot and a column that mark a robot whose type has no model. */
