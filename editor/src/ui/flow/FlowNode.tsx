@@ -4,17 +4,18 @@ import { t } from "@lingui/core/macro";
 import { Handle, type Node, type NodeProps, Position } from "@xyflow/react";
 import { notEditable, startConnecting } from "../../commands/program";
 import { notify, now } from "../../store/store";
-import { Icon } from "../kit/icons";
+import { deviceIcon } from "../kit/deviceIcons";
+import { Drawing, Icon } from "../kit/icons";
 import { ReachBadge } from "../points/Reach";
-import { type Box, lastIn, type Way } from "./graph";
+import { type Box, type Branch, lastIn } from "./graph";
 
 export type FlowNodeType = Node<
-  { box: Box; running: boolean; breakpoint: boolean; paused: boolean; trouble: string; target: boolean; from: boolean },
+  { box: Box; running: boolean; breakpoint: boolean; paused: boolean; fault: string; target: boolean; from: boolean },
   "box"
 >;
 
 export function FlowNode({ data }: NodeProps<FlowNodeType>) {
-  const { box, running, paused, breakpoint, trouble, target, from } = data;
+  const { box, running, paused, breakpoint, fault, target, from } = data;
   return (
     <div className={`flow-node ${box.kind}`} data-running={running} data-target={target} data-from={from}>
       {box.kind !== "start" && (
@@ -22,42 +23,44 @@ export function FlowNode({ data }: NodeProps<FlowNodeType>) {
       )}
       <div className="flow-name">
         {box.kind === "fold" && <Icon name="list" size={18} />}
+        {box.kind === "action" && <Drawing path={deviceIcon(box)} size={18} />}
         {breakpoint && <span className="breakpoint-dot" data-on="true" role="img" aria-label={t`pauses here`} />}
-        {box.name}
+        <span className="flow-title">{box.name}</span>
         {box.kind === "action" && <ReachBadge id={box.id} />}
         {running && <span className="tag good">{paused ? "next" : "runs"}</span>}
-        {trouble && (
-          <span className="flow-trouble" role="img" aria-label={trouble} title={trouble}>
+        {fault && (
+          <span className="flow-fault" role="img" aria-label={fault} title={fault}>
             <Icon name="warn" size={16} />
           </span>
         )}
       </div>
       {box.detail && <div className="quiet small flow-detail">{box.detail}</div>}
-      <div className="flow-ways">
-        {box.ways.map((way) => (
+      {box.values && <div className="small flow-values">{box.values}</div>}
+      <div className="flow-branches">
+        {box.branches.map((branch) => (
           <Handle
-            key={way.id}
-            id={way.id}
+            key={branch.id}
+            id={branch.id}
             type="source"
             position={Position.Bottom}
-            className={`flow-way ${way.id}`}
+            className={`flow-branch ${branch.id}`}
             role="button"
             tabIndex={0}
-            aria-label={`${box.name}: ${way.label}`}
+            aria-label={`${box.name}: ${branch.label}`}
             onClick={(event) => {
               event.stopPropagation();
-              begin(lastIn(box), way);
+              begin(lastIn(box), branch);
             }}
             onKeyDown={(event) => {
               if (event.key !== "Enter" && event.key !== " ") return;
               event.stopPropagation();
-              begin(lastIn(box), way);
+              begin(lastIn(box), branch);
             }}
           >
-            {way.label}
+            {branch.label}
           </Handle>
         ))}
-        {box.ways.length === 0 && box.kind !== "end" && (
+        {box.branches.length === 0 && box.kind !== "end" && (
           <Handle type="source" position={Position.Bottom} className="flow-none" isConnectable={false} aria-hidden />
         )}
       </div>
@@ -65,11 +68,13 @@ export function FlowNode({ data }: NodeProps<FlowNodeType>) {
   );
 }
 
-export function conditionOf(way: Way) {
-  return way.what && (way.id === "true" || way.id === "false") ? { what: way.what, value: way.id } : undefined;
+export function conditionOf(branch: Branch) {
+  return branch.what && (branch.id === "true" || branch.id === "false")
+    ? { what: branch.what, value: branch.id }
+    : undefined;
 }
 
-function begin(id: string, way: Way): void {
+function begin(id: string, branch: Branch): void {
   const why = notEditable(now(), "AddLogicItem");
   if (why) notify("info", why);
   else startConnecting(id, conditionOf(branch));

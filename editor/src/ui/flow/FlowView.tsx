@@ -7,26 +7,27 @@ import {
   Controls,
   type Edge,
   MarkerType,
+  MiniMap,
   ReactFlow,
   ReactFlowProvider,
-  useReactFlow,
 } from "@xyflow/react";
-import { useEffect, useMemo, useRef } from "react";
+import { useMemo, useRef } from "react";
 import "@xyflow/react/dist/base.css";
 import { connect, finishConnecting, notEditable, removeAction, removeStep } from "../../commands/program";
 import { cannotLead } from "../../program/logic";
 import { problemsOf } from "../../program/problems";
 import { notify, now, select, setUi, useEditor } from "../../store/store";
 import { selectionOf } from "../../viewmodel/names";
+import { Icon } from "../kit/icons";
 import { conditionOf, FlowNode, type FlowNodeType } from "./FlowNode";
 import { foldAll, unfold, useFolds } from "./folding";
 import { type Box, firstIn, graphOf, lastIn } from "./graph";
 import { usePressed } from "./usePressed";
+import { useViewport } from "./useViewport";
+import { SMALLEST } from "./viewport";
 import "../program/program.css";
 import "./flow.css";
 
-/** Space for the controls above the view. */
-const WHOLE = { padding: { top: "70px", right: "16px", bottom: "16px", left: "70px" }, maxZoom: 1.1 } as const;
 const NODE_TYPES = { box: FlowNode };
 const COLOURS = { always: "var(--ink-2)", true: "var(--good)", false: "var(--warn)", value: "var(--accent)" } as const;
 /** Return the name shown at a node of the graph. */
@@ -71,7 +72,6 @@ function Flow() {
   const breakpoints = useEditor((state) => state.breakpoints);
   const selected = useEditor((state) => state.ui.selection?.id ?? "");
   const connecting = useEditor((state) => state.ui.connecting);
-  const follow = useEditor((state) => state.ui.follow);
   const dark = useEditor((state) => state.ui.theme === "dark" || (state.ui.theme === "system" && state.ui.systemDark));
   const reach = useEditor((state) => state.reach);
   const problems = useMemo(() => (doc ? problemsOf(doc, types, reach) : []), [doc, types, reach]);
@@ -83,7 +83,6 @@ function Flow() {
   const choose = useChoose();
   const host = useRef<HTMLDivElement>(null);
   const graph = usePressed(host, latest);
-  const { fitView } = useReactFlow();
 
   const nodes = graph.boxes.map(
     (box): FlowNodeType => ({
@@ -99,7 +98,7 @@ function Flow() {
         running: running.includes(box.id) || executing === box.id,
         paused,
         breakpoint: box.id in breakpoints,
-        trouble: problems.find((each) => each.id === box.id)?.text ?? "",
+        fault: problems.find((each) => each.id === box.id)?.text ?? "",
         target:
           connecting !== null && doc !== null && cannotLead(doc, connecting.from, firstIn(box), connecting.item) === "",
         from: connecting?.from === lastIn(box),
@@ -125,23 +124,14 @@ function Flow() {
     };
   });
 
-  const last = running.at(-1);
-  const known = graph.boxes.some((each) => each.id === last);
-  useEffect(() => {
-    if (follow && last !== undefined && known) void fitView({ nodes: [{ id: last }], maxZoom: 1, duration: 200 });
-  }, [follow, last, known, fitView]);
-  // Show the whole graph again after it grew.
-  const size = graph.boxes.length;
-  useEffect(() => {
-    void fitView(WHOLE);
-  }, [size, fitView]);
+  const { moved, whole } = useViewport(graph.boxes, running.at(-1) ?? executing, selected);
 
-  const box = (id: string): Pick<Box, "id" | "kind" | "run" | "ways"> =>
-    graph.boxes.find((each) => each.id === id) ?? { id, kind: "action", run: [], ways: [] };
+  const box = (id: string): Pick<Box, "id" | "kind" | "run" | "branches"> =>
+    graph.boxes.find((each) => each.id === id) ?? { id, kind: "action", run: [], branches: [] };
 
   return (
     <div className="flow" role="region" aria-label={t`Program graph`} ref={host}>
-      <ReactFlow
+      <ReactFlow<FlowNodeType>
         nodes={nodes}
         edges={edges}
         nodeTypes={NODE_TYPES}
@@ -149,18 +139,23 @@ function Flow() {
         nodesDraggable={false}
         connectOnClick={false}
         deleteKeyCode={["Delete", "Backspace"]}
-        minZoom={0.15}
+        minZoom={SMALLEST}
         maxZoom={2}
-        fitView
-        fitViewOptions={WHOLE}
+        onMoveStart={(event) => event && moved()}
+        ariaLabelConfig={{
+          "controls.ariaLabel": t`View`,
+          "controls.fitView.ariaLabel": t`Show everything`,
+          "controls.zoomIn.ariaLabel": t`Zoom in`,
+          "controls.zoomOut.ariaLabel": t`Zoom out`,
+        }}
         isValidConnection={({ source, target }) =>
           doc !== null && cannotLead(doc, lastIn(box(source)), firstIn(box(target))) === ""
         }
         onConnect={({ source, target, sourceHandle }) => {
           const why = notEditable(now(), "AddLogicItem");
           if (why) return notify("info", why);
-          const way = box(source).ways.find((each) => each.id === sourceHandle);
-          void connect(lastIn(box(source)), firstIn(box(target)), way && conditionOf(way));
+          const branch = box(source).branches.find((each) => each.id === sourceHandle);
+          void connect(lastIn(box(source)), firstIn(box(target)), branch && conditionOf(branch));
         }}
         onNodeClick={(_, { id }) => choose(box(id))}
         onEdgeClick={(_, { id }) => choose({ id, kind: "action", run: [] })}
@@ -180,14 +175,25 @@ function Flow() {
         proOptions={{ hideAttribution: true }}
       >
         <Background gap={24} />
-        <Controls showInteractive={false} position="bottom-left">
+        <MiniMap
+          pannable
+          zoomable
+          position="bottom-right"
+          ariaLabel={t`Overview of the program`}
+          nodeClassName={({ data }: FlowNodeType) => `flow-mini ${data.running ? "running" : data.box.kind}`}
+          nodeBorderRadius={12}
+        />
+        <Controls showInteractive={false} showFitView={false} position="bottom-left">
+          <ControlButton aria-label={t`Show the whole program`} onClick={whole}>
+            <Icon name="zoom" />
+          </ControlButton>
           {folds.runs > 0 && (
             <ControlButton
               className="flow-fold-all"
-              aria-label={folds.wished ? t`Unfold all` : t`Fold sequences`}
-              onClick={() => foldAll(!folds.wished)}
+              aria-label={folds.chosen ? t`Unfold all` : t`Fold sequences`}
+              onClick={() => foldAll(!folds.chosen)}
             >
-              {folds.wished ? t`Unfold` : t`Fold`}
+              {folds.chosen ? t`Unfold` : t`Fold`}
             </ControlButton>
           )}
         </Controls>

@@ -8,9 +8,9 @@ import { isRunning } from "../../store/selectors";
 import { now, useEditor } from "../../store/store";
 
 const KEY = "folded";
-const NONE: string[] = [];
+const NONE: readonly string[] = [];
 
-function wishedOf(stored: unknown): string[] {
+function storedFolds(stored: unknown): readonly string[] {
   return Array.isArray(stored) && stored.length > 0 ? stored.filter((each) => typeof each === "string") : NONE;
 }
 
@@ -22,10 +22,10 @@ const keep = (ids: Iterable<string>): void => {
 };
 
 /** Store all actions of a sequence, so that it stays folded when its first action changes. */
-export const fold = (run: readonly string[]): void => keep([...wishedOf(now().view.user[KEY]), ...run]);
+export const fold = (run: readonly string[]): void => keep([...storedFolds(now().view.user[KEY]), ...run]);
 
 export const unfold = (run: readonly string[]): void =>
-  keep(wishedOf(now().view.user[KEY]).filter((id) => !run.includes(id)));
+  keep(storedFolds(now().view.user[KEY]).filter((id) => !run.includes(id)));
 
 export function foldAll(on: boolean): void {
   const { doc } = now();
@@ -36,7 +36,7 @@ export interface Folds {
   /** Return the number of sequences that can be folded. */
   runs: number;
   /** Return whether the user has folded any. */
-  wished: boolean;
+  chosen: boolean;
   folded: string[][];
 }
 
@@ -50,19 +50,19 @@ export function useFolds(problems: readonly Problem[]): Folds {
   const selected = useEditor((state) => state.ui.selection?.id ?? "");
   const from = useEditor((state) => state.ui.connecting?.from ?? "");
   // Between two actions none is running: keep the last one visible until the next one starts.
-  const ran = useRef<string[]>(NONE);
+  const ran = useRef<readonly string[]>(NONE);
   if (!active) ran.current = NONE;
   else if (running.length > 0) ran.current = running;
   const last = ran.current;
   return useMemo(() => {
-    if (!doc) return { runs: 0, wished: false, folded: [] };
-    const wished = wishedOf(stored);
+    if (!doc) return { runs: 0, chosen: false, folded: [] };
+    const chosen = storedFolds(stored);
     const runs = runsOf(doc);
     const seen = new Set([...last, executing, selected, from, ...problems.map((each) => each.id)]);
     return {
       runs: runs.length,
-      wished: runs.some((run) => run.some((id) => wished.includes(id))),
-      folded: foldedRuns(doc, new Set(wished), seen),
+      chosen: runs.some((run) => run.some((id) => chosen.includes(id))),
+      folded: foldedRuns(doc, new Set(chosen), seen),
     };
   }, [doc, stored, last, executing, selected, from, problems]);
 }

@@ -2,16 +2,21 @@
 
 import { Graph, layout } from "@dagrejs/dagre";
 import { plural, t } from "@lingui/core/macro";
-import { conditionWords, END, outgoing, placeOf, resultsOf, START } from "../../program/logic";
-import type { OpenDocument, State } from "../../store/state";
+import { conditionWords, END, metaOf, outgoing, placeOf, resultsOf, START } from "../../program/logic";
+import { decoded, type Extra, extraOf, textOf } from "../../program/values";
+import type { Action, ActionParameter } from "../../protocol/types";
+import type { Of, OpenDocument, State } from "../../store/state";
 
-const NODE = { width: 230, height: 64 };
+const NODE = { width: 250, height: 66 };
+/** Additional height for a line of parameters, and the largest number of them. */
+const LINE = 21;
+const SHOWN = 3;
 /** Additional height for the free branches. */
-const WAYS = 22;
+const BRANCHES = 22;
 const BORDER = { width: 132, height: 68 };
 
 /** A free branch of an action: the next step, or one for a value of its result. */
-export interface Way {
+export interface Branch {
   id: "next" | "true" | "false" | "branch";
   label: string;
   /** `<action>/default/<index>`, for a value of a result. */
@@ -23,7 +28,11 @@ export interface Box {
   kind: "action" | "start" | "end" | "fold";
   name: string;
   detail: string;
-  ways: Way[];
+  /** Its most telling parameters as text; empty if it has none. */
+  values: string;
+  /** Icon that the type of its device declares. */
+  icon?: string | undefined;
+  branches: Branch[];
   /** Folded actions in their order. */
   run: string[];
   x: number;
@@ -69,7 +78,8 @@ export function graphOf(
       kind: "start",
       name: t`Start`,
       detail: "",
-      ways: lines.some((each) => each.from === START) ? [] : [{ id: "next", label: t`next` }],
+      values: "",
+      branches: lines.some((each) => each.from === START) ? [] : [{ id: "next", label: t`next` }],
       run: [],
       ...BORDER,
     },
@@ -93,10 +103,11 @@ export function graphOf(
       kind: "fold" as const,
       name: plural(run.length, { one: "# action", other: "# actions" }),
       detail: run.map((id) => doc.actions[id]?.name ?? "").join(", "),
+      values: "",
       run,
-      ...sized(waysOf(doc, types, run.at(-1) ?? "")),
+      ...sized(branchesOf(doc, types, run.at(-1) ?? "")),
     })),
-    { id: END, kind: "end", name: t`End`, detail: "", ways: [], run: [], ...BORDER },
+    { id: END, kind: "end", name: t`End`, detail: "", values: "", branches: [], run: [], ...BORDER },
   ];
   const places = placed(bare, lines);
   return { boxes: bare.map((box) => ({ ...box, ...(places.get(box.id) ?? { x: 0, y: 0 }) })), lines };
@@ -115,27 +126,59 @@ export const lastIn = (box: Pick<Box, "id" | "kind" | "run">): string =>
 export const firstIn = (box: Pick<Box, "id" | "kind" | "run">): string =>
   box.kind === "fold" ? (box.run[0] ?? box.id) : box.id;
 
-function sized(ways: Way[]): Pick<Box, "ways" | "width" | "height"> {
-  return { ways, width: NODE.width, height: NODE.height + (ways.length > 0 ? WAYS : 0) };
+/** Return the first values that the name and the point of an action do not already tell, with their units. */
+export function valuesOf(doc: OpenDocument, types: State["types"], action: Of<Action>): string {
+  const meta = metaOf(types, doc, action);
+  return action.parameters
+    .flatMap((parameter) => {
+      const value = shortValue(
+        doc,
+        action,
+        parameter,
+        extraOf(meta?.parameters.find((each) => each.name === parameter.name)),
+      );
+      return value ? [`${parameter.name.replaceAll("_", " ")} ${value}`] : [];
+    })
+    .slice(0, SHOWN)
+    .join(" · ");
+}
+
+function shortValue(doc: OpenDocument, action: Of<Action>, { type, value }: ActionParameter, { unit }: Extra): string {
+  const read = decoded(value);
+  if (type === "project_parameter") return doc.parameters[String(read)]?.name ?? "";
+  if (type === "link") {
+    const [from = "", , index] = String(read).split("/");
+    const source = doc.actions[from]?.flows.find((flow) => flow.type === "default");
+    return source?.outputs?.[Number(index)] ?? "";
+  }
+  const at = doc.orientations[String(read)] ?? doc.joints[String(read)];
+  if (at) return at.pointId === action.pointId ? "" : (doc.points[at.pointId]?.name ?? "");
+  const text = typeof read === "object" || type === "pose" ? "" : textOf(type, value);
+  return text && unit ? `${text}\u00a0${unit}` : text;
+}
+
+function sized(branches: Branch[], values = false): Pick<Box, "branches" | "width" | "height"> {
+  const height = NODE.height + (branches.length > 0 ? BRANCHES : 0) + (values ? LINE : 0);
+  return { branches, width: NODE.width, height };
 }
 
 /** Return the free branches of an action. */
-export function waysOf(doc: OpenDocument, types: State["types"], id: string): Way[] {
+export function branchesOf(doc: OpenDocument, types: State["types"], id: string): Branch[] {
   const action = doc.actions[id];
   if (!action) return [];
-  const ways = outgoing(doc, id);
+  const branches = outgoing(doc, id);
   const result = resultsOf(doc, types, action).find(
     (each) => each.type === "boolean" || each.type === "integer" || each.type.endsWith("_enum"),
   );
-  if (!result) return ways.length === 0 ? [{ id: "next", label: t`next` }] : [];
+  if (!result) return branches.length === 0 ? [{ id: "next", label: t`next` }] : [];
   if (result.type !== "boolean")
-    return [ways.length === 0 ? { id: "next", label: t`next` } : { id: "branch", label: t`branch` }];
+    return [branches.length === 0 ? { id: "next", label: t`next` } : { id: "branch", label: t`branch` }];
   const what = `${id}/default/${result.index}`;
-  const asked = (value: string) => ways.some((each) => each.condition?.value === value);
-  if (ways.some((each) => !each.condition)) return [{ id: "branch", label: t`branch` }];
-  const free: Way[] = [];
+  const asked = (value: string) => branches.some((each) => each.condition?.value === value);
+  if (branches.some((each) => !each.condition)) return [{ id: "branch", label: t`branch` }];
+  const free: Branch[] = [];
   if (!asked("true")) free.push({ id: "true", label: t`yes`, what });
-  if (ways.length === 0) free.push({ id: "next", label: t`next` });
+  if (branches.length === 0) free.push({ id: "next", label: t`next` });
   if (!asked("false")) free.push({ id: "false", label: t`no`, what });
   return free;
 }

@@ -1,6 +1,6 @@
 /** Icons on a grid of 24 × 24 in the colour of the text, used next to a word or with a label. */
 
-const PATHS = {
+export const PATHS = {
   home: "M4 11l8-7 8 7v9h-5v-6H9v6H4z",
   save: "M5 4h11l3 3v13H5zM8 4v5h7V4M8 20v-6h8v6",
   undo: "M9 14L4 9l5-5M4 9h10a5 5 0 0 1 0 11h-3",
@@ -36,7 +36,12 @@ const PATHS = {
 
 export type IconName = keyof typeof PATHS;
 
-export function Icon({ name, size = 20 }: { name: IconName; size?: number }) {
+export function Icon({ name, size }: { name: IconName; size?: number }) {
+  return <Drawing path={PATHS[name]} {...(size !== undefined && { size })} />;
+}
+
+/** A path in the style of the icons. */
+export function Drawing({ path, size = 20 }: { path: string; size?: number }) {
   return (
     <svg
       width={size}
@@ -49,7 +54,7 @@ export function Icon({ name, size = 20 }: { name: IconName; size?: number }) {
       strokeLinejoin="round"
       aria-hidden="true"
     >
-      <path d={PATHS[name]} />
+      <path d={path} />
     </svg>
   );
 }
