@@ -198,4 +198,4 @@ export const frameByAxes = (
   });
 
 export const placeAt = (object_id: string, pose: Pose) =>
-  refusal(() => held(object_id, () => call("UpdateObjectPose", { object_id, pose })));
+  refusal(() => held(object_id, () => call("UpdateSceneObjectPose", { object_id, pose })));

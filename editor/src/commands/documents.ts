@@ -1,7 +1,9 @@
 /** Scenes, projects and packages: open, create, save, close, copy, rename, delete. */
 
 import { call } from "../session/connection";
-import { now, store } from "../store/store";
+import type { State } from "../store/state";
+import { now } from "../store/store";
+import { awaited } from "./awaited";
 import { ask, held, refusal } from "./requests";
 import { keepThumbnail } from "./thumbnail";
 
@@ -10,6 +12,15 @@ export const openProject = (id: string) => ask("OpenProject", { id });
 export const newScene = (name: string, description = "") => ask("NewScene", { name, description });
 export const newProject = (scene_id: string, name: string, description = "", has_logic = true) =>
   ask("NewProject", { scene_id, name, description, has_logic });
+
+/** Create a scene and a project on it, and open the project. Devices are then added in the project. */
+export async function startEmpty(scene: string, project: string): Promise<void> {
+  if (!(await newScene(scene))) return;
+  const made = await awaited((state) => (state.doc?.scene.name === scene ? state.doc.scene.id : undefined)).catch(
+    () => "",
+  );
+  if (made) await newProject(made, project);
+}
 
 /** Create a copy with another name and open it. Return whether it was created. */
 export async function fromTemplate(kind: "scene" | "project", source: string, name: string): Promise<boolean> {
@@ -25,18 +36,9 @@ export async function fromTemplate(kind: "scene" | "project", source: string, na
 const LISTED = 10_000;
 
 function listed(kind: "scene" | "project", name: string): Promise<string> {
-  const find = () =>
-    (kind === "scene" ? now().lists.scenes : now().lists.projects)?.find((each) => each.name === name)?.id ?? "";
-  return new Promise((resolve) => {
-    const end = (id: string) => {
-      clearTimeout(late);
-      stop();
-      resolve(id);
-    };
-    const stop = store.subscribe(() => find() && end(find()));
-    const late = setTimeout(() => end(""), LISTED);
-    if (find()) end(find());
-  });
+  const find = ({ lists }: State) =>
+    (kind === "scene" ? lists.scenes : lists.projects)?.find((each) => each.name === name)?.id;
+  return awaited(find, LISTED_WITHIN).catch(() => "");
 }
 
 export async function save() {

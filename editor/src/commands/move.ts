@@ -57,7 +57,7 @@ export class Moving {
       if (ui.selection?.id !== selection?.id && ui.selection?.id !== target.id) this.finish();
     });
     this.over = before
-      .then(() => holding(target.id, work, target.kind === "point"))
+      .then(() => holding(target.id, work, carriesPoints(target)))
       .then((done) => {
         this.ended = true;
         clearTimeout(this.previewTimer);
@@ -130,7 +130,7 @@ export class Moving {
     const { target, stored, model } = this;
     if (model && target.type) {
       const { type } = target;
-      if (!(await holding(type, () => ask("UpdateObjectModel", { object_type_id: type, object_model: model }))))
+      if (!(await holding(type, () => ask("UpdateSceneShape", { object_type_id: type, object_model: model }))))
         return false;
     }
     if (!stored || same(stored, relativeTo(target.frame, target.pose))) {
@@ -141,10 +141,15 @@ export class Moving {
   }
 }
 
+/** Return whether action points move with it: they have to be locked, too. */
+function carriesPoints({ kind, id }: Target): boolean {
+  return kind === "point" || Object.values(now().doc?.points ?? {}).some((each) => each.parent === id);
+}
+
 function asked({ kind, id }: Target, { position, orientation }: Pose) {
   switch (kind) {
     case "object":
-      return ask("UpdateObjectPose", { object_id: id, pose: { position, orientation } });
+      return ask("UpdateSceneObjectPose", { object_id: id, pose: { position, orientation } });
     case "point":
       return ask("UpdateActionPointPosition", { action_point_id: id, new_position: position });
     case "orientation":

@@ -6,6 +6,7 @@ import { call } from "../session/connection";
 import type { State } from "../store/state";
 import { now, select, store } from "../store/store";
 import { relativeTo, worldOf } from "../viewmodel/frames";
+import { awaited } from "./awaited";
 import { held, refusal } from "./requests";
 import { type Chosen, robotArg } from "./robot";
 
@@ -51,7 +52,7 @@ function seen<T>(look: (state: State) => T | undefined): Promise<T | undefined> 
 }
 
 const pointNamed = (name: string) =>
-  seen((state) => Object.values(state.doc?.points ?? {}).find((each) => each.name === name));
+  awaited((state) => Object.values(state.doc?.points ?? {}).find((each) => each.name === name)).catch(() => undefined);
 
 // ------------------------------------------------------------------------------------------------ points
 /** Add a point at a position in the world, with an optional parent, and select it. */

@@ -17,9 +17,10 @@ import type {
 import { call } from "../session/connection";
 import { whyUnavailable } from "../store/permissions";
 import { put } from "../store/records";
-import { isRunning } from "../store/selectors";
+import { isClosed } from "../store/selectors";
 import type { State } from "../store/state";
 import { notify, now, select, setUi, store } from "../store/store";
+import { awaited } from "./awaited";
 import { ask, held, refusal, sentence } from "./requests";
 
 /** Time within which the event of an added item arrives, s. */
@@ -28,26 +29,7 @@ const TOLD_WITHIN = 5;
 /** Return why a request cannot edit the program now; an empty string if it can. */
 export function notEditable(state: State, request: keyof Requests = "UpdateAction"): string {
   if (!state.doc?.project) return t`Open a project first. A scene has no program.`;
-  return whyUnavailable(state, request) || (isRunning(state) ? t`Stop the program first.` : "");
-}
-
-/** Wait until an event brings something into the store. Reject if it does not arrive. */
-export function awaited<T>(find: (state: State) => T | undefined): Promise<T> {
-  return new Promise((resolve, reject) => {
-    const known = find(now());
-    if (known !== undefined) return resolve(known);
-    const timer = setTimeout(() => {
-      stop();
-      reject(new Error(t`The server did not confirm the change.`));
-    }, TOLD_WITHIN * 1000);
-    const stop = store.subscribe((state) => {
-      const found = find(state);
-      if (found === undefined) return;
-      clearTimeout(timer);
-      stop();
-      resolve(found);
-    });
-  });
+  return whyUnavailable(state, request) || (isClosed(state) ? t`Stop the program first.` : "");
 }
 
 /** Where to add an action: at a point, or at a position in the world, where a point is added. */

@@ -5,7 +5,15 @@
 
 import { t } from "@lingui/core/macro";
 import { freeName } from "../program/naming";
-import type { ObjectModel, ObjectTypeMeta, Parameter, Pose, SceneObject } from "../protocol/types";
+import type {
+  CheckConnectionData,
+  ObjectModel,
+  ObjectTypeMeta,
+  Parameter,
+  Pose,
+  Requests,
+  SceneObject,
+} from "../protocol/types";
 import { uploadAsset } from "../session/assets";
 import { call } from "../session/connection";
 import { whyUnavailable } from "../store/permissions";
@@ -14,12 +22,17 @@ import type { State } from "../store/state";
 import { notify, now, select, setUi } from "../store/store";
 import { lifted } from "../transform/sizes";
 import { ORIGIN, plus, rotated } from "../viewmodel/frames";
+import { awaited } from "./awaited";
 import { aimedPlace } from "./crosshair";
-import { awaited } from "./program";
-import { ask, held, refusal } from "./requests";
+import { ask, held, refusal, sentence } from "./requests";
+
+/** Requests that are also possible while the scene is online. */
+const ONLINE: ReadonlySet<keyof Requests> = new Set<keyof Requests>(["AddSceneObject"]);
+/** Requests that are refused while a project is open, since other projects may use the object. */
+const SCENE_ALONE: ReadonlySet<keyof Requests> = new Set<keyof Requests>(["RemoveFromScene", "RenameObject"]);
 
 /** Return why objects cannot be added, removed or configured now; an empty string if they can. */
-export function notBuildable(state: State, request: Parameters<typeof whyUnavailable>[1] = "AddObjectToScene"): string {
+export function notBuildable(state: State, request: keyof Requests): string {
   if (!state.doc) return t`No scene or project is open.`;
   if (state.doc.project && SCENE_ALONE.has(request))
     return t`Other projects may use this object. Close the project and open the scene.`;
@@ -38,10 +51,10 @@ export function freeObjectName(base: string): string {
   return freeName(clean, [...Object.values(doc?.objects ?? {}).map((each) => each.name), ...Object.keys(types.byName)]);
 }
 
-/** Return the pose of a new object: on the surface in the middle of the view, upright. */
+/** Return the pose of a new object: on the surface in the middle of the view, upright; the first one at the origin. */
 export function newPlace(model?: ObjectModel): Pose {
   const aimed = aimedPlace();
-  if (!aimed) return ORIGIN;
+  if (!aimed || !Object.values(now().doc?.objects ?? {}).some((each) => each.pose)) return ORIGIN;
   const into = rotated({ x: 0, y: 0, z: 1 }, aimed.orientation);
   const out = { x: -into.x, y: -into.y, z: -into.z };
   const fine = (value: number) => Math.round(value * 1e4) / 1e4;
@@ -59,16 +72,33 @@ async function taken(name: string): Promise<void> {
 export function addObject(type: ObjectTypeMeta, name: string, parameters: Parameter[]): Promise<string> {
   const pose = type.has_pose ? { pose: newPlace(type.object_model) } : {};
   return refusal(async () => {
-    await call("AddObjectToScene", { name, type: type.type, parameters, ...pose });
+    await call("AddSceneObject", { name, type: type.type, parameters, ...pose });
     await taken(name);
   });
 }
 
-export type ShapeKind = "box" | "cylinder" | "sphere";
+/** Time limit of a connection check, s; the server has a shorter one. */
+const CHECKED_WITHIN = 45;
 
-/** A shape of 10 cm; `id` becomes the name of its type. */
+/** Connect a device without adding it, and return what it reports, or why it cannot be connected. */
+export async function checkConnection(
+  type: string,
+  parameters: Parameter[],
+  id = "",
+): Promise<{ found: CheckConnectionData } | { refused: string }> {
+  try {
+    return { found: await call("CheckConnection", { type, parameters, id }, { deadline: CHECKED_WITHIN }) };
+  } catch (error) {
+    return { refused: sentence(error) };
+  }
+}
+
+export type ShapeKind = "table" | "box" | "cylinder" | "sphere";
+
+/** A shape of 10 cm, or a table top of 1.2 m by 0.8 m; `id` becomes the name of its type. */
 export function shapeModel(kind: ShapeKind, id: string): ObjectModel {
   const size = 0.1;
+  if (kind === "table") return { type: "Box", box: { id, size_x: 1.2, size_y: 0.8, size_z: 0.04 } };
   if (kind === "box") return { type: "Box", box: { id, size_x: size, size_y: size, size_z: size } };
   if (kind === "cylinder") return { type: "Cylinder", cylinder: { id, radius: size / 2, height: size } };
   return { type: "Sphere", sphere: { id, radius: size / 2 } };
@@ -77,13 +107,17 @@ export function shapeModel(kind: ShapeKind, id: string): ObjectModel {
 /** Add a shape with a generated name at once; everything else can be changed later. */
 export async function addShape(kind: ShapeKind): Promise<void> {
   const name = freeObjectName(kind);
-  const why = await addModel(name, shapeModel(kind, name));
+  const model = shapeModel(kind, name);
+  const pose = newPlace(model);
+  // The top of a table is the floor of the workplace, on which robots and devices stand.
+  const at = kind === "table" ? { ...pose, position: { ...pose.position, z: -0.02 } } : pose;
+  const why = await addModel(name, model, at);
   if (why) notify("error", why);
 }
 
 function addModel(name: string, model: ObjectModel, pose = newPlace(model)): Promise<string> {
   return refusal(async () => {
-    await call("AddVirtualCollisionObjectToScene", { name, pose, model });
+    await call("AddSceneShape", { name, pose, model });
     await taken(name);
   });
 }
@@ -108,12 +142,12 @@ export async function duplicateObject({ name, type, pose, parameters }: SceneObj
   const beside = pose && { ...pose, position: plus(pose.position, { x: 0.1, y: 0.1, z: 0 }) };
   const own = meta?.base === "VirtualCollisionObject" && meta.object_model && beside;
   const done = own
-    ? await ask("AddVirtualCollisionObjectToScene", {
+    ? await ask("AddSceneShape", {
         name: copy,
         pose: beside,
         model: named(meta.object_model as ObjectModel, copy),
       })
-    : await ask("AddObjectToScene", { name: copy, type, parameters, ...(beside ? { pose: beside } : {}) });
+    : await ask("AddSceneObject", { name: copy, type, parameters, ...(beside ? { pose: beside } : {}) });
   if (done) await taken(copy).catch(() => {}); // another user has removed it meanwhile
 }
 
@@ -135,7 +169,7 @@ export async function projectsUsing(id: string): Promise<string[]> {
 export const removeObject = (id: string, force = false) => ask("RemoveFromScene", { id, force });
 
 export const setParameters = (id: string, parameters: Parameter[]): Promise<string> =>
-  refusal(() => held(id, () => call("UpdateObjectParameters", { id, parameters })));
+  refusal(() => held(id, () => call("UpdateSceneObjectSettings", { id, parameters })));
 
 /** Scenes that use a type, and its deletion. */
 export async function scenesUsing(type: string): Promise<string[]> {

@@ -71,6 +71,8 @@ export class Engine {
   private hovered = "";
   /** Position of the camera after the last fit to all items. */
   private fitted: Vector3 | null = null;
+  /** Items of that fit whose models may not be loaded yet. */
+  private awaited = new Set<string>();
   private readonly notes = new Map<string, string>();
   /** Text shown next to an item while it is moved, instead of its height. */
   private messageLog = { id: "", text: "" };
@@ -217,8 +219,13 @@ export class Engine {
     return onFloor(x, y, { width: this.width, height: this.height }, this.view.camera, 20, level);
   }
 
-  /** Bring an item, or all items, into the view. */
-  focus(id?: string): void {
+  /** Bring an item, or all items, into the view; `best` chooses the direction too. */
+  focus(id?: string, best = false): void {
+    this.fit(id, best);
+    this.awaited = new Set(id === undefined ? this.things.keys() : []);
+  }
+
+  private fit(id?: string, best = false): void {
     this.place();
     const boxes = [...this.things.values()]
       .filter(({ item }) => (id === undefined ? item.faint < 1 : item.id === id))
@@ -227,9 +234,15 @@ export class Engine {
     this.fitted = id === undefined ? this.view.camera.position.clone() : null;
   }
 
-  /** Fit the view again after loading, unless the user has moved the camera. */
-  private loaded(): void {
-    if (this.fitted?.equals(this.view.camera.position)) this.focus();
+  /** Fit the view to all items again, unless the user has moved the camera. */
+  private refit(): void {
+    if (this.fitted && this.fitted.distanceTo(this.view.camera.position) < 1e-6) this.fit();
+  }
+
+  /** A model appears: fit the view again, if it was to show this item. Later ones do not move the camera. */
+  private loaded(id: string): void {
+    this.dirty = true;
+    if (this.awaited.delete(id)) this.refit();
     this.invalidate();
   }
 

@@ -1971,6 +1971,8 @@ export interface Requests {
   AddObjectToScene: { args: AddObjectToSceneArgs; data: undefined };
   AddOverride: { args: AddOverrideArgs; data: undefined };
   AddProjectParameter: { args: AddProjectParameterArgs; data: undefined };
+  AddSceneObject: { args: AddObjectToSceneArgs; data: undefined };
+  AddSceneShape: { args: AddVirtualCollisionObjectToSceneArgs; data: undefined };
   AddVirtualCollisionObjectToScene: { args: AddVirtualCollisionObjectToSceneArgs; data: undefined };
   Authenticate: { args: AuthenticateArgs; data: AuthenticateData };
   BuildProject: { args: BuildProjectArgs; data: BuildProjectData };
@@ -2101,6 +2103,9 @@ export interface Requests {
   UpdateProjectHasLogic: { args: UpdateProjectHasLogicArgs; data: undefined };
   UpdateProjectParameter: { args: UpdateProjectParameterArgs; data: undefined };
   UpdateSceneDescription: { args: UpdateSceneDescriptionArgs; data: undefined };
+  UpdateSceneObjectPose: { args: UpdateObjectPoseArgs; data: undefined };
+  UpdateSceneObjectSettings: { args: UpdateObjectParametersArgs; data: undefined };
+  UpdateSceneShape: { args: UpdateObjectModelArgs; data: undefined };
   UploadPackage: { args: UploadPackageArgs; data: undefined };
   WriteLock: { args: WriteLockArgs; data: undefined };
   WriteUnlock: { args: WriteUnlockArgs; data: undefined };
@@ -2194,6 +2199,8 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   AddObjectToScene: 4,
   AddOverride: 3,
   AddProjectParameter: 3,
+  AddSceneObject: 4,
+  AddSceneShape: 4,
   AddVirtualCollisionObjectToScene: 4,
   Authenticate: 1,
   BuildProject: 2,
@@ -2324,6 +2331,9 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   UpdateProjectHasLogic: 3,
   UpdateProjectParameter: 2,
   UpdateSceneDescription: 4,
+  UpdateSceneObjectPose: 4,
+  UpdateSceneObjectSettings: 4,
+  UpdateSceneShape: 4,
   UploadPackage: 5,
   WriteLock: 2,
   WriteUnlock: 2,

@@ -5,7 +5,7 @@ import { createStore } from "zustand/vanilla";
 import type { ServerEvent } from "../protocol/types";
 import { notice, reduce } from "./reduce";
 import { type Connection, initialState, type Notice, type State } from "./state";
-import type { Selection, Ui } from "./ui";
+import type { FormDraft, Selection, Ui } from "./ui";
 
 export const store = createStore<State>(initialState);
 
@@ -26,6 +26,12 @@ export function setConnection(change: Partial<Connection>): void {
 
 export function setUi(change: Partial<Ui>): void {
   store.setState((state) => ({ ui: { ...state.ui, ...change } }));
+}
+
+/** Keep the unsaved form of an object or type; null: it is saved or reverted. */
+export function keepForm(key: string, draft: FormDraft | null): void {
+  const { [key]: _, ...others } = now().ui.forms;
+  setUi({ forms: draft ? { ...others, [key]: draft } : others });
 }
 
 export function select(selection: Selection | null): void {

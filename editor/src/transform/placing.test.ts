@@ -19,14 +19,14 @@ const POSE = { position: { x: 0.3, y: -0.2, z: 0.15 }, orientation: fromAngles({
 const FRAME = { position: { x: 1, y: 2, z: 0.5 }, orientation: fromAngles({ x: 0, y: 0, z: Math.PI / 2 }) };
 
 describe("moving", () => {
-  it("goes along the axes of the frame", () => {
+  it("is along the axes of the frame", () => {
     const to = moved(POSE, FRAME, "x", 0.1);
     expect(to.position.x).toBeCloseTo(0.3, 12);
     expect(to.position.y).toBeCloseTo(-0.1, 12);
     expect(to.orientation).toEqual(POSE.orientation);
   });
 
-  it("puts one coordinate to a value, and leaves the others as seen from the frame", () => {
+  it("sets one coordinate in the frame and keeps the others", () => {
     const before = relativeTo(FRAME, POSE).position;
     const after = relativeTo(FRAME, placedAt(POSE, FRAME, "y", 0.7)).position;
     expect(after.x).toBeCloseTo(before.x, 12);
@@ -34,7 +34,7 @@ describe("moving", () => {
     expect(after.z).toBeCloseTo(before.z, 12);
   });
 
-  it("snaps to the raster of the frame along the named axes", () => {
+  it("snaps to the grid of the frame along the named axes", () => {
     const seen = relativeTo(FRAME, { ...ORIGIN, position: onGrid(POSE.position, FRAME, 0.1, ["x"]) }).position;
     const before = relativeTo(FRAME, POSE).position;
     expect(seen.x).toBeCloseTo(Math.round(before.x * 10) / 10, 12);
@@ -43,7 +43,7 @@ describe("moving", () => {
 });
 
 describe("turning", () => {
-  it("is about the frame's axis, around Object", () => {
+  it("is about an axis of the frame, around the origin of the item", () => {
     const to = turned(POSE, FRAME, "y", 0.3);
     expect(to.position).toEqual(POSE.position);
     expect(
@@ -54,7 +54,7 @@ describe("turning", () => {
     ).toBe(true);
   });
 
-  it("to an angle leaves the two others", () => {
+  it("to an angle keeps the other two", () => {
     const before = angles(relativeTo(FRAME, POSE).orientation);
     const after = angles(relativeTo(FRAME, turnedTo(POSE, FRAME, "z", 0.25)).orientation);
     expect(after[0]).toBeCloseTo(before[0], 9);
@@ -62,7 +62,7 @@ describe("turning", () => {
     expect(after[2]).toBeCloseTo(0.25, 9);
   });
 
-  it("squares to the nearest of the 24 ways to stand", () => {
+  it("aligns to the nearest of the 24 right-angled rotations", () => {
     const near = fromAngles({ x: Math.PI / 2 + 0.2, y: 0.1, z: -Math.PI / 2 - 0.2 });
     const wanted = fromAngles({ x: Math.PI / 2, y: 0, z: -Math.PI / 2 });
     const at = (orientation: typeof near) => ({ position: ORIGIN.position, orientation });
@@ -73,14 +73,14 @@ describe("turning", () => {
 });
 
 describe("a pose as text", () => {
-  it("comes back as it was", () => {
+  it("is parsed back to the same pose", () => {
     const read = poseFrom(poseText(POSE), ORIGIN);
     expect(read?.position).toEqual(POSE.position);
     for (const part of ["x", "y", "z", "w"] as const)
       expect(read?.orientation[part]).toBeCloseTo(POSE.orientation[part], 5);
   });
 
-  it("may be a part of one", () => {
+  it("can be partial", () => {
     expect(poseFrom("0.1 0.2 -3e-1", POSE)).toEqual({ ...POSE, position: { x: 0.1, y: 0.2, z: -0.3 } });
     expect(poseFrom("[0, 0, 0, 1]", POSE)).toEqual({ ...POSE, orientation: ORIGIN.orientation });
     expect(angles(poseFrom("0 0 0 0 0 90", POSE)?.orientation ?? ORIGIN.orientation)[2]).toBeCloseTo(Math.PI / 2, 9);

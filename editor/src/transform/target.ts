@@ -72,7 +72,7 @@ export function isShapeAlone(state: State, type: string): boolean {
 }
 
 const REQUESTS = {
-  object: "UpdateObjectPose",
+  object: "UpdateSceneObjectPose",
   point: "UpdateActionPointPosition",
   orientation: "UpdateActionPointOrientation",
 } as const;
@@ -94,7 +94,7 @@ export function notSizable(state: State, target: Pick<Target, "kind" | "id">): s
   return (
     notMovable(state, target) ||
     (state.live.state !== "stopped" ? t`Go offline to change its size.` : "") ||
-    whyUnavailable(state, "UpdateObjectModel")
+    whyUnavailable(state, "UpdateSceneShape")
   );
 }
 

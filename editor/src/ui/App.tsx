@@ -14,11 +14,13 @@ import { Waiting } from "./kit/kit";
 import { lazyComponent } from "./kit/lazy";
 import { Overlays } from "./search/Overlays";
 import { useScreenSettings } from "./settings/Settings";
+import { uncontrolledOnline } from "./workplace/uncontrolled";
 import { Workplace } from "./workplace/Workplace";
 
 /** Screens that most users see one of: a chunk each. */
 const Home = lazyComponent(() => import("./home/Home").then((module) => ({ default: module.Home })));
 const Operator = lazyComponent(() => import("./operator/Operator"));
+const ControlBanner = lazyComponent(() => import("./workplace/ControlBanner"));
 const ResultBanner = lazyComponent(() => import("./run/ResultBanner"));
 
 /** The hash of the address, which selects the editor or the operator screen. */
@@ -39,6 +41,7 @@ export function App() {
   const status = useEditor((state) => state.connection.status);
   const open = useEditor((state) => state.doc !== null);
   const live = useEditor(isLive);
+  const limited = useEditor((state) => uncontrolledOnline(state).length > 0);
   const document = useEditor((state) =>
     state.connection.status === "ready" && !isRunning(state) ? openId(state) : "",
   );
@@ -65,6 +68,7 @@ export function App() {
       <LostConnection />
       {!operator && (
         <Suspense fallback={null}>
+          {limited && <ControlBanner />}
           <ResultBanner />
         </Suspense>
       )}

@@ -3,14 +3,8 @@
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
-import {
-  addParameter,
-  awaited,
-  dynamicValues,
-  lastDynamicValues,
-  notEditable,
-  setParameter,
-} from "../../commands/program";
+import { awaited } from "../../commands/awaited";
+import { addParameter, dynamicValues, lastDynamicValues, notEditable, setParameter } from "../../commands/program";
 import { linkTo, metaOf, usable } from "../../program/logic";
 import { freeName, words } from "../../program/naming";
 import { decoded, extraOf, initial, SIMPLE, type Source, sourceOf, typeName } from "../../program/values";

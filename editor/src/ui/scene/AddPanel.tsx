@@ -17,24 +17,28 @@ import { AddObject } from "./AddObject";
 import "./scene.css";
 
 const SHAPES: readonly (readonly [ShapeKind, MessageDescriptor])[] = [
+  ["table", msg`Table`],
   ["box", msg`Box`],
   ["cylinder", msg`Cylinder`],
   ["sphere", msg`Sphere`],
 ];
 
 export default function AddPanel() {
-  const why = useEditor((state) => notBuildable(state));
+  const why = useEditor((state) => notBuildable(state, "AddSceneObject"));
+  const whyShape = useEditor((state) => notBuildable(state, "AddSceneShape"));
   const types = useEditor((state) => state.types.byName);
   const [chosen, setChosen] = useState("");
   const [search, setSearch] = useState("");
   const type = types[chosen];
   if (type) return <AddObject type={type} why={why} onBack={() => setChosen("")} />;
-  if (chosen === "mesh") return <AddMesh why={why} onBack={() => setChosen("")} />;
+  if (chosen === "mesh") return <AddMesh why={whyShape} onBack={() => setChosen("")} />;
   const wanted = search.trim().toLowerCase();
   const found = Object.values(types).filter(
     (each) =>
       isDevice(each) &&
-      `${each.type} ${each.display_name} ${each.category ?? ""} ${each.description}`.toLowerCase().includes(wanted),
+      `${each.type} ${each.display_name} ${words(each.category ?? "")} ${each.description}`
+        .toLowerCase()
+        .includes(wanted),
   );
   const groups = new Map<string, ObjectTypeMeta[]>();
   for (const each of found.sort((a, b) => compared(shownName(a), shownName(b)))) {
@@ -46,11 +50,11 @@ export default function AddPanel() {
       {why && <p className="small">{why}</p>}
       <div className="shapes" role="group" aria-label={t`Shapes`}>
         {SHAPES.map(([kind, label]) => (
-          <Button key={kind} icon="box" why={why} onPress={() => void addShape(kind)}>
+          <Button key={kind} icon="box" why={whyShape} onPress={() => void addShape(kind)}>
             {i18n._(label)}
           </Button>
         ))}
-        <Button icon="box" why={why} onPress={() => setChosen("mesh")}>
+        <Button icon="box" why={whyShape} onPress={() => setChosen("mesh")}>
           {t`Mesh…`}
         </Button>
       </div>
@@ -88,7 +92,9 @@ export default function AddPanel() {
                         {each.disabled ? each.problem : first(each.description)}
                       </span>
                       {each.shadows && (
-                        <span className="small">{t`replaces the installed type ${each.type} (${each.shadows})`}</span>
+                        <span className="small">
+                          {t`replaces the installed type ${shownName(each)} (${each.shadows})`}
+                        </span>
                       )}
                     </span>
                   </button>

@@ -17,16 +17,10 @@ import "./scene.css";
 const Body: Section["Body"] = ({ selection: { id } }) => {
   const object = useEditor((state) => state.doc?.objects[id]);
   const holder = useEditor((state) => heldBy(state, id));
-  const why = useEditor((state) =>
-    heldBy(state, id) ? t`In use by ${heldBy(state, id)}.` : notBuildable(state, "RemoveFromScene"),
-  );
-  const cannotRename = useEditor((state) =>
-    holder
-      ? t`In use by ${holder}.`
-      : state.doc?.project
-        ? t`Objects belong to the scene. Close the project and open the scene.`
-        : "",
-  );
+  const inUse = holder && t`In use by ${holder}.`;
+  const why = useEditor((state) => inUse || notBuildable(state, "RemoveFromScene"));
+  const cannotCopy = useEditor((state) => notBuildable(state, "AddSceneShape"));
+  const cannotRename = useEditor((state) => inUse || (state.doc?.project ? notBuildable(state, "RenameObject") : ""));
   const [needing, setNeeding] = useState<string[] | null>(null);
   if (!object) return null;
   const remove = async () => {
@@ -44,7 +38,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
         onRename={(name) => renameObject(id, name)}
       />
       <div className="tool-actions">
-        <Button icon="plus" why={why} onPress={() => void duplicateObject(object)}>
+        <Button icon="plus" why={cannotCopy} onPress={() => void duplicateObject(object)}>
           {t`Duplicate`}
         </Button>
         <Button icon="close" why={why} onPress={() => void remove()}>

@@ -1,73 +1,76 @@
-/** Fields of the settings of an object: required ones first, advanced ones below. */
+/** Fields of the settings of an object: required ones first and marked, groups and advanced ones below. */
 
 import { t } from "@lingui/core/macro";
 import { words } from "../../program/naming";
+import { grouped, type Values } from "../../program/settings";
 import { extraOf } from "../../program/values";
-import type { Parameter, ParameterMeta } from "../../protocol/types";
+import type { ParameterMeta } from "../../protocol/types";
 import { ValueField } from "../program/ValueField";
 
-/** JSON of each setting that differs from its default. */
-export type Values = Record<string, string>;
-
-/** Values in the format of the server. */
-export function parametersOf(settings: ParameterMeta[], values: Values): Parameter[] {
-  return settings.flatMap(({ name, type }) =>
-    values[name] === undefined ? [] : [{ name, type, value: values[name] }],
-  );
-}
-
-/** Names of required settings without a value. */
-export function missing(settings: ParameterMeta[], values: Values): string[] {
-  return settings
-    .filter(
-      ({ name, default_value }) => default_value === undefined && (values[name] === undefined || values[name] === '""'),
-    )
-    .map(({ name }) => name);
-}
-
-export function SettingsFields({
-  settings,
-  values,
-  why,
-  onChange,
-}: {
+interface SettingsFieldsProps {
   settings: ParameterMeta[];
   values: Values;
   why: string;
+  /** Focus the first required field. */
+  autoFocus?: boolean;
   onChange: (values: Values) => void;
-}) {
-  const needed = settings.filter((each) => each.default_value === undefined);
-  const others = settings.filter((each) => each.default_value !== undefined);
-  const field = (each: ParameterMeta) => (
-    <ValueField
-      key={each.name}
-      label={words(each.name)}
-      name={words(each.name)}
-      type={each.type}
-      json={values[each.name] ?? each.default_value}
-      extra={extraOf(each)}
-      hint={each.description}
-      secret={each.secret}
-      why={why}
-      onSet={(json) => {
-        const next = { ...values, [each.name]: json };
-        if (json === each.default_value) delete next[each.name];
-        onChange(next);
-        return Promise.resolve("");
-      }}
-    />
-  );
+}
+
+export function SettingsFields({ settings, values, why, autoFocus = false, onChange }: SettingsFieldsProps) {
+  const needed = settings.filter((each) => each.default_value === undefined || each.for_control);
+  // The port belongs to the address.
+  const first = [...needed, ...settings.filter((each) => each.name === "port" && !needed.includes(each))];
+  const groups = grouped(settings.filter((each) => !first.includes(each)));
+  const set = (name: string, json: string, initial: string | undefined) => {
+    const next = { ...values, [name]: json };
+    if (json === initial) delete next[name];
+    onChange(next);
+  };
+  const field = (each: ParameterMeta) => {
+    const { name, type, default_value, for_control } = each;
+    return (
+      <ValueField
+        key={name}
+        label={words(name)}
+        name={words(name)}
+        type={type}
+        json={values[name] ?? (for_control ? undefined : default_value)}
+        extra={extraOf(each)}
+        hint={each.description}
+        secret={each.secret}
+        why={why}
+        required={needed.includes(each)}
+        autoFocus={autoFocus && each === needed[0]}
+        onTyped={each.secret ? undefined : (json) => set(name, json, default_value)}
+        onSet={(json) => {
+          set(name, json, default_value);
+          return Promise.resolve("");
+        }}
+      />
+    );
+  };
   return (
     <>
-      {needed.map(field)}
-      {others.length > 0 && (
-        <details className="more-settings" open={needed.length === 0 && others.length <= 6}>
+      {first.map(field)}
+      {groups.map(({ title, settings: members }) => (
+        <details
+          key={title}
+          className="more-settings"
+          open={first.length === 0 && groups.length === 1 && members.length <= 6}
+        >
           <summary>
-            {needed.length > 0 ? t`Advanced` : t`Settings`} <span className="tag">{others.length}</span>
+            {title ? titleOf(title) : first.length > 0 ? t`Advanced` : t`Settings`}{" "}
+            <span className="tag">{members.length}</span>
           </summary>
-          {others.map(field)}
+          {members.map(field)}
         </details>
-      )}
+      ))}
     </>
   );
+}
+
+/** Return the title of a group; short words are abbreviations, such as TCP. */
+function titleOf(word: string): string {
+  const title = words(word);
+  return title.length <= 3 ? title.toUpperCase() : title.charAt(0).toUpperCase() + title.slice(1);
 }

@@ -4,7 +4,7 @@ import { storeViewState } from "../../commands/viewstate";
 import type { State } from "../../store/state";
 import { now } from "../../store/store";
 
-const NOTHING: string[] = [];
+const NOTHING: readonly string[] = [];
 
 export function hiddenOf(state: State): readonly string[] {
   const stored = state.view.user.blocklist;

@@ -1,4 +1,4 @@
-/** Add devices, shapes and meshes to the scene. */
+/** Add devices, shapes and meshes to the scene. In a project, the list of objects opens it. */
 
 import { msg } from "@lingui/core/macro";
 import { lazyComponent } from "../kit/lazy";

@@ -5,10 +5,11 @@ import { msg, t } from "@lingui/core/macro";
 import { useMemo, useState } from "react";
 import { Input, Label, SearchField, ToggleButton, ToggleButtonGroup } from "react-aria-components";
 import { storeViewState } from "../../commands/viewstate";
-import { useEditor } from "../../store/store";
+import { setUi, useEditor } from "../../store/store";
 import { allOf, counts, fitting, narrowed, type Row, thingsOf } from "../../viewmodel/things";
 import { GROUPS, type Group } from "../../viewmodel/visibility";
 import { OneOf } from "../kit/fields";
+import { Button } from "../kit/kit";
 import { hiddenOf } from "../scene/hidden";
 import { AtCrosshair } from "./AtCrosshair";
 import { ThingTree } from "./ThingTree";
@@ -61,6 +62,7 @@ function All() {
         )
       : [],
   );
+  const inProject = useEditor((state) => state.doc?.project != null);
   const ofKind = fitting(new Set([...groups].filter((each) => each !== HIDDEN)), search);
   const fits = (row: Row) => ofKind(row) && (!groups.has(HIDDEN) || hiddenIds.includes(row.id));
   const narrow = search.trim() !== "" || groups.size > 0;
@@ -72,6 +74,11 @@ function All() {
   const found = parts.filter(([, , part]) => part.length > 0);
   return (
     <>
+      {inProject && (
+        <Button icon="plus" onPress={() => setUi({ tool: "add" })}>
+          {t`Add object`}
+        </Button>
+      )}
       <SearchField className="field" value={search} onChange={setSearch}>
         <Label className="hidden-but-read">{t`Search`}</Label>
         <Input placeholder={t`Search ${rows.length} objects`} />

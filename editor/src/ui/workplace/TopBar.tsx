@@ -12,6 +12,7 @@ import { Button } from "../kit/kit";
 import { Confirm } from "../kit/lazyControls";
 import { People } from "../people/People";
 import { Settings } from "../settings/Settings";
+import { uncontrolledOnline } from "./uncontrolled";
 import { useUndoKeys } from "./useUndoKeys";
 
 export function TopBar() {
@@ -95,31 +96,32 @@ const WORDS = {
 
 function LiveSwitch() {
   const live = useEditor((state) => state.live.state);
+  const limited = useEditor((state) => uncontrolledOnline(state).length > 0);
   const running = useEditor(isClosed);
   const cannot = useEditor((state) => whyUnavailable(state, "StartScene"));
   const objects = useEditor((state) => state.live.objects);
   const wrong = Object.values(objects).filter(
     (each) => each.state === "failed" || each.state === "lost" || each.answering === false,
   ).length;
-  const inTrouble = plural(wrong, { one: "# device fault", other: "# device faults" });
+  const faults = plural(wrong, { one: "# device fault", other: "# device faults" });
   const busy = live === "starting" || live === "stopping";
   return (
     <Button
-      className={`live ${live}`}
+      className={`live ${live} ${wrong > 0 || limited ? "faulty" : ""}`}
       icon="plug"
       aria-pressed={live === "started"}
       isDisabled={busy || running || cannot !== ""}
       onPress={() => void (live === "stopped" ? goOnline() : goOffline())}
       aria-label={[
         running ? t`Program is running` : i18n._(WORDS[live]),
-        wrong > 0 && inTrouble,
+        wrong > 0 && faults,
         live === "started" && !running && t`Press to go offline`,
       ]
         .filter(Boolean)
         .join(". ")}
     >
       <span>{running ? t`Program is running` : i18n._(WORDS[live])}</span>{" "}
-      {wrong > 0 && <span className="tag bad">{inTrouble}</span>}
+      {wrong > 0 && <span className="tag bad">{faults}</span>}
     </Button>
   );
 }

@@ -10,6 +10,7 @@ import { kindName, nameOf } from "../../../viewmodel/names";
 import { Button } from "../../kit/kit";
 import { lazyComponent } from "../../kit/lazy";
 import type { Section } from "../section";
+import { uncontrolledOnline } from "../uncontrolled";
 
 const Holder = lazyComponent(() => import("./Holder"));
 
@@ -21,11 +22,12 @@ const Body: Section["Body"] = ({ selection: { kind, id } }) => {
   const action = useEditor((state) => state.doc?.actions[id]);
   const by = useEditor((state) => (action ? nameOf(state, action.type.split("/")[0] ?? "") : ""));
   const state = useEditor((each) => each.live.objects[id]);
+  const limited = useEditor((each) => uncontrolledOnline(each).some((one) => one.id === id));
   return (
     <>
       <p>
         {action ? `${by}: ${words(action.type.split("/")[1] ?? "")}` : typeName || kindName(kind)}
-        {state && <span className={`tag ${TONE[state.state] ?? ""}`}>{state.state}</span>}
+        {state && <span className={`tag ${limited ? "warn" : (TONE[state.state] ?? "")}`}>{state.state}</span>}
       </p>
       {state?.reason && <p className="small">{state.reason}</p>}
       {description && <p className="quiet small">{description}</p>}

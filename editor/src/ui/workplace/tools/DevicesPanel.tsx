@@ -12,6 +12,7 @@ import { derivesFrom } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
 import { Button } from "../../kit/kit";
 import { TONE } from "../sections/about";
+import { uncontrolledOnline } from "../uncontrolled";
 
 const STATES: Record<string, MessageDescriptor> = {
   offline: msg`offline`,
@@ -31,7 +32,7 @@ export default function Panel() {
   const live = useEditor((state) => state.live);
   const doc = useEditor((state) => state.doc);
   const cannot = useEditor((state) => whyUnavailable(state, "RetryObject"));
-  const troubled = (id: string) => live.objects[id]?.state === "failed" || live.objects[id]?.state === "lost";
+  const isFaulty = (id: string) => live.objects[id]?.state === "failed" || live.objects[id]?.state === "lost";
   // Boxes and tables are not devices.
   const inert = useEditor((state) =>
     Object.values(state.doc?.objects ?? {})
@@ -40,8 +41,9 @@ export default function Panel() {
       .join(),
   );
   const devices = Object.values(doc?.objects ?? {}).filter(
-    (each) => troubled(each.id) || !inert.split(",").includes(each.id),
+    (each) => isFaulty(each.id) || !inert.split(",").includes(each.id),
   );
+  const limited = useEditor(uncontrolledOnline);
   // Faulty devices first.
   const objects = devices.sort((a, b) => Number(isFaulty(b.id)) - Number(isFaulty(a.id)) || byName(a, b));
   return (
@@ -55,6 +57,7 @@ export default function Panel() {
         {objects.map((object) => {
           const state = live.objects[object.id];
           const health = live.health[object.id];
+          const lacking = limited.find((each) => each.id === object.id);
           const failed = state?.state === "failed" || state?.state === "lost";
           return (
             <li key={object.id}>
@@ -63,7 +66,7 @@ export default function Panel() {
                 {state?.answering === false ? (
                   <span className="tag bad">{t`not answering`}</span>
                 ) : (
-                  <span className={`tag ${TONE[state?.state ?? ""] ?? ""}`}>
+                  <span className={`tag ${lacking && !failed ? "warn" : (TONE[state?.state ?? ""] ?? "")}`}>
                     {stateName(state?.state ?? "offline")}
                   </span>
                 )}

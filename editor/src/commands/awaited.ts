@@ -1,0 +1,27 @@
+/** Wait for the events of own requests. */
+
+import { t } from "@lingui/core/macro";
+import type { State } from "../store/state";
+import { now, store } from "../store/store";
+
+/** Time within which the event of a change arrives after the answer, s. */
+const WITHIN = 5;
+
+/** Wait until an event brings something into the store. Reject if it does not arrive in time. */
+export function awaited<T>(find: (state: State) => T | undefined, within = WITHIN): Promise<T> {
+  return new Promise((resolve, reject) => {
+    const known = find(now());
+    if (known !== undefined) return resolve(known);
+    const timer = setTimeout(() => {
+      stop();
+      reject(new Error(t`The server did not confirm the change.`));
+    }, within * 1000);
+    const stop = store.subscribe((state) => {
+      const found = find(state);
+      if (found === undefined) return;
+      clearTimeout(timer);
+      stop();
+      resolve(found);
+    });
+  });
+}
