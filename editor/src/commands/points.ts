@@ -1,26 +1,15 @@
 /** Action points, orientations and joints. Functions return why they were refused, or an empty string. */
 
 import { t } from "@lingui/core/macro";
+import { freeName } from "../program/naming";
 import type { Joint, Orientation, Position } from "../protocol/types";
 import { call } from "../session/connection";
 import type { State } from "../store/state";
-import { now, select, store } from "../store/store";
+import { now, select } from "../store/store";
 import { relativeTo, worldOf } from "../viewmodel/frames";
 import { awaited } from "./awaited";
 import { held, refusal } from "./requests";
 import { type Chosen, robotArg } from "./robot";
-
-/** Time within which the event of an added item arrives after the answer, s. */
-const SEEN_WITHIN = 3;
-
-/** Return a free name: `stem`, with a number if necessary. */
-export function freeName(stem: string, taken: Iterable<string>): string {
-  const used = new Set(taken);
-  for (let number = 1; ; number++) {
-    const name = number === 1 ? stem : `${stem}_${number}`;
-    if (!used.has(name)) return name;
-  }
-}
 
 const names = (of: Record<string, { name: string }> | undefined) => Object.values(of ?? {}).map((each) => each.name);
 
@@ -29,27 +18,6 @@ const namesAt = <T extends { name: string; pointId: string }>(of: Record<string,
   Object.values(of ?? {})
     .filter((each) => each.pointId === point)
     .map((each) => each.name);
-
-/** Wait until an event brings something into the store. Return undefined if it does not arrive. */
-function seen<T>(look: (state: State) => T | undefined): Promise<T | undefined> {
-  return new Promise((resolve) => {
-    const found = look(now());
-    if (found !== undefined) {
-      resolve(found);
-      return;
-    }
-    const done = (value: T | undefined) => {
-      stop();
-      clearTimeout(timer);
-      resolve(value);
-    };
-    const stop = store.subscribe((state) => {
-      const value = look(state);
-      if (value !== undefined) done(value);
-    });
-    const timer = setTimeout(() => done(undefined), SEEN_WITHIN * 1000);
-  });
-}
 
 const pointNamed = (name: string) =>
   awaited((state) => Object.values(state.doc?.points ?? {}).find((each) => each.name === name)).catch(() => undefined);
@@ -77,18 +45,22 @@ export function addPoint(world: Position, parent = "", orientation?: Orientation
 }
 
 /** Save the robot pose as a point with orientation and joints, and select it. */
-export function addPointFromRobot({ robotId, armId, effector }: Chosen): Promise<string> {
-  return refusal(async () => {
-    const name = freeName("point", names(now().doc?.points));
-    await call("AddApUsingRobot", {
-      robot_id: robotId,
-      end_effector_id: effector,
-      name,
-      ...(armId ? { arm_id: armId } : {}),
-    });
-    const point = await pointNamed(name);
+export const addPointFromRobot = (chosen: Chosen): Promise<string> =>
+  refusal(async () => {
+    const point = await pointNamed(await teachPoint(chosen));
     if (point) select({ kind: "point", id: point.id });
   });
+
+/** Save the robot pose as a point with orientation and joints. Return its name. */
+export async function teachPoint({ robotId, armId, effector }: Chosen): Promise<string> {
+  const name = freeName("point", names(now().doc?.points));
+  await call("AddApUsingRobot", {
+    robot_id: robotId,
+    end_effector_id: effector,
+    name,
+    ...(armId ? { arm_id: armId } : {}),
+  });
+  return name;
 }
 
 /** Move a point in the frame of its parent, together with its children. */

@@ -1,7 +1,9 @@
 /** The program: actions, parameters, connections, project parameters and overrides. */
 
 import { t } from "@lingui/core/macro";
-import { cannotLead, freeStep, incoming, outgoing } from "../program/logic";
+import { compared } from "../formats";
+import { insertion, type Slot } from "../program/chain";
+import { cannotLead, END, freeStep, incoming, outgoing } from "../program/logic";
 import { actionNames, freeName, newOutputs } from "../program/naming";
 import { initial } from "../program/values";
 import type {
@@ -23,9 +25,6 @@ import { notify, now, select, setUi, store } from "../store/store";
 import { awaited } from "./awaited";
 import { ask, held, refusal, sentence } from "./requests";
 
-/** Time within which the event of an added item arrives, s. */
-const TOLD_WITHIN = 5;
-
 /** Return why a request cannot edit the program now; an empty string if it can. */
 export function notEditable(state: State, request: keyof Requests = "UpdateAction"): string {
   if (!state.doc?.project) return t`Open a project first. A scene has no program.`;
@@ -36,21 +35,31 @@ export function notEditable(state: State, request: keyof Requests = "UpdateActio
 export type Where = { pointId: string; orientationId?: string } | { position: Position; orientation: Orientation };
 
 /**
- * Add an action with names for its results, and the point and orientation that it needs. Return its id, or undefined
- * after notifying the user.
+ * Add an action with names for its results, and the point and orientation that it needs, and connect it in a slot of
+ * the program. Return its id, or undefined after notifying the user.
+ *
+ * `object`: the device, or the name of a service type, whose object is added if there is none. `where`: null if the
+ * action needs no place; it is then stored with its predecessor.
  */
-export async function addAction(objectId: string, meta: ObjectAction, where: Where): Promise<string | undefined> {
+export async function addAction(
+  object: string,
+  meta: ObjectAction,
+  where: Where | null,
+  slot: Slot | null,
+): Promise<string | undefined> {
   try {
-    const pointId = "pointId" in where ? where.pointId : await newPoint(meta.name, where.position);
-    const parameters = await startingParameters(objectId, meta, pointId, where);
+    const objectId = await serviceObject(object);
+    const at = where ?? (await anyPlace(objectId, slot));
+    const pointId = "pointId" in at ? at.pointId : await newPoint(`${meta.name}_point`, at.position);
+    const parameters = await startingParameters(objectId, meta, pointId, at);
     const { doc } = now();
     if (!doc) return undefined;
     const name = freeName(meta.name, actionNames(doc));
     const flows = [{ type: "default" as const, outputs: newOutputs(doc, meta.name, meta.returns.length) }];
     await call("AddAction", { action_point_id: pointId, name, type: `${objectId}/${meta.name}`, parameters, flows });
     const added = await awaited((state) => Object.values(state.doc?.actions ?? {}).find((each) => each.name === name));
+    if (slot) await insert(added.id, slot);
     select({ kind: "action", id: added.id });
-    setUi({ tool: "" });
     return added.id;
   } catch (error) {
     notify("error", sentence(error));
@@ -58,9 +67,48 @@ export async function addAction(objectId: string, meta: ObjectAction, where: Whe
   }
 }
 
+/** Return the id of an object; for the name of a type, that of its first object, which is added if there is none. */
+async function serviceObject(object: string): Promise<string> {
+  const of = (state: State) => Object.values(state.doc?.objects ?? {}).find((each) => each.type === object)?.id;
+  const { doc } = now();
+  if (doc && object in doc.objects) return object;
+  const known = of(now());
+  if (known !== undefined) return known;
+  const name = freeName(
+    object.replace(/Actions$/, "").toLowerCase(),
+    Object.values(doc?.objects ?? {}).map((each) => each.name),
+  );
+  await call("AddSceneObject", { name, type: object });
+  return awaited(of);
+}
+
+/** Return the point for an action without a place: that of its predecessor, else one on the device or in the world. */
+async function anyPlace(objectId: string, slot: Slot | null): Promise<Where> {
+  const { doc } = now();
+  const before = doc?.actions[slot?.after ?? ""]?.pointId ?? Object.keys(doc?.points ?? {})[0];
+  if (before !== undefined) return { pointId: before };
+  const position = doc?.objects[objectId]?.pose?.position ?? { x: 0, y: 0, z: 0 };
+  return { pointId: await newPoint("program", position) };
+}
+
+/** Connect a new action in a slot: what was there follows it. */
+async function insert(id: string, slot: Slot): Promise<void> {
+  const { doc } = now();
+  if (!doc) return;
+  const { redirect, branch, to } = insertion(doc, slot);
+  const update = async (item: string, end: string, condition: ProjectLogicIf | undefined) => {
+    const start = doc.logic[item]?.start;
+    if (start) await call("UpdateLogicItem", { logic_item_id: item, start, end, condition });
+  };
+  if (branch) await update(branch.id, doc.logic[branch.id]?.end ?? END, branch.condition);
+  if (redirect) await update(redirect, id, slot.condition);
+  else await call("AddLogicItem", { start: slot.after, end: id, condition: slot.condition });
+  await call("AddLogicItem", { start: id, end: to });
+}
+
 async function newPoint(base: string, position: Position): Promise<string> {
   const taken = Object.values(now().doc?.points ?? {}).map((each) => each.name);
-  const name = freeName(`${base}_point`, taken);
+  const name = freeName(base, taken);
   await call("AddActionPoint", { name, position });
   return (await awaited((state) => Object.values(state.doc?.points ?? {}).find((each) => each.name === name))).id;
 }
@@ -165,7 +213,7 @@ export async function dynamicValues(
   parents: { id: string; value: string }[],
 ): Promise<string[]> {
   const found = await call("ActionParamValues", { id: objectId, param_id: name, parent_params: parents });
-  const values = [...found].sort((a, b) => a.localeCompare(b, undefined, { numeric: true }));
+  const values = [...found].sort((a, b) => compared(a, b));
   store.setState((state) => ({ dynamicValues: put(state.dynamicValues, dynamicKey(objectId, name, parents), values) }));
   return values;
 }

@@ -1,6 +1,7 @@
 /** Request the data of programs that events only update: actions, run history, trace of the running program. */
 
 import { inUserLanguage } from "../i18n/serverMessages";
+import { SERVICES } from "../program/chain";
 import { withRuns } from "../store/reduce";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
@@ -50,7 +51,7 @@ export class ProgramDetails implements Follower {
 
   private followActions(state: State): void {
     if (!state.doc?.project) return;
-    for (const { type } of Object.values(state.doc.objects)) {
+    for (const type of [...Object.values(state.doc.objects).map((each) => each.type), ...SERVICES]) {
       if (!(type in state.types.byName)) continue;
       if (type in state.types.actions)
         this.types.delete(type); // requested again when the type changes

@@ -149,7 +149,7 @@ function One({
   );
 }
 
-/** Stands for the choice of a new project parameter; no id is the JSON null. */
+/** Choice of a new project parameter; no id is the JSON null. */
 const NEW = "null";
 
 async function sharedFrom(

@@ -1,10 +1,10 @@
 /**
- * All actions by device, with search and recently used ones. One tap adds an action to the selected point, or to a new
- * one at the crosshair, with the point and orientation that it needs.
+ * All actions by device, with search and recently used ones. One tap adds an action and connects it after the selected
+ * one. Actions in space get the next taught point, or a new one at the crosshair; the others need no point.
  */
 
 import { t } from "@lingui/core/macro";
-import { useMemo, useState } from "react";
+import { useEffect, useMemo, useState } from "react";
 import {
   Button as AriaButton,
   Input,
@@ -16,12 +16,17 @@ import {
 import { createPortal } from "react-dom";
 import { aimedPlace } from "../../commands/crosshair";
 import { addAction, notEditable, type Where } from "../../commands/program";
+import { byName } from "../../formats";
+import { needsPlace, pointFor, SERVICES, type Slot, slotFor, slotKey, slotsOf } from "../../program/chain";
 import { words } from "../../program/naming";
 import type { ObjectAction } from "../../protocol/types";
+import { whyUnavailable } from "../../store/permissions";
 import type { State } from "../../store/state";
-import { notify, now, setUi, useEditor } from "../../store/store";
+import { notify, now, select, setUi, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
+import { Pick } from "../kit/fields";
 import { Icon } from "../kit/icons";
+import { Button } from "../kit/kit";
 import { CATEGORY_ICONS } from "./categories";
 
 /** Number of actions that are offered again. */
@@ -41,17 +46,24 @@ export function AddAction() {
   const types = useEditor((state) => state.types);
   const cannot = useEditor((state) => notEditable(state, "AddAction"));
   const online = useEditor((state) => state.live.state === "started");
-  const selected = useEditor(pointOfSelection);
+  const selectedId = useEditor((state) => state.ui.selection?.id ?? "");
+  const selected = doc ? pointFor(doc, selectedId) : "";
   const pointName = useEditor((state) => nameOf(state, selected));
   const recent = useEditor((state) => state.ui.recentActions);
   const [search, setSearch] = useState("");
   const [anew, setAnew] = useState(false);
   const [busy, setBusy] = useState("");
+  const [slot, setSlot] = useState<Slot | null>(null);
+  const [last, setLast] = useState("");
+  useEffect(() => setSlot(null), [selectedId]);
   const onPoint = selected && !anew ? selected : "";
+  const slots = doc?.project?.has_logic ? slotsOf(doc, types) : [];
+  const proposed = doc?.project?.has_logic ? slotFor(doc, types, selectedId) : null;
+  const chosen = (slot && slots.find((each) => slotKey(each) === slotKey(slot))) ?? proposed;
   const offers = useMemo(() => offersOf(now(), onPoint), [doc, types, onPoint, online]);
   const wanted = search.trim().toLowerCase();
   const found = offers.filter((each) =>
-    `${each.object} ${words(each.meta.name)} ${each.meta.description ?? ""} ${each.category}`
+    `${each.object} ${words(each.meta.name)} ${each.meta.description ?? ""} ${words(each.category)}`
       .toLowerCase()
       .includes(wanted),
   );
@@ -60,11 +72,12 @@ export function AddAction() {
   const add = async (offer: Offer) => {
     const why = cannot || offer.why;
     if (why) return notify("info", `${words(offer.meta.name)}: ${why}`);
-    const where = placeFor(onPoint);
-    if (!where) return notify("info", t`Nothing at the crosshair. Aim at the table or an object.`);
+    const where = needsPlace(offer.meta) ? placeFor(onPoint) : null;
+    if (needsPlace(offer.meta) && !where)
+      return notify("info", t`Nothing at the crosshair. Aim at the table or an object.`);
     setBusy(offer.key);
     setUi({ recentActions: [offer.key, ...recent.filter((each) => each !== offer.key)].slice(0, RECENT) });
-    await addAction(offer.objectId, offer.meta, where);
+    setLast((await addAction(offer.objectId, offer.meta, where, chosen)) ?? "");
     setBusy("");
   };
   const row = (offer: Offer, prefix = "") => (
@@ -102,9 +115,32 @@ export function AddAction() {
           </ToggleButton>
         </ToggleButtonGroup>
         <p className="quiet small">
-          {onPoint ? t`The action is added to the selected point.` : t`A new point is added at the crosshair.`}
+          {onPoint
+            ? t`Actions in space are added to ${pointName}.`
+            : t`Actions in space get a new point at the crosshair.`}
         </p>
       </div>
+      {chosen && (
+        <Pick
+          label={t`Follows`}
+          value={slotKey(chosen)}
+          choices={slots.map((each) => [slotKey(each), slotWords(now(), each)])}
+          onChange={(key) => setSlot(slots.find((each) => slotKey(each) === key) ?? null)}
+        />
+      )}
+      {doc?.actions[last] && (
+        <p className="added" role="status">
+          {t`Added ${doc.actions[last].name}.`}{" "}
+          <Button
+            onPress={() => {
+              select({ kind: "action", id: last });
+              setUi({ tool: "" });
+            }}
+          >
+            {t`Set parameters`}
+          </Button>
+        </p>
+      )}
       {!onPoint && <Cross />}
       <SearchField className="field" value={search} onChange={setSearch}>
         <Label className="hidden-but-read">{t`Search actions`}</Label>
@@ -120,7 +156,7 @@ export function AddAction() {
         <section key={object} className="offers" aria-label={object}>
           <h3>
             <Icon name={CATEGORY_ICONS[of[0]?.category ?? ""] ?? "box"} /> {object}{" "}
-            {of[0]?.category && <span className="tag">{of[0].category}</span>}
+            {of[0]?.category && <span className="tag">{words(of[0].category)}</span>}
           </h3>
           <ul>{of.map((offer) => row(offer))}</ul>
         </section>
@@ -138,14 +174,13 @@ function Cross() {
   return view && createPortal(<span className="crosshair" aria-hidden="true" />, view);
 }
 
-/** Return the selected point, or that of the selected item; an empty string without one. */
-function pointOfSelection(state: State): string {
-  const { selection } = state.ui;
-  const { doc } = state;
-  if (!selection || !doc) return "";
-  const { id } = selection;
-  if (selection.kind === "point") return id;
-  return (doc.orientations[id] ?? doc.joints[id] ?? doc.actions[id])?.pointId ?? "";
+/** Return a slot as text: "move", "test: if no". */
+function slotWords(state: State, { after, condition }: Slot): string {
+  const name = nameOf(state, after);
+  if (!condition) return name;
+  if (condition.value === "true") return t`${name}: if yes`;
+  if (condition.value === "false") return t`${name}: if no`;
+  return t`${name}: if ${condition.value}`;
 }
 
 function placeFor(pointId: string): Where | null {
@@ -163,20 +198,22 @@ function groups(offers: Offer[]): [string, Offer[]][] {
 function offersOf(state: State, pointId: string): Offer[] {
   const { doc, types } = state;
   const rank = (type: string) => (type in types.robots ? 0 : 1);
-  const objects = Object.values(doc?.objects ?? {}).sort(
-    (a, b) => rank(a.type) - rank(b.type) || a.name.localeCompare(b.name),
-  );
-  return objects.flatMap((object) => {
-    const type = types.byName[object.type];
-    return (types.actions[object.type] ?? []).map((meta) => ({
-      key: `${object.id}/${meta.name}`,
-      objectId: object.id,
-      object: object.name,
-      category: meta.category ?? type?.category ?? "",
+  const objects = Object.values(doc?.objects ?? {}).sort((a, b) => rank(a.type) - rank(b.type) || byName(a, b));
+  const present = new Set(objects.map((each) => each.type));
+  const services = SERVICES.filter((type) => !present.has(type) && type in types.byName);
+  return [
+    ...objects.map(({ id, name, type }) => ({ id, name, type })),
+    ...services.map((type) => ({ id: type, name: types.byName[type]?.display_name ?? type, type })),
+  ].flatMap(({ id, name, type }) =>
+    (types.actions[type] ?? []).map((meta) => ({
+      key: `${id}/${meta.name}`,
+      objectId: id,
+      object: name,
+      category: meta.category ?? types.byName[type]?.category ?? "",
       meta,
-      why: whyNot(state, object.id, meta, pointId),
-    }));
-  });
+      why: services.includes(type) ? whyUnavailable(state, "AddSceneObject") : whyNot(state, id, meta, pointId),
+    })),
+  );
 }
 
 /** Return why an action cannot be added now; an empty string if it can. */

@@ -12,7 +12,12 @@ import { Problems } from "./Problems";
 import { Steps } from "./Steps";
 import "./program.css";
 
-const TABS = { add: msg`Add`, steps: msg`Actions`, problems: msg`Check`, parameters: msg`Variables` } as const;
+const TABS = {
+  add: msg({ message: "Add", context: "tab" }),
+  steps: msg`Actions`,
+  problems: msg`Check`,
+  parameters: msg`Variables`,
+} as const;
 type Tab = keyof typeof TABS;
 
 export default function ProgramPanel() {

@@ -2,7 +2,8 @@
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
-import { addPointFromRobot } from "../../commands/points";
+import { addPointFromRobot, teachPoint } from "../../commands/points";
+import { refusal } from "../../commands/requests";
 import { chosenRobot, notReady } from "../../commands/robot";
 import { isRunning } from "../../store/selectors";
 import { notify, setUi, useEditor } from "../../store/store";
@@ -28,10 +29,14 @@ export default function RobotChip() {
       return;
     }
     setAsking(true);
-    void addPointFromRobot(chosen).then((refused) => {
+    // While the user is jogging, the panel stays open for the next point.
+    const work = open
+      ? refusal(async () => notify("info", t`Saved ${await teachPoint(chosen)}.`))
+      : addPointFromRobot(chosen);
+    void work.then((refused) => {
       setAsking(false);
       if (refused) notify("error", refused);
-      else setUi({ tool: "" });
+      else if (!open) setUi({ tool: "" });
     });
   };
   return (

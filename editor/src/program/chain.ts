@@ -1,0 +1,97 @@
+/** Where a new action goes in the program. Pure functions. */
+
+import type { ObjectAction, ProjectLogicIf } from "../protocol/types";
+import type { OpenDocument, State } from "../store/state";
+import { conditionsOf, END, linkTo, outgoing, placeOf, START } from "./logic";
+
+/** Types whose actions control the program. They are always offered; their objects are added when they are needed. */
+export const SERVICES: readonly string[] = ["FlowActions", "LogicActions", "CounterActions"];
+
+const IN_SPACE: ReadonlySet<string> = new Set(["pose", "position", "joints", "relative_pose"]);
+
+/** Return whether an action needs a point in space. */
+export const needsPlace = ({ parameters }: ObjectAction): boolean => parameters.some((each) => IN_SPACE.has(each.type));
+
+/** A place after a step of the program; with a condition, on that branch. */
+export interface Slot {
+  after: string;
+  condition?: ProjectLogicIf;
+}
+
+/** Text that identifies a slot. */
+export const slotKey = ({ after, condition }: Slot): string => JSON.stringify([after, condition]);
+
+/** Return the slots after a step, the one that is usually wanted first. */
+function slotsAfter(doc: OpenDocument, types: State["types"], after: string): Slot[] {
+  const steps = outgoing(doc, after);
+  const plain = steps.find((each) => !each.condition);
+  const taken = steps.flatMap(({ condition }): Slot[] => (condition ? [{ after, condition }] : []));
+  const own = conditionsOf(doc, types, after).find((each) => each.action.id === after && each.type === "boolean");
+  const free = own
+    ? ["false", "true"]
+        .filter((value) => !taken.some((each) => each.condition?.value === value))
+        .map((value) => ({ after, condition: { what: linkTo(own), value } }))
+    : [];
+  if (!plain) return steps.length === 0 ? [{ after }, ...free] : [...free, ...taken];
+  // What already follows becomes the other branch; an action before End is usually continued instead.
+  return placeOf(plain.end) === END ? [{ after }, ...free] : [...free, { after }];
+}
+
+/** Return all slots of a program. */
+export const slotsOf = (doc: OpenDocument, types: State["types"]): Slot[] =>
+  [START, ...Object.keys(doc.actions)].flatMap((after) => slotsAfter(doc, types, after));
+
+/** Return where the next action goes: after the selected one, else at the end of the program. */
+export function slotFor(doc: OpenDocument, types: State["types"], selected: string): Slot {
+  const after = selected in doc.actions || selected === START ? selected : lastOf(doc);
+  return slotsAfter(doc, types, after)[0] ?? { after };
+}
+
+/** Return the last action of the chain from START. */
+function lastOf(doc: OpenDocument): string {
+  const seen = new Set<string>();
+  let at = START;
+  while (!seen.has(at)) {
+    seen.add(at);
+    const next = outgoing(doc, at).map((each) => placeOf(each.end));
+    at = next.find((each) => each !== END && !seen.has(each)) ?? at;
+  }
+  return at;
+}
+
+/** How an action is put into a slot. */
+export interface Insertion {
+  /** Connection that leads to the new action from now on. */
+  redirect?: string;
+  /** Connection that becomes the other branch. */
+  branch?: { id: string; condition: ProjectLogicIf };
+  /** Where the new action leads to. */
+  to: string;
+}
+
+export function insertion(doc: OpenDocument, { after, condition }: Slot): Insertion {
+  const steps = outgoing(doc, after);
+  const same = steps.find(
+    (each) => each.condition?.what === condition?.what && each.condition?.value === condition?.value,
+  );
+  if (same) return { redirect: same.id, to: same.end };
+  const plain = steps.find((each) => !each.condition);
+  if (!condition || !plain) return { to: END };
+  return {
+    branch: { id: plain.id, condition: { what: condition.what, value: condition.value === "true" ? "false" : "true" } },
+    to: END,
+  };
+}
+
+/**
+ * Return the point for a new action in space: the selected one. After an action, or without a selection, it is the
+ * first taught point without actions; then the point of the action.
+ */
+export function pointFor(doc: OpenDocument, selected: string): string {
+  if (doc.points[selected]) return selected;
+  const taught = doc.orientations[selected]?.pointId ?? doc.joints[selected]?.pointId;
+  if (taught) return taught;
+  const used = new Set(Object.values(doc.actions).map((each) => each.pointId));
+  const free = Object.values(doc.joints).find((each) => !used.has(each.pointId))?.pointId;
+  return free ?? doc.actions[selected]?.pointId ?? "";
+}
