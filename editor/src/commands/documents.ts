@@ -32,8 +32,8 @@ export async function fromTemplate(kind: "scene" | "project", source: string, na
   return true;
 }
 
-/** Time within which a list contains a new document, ms. */
-const LISTED = 10_000;
+/** Time within which a list contains a new document, s. */
+const LISTED_WITHIN = 10;
 
 function listed(kind: "scene" | "project", name: string): Promise<string> {
   const find = ({ lists }: State) =>

@@ -9,7 +9,6 @@ import { now, useEditor } from "../store/store";
 import { LostConnection } from "./connection/LostConnection";
 import { Dock } from "./dock/Dock";
 import { storeOpened } from "./home/recent";
-import { Join } from "./join/Join";
 import { Waiting } from "./kit/kit";
 import { lazyComponent } from "./kit/lazy";
 import { Overlays } from "./search/Overlays";
@@ -18,9 +17,11 @@ import { uncontrolledOnline } from "./workplace/uncontrolled";
 import { Workplace } from "./workplace/Workplace";
 
 /** Screens that most users see one of: a chunk each. */
+const Join = lazyComponent(() => import("./join/Join"));
 const Home = lazyComponent(() => import("./home/Home").then((module) => ({ default: module.Home })));
 const Operator = lazyComponent(() => import("./operator/Operator"));
 const ControlBanner = lazyComponent(() => import("./workplace/ControlBanner"));
+const Tour = lazyComponent(() => import("./tour/Tour"));
 const ResultBanner = lazyComponent(() => import("./run/ResultBanner"));
 
 /** The hash of the address, which selects the editor or the operator screen. */
@@ -41,6 +42,7 @@ export function App() {
   const status = useEditor((state) => state.connection.status);
   const open = useEditor((state) => state.doc !== null);
   const live = useEditor(isLive);
+  const touring = useEditor((state) => state.ui.tour !== null && state.doc !== null);
   const limited = useEditor((state) => uncontrolledOnline(state).length > 0);
   const document = useEditor((state) =>
     state.connection.status === "ready" && !isRunning(state) ? openId(state) : "",
@@ -58,7 +60,9 @@ export function App() {
   if (!been) {
     return (
       <div className="screen">
-        <Join />
+        <Suspense fallback={<Waiting>{t`Connecting…`}</Waiting>}>
+          <Join />
+        </Suspense>
       </div>
     );
   }
@@ -70,6 +74,7 @@ export function App() {
         <Suspense fallback={null}>
           {limited && <ControlBanner />}
           <ResultBanner />
+          {touring && <Tour />}
         </Suspense>
       )}
       <div className="screen">

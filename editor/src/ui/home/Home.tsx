@@ -18,6 +18,7 @@ import { favoritesOf } from "./favorites";
 import { NewProject } from "./NewProject";
 import { NewScene } from "./NewScene";
 import { recentOf } from "./recent";
+import { Start } from "./Start";
 import { UploadPackage } from "./UploadPackage";
 import "./home.css";
 
@@ -76,6 +77,7 @@ export function Home() {
         <Settings />
       </header>
       <main>
+        <Start />
         <div className="home-tools">
           <ToggleButtonGroup
             className="tabs"

@@ -1,0 +1,37 @@
+/** The guided tour: one sentence at a time over the view; it continues when the user has done it. */
+
+import { i18n } from "@lingui/core";
+import { t } from "@lingui/core/macro";
+import { useEffect, useState } from "react";
+import { now, setUi, useEditor } from "../../store/store";
+import { Button } from "../kit/kit";
+import { STEPS } from "./steps";
+import "./tour.css";
+
+export default function Tour() {
+  const at = useEditor((state) => state.ui.tour) ?? 0;
+  const [began, setBegan] = useState(now);
+  const done = useEditor((state) => STEPS[at]?.done?.(state, began) ?? false);
+  const step = STEPS[at];
+  const next = () => {
+    setBegan(now());
+    setUi({ tour: at + 1 < STEPS.length ? at + 1 : null });
+  };
+  useEffect(() => {
+    if (done) next();
+  }, [done, at]);
+  if (!step) return null;
+  return (
+    <section className="tour" aria-label={t`Guided tour`}>
+      <p aria-live="polite">
+        <strong>{`${at + 1}/${STEPS.length}`}</strong> {i18n._(step.text)}
+      </p>
+      <div className="row">
+        <Button look="plain" onPress={() => setUi({ tour: null })}>
+          {t`End tour`}
+        </Button>
+        <Button onPress={next}>{step.done ? t`Skip step` : t`Next`}</Button>
+      </div>
+    </section>
+  );
+}
