@@ -54,6 +54,16 @@
     }
     return found;
   };
+  // The number of rows into which a bar has wrapped.
+  const rowsOf = (bar) => {
+    const boxes = [...(bar?.children ?? [])].filter(shown).map((element) => element.getBoundingClientRect());
+    let [rows, bottom] = [0, -Infinity];
+    for (const box of boxes.sort((p, q) => p.top - q.top)) {
+      if (box.top >= bottom) rows++;
+      bottom = Math.max(bottom, box.bottom);
+    }
+    return rows;
+  };
   // Below a dialog or menu nothing can be touched.
   const scope = [...document.querySelectorAll(".overlay, .popover")].at(-1) ?? document;
   const name = (element) =>
@@ -79,6 +89,8 @@
     }
   }
   faults.push(...stopFaults());
+  const rows = rowsOf(document.querySelector(".topbar"));
+  if (rows > 2) faults.push(`the top bar has ${rows} rows`);
   if (document.documentElement.scrollWidth > innerWidth + 1) faults.push("the page scrolls sideways");
   const labels = [...document.querySelectorAll(".view-label")]
     .filter(shown)

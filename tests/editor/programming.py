@@ -18,7 +18,7 @@ from arcor2_hw.data.project import Action, ActionParameter, Flow, FlowTypes, Pro
 from arcor2_hw.data.scene import Scene
 from tests.e2e.harness import Cell, until
 from tests.editor import texts
-from tests.editor.screen import SEEN_WITHIN, VIEWPORTS, Screen, screen_of
+from tests.editor.screen import VIEWPORTS, Screen, screen_of
 
 
 @dataclass
@@ -80,7 +80,7 @@ class Work:
     async def _open_id(self) -> str:
         """Return the id of the open project, as the server sends it to a new client."""
         async with Client(self.cell.url, "observer", reconnect=False) as observer:
-            event = await observer.next_event("OpenProject", "OpenScene", "ShowMainScreen", timeout=10)
+            event = await observer.next_event("OpenProject", "OpenScene", "ShowMainScreen")
             return str(event.data.project.id) if event.event == "OpenProject" else ""
 
     async def tool(self, name: str) -> None:
@@ -107,7 +107,7 @@ class Work:
     async def told(self, name: str, wanted: Any = lambda event: True) -> Event:
         """Return the next event of that name that is wanted, as the second client receives it."""
         while True:
-            event = await self.client.next_event(name, timeout=SEEN_WITHIN)
+            event = await self.client.next_event(name)
             if wanted(event):
                 return event
 

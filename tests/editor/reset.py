@@ -62,7 +62,7 @@ async def _empty(cell: Cell) -> None:
         await _clear_views(client, ViewScope.SHARED)
     for user in sorted(USERS):
         await until(partial(_is_forgotten, cell, user), f"{user} has left, and the user's settings are cleared", 30)
-    async with httpx.AsyncClient(base_url=cell.url.replace("ws", "http", 1)) as rest:
+    async with httpx.AsyncClient(timeout=60, base_url=cell.url.replace("ws", "http", 1)) as rest:
         (await rest.put("/api/calibration/markers", json={})).raise_for_status()
 
 

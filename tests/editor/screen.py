@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import re
 import shutil
 from base64 import b64encode
 from collections.abc import AsyncIterator, Iterable
@@ -16,8 +17,8 @@ from tests.editor import texts
 ARGUMENTS: Final = [
     "--no-sandbox",  # containers seldom allow one
     "--disable-background-networking",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
+    "--disable-gpu",  # the page is composed without OpenGL, which halves the processor time on machines without a GPU
+    "--enable-unsafe-swiftshader",  # WebGL in software
 ]
 VIEWPORTS: Final = {
     "tablet": {"width": 1280, "height": 800},
@@ -33,6 +34,7 @@ SEEN_WITHIN: Final = 30.0
 """Timeout for something to appear on the screen, s. Software rendering on a busy machine is slow."""
 SMALLEST: Final = 44
 """Smallest side of a control, CSS pixels."""
+expect.set_options(timeout=SEEN_WITHIN * 1000)
 USERS: Final = set[str]()
 """Names of the users who have joined since the workplace was reset."""
 
@@ -44,6 +46,7 @@ _ARCHIVO: Final = _NODE_MODULES / "@fontsource-variable" / "archivo" / "files" /
 _FONT: Final = Path(__file__).with_name("font.js").read_text()
 _BEHIND: Final = Path(__file__).with_name("behind.sh")
 _LAYOUT: Final = Path(__file__).with_name("layout.js").read_text()
+_CLIPPED: Final = Path(__file__).with_name("clipped.js").read_text()
 _AXE: Final = _NODE_MODULES / "axe-core" / "axe.min.js"
 _RULES: Final = """async () => {
   const tags = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"];
@@ -56,9 +59,10 @@ _RULES: Final = """async () => {
 
 def chromium() -> str:
     """The browser that `make test` installs."""
-    found = shutil.which("chromium") or shutil.which("chromium-browser")
-    assert found, "no chromium: `make test` installs it where it may"
-    return found
+    found = filter(None, map(shutil.which, ("chromium-headless-shell", "chromium", "chromium-browser")))
+    if not (path := next(found, None)):
+        raise FileNotFoundError("Chromium is not installed. Run `make .make/browser`.")
+    return path
 
 
 @asynccontextmanager
@@ -100,8 +104,8 @@ class Screen:
     async def press(self, name: str) -> None:
         await self.page.get_by_role("button", name=name, exact=True).click()
 
-    async def sees(self, text: str) -> None:
-        await expect(self.page.get_by_text(text).first).to_be_visible(timeout=SEEN_WITHIN * 1000)
+    async def sees(self, text: str | re.Pattern[str]) -> None:
+        await expect(self.page.get_by_text(text).first).to_be_visible()
 
     async def until(self, expression: str, argument: Any = None) -> Any:
         """Wait until a JavaScript expression or function returns a true value, and return it."""
@@ -151,6 +155,10 @@ class Screen:
         """Return which controls are too small, off the screen, covered or overlapping."""
         return list(await self.page.evaluate(_LAYOUT, SMALLEST))
 
+    async def clipped(self) -> list[str]:
+        """Return which texts of controls and headings are cut off."""
+        return list(await self.page.evaluate(_CLIPPED))
+
     async def faults_with(self, fonts: Iterable[str]) -> list[str]:
         """Return the faults with each of these fonts, so that they do not depend on the machine's fonts."""
         found = []
@@ -190,6 +198,7 @@ async def screen_of(
     touch: bool = False,
     reduced_motion: bool = False,
     text_scale: float = 1.0,
+    locale: str = "en-US",
 ) -> AsyncIterator[Screen]:
     """Open a page in a browser context of its own. `url` is that of the server, ws or http."""
     context = await browser.new_context(
@@ -198,6 +207,7 @@ async def screen_of(
         has_touch=touch,
         reduced_motion="reduce" if reduced_motion else "no-preference",
         service_workers="block",
+        locale=locale,
     )
     try:
         screen = Screen(await context.new_page(), url.replace("ws", "http", 1) if url.startswith("ws") else url)

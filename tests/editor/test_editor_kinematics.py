@@ -13,7 +13,7 @@ from arcor2_hw.data.parameter import Parameter
 from tests.e2e.harness import Cell, scene_state
 from tests.editor.screen import screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(180)]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
 async def test_the_robot_panel_names_the_kinematics_in_force(browser: Browser, cell: Cell) -> None:

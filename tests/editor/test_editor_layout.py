@@ -16,7 +16,7 @@ from tests.e2e.harness import Cell
 from tests.editor import texts
 from tests.editor.screen import FONTS, VIEWPORTS, Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(240)]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
 @pytest_asyncio.fixture(loop_scope="session")

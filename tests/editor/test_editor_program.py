@@ -1,6 +1,7 @@
 """Writing a program: actions, parameters, steps and branches, faults, code."""
 
 import math
+import re
 from collections.abc import AsyncIterator
 from typing import Any
 
@@ -17,8 +18,9 @@ from arcor2_hw.data.project import ActionParameter, Flow, FlowTypes
 from tests.e2e.harness import Cell, until
 from tests.editor import texts
 from tests.editor.programming import Work, at_work
+from tests.editor.screen import VIEWPORTS
 
-pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(180)]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
@@ -70,7 +72,8 @@ async def test_action_at_the_crosshair_takes_two_taps(work: Work) -> None:
     given = await work.parameters(action.id)
     assert reference(given["pose"]) == orientation.id
     assert given["speed"].value == "0.25", "what has a default gets it"
-    # It is shown and selected, with its parameters in the panel.
+    # It is shown and selected; the panel stays open for the next action.
+    await work.tap_button("Set parameters")
     assert (await screen.item(action.id))["kind"] == "action"
     await work.panel.get_by_role("heading", name=action.name, exact=True).wait_for()
     await work.panel.get_by_label("speed", exact=True).wait_for()
@@ -139,6 +142,7 @@ async def test_branch_takes_four_taps_and_step_two(work: Work) -> None:
     await work.screen.close_panels()
     await work.mode("Flow")
     graph = page.get_by_role("region", name=texts.GRAPH)
+    await graph.get_by_role("button", name=texts.WHOLE_PROGRAM).click()
 
     async def node(name: str) -> None:
         work.taps += 1
@@ -193,6 +197,7 @@ async def test_graph_does_not_move_under_a_tap(work: Work) -> None:
     await work.screen.close_panels()
     await work.mode("Flow")
     graph = page.get_by_role("region", name=texts.GRAPH)
+    await graph.get_by_role("button", name=texts.WHOLE_PROGRAM).click()
     way = graph.get_by_role("button", name="surely: yes", exact=True)
     await way.hover()
     await page.mouse.down()
@@ -220,6 +225,7 @@ async def test_straight_sequences_are_folded_except_around_the_selection(work: W
     await work.client.call("UpdateLogicItem", rpc.UpdateLogicItemArgs(last.id, last.start, first))
     await work.mode("Flow")
     graph = page.get_by_role("region", name=texts.GRAPH)
+    await graph.get_by_role("button", name=texts.WHOLE_PROGRAM).click()
     await graph.locator('.react-flow__node[aria-label^="second,"] .flow-name').click()
     await work.tap_button("Fold 4 actions in the graph", work.panel)
     one = graph.locator('.react-flow__node[aria-label="4 actions, folded, into_bad_box, first, second, third"]')
@@ -248,6 +254,7 @@ async def test_straight_sequences_are_folded_except_around_the_selection(work: W
     # The folding is stored per user until it is switched off.
     await work.mode("3D")
     await work.mode("Flow")
+    await graph.get_by_role("button", name=texts.WHOLE_PROGRAM).click()
     await one.locator(".flow-name").click()
     await inner.wait_for()
     await work.mode("3D")
@@ -434,6 +441,40 @@ async def test_program_panel_layout(work: Work) -> None:
             if faults := await screen.faults():
                 found[f"{tab}, {name}"] = faults
             await screen.picture(f"program {tab} {name}")
+    assert found == {}
+
+
+async def test_messages_cover_no_control(work: Work) -> None:
+    """Neither in the panels nor in any view, at any size."""
+    page, screen = work.screen.page, work.screen
+    found: dict[str, list[str]] = {}
+
+    async def check(view: str) -> None:
+        for name in ("tablet", "ipad", "phone"):
+            await page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
+            await screen.settle()
+            if faults := await screen.faults():
+                found[f"{view}, {name}"] = faults
+            await screen.picture(f"messages {view} {name}")
+        await page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
+
+    await work.select("test")
+    for _ in range(4):  # refused each time
+        await work.tap_button(texts.REMOVE, work.panel)
+    messages = page.get_by_role("region", name=texts.MESSAGE_BAR)
+    await messages.get_by_text("A result of test is used by a condition of the logic").wait_for()
+    await messages.get_by_text(re.compile(r"^\+[3-9]$")).wait_for()
+    await check("action")
+    await work.tool(texts.PROGRAM)
+    await work.mode("Add")
+    await check("program")
+    await work.tool(texts.ROBOT)
+    await check("robot")
+    await screen.close_panels()
+    for mode in ("3D", "Flow", "Split", "Code"):
+        await work.mode(mode)
+        await check(mode)
+    await work.mode("3D")
     assert found == {}
 
 

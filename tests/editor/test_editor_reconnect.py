@@ -21,7 +21,7 @@ async def test_the_view_stays_while_the_server_is_gone_and_reconnects(browser: B
         "AddVirtualCollisionObjectToScene",
         rpc.AddVirtualCollisionObjectToSceneArgs("table", Pose(Position(0.2, 0.0, 0.0)), model),
     )
-    table = (await client.next_event("SceneObjectChanged", timeout=10)).data.id
+    table = (await client.next_event("SceneObjectChanged")).data.id
     async with screen_of(browser, cell.url) as screen:
         # The page may be loading a part when the server is killed.
         screen.expected_errors = ("WebSocket connection to", "Failed to load resource: net::ERR_CONNECTION_")
@@ -33,7 +33,7 @@ async def test_the_view_stays_while_the_server_is_gone_and_reconnects(browser: B
         await screen.sees(texts.NO_CONNECTION)
         await screen.sees("Unsaved changes are kept on the server.")
         assert (await screen.item(table))["name"] == "table"
-        assert await screen.page.get_by_role("button", name=texts.SAVE).is_disabled()
+        assert await screen.page.get_by_role("button", name=texts.SAVE, exact=True).is_disabled()
 
         await cell.restart_server()
         await screen.until("() => !document.querySelector('.lost')")

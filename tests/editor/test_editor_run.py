@@ -16,7 +16,7 @@ from tests.editor import texts
 from tests.editor.programming import Work, at_work
 from tests.editor.screen import screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(240)]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 BEGUN = 60_000
 """Timeout for a started program to run: it is built and its host started, on a busy machine, ms."""
@@ -47,7 +47,7 @@ class Store(Generic):
 
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def opened(module_cell: Cell, browser: Browser) -> AsyncIterator[Work]:
-    async with httpx.AsyncClient(base_url=module_cell.url.replace("ws", "http", 1)) as rest:
+    async with httpx.AsyncClient(timeout=60, base_url=module_cell.url.replace("ws", "http", 1)) as rest:
         answer = await rest.put("/object-types", json={"id": "Store", "name": "Store", "source": STORE})
         assert answer.status_code == 200, answer.text
     async with at_work(module_cell, browser, ("store", "Store")) as open_project:
@@ -76,8 +76,8 @@ async def state(work: Work, wanted: PackageStateEnum) -> None:
 
 
 async def is_broken_at(work: Work, *ids: str) -> bool:
-    kept = await work.client.call("GetBreakpoints", rpc.GetBreakpointsArgs(work.project.id))
-    return list(kept.ids) == list(ids)
+    breakpoints = await work.client.call("GetBreakpoints", rpc.GetBreakpointsArgs(work.project.id))
+    return list(breakpoints.ids) == list(ids)
 
 
 async def test_run_to_an_action_step_and_show_the_failure(work: Work, browser: Browser) -> None:
@@ -110,6 +110,11 @@ async def test_run_to_an_action_step_and_show_the_failure(work: Work, browser: B
         await page.get_by_role("button", name=texts.CLOSE_PANEL).click()
     here = graph.locator('.react-flow__node[aria-label^="scan,"]')
     await expect(here).to_contain_text("next")
+    # The graph shows the running action at a readable size.
+    await expect(here).to_be_in_viewport(ratio=1)
+    box = await here.bounding_box()
+    assert box is not None
+    assert box["width"] > 200
     await screen.picture("run paused")
     await work.tool(texts.RUN)
 

@@ -20,7 +20,7 @@ from tests.e2e.harness import Cell, until
 from tests.editor import texts
 from tests.editor.screen import Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(120)]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
 @dataclass
@@ -32,7 +32,7 @@ class Open:
     async def objects(self) -> list[SceneObject]:
         """Return the objects as the server has them now, saved or not."""
         async with Client(self.cell.url, "observer", reconnect=False) as observer:
-            opened = await observer.next_event("OpenScene", timeout=10)
+            opened = await observer.next_event("OpenScene")
             found: list[SceneObject] = opened.data.scene.objects
             return found
 
@@ -117,7 +117,7 @@ async def test_object_is_dragged_previewed_to_others_and_undone(opened: Open, br
         await mouse.down()
         await mouse.move(x, y - 60, steps=4)
         # Other users see the preview and who drags; the document is unchanged so far.
-        preview = await client.next_event("MovePreview", timeout=10)
+        preview = await client.next_event("MovePreview")
         assert (preview.data.id, preview.data.user) == (tester.id, "Eva")
         assert not await _granted(client, "WriteLock", rpc.WriteLockArgs(tester.id))
         assert await opened.pose("tester") == before
@@ -189,7 +189,7 @@ async def test_steps_and_typed_numbers_place_an_object_exactly(opened: Open, bro
         await until(lambda: _at(opened, "z", start.position.z + 0.02), "two steps up")
         edits = await opened.client.call("History", rpc.HistoryArgs())
         new = [edit for edit in edits.edits if edit not in before.edits]
-        assert [edit.request for edit in new] == ["UpdateObjectPose"]
+        assert [edit.request for edit in new] == ["UpdateSceneObjectPose"]
 
         for typed, axis, value in (
             ("+12.5", "x", start.position.x + 0.0125),

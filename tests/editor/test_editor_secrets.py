@@ -14,7 +14,7 @@ from tests.e2e.harness import Cell, scene_state, until
 from tests.editor import texts
 from tests.editor.screen import Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(120)]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 CODE = "swordfish-4711"
 VAULT = '''
@@ -47,7 +47,7 @@ TYPE = {"id": "Vault", "name": "Vault", "source": VAULT, "description": ""}
 
 
 async def upload(cell: Cell, source: dict[str, str]) -> None:
-    async with httpx.AsyncClient(base_url=cell.url.replace("ws", "http", 1)) as rest:
+    async with httpx.AsyncClient(timeout=60, base_url=cell.url.replace("ws", "http", 1)) as rest:
         answer = await rest.put("/object-types", json=source)
         assert answer.status_code == 200, answer.text
 

@@ -91,7 +91,7 @@ async def test_page_needs_no_token_but_foreign_origins_are_refused(tmp_path: Pat
     settings = ServerSettings(data_dir=tmp_path, host="192.0.2.1")  # on a network every client needs a token
     async with running_server(settings) as services:
         transport = httpx.ASGITransport(create_app(services))
-        async with httpx.AsyncClient(transport=transport, base_url="http://192.0.2.1:6789") as client:
+        async with httpx.AsyncClient(timeout=60, transport=transport, base_url="http://192.0.2.1:6789") as client:
             assert (await client.get("/")).status_code == 200
             assert (await client.head("/")).status_code == 200
             assert (await client.get("/api/devices")).status_code == 401

@@ -31,4 +31,5 @@ def test_shell_and_3d_view_are_small(built_editor: Path) -> None:
     assert sum(sizes.values()) <= MOST, sizes
     # Rarely used parts are loaded on demand.
     assert not needed(manifest, "src/engine/loaders/urdf.ts") <= files
-    assert not needed(manifest, "src/ui/kit/menu.tsx") <= files
+    assert not needed(manifest, "src/ui/settings/SettingsMenu.tsx") <= files
+    assert not needed(manifest, "src/ui/join/Join.tsx") <= files

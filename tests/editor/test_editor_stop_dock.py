@@ -18,7 +18,7 @@ from tests.e2e.harness import Cell, scene_state, until
 from tests.editor import texts
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(240)]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 SIZES = ("tablet", "desktop", "ipad", "phone")
 BUTTONS = {"Tool": 6, "By hand": 1}

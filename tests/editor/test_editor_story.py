@@ -2,7 +2,6 @@
 
 import asyncio
 import re
-import time
 from collections.abc import AsyncIterator
 from typing import Any
 
@@ -17,7 +16,8 @@ from tests.editor.screen import Screen, screen_of
 
 pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(400), pytest.mark.alone]
 
-SLOWLY = "0.05"
+SLOWLY = "5"
+"""Speed, % of the maximum."""
 GOOD = 3
 """A seed with a good board: the robot ends at a place with free space around it."""
 
@@ -69,12 +69,15 @@ class User:
         await self.screen.press(texts.GO_ONLINE)
         await self.page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=40_000)
 
-    async def add_action(self, offer: str) -> str:
-        """Add an action to the selected point and return its name."""
+    async def add_action(self, offer: str, follows: str = "") -> str:
+        """Add an action to the selected point, after the selected action or in `follows`, and return its name."""
         await self.tool(texts.PROGRAM)
         await self.mode("Add")
+        if follows:
+            await self.panel.get_by_label("Follows").select_option(label=follows)
         await self.panel.get_by_role("radio", name=re.compile("^On ")).click()
         await self.panel.get_by_role("region", name="robot", exact=True).get_by_role("button", name=offer).first.click()
+        await self.panel.get_by_role("button", name="Set parameters").click()
         await self.panel.get_by_role("region", name=texts.PARAMETERS).wait_for()
         return await self.title()
 
@@ -124,26 +127,18 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
         await page.get_by_role("radio", name="3D", exact=True).click()
         await user.tool(texts.OBJECTS)
         await page.get_by_role("row", name=f"{point} Action point").click()
-        move = await user.add_action("move Move the TCP to a pose.")
-        speed = user.panel.get_by_label("speed", exact=True)
-        await speed.fill(SLOWLY)
-        await speed.press("Enter")
         check = await user.add_action("get digital input")
         number = user.panel.get_by_label("number", exact=True)
         await number.fill("1")
         await number.press("Enter")
+        move = await user.add_action("move Move the TCP to a pose.", f"{check}: if no")
+        speed = user.panel.get_by_label("speed", exact=True)
+        await speed.fill(SLOWLY)
+        await speed.press("Enter")
         await screen.press(texts.CLOSE_PANEL)
         await user.mode("Flow")
         graph = page.get_by_role("region", name=texts.GRAPH)
-
-        async def step(way: str, to: str) -> None:
-            await graph.get_by_role("button", name=way, exact=True).click()
-            await graph.locator(f'.react-flow__node[aria-label^="{to}"] .flow-name').click()
-
-        await step("Start: next", check)
-        await step(f"{check}: no", move)
-        await step(f"{check}: yes", "End")
-        await step(f"{move}: next", "End")
+        await graph.get_by_role("button", name=texts.WHOLE_PROGRAM).click()
 
         # Run with a breakpoint; stop the arm in mid-move.
         await graph.locator(f'.react-flow__node[aria-label^="{move}"] .flow-name').click()
@@ -156,12 +151,10 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
         await screen.picture("story paused")
         await bar.get_by_role("button", name=texts.RESUME).click()
         await until(user.moving, "the arm moves")
-        tapped = time.monotonic()
         await page.get_by_role("button", name=texts.STOP_MOTION).click()
         await until(user.resting, "the arm rests", 2)
-        assert time.monotonic() - tapped < 2
         assert (await user.robot())["tcp_pose"][2] > taught + 0.005, "it had come to the end"
-        await expect(bar).to_be_hidden(timeout=20_000)
+        await expect(bar).to_be_hidden()
         still = (await user.robot())["q"]
 
         # Undo a removal.
@@ -181,7 +174,7 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
         await row.wait_for()
         await workplace.tell("robot", "silence")
         lost = user.panel.get_by_role("listitem").filter(has_text="connection lost")
-        await expect(lost).to_contain_text("robot", timeout=30_000)
+        await expect(lost).to_contain_text("robot")
         await screen.picture("story cable")
         await workplace.tell("robot", "heal")
         await user.panel.get_by_role("listitem").filter(has_text="robot").filter(has_text="online").wait_for()

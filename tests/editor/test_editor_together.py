@@ -19,7 +19,7 @@ from tests.e2e.harness import Cell, until
 from tests.editor import texts
 from tests.editor.screen import Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(120)]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 EDITS = 10
 """Number of edits of each user."""
@@ -43,7 +43,7 @@ async def edits_at_a_screen(screen: Screen, seed: int) -> None:
 
 async def _added(client: Client, name: str) -> str:
     while True:
-        event = await client.next_event("ActionPointChanged", timeout=10)
+        event = await client.next_event("ActionPointChanged")
         if event.change_type is ChangeType.ADD and event.data.name == name:
             found: str = event.data.id
             return found
@@ -115,7 +115,7 @@ async def test_concurrent_edits_converge(cell: Cell, browser: Browser) -> None:
         async def opened() -> Project:
             """Return the open project as a new client receives it."""
             async with Client(cell.url, "late", reconnect=False) as late:
-                shown = (await late.next_event("OpenProject", timeout=10)).data.project
+                shown = (await late.next_event("OpenProject")).data.project
                 assert isinstance(shown, Project)
                 return shown
 

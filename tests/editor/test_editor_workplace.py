@@ -18,9 +18,9 @@ from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from tests.e2e.harness import Cell, until
 from tests.editor import texts
-from tests.editor.screen import Screen, screen_of
+from tests.editor.screen import FONTS, VIEWPORTS, Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(180)]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 SLOW = 0.05
 """Speed fraction at which a motion of 0.3 m lasts long enough to be stopped."""
@@ -169,9 +169,9 @@ async def test_stop_motion_stops_a_motion_of_another_user(place: Place, browser:
             [place.robot, start["position"]["z"]],
         )
         await screen.page.get_by_role("button", name=texts.STOP_MOTION).click()
-        ended = await client.next_event("RobotMoveToPose", timeout=10)
+        ended = await client.next_event("RobotMoveToPose")
         while ended.data.move_event_type.value == "start":
-            ended = await client.next_event("RobotMoveToPose", timeout=10)
+            ended = await client.next_event("RobotMoveToPose")
         rest = await client.call(
             "GetEndEffectorPose", rpc.GetEndEffectorPoseArgs(place.robot, arguments.end_effector_id)
         )
@@ -189,7 +189,7 @@ async def test_edits_and_locks_of_another_user_are_shown(place: Place, browser: 
         await screen.press(texts.open_document(place.project.name))
         await screen.item(place.robot)
         await client.call("AddActionPoint", rpc.AddActionPointArgs("lonely", Pose().position))
-        added = await client.next_event("ActionPointChanged", timeout=10)
+        added = await client.next_event("ActionPointChanged")
         new = added.data.id
         assert (await screen.item(new))["pose"]["position"] == {"x": 0, "y": 0, "z": 0}
         await screen.sees(texts.NOT_SAVED)
@@ -200,9 +200,9 @@ async def test_edits_and_locks_of_another_user_are_shown(place: Place, browser: 
         await screen.page.get_by_role("row", name="lonely In use by colleague").click()
         # The panel shows who holds the lock, since when, and a button to ask for it.
         about = screen.page.get_by_role("region", name="About", exact=True)
-        await about.get_by_text("just now. Available when colleague has finished").wait_for()
+        await about.get_by_text(re.compile(rf"{texts.AGO}\. Available when colleague has finished")).wait_for()
         await screen.press("Ask colleague for it")
-        asked = await client.next_event("ViewStateChanged", timeout=10)
+        asked = await client.next_event("ViewStateChanged")
         assert (asked.data.scope, asked.data.values[f"asked/{new}"]["by"]) == (ViewScope.SHARED, "Eva")
         await about.get_by_text("Request sent to colleague").wait_for()
         lock = place.project.action_points[0].id
@@ -250,6 +250,12 @@ async def test_online_without_a_device_and_retry(place: Place, browser: Browser)
             listed = await page.get_by_role("list").get_by_role("listitem").all_inner_texts()
             assert [text.split()[0] for text in listed] == ["tester", "flow", "reader", "robot"]  # no boxes
             assert place.cell.at["tester"]["modbus"].split(":")[0] in await tester.inner_text()
+            # The longest words of the switch.
+            await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
+            await screen.settle()
+            assert not await screen.faults_with(FONTS)
+            await screen.picture("device fault phone")
+            await page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
         finally:
             await place.cell.tell("tester", "heal")
         await screen.press("Retry tester")
@@ -270,3 +276,33 @@ async def test_online_without_a_device_and_retry(place: Place, browser: Browser)
 
 async def _tool(screen: Screen, name: str) -> None:
     await screen.page.get_by_role("navigation").get_by_role("button").filter(has_text=name).click()
+
+
+_OUTSIDE = """() => {
+    const { clientWidth: width, clientHeight: height } = document.querySelector(".view canvas");
+    const off = ({ x, y }) => x < 0 || y < 0 || x > width || y > height;
+    const at = __engine.ids().filter((id) => __engine.item(id).kind === "action").map((id) => __engine.item(id).screen);
+    const xs = at.map(({ x }) => x);
+    return { off: at.filter(off).length, share: (Math.max(...xs) - Math.min(...xs)) / width };
+}"""
+
+
+async def test_camera_fits_the_cell_until_it_is_moved(place: Place, browser: Browser) -> None:
+    """All actions are in the view, also next to a panel, and a moved camera stays where it is."""
+    await place.client.call("OpenProject", rpc.IdArgs(place.project.id))
+    async with screen_of(browser, place.cell.url) as screen:
+        page = screen.page
+        await screen.join("Eva")
+        await screen.item(place.project.action_points[0].id)
+        await screen.settle()
+        for tool in ("", texts.POINTS):
+            if tool:
+                await page.get_by_role("navigation").get_by_role("button", name=tool, exact=True).click()
+                await page.get_by_role("complementary").get_by_role("heading", name=tool, exact=True).wait_for()
+            await screen.until(f"() => ({_OUTSIDE})().off === 0")
+            assert (await page.evaluate(_OUTSIDE))["share"] > 0.3
+        await page.evaluate("__engine.view.set([2, 0.5, 1], [0, 0, 0])")
+        width = await page.evaluate("__engine.width")
+        await screen.close_panels()
+        await screen.until("width => __engine.width > width", width)
+        assert await page.evaluate("__engine.view.camera.position.toArray()") == pytest.approx([2, 0.5, 1])
