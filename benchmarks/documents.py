@@ -153,7 +153,7 @@ async def logic(report: Report, author: Author, scene: str, echo: ClientConnecti
     _, point = await author.project(scene, "branches")
     ids = await author.actions(point, range(3 * 18 + 2))
     first, last, blocks = ids[0], ids[1], [ids[at : at + 3] for at in range(2, len(ids), 3)]
-    steps = [{"start": last, "end": "END"}]
+    steps: list[dict[str, object]] = [{"start": last, "end": "END"}]
     for (dice, *branches), following in zip(blocks, [*(block[0] for block in blocks[1:]), last], strict=True):
         for branch, value in zip(branches, ("true", "false"), strict=True):
             condition = {"what": f"{dice}/default/0", "value": value}

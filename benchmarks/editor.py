@@ -22,7 +22,7 @@ from arcor2_hw.client import Client, RequestFailed
 from arcor2_hw.data import rpc
 from arcor2_hw.data.events import SceneStateEnum
 from arcor2_hw.data.geometry import Pose, Position
-from arcor2_hw.data.project import Project
+from arcor2_hw.data.project import ActionParameter, Flow, Project
 from arcor2_server.web.editor import FILES
 from benchmarks.metrics import Metric, Report, median, percentile
 from tests.e2e.harness import Cell, running_cell, scene_state, until
@@ -40,6 +40,26 @@ RESTARTS: Final = 3
 ATTEMPTS: Final = 4
 SLOW: Final = 0.015
 """Fraction of the robot's speed."""
+LARGE_POINTS: Final = 300
+LARGE_ACTIONS: Final = 400
+ORBITED: Final = 40
+"""Number of frames drawn around the workplace."""
+_ORBIT: Final = """async (frames) => {
+    const engine = window.__engine, took = [];
+    const { position, target } = engine.view.viewpoint;
+    const pixel = new Uint8Array(4), gl = engine.renderer.getContext();
+    for (let n = 0; n < frames; n++) {
+        const a = 0.03 * (n + 1), [x, y] = [position[0] - target[0], position[1] - target[1]];
+        const to = [target[0] + x * Math.cos(a) - y * Math.sin(a), target[1] + x * Math.sin(a) + y * Math.cos(a)];
+        engine.view.set([...to, position[2]], target);
+        const begin = performance.now();
+        engine.render();
+        gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);  // waits until the frame is drawn
+        took.push(performance.now() - begin);
+        await new Promise(requestAnimationFrame);
+    }
+    return took;
+}"""
 _PROBE: Final = Path(__file__).with_suffix(".js").read_text()
 
 
@@ -203,6 +223,43 @@ async def returning(report: Report, screen: Screen, cell: Cell) -> None:
     report.add(Metric("editor_back_s", max(took), len(took), note))
 
 
+async def large(report: Report, browser: Browser, cell: Cell, client: Client, project: Project) -> None:
+    """Measure a project with 300 points and 400 actions: opening it, orbiting, and the list of objects."""
+    known = await client.get_project(project.id)
+    scene = await client.get_scene(known.scene_id)
+    flow = next(each.id for each in scene.objects if each.type == "FlowActions")
+    points = [point.id for point in known.action_points]
+    for number in range(LARGE_POINTS - len(points)):
+        place = Position(-0.5 + 0.06 * (number % 17), -0.5 + 0.06 * (number // 17), 0.05)
+        await client.call("AddActionPoint", rpc.AddActionPointArgs(f"large_{number}", place))
+        points.append((await client.next_event("ActionPointChanged")).data.id)
+    before = "START"
+    for number in range(LARGE_ACTIONS):
+        point = points[number % len(points)]
+        seconds = [ActionParameter("seconds", "double", "1.0")]
+        action = rpc.AddActionArgs(point, f"step_{number}", f"{flow}/wait", seconds, [Flow()])
+        await client.call("AddAction", action)
+        added: str = (await client.next_event("ActionChanged")).data.id
+        if before != "START":
+            await client.call("AddLogicItem", rpc.AddLogicItemArgs(before, added))
+        before = added
+    async with screen_of(browser, cell.url) as screen:
+        await screen.page.add_init_script("localStorage.setItem('arcor2-hw.name', 'large')")
+        await screen.page.add_init_script(_PROBE)
+        await screen.page.goto(f"{screen.url}/?q=low")
+        await screen.until("() => window.__bench.items > 0")
+        usable = float((await _observed(screen))["items"]) / 1e3
+        report.add(Metric("editor_large_usable_s", usable, 1, f"{LARGE_POINTS} points, {LARGE_ACTIONS} actions"))
+        await _idle(screen)
+        took: list[float] = await screen.page.evaluate(_ORBIT, ORBITED)
+        report.add(Metric("editor_large_frame_ms", median(took), ORBITED, f"p95 {percentile(took, 95):.0f} ms"))
+        begin = time.perf_counter()
+        await screen.press(texts.OBJECTS)
+        await screen.page.get_by_role("row").first.wait_for()
+        rows = await screen.page.get_by_role("row").count()
+        report.add(Metric("editor_large_list_s", time.perf_counter() - begin, 1, f"{rows} rows rendered"))
+
+
 async def measure(report: Report, directory: Path) -> None:
     """Measure everything in this group."""
     size(report)
@@ -231,6 +288,9 @@ async def measure(report: Report, directory: Path) -> None:
             await stopping(report, screen, client, cell, robot)
             await editing(report, browser, screen, cell, project)
             await returning(report, screen, cell)
+        await client.call("StopScene")
+        await scene_state(client, SceneStateEnum.STOPPED, 30)
+        await large(report, browser, cell, client, project)
 
 
 async def main() -> int:

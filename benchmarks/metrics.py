@@ -115,6 +115,9 @@ GOALS: Final[dict[str, tuple[str, str]]] = {
     "editor_edit_ms": ("ms", "<= 150"),
     "editor_step_ms": ("ms", "<= 150"),
     "editor_back_s": ("s", "<= 2"),
+    "editor_large_usable_s": ("s", "<= 3"),
+    "editor_large_frame_ms": ("ms", "<= 50"),
+    "editor_large_list_s": ("s", "<= 1"),
     "kinematics_plans_found": ("of 20", ">= 20"),
     "kinematics_plan_ms": ("ms", "<= 50"),
 }
