@@ -23,6 +23,12 @@ GRACE: Final = 2
 """Time limit for open requests when the server stops, s. The whole stop must take at most 5 s."""
 ACCEPTED_AT_ONCE: Final = 100
 """Number of connections accepted before the event loop continues."""
+KEEP_ALIVE: Final = 20
+"""Time after which an idle connection is closed, s.
+
+It must be longer than the time for which clients keep idle connections (httpx 5 s, aiohttp 15 s). Otherwise a client
+sends a request on a connection that the server is closing, and gets no answer.
+"""
 PAUSE: Final = 0.5
 """Time without accepting connections after the file descriptors were used up, s."""
 
@@ -43,6 +49,7 @@ def configuration(
         ws_ping_interval=settings.ping_interval,
         ws_ping_timeout=settings.ping_interval,
         ws_per_message_deflate=False,
+        timeout_keep_alive=KEEP_ALIVE,
         timeout_graceful_shutdown=GRACE,
         ssl_certfile=certificate[0] if certificate else None,
         ssl_keyfile=certificate[1] if certificate else None,

@@ -254,6 +254,12 @@ async def test_an_unread_answer_is_dropped(tmp_path: Path) -> None:
         await here.none_left()
 
 
+def test_clients_close_idle_connections_before_the_server(tmp_path: Path) -> None:
+    kept_by_clients = httpx.Limits().keepalive_expiry
+    assert kept_by_clients
+    assert configuration(answer, ServerSettings(data_dir=tmp_path)).timeout_keep_alive >= 3 * kept_by_clients
+
+
 @on_uvloop
 async def test_a_flood_of_connections_blocks_no_admitted_client(tmp_path: Path) -> None:
     async with (
