@@ -32,15 +32,20 @@ def texts(folder: Path, types: Iterable[SourceFile] = ()) -> frozenset[str]:
             are left out, since the library translates them.
         types: Files of object types in the folder that are not installed.
     """
-    files = [path for path in sources(folder) if path.relative_to(folder).parts[0] not in ENGLISH]
-    found = {each.key for each in templates(files)}.union(_texts_of_types(folder, types))
-    found = {text for text in found if any(map(str.isalpha, _FIELD.sub("", text)))}
-    return frozenset(found if folder == LIBRARY else found - _texts_of_library())
+    if folder == LIBRARY:
+        return _texts_of_library()
+    return _found(folder, types) - _texts_of_library()
 
 
 @lru_cache(maxsize=1)
 def _texts_of_library() -> frozenset[str]:
-    return texts(LIBRARY)
+    return _found(LIBRARY)
+
+
+def _found(folder: Path, types: Iterable[SourceFile] = ()) -> frozenset[str]:
+    files = [path for path in sources(folder) if path.relative_to(folder).parts[0] not in ENGLISH]
+    found = {each.key for each in templates(files)}.union(_texts_of_types(folder, types))
+    return frozenset(text for text in found if any(map(str.isalpha, _FIELD.sub("", text))))
 
 
 def _texts_of_types(folder: Path, types: Iterable[SourceFile]) -> Iterator[str]:

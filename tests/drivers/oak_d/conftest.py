@@ -16,7 +16,7 @@ PATIENCE = 40.0
 """s for the first picture: the fake loads Open3D on a busy machine."""
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def running() -> Iterator[FakeProcess]:
     fake = FakeProcess("oak_d", "--width", "640", "--height", "360", "--boot-time", "0.5")
     assert fake.control.do("commands")

@@ -42,7 +42,7 @@ class BackgroundCall:
         return self.result
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def one_fake() -> Iterator[FakeProcess]:
     fake = FakeProcess("opcua_plc", "--time-scale", "5")
     fake.truth()  # opens the control channel, which lives as long
@@ -52,7 +52,7 @@ def one_fake() -> Iterator[FakeProcess]:
 
 @pytest.fixture
 def fake(one_fake: FakeProcess) -> FakeProcess:
-    """A PLC as switched on; one process serves all files, for it takes 2 s of a processor to start."""
+    """A PLC as switched on; one process serves a whole module, for it takes 2 s of a processor to start."""
     one_fake.control.do("heal")
     one_fake.control.do("restart")
     return one_fake

@@ -27,6 +27,7 @@ from arcor2_hw.exceptions import (
 from arcor2_hw.objects.mapped_device import MappedDevice
 from arcor2_hw.testing.fake_bench import modbus_address
 from tests.fakes.conftest import FakeProcess
+from tests.server.cli.generated import run_tests
 
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "docs" / "examples"
@@ -50,14 +51,6 @@ def changed(old: str, new: str) -> str:
     text = (EXAMPLES / "screwdriver.yaml").read_text()
     assert old in text
     return text.replace(old, new)
-
-
-def suite(root: Path) -> str:
-    """Run the tests of a generated driver and return the output."""
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-rs"]
-    done = subprocess.run(command, cwd=root, env=os.environ, capture_output=True, text=True, timeout=200, check=False)
-    assert done.returncode == 0, done.stdout[-6000:]
-    return done.stdout
 
 
 @pytest.fixture(scope="module")
@@ -172,7 +165,7 @@ def test_generated_code_is_clean_and_typed(tmp_path: Path, pytestconfig: pytest.
 
 # ------------------------------------------------------------------------------------------------ the suite
 def test_with_the_fake_of_the_map_the_driver_reaches_bronze(tmp_path: Path) -> None:
-    out = suite(generate(tmp_path, "dispenser"))
+    out = run_tests(generate(tmp_path, "dispenser"))
     assert "Dispenser: bronze (claimed bronze)" in out
     assert "the fake is written from the same source as the driver" in out
     assert set(re.findall(r"SKIPPED .*: Dispenser: (.*)", out)) == {
@@ -189,7 +182,7 @@ def test_with_an_independent_fake_the_driver_reaches_silver(tmp_path: Path) -> N
     quality.write_text(quality.read_text().replace("level: bronze", "level: silver"))
     shutil.copy(EXAMPLES / "screwdriver_fake.py", root / "screwdriver")
     shutil.copy(EXAMPLES / "screwdriver_suite.py", root / "tests" / "test_screwdriver.py")
-    out = suite(root)
+    out = run_tests(root)
     assert re.search(r"Screwdriver: silver \(claimed silver\), \d+ passed; next: quality.yaml names no report", out), (
         out
     )

@@ -10,6 +10,7 @@ import pytest
 from arcor2_hw.data.cell import read_cell
 from arcor2_server.cli.device_new import WIRES, Bus, refusal, texts
 from arcor2_server.cli.starter_kinds import KINDS, Base
+from tests.server.cli.generated import run_tests
 
 COMMAND = [sys.executable, "-m", "arcor2_server.cli.main"]
 ROOT = Path(__file__).parents[3]
@@ -31,19 +32,9 @@ def written(directory: Path, base: Base, bus: Bus, name: str = "dough-mixer") ->
 
 @pytest.mark.parametrize(("base", "bus"), RUN, ids=lambda each: each.value)
 def test_the_generated_driver_reaches_silver(tmp_path: Path, base: Base, bus: Bus) -> None:
-    root = written(tmp_path, base, bus)
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-rs"],
-        cwd=root,
-        env=os.environ,
-        capture_output=True,
-        text=True,
-        timeout=150,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout[-6000:]
-    assert "DoughMixer: silver (claimed silver)" in done.stdout
-    for line in done.stdout.splitlines():
+    output = run_tests(written(tmp_path, base, bus))
+    assert "DoughMixer: silver (claimed silver)" in output
+    for line in output.splitlines():
         if line.startswith("SKIPPED"):
             assert line.endswith(tuple(why for _, why in KINDS[base].not_run)), line
 
@@ -71,17 +62,7 @@ def test_generated_code_is_clean_with_any_name(tmp_path: Path) -> None:
 
 def pass_tests(root: Path, selected: str, count: int) -> None:
     """Run selected tests of a generated driver; as many have to pass."""
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-k", selected],
-        cwd=root,
-        env=os.environ,
-        capture_output=True,
-        text=True,
-        timeout=150,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout[-6000:]
-    assert f"{count} passed" in done.stdout
+    assert f"{count} passed" in run_tests(root, "-k", selected)
 
 
 def test_a_generated_modbus_driver_also_works_over_rtu(tmp_path: Path) -> None:
