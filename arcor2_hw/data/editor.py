@@ -132,7 +132,7 @@ class TaskStateData(TranslatableData, frozen=True):
 
 
 # ---------------------------------------------------------------------------------------------- history
-class HistoryStep(Data, frozen=True):
+class HistoryStep(TranslatableData, frozen=True):
     """The edit that Undo or Redo of a user would revert.
 
     request: request that made the edit. text: label of the button, without `Undo` or `Redo`.

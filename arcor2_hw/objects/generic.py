@@ -10,6 +10,7 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2NotImplemented, NotFound
+from arcor2_hw.messages import Message
 from arcor2_hw.objects.settings import Settings
 
 DEFAULT_CONNECT_TIMEOUT = 5.0
@@ -111,7 +112,7 @@ class Generic(abc.ABC):
         return Connection.ONLINE
 
     @property
-    def connection_reason(self) -> str:
+    def connection_reason(self) -> str | Message:
         """Return why the connection is lost or failed. Types with an `Observing` connection need not override it."""
         return ""
 

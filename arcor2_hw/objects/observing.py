@@ -9,6 +9,7 @@ from typing import Final
 
 from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import Cancelled, ConnectionLost, DeviceError, DeviceTimeout, NotConnected
+from arcor2_hw.messages import Message
 
 GoOn = Callable[[], None]
 """A check that returns while work may continue, and otherwise raises Cancelled or ConnectionLost."""
@@ -80,9 +81,10 @@ class Observing:
         self._listener: Callable[[Observing], None] | None = getattr(_created_here, "changed", None)
 
     @property
-    def reason(self) -> str:
-        """Return why the connection is lost or failed; empty in other states."""
-        return str(self._reason or "") if self._state in (Connection.LOST, Connection.FAILED) else ""
+    def reason(self) -> Message | None:
+        """Return why the connection is lost or failed; None in other states."""
+        reason = self._reason
+        return reason.message if reason and self._state in (Connection.LOST, Connection.FAILED) else None
 
     @property
     def state(self) -> Connection:

@@ -136,17 +136,19 @@ class Device:
             self._connections.append(life)
         self._changed(self)
 
-    def connection_reason(self) -> str:
-        """Return why the connection is lost or has failed; empty if it has not, or for an unknown reason."""
+    def connection_reason(self) -> Message | None:
+        """Return why the connection is lost or has failed; None if it has not, or for an unknown reason."""
         given = "" if self.instance is None else self.instance.connection_reason
-        return given or next((life.reason for life in self._connections if life.reason), "")
+        if given:
+            return given if isinstance(given, Message) else Message.of(given)
+        return next((life.reason for life in self._connections if life.reason), None)
 
     def require_not_lost(self, method: str) -> None:
         """Raise ConnectionLost while the connection is lost."""
         if self.require().connection is Connection.LOST:
             raise ConnectionLost(
                 "{name}: {method} was not executed, because the connection is lost",
-                self.connection_reason(),
+                str(self.connection_reason() or ""),
                 name=self.name,
                 method=method,
             )

@@ -97,8 +97,7 @@ class Watch:
                 if before is not None:
                     queried = (before.health, before.alarms, before.control_owner)
             connection = _value_or(lambda: instance.connection, Connection.FAILED)
-            reason = _value_or(device.connection_reason, "") if connection in _WITH_REASON else ""
-            why = Message.of(reason) if reason else None
+            why = _value_or(device.connection_reason, None) if connection in _WITH_REASON else None
             was = Connection.OFFLINE if before is None else before.connection
             if before is not None and connection is was:
                 why = before.reason  # keep the reason of the loss; later attempts to connect may fail for others

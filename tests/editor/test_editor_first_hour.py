@@ -171,6 +171,17 @@ async def test_from_an_empty_server_to_a_stepped_program(cell: Cell, browser: Br
         await screen.picture("first hour paused")
         assert user.taps <= MOST_TAPS
 
+        # Undo survives saving and running; an action and its connections are one step.
+        await bar.get_by_role("button", name=texts.STOP, exact=True).click()
+        await page.get_by_role("button", name=texts.undo("adding the action wait")).click(timeout=30_000)
+        await page.get_by_role("button", name="Redo adding the action wait").wait_for()
+        remaining = await client.get_project(listed.id)
+        assert len(remaining.logic) == len(project.logic), "the saved project is unchanged"
+        # The object of the wait was added online, so it is a step of its own: it cannot be removed online.
+        await page.get_by_role("button", name=texts.undo("adding the object flow")).wait_for()
+        await page.get_by_role("button", name="Redo adding the action wait").click()
+        await page.get_by_role("button", name=texts.undo("adding the action wait")).wait_for()
+
 
 async def test_a_missing_payload_is_named_and_set(cell: Cell, browser: Browser) -> None:
     """On a phone, too; what was typed survives closing the panel."""

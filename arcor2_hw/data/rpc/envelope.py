@@ -1,8 +1,8 @@
 """The envelopes of requests and answers, and the declaration of a request."""
 
-from typing import Any
+from typing import Annotated, Any
 
-from msgspec import Raw, Struct
+from msgspec import Meta, Raw, Struct
 
 from arcor2_hw.data.base import UNSET, Data, TranslatableData, Unset
 from arcor2_hw.data.role import Role
@@ -28,6 +28,7 @@ class Request(Data, frozen=True):
     """The envelope of a request; `args` is decoded when the request is known.
 
     `codes`: whether a refusal contains its reason, and every answer what is needed to translate its messages.
+    `step`: edits of a user with the same name of a step are undone together.
     """
 
     id: int
@@ -35,6 +36,7 @@ class Request(Data, frozen=True):
     args: Raw | Unset = UNSET
     dry_run: bool = False
     codes: bool = False
+    step: Annotated[str, Meta(max_length=100)] = ""
 
 
 class Response(TranslatableData, frozen=True):

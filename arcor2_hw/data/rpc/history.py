@@ -58,7 +58,7 @@ class HistoryItem(Data, frozen=True):
 
 
 class HistoryEdit(Data, frozen=True):
-    """One edit. `of` is the edit that an undo or redo reverted, or the restored revision."""
+    """One edit. `of` is the edit that an undo or redo reverted or that started the step, or the restored revision."""
 
     number: int
     time: Timestamp

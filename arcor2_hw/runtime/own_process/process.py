@@ -13,9 +13,11 @@ from typing import Any, Final
 
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, NotConnected, NotFound
+from arcor2_hw.messages import Message
 from arcor2_hw.objects import Generic
 from arcor2_hw.runtime.own_process import state
-from arcor2_hw.runtime.own_process.peer import Kind, Message, Peer
+from arcor2_hw.runtime.own_process.peer import Kind, Peer
+from arcor2_hw.runtime.own_process.peer import Message as PeerMessage
 from arcor2_hw.runtime.own_process.stubs import object_stub, stub_class
 
 START_TIMEOUT: Final = 10.0
@@ -43,7 +45,7 @@ class DeviceProcess(Peer):
         self._cls, self._name, self._changed = cls, name, changed
         self._state: state.State = {}
         self._ending = False
-        self._end_reason = ""
+        self._end_reason: Message | None = None
         self._end_known = threading.Event()
         with theirs:
             self._process = subprocess.Popen(  # noqa: S603 - it runs our own module
@@ -100,7 +102,7 @@ class DeviceProcess(Peer):
             self._end_process()
         code = self._process.wait()
         self._socket.close()
-        self._end_reason = f"{self._name}: the process of the device {_exit_description(code)}"
+        self._end_reason = _end_message(self._name, code)
         self._end_known.set()
         if self._ending:
             return
@@ -133,11 +135,11 @@ class DeviceProcess(Peer):
         """Return the error of a call that was not answered."""
         return ConnectionLost(self._end_text())
 
-    def _end_text(self) -> str:
+    def _end_text(self) -> Message:
         self._end_known.wait(2.0 * EXIT_WAIT)
-        return self._end_reason or f"{self._name}: the process of the device has ended"
+        return self._end_reason or Message.of("{name}: the process of the device has ended", name=self._name)
 
-    def notified(self, message: Message) -> None:
+    def notified(self, message: PeerMessage) -> None:
         """Store a new state of the instance, or log a record of the process."""
         content = self.codec.decode(message.payload)
         if message.header.kind is Kind.LOG:
@@ -156,10 +158,11 @@ def _settings(stub: Any) -> Any:
     return stub._settings
 
 
-def _exit_description(code: int) -> str:
+def _end_message(name: str, code: int) -> Message:
     if code >= 0:
-        return f"ended with status {code}"
+        return Message.of("{name}: the process of the device ended with status {code}", name=name, code=code)
     try:
-        return f"was killed by {signal.Signals(-code).name}"
+        which = signal.Signals(-code).name
     except ValueError:
-        return f"was killed by signal {-code}"
+        which = f"signal {-code}"
+    return Message.of("{name}: the process of the device was killed by {signal}", name=name, signal=which)

@@ -8,7 +8,7 @@ import type { State } from "../store/state";
 import { now, select } from "../store/store";
 import { relativeTo, worldOf } from "../viewmodel/frames";
 import { awaited } from "./awaited";
-import { held, refusal } from "./requests";
+import { held, newStep, refusal } from "./requests";
 import { type Chosen, robotArg } from "./robot";
 
 const names = (of: Record<string, { name: string }> | undefined) => Object.values(of ?? {}).map((each) => each.name);
@@ -31,14 +31,15 @@ export function addPoint(world: Position, parent = "", orientation?: Orientation
     const name = freeName("point", names(doc.points));
     const frame = worldOf(doc, parent);
     const { position } = relativeTo(frame, { position: world, orientation: { x: 0, y: 0, z: 0, w: 1 } });
-    await call("AddActionPoint", { name, position, ...(parent ? { parent } : {}) });
+    const step = newStep();
+    await call("AddActionPoint", { name, position, ...(parent ? { parent } : {}) }, step);
     const point = await pointNamed(name);
     if (!point) return;
     select({ kind: "point", id: point.id });
     if (orientation) {
       const turned = relativeTo(frame, { position: world, orientation }).orientation;
       await held(point.id, () =>
-        call("AddActionPointOrientation", { action_point_id: point.id, orientation: turned, name: "default" }),
+        call("AddActionPointOrientation", { action_point_id: point.id, orientation: turned, name: "default" }, step),
       );
     }
   });
@@ -94,9 +95,10 @@ export function copyPoint(id: string, count: number, step: Position): Promise<st
   return refusal(async () => {
     const from = now().doc?.points[id]?.position;
     if (!from) return;
+    const together = newStep();
     for (let number = 1; number <= count; number++) {
       const position = { x: from.x + step.x * number, y: from.y + step.y * number, z: from.z + step.z * number };
-      await call("CopyActionPoint", { id, position }, { deadline: 30 });
+      await call("CopyActionPoint", { id, position }, { ...together, deadline: 30 });
     }
   });
 }

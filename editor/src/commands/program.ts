@@ -6,6 +6,7 @@ import { insertion, type Slot } from "../program/chain";
 import { cannotLead, END, freeStep, incoming, outgoing } from "../program/logic";
 import { actionNames, freeName, newOutputs } from "../program/naming";
 import { initial } from "../program/values";
+import type { CallOptions } from "../protocol/client";
 import type {
   Action,
   ActionParameter,
@@ -23,7 +24,7 @@ import { isClosed } from "../store/selectors";
 import type { State } from "../store/state";
 import { notify, now, select, setUi, store } from "../store/store";
 import { awaited } from "./awaited";
-import { ask, held, refusal, sentence } from "./requests";
+import { ask, held, newStep, refusal, sentence } from "./requests";
 
 /** Return why a request cannot edit the program now; an empty string if it can. */
 export function notEditable(state: State, request: keyof Requests = "UpdateAction"): string {
@@ -36,7 +37,7 @@ export type Where = { pointId: string; orientationId?: string } | { position: Po
 
 /**
  * Add an action with names for its results, and the point and orientation that it needs, and connect it in a slot of
- * the program. Return its id, or undefined after notifying the user.
+ * the program, as one step of undo. Return its id, or undefined after notifying the user.
  *
  * `object`: the device, or the name of a service type, whose object is added if there is none. `where`: null if the
  * action needs no place; it is then stored with its predecessor.
@@ -48,17 +49,19 @@ export async function addAction(
   slot: Slot | null,
 ): Promise<string | undefined> {
   try {
-    const objectId = await serviceObject(object);
-    const at = where ?? (await anyPlace(objectId, slot));
-    const pointId = "pointId" in at ? at.pointId : await newPoint(`${meta.name}_point`, at.position);
-    const parameters = await startingParameters(objectId, meta, pointId, at);
+    const step = newStep();
+    const objectId = await serviceObject(object, step);
+    const at = where ?? (await anyPlace(objectId, slot, step));
+    const pointId = "pointId" in at ? at.pointId : await newPoint(`${meta.name}_point`, at.position, step);
+    const parameters = await startingParameters(objectId, meta, pointId, at, step);
     const { doc } = now();
     if (!doc) return undefined;
     const name = freeName(meta.name, actionNames(doc));
     const flows = [{ type: "default" as const, outputs: newOutputs(doc, meta.name, meta.returns.length) }];
-    await call("AddAction", { action_point_id: pointId, name, type: `${objectId}/${meta.name}`, parameters, flows });
+    const action = { action_point_id: pointId, name, type: `${objectId}/${meta.name}`, parameters, flows };
+    await call("AddAction", action, step);
     const added = await awaited((state) => Object.values(state.doc?.actions ?? {}).find((each) => each.name === name));
-    if (slot) await insert(added.id, slot);
+    if (slot) await insert(added.id, slot, step);
     select({ kind: "action", id: added.id });
     return added.id;
   } catch (error) {
@@ -68,7 +71,7 @@ export async function addAction(
 }
 
 /** Return the id of an object; for the name of a type, that of its first object, which is added if there is none. */
-async function serviceObject(object: string): Promise<string> {
+async function serviceObject(object: string, step: CallOptions): Promise<string> {
   const of = (state: State) => Object.values(state.doc?.objects ?? {}).find((each) => each.type === object)?.id;
   const { doc } = now();
   if (doc && object in doc.objects) return object;
@@ -78,45 +81,46 @@ async function serviceObject(object: string): Promise<string> {
     object.replace(/Actions$/, "").toLowerCase(),
     Object.values(doc?.objects ?? {}).map((each) => each.name),
   );
-  await call("AddSceneObject", { name, type: object });
+  // Undo cannot remove an object while the scene is online, and would refuse the whole step.
+  await call("AddSceneObject", { name, type: object }, now().live.state === "stopped" ? step : {});
   return awaited(of);
 }
 
 /** Return the point for an action without a place: that of its predecessor, else one on the device or in the world. */
-async function anyPlace(objectId: string, slot: Slot | null): Promise<Where> {
+async function anyPlace(objectId: string, slot: Slot | null, step: CallOptions): Promise<Where> {
   const { doc } = now();
   const before = doc?.actions[slot?.after ?? ""]?.pointId ?? Object.keys(doc?.points ?? {})[0];
   if (before !== undefined) return { pointId: before };
   const position = doc?.objects[objectId]?.pose?.position ?? { x: 0, y: 0, z: 0 };
-  return { pointId: await newPoint("program", position) };
+  return { pointId: await newPoint("program", position, step) };
 }
 
 /** Connect a new action in a slot: what was there follows it. */
-async function insert(id: string, slot: Slot): Promise<void> {
+async function insert(id: string, slot: Slot, step: CallOptions): Promise<void> {
   const { doc } = now();
   if (!doc) return;
   const { redirect, branch, to } = insertion(doc, slot);
   const update = async (item: string, end: string, condition: ProjectLogicIf | undefined) => {
     const start = doc.logic[item]?.start;
-    if (start) await call("UpdateLogicItem", { logic_item_id: item, start, end, condition });
+    if (start) await call("UpdateLogicItem", { logic_item_id: item, start, end, condition }, step);
   };
   if (branch) await update(branch.id, doc.logic[branch.id]?.end ?? END, branch.condition);
   if (redirect) await update(redirect, id, slot.condition);
-  else await call("AddLogicItem", { start: slot.after, end: id, condition: slot.condition });
-  await call("AddLogicItem", { start: id, end: to });
+  else await call("AddLogicItem", { start: slot.after, end: id, condition: slot.condition }, step);
+  await call("AddLogicItem", { start: id, end: to }, step);
 }
 
-async function newPoint(base: string, position: Position): Promise<string> {
+async function newPoint(base: string, position: Position, step: CallOptions): Promise<string> {
   const taken = Object.values(now().doc?.points ?? {}).map((each) => each.name);
   const name = freeName(base, taken);
-  await call("AddActionPoint", { name, position });
+  await call("AddActionPoint", { name, position }, step);
   return (await awaited((state) => Object.values(state.doc?.points ?? {}).find((each) => each.name === name))).id;
 }
 
 /** The tool points down, which suits a gripper above a table. */
 export const DOWN: Orientation = { x: 1, y: 0, z: 0, w: 0 };
 
-async function orientationOf(pointId: string, where: Where): Promise<string> {
+async function orientationOf(pointId: string, where: Where, step: CallOptions): Promise<string> {
   if ("pointId" in where && where.orientationId) return where.orientationId;
   const on = (state: State) =>
     Object.values(state.doc?.orientations ?? {}).find((each) => each.pointId === pointId)?.id;
@@ -124,13 +128,13 @@ async function orientationOf(pointId: string, where: Where): Promise<string> {
   if (there) return there;
   const orientation = "orientation" in where ? where.orientation : DOWN;
   await held(pointId, () =>
-    call("AddActionPointOrientation", { action_point_id: pointId, orientation, name: "default" }),
+    call("AddActionPointOrientation", { action_point_id: pointId, orientation, name: "default" }, step),
   );
   return awaited(on);
 }
 
 /** Return joints of a robot at a point; they are read from the robot if there are none. */
-async function jointsOf(pointId: string, robotId: string): Promise<string> {
+async function jointsOf(pointId: string, robotId: string, step: CallOptions): Promise<string> {
   const on = (state: State) =>
     Object.values(state.doc?.joints ?? {}).find((each) => each.pointId === pointId && each.robot_id === robotId)?.id;
   const there = on(now());
@@ -140,7 +144,7 @@ async function jointsOf(pointId: string, robotId: string): Promise<string> {
     .map((each) => each.name);
   const name = freeName("default", taken);
   await held(pointId, () =>
-    call("AddActionPointJointsUsingRobot", { action_point_id: pointId, robot_id: robotId, name }),
+    call("AddActionPointJointsUsingRobot", { action_point_id: pointId, robot_id: robotId, name }, step),
   );
   return awaited(on);
 }
@@ -150,15 +154,16 @@ async function startingParameters(
   meta: ObjectAction,
   pointId: string,
   where: Where,
+  step: CallOptions,
 ): Promise<ActionParameter[]> {
   const parameters: ActionParameter[] = [];
   for (const wanted of meta.parameters) {
     const { name, type } = wanted;
     const value =
       type === "pose"
-        ? JSON.stringify(await orientationOf(pointId, where))
+        ? JSON.stringify(await orientationOf(pointId, where, step))
         : type === "joints"
-          ? JSON.stringify(await jointsOf(pointId, objectId))
+          ? JSON.stringify(await jointsOf(pointId, objectId, step))
           : type === "position"
             ? JSON.stringify(pointId)
             : await startingValue(objectId, wanted);
@@ -307,6 +312,7 @@ export async function connect(from: string, to: string, condition?: ProjectLogic
   if (!doc) return;
   const why = cannotLead(doc, from, to);
   if (why) return notify("info", why);
+  const step = newStep();
   let given = condition;
   if (!given) {
     const free = freeStep(doc, types, from);
@@ -314,19 +320,24 @@ export async function connect(from: string, to: string, condition?: ProjectLogic
     given = free.condition;
     if (
       free.first &&
-      !(await updateStep(free.first.item.id, free.first.item.start, free.first.item.end, free.first.condition))
+      !(await updateStep(free.first.item.id, free.first.item.start, free.first.item.end, free.first.condition, step))
     )
       return;
   }
-  if (!(await ask("AddLogicItem", { start: from, end: to, condition: given }))) return;
+  if (!(await ask("AddLogicItem", { start: from, end: to, condition: given }, step))) return;
   const added = await awaited((state) =>
     Object.values(state.doc?.logic ?? {}).find((each) => each.start === from && each.end === to),
   ).catch(() => null);
   if (added) select({ kind: "logic", id: added.id });
 }
 
-export const updateStep = (logic_item_id: string, start: string, end: string, condition: ProjectLogicIf | undefined) =>
-  ask("UpdateLogicItem", { logic_item_id, start, end, condition });
+export const updateStep = (
+  logic_item_id: string,
+  start: string,
+  end: string,
+  condition: ProjectLogicIf | undefined,
+  options?: CallOptions,
+) => ask("UpdateLogicItem", { logic_item_id, start, end, condition }, options);
 
 /** Like `updateStep`, for a form. */
 export const setCondition = (id: string, condition: ProjectLogicIf | undefined): Promise<string> =>

@@ -20,6 +20,9 @@ export async function ask<N extends keyof Requests>(
   }
 }
 
+/** Return an option for requests whose edits Undo reverts together. */
+export const newStep = (): CallOptions => ({ step: Math.random().toString(36).slice(2) });
+
 /** Return why a request would be refused, an empty string if it would be accepted; nothing is changed. */
 export async function whyNot<N extends keyof Requests>(request: N, args?: Requests[N]["args"]): Promise<string> {
   try {

@@ -32,6 +32,8 @@ export interface ClientOptions {
 
 export interface CallOptions {
   dryRun?: boolean;
+  /** Name of a step: edits of the user with the same name are undone together. */
+  step?: string | undefined;
   /** Time limit of the connection, s. */
   deadline?: number;
   signal?: AbortSignal;
@@ -137,7 +139,8 @@ export class ProtocolClient {
         signal?.removeEventListener("abort", aborted);
       };
       this.waiting.set(id, { request, resolve: resolve as (data: never) => void, reject, done });
-      socket.send(JSON.stringify({ id, request, args, dry_run: options?.dryRun || undefined, codes: true }));
+      const { dryRun, step } = options ?? {};
+      socket.send(JSON.stringify({ id, request, args, dry_run: dryRun || undefined, step, codes: true }));
     });
   }
 

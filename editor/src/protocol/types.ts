@@ -600,7 +600,7 @@ export interface HistoryData {
   redo?: number;
 }
 
-/** One edit. `of` is the edit that an undo or redo reverted, or the restored revision. */
+/** One edit. `of` is the edit that an undo or redo reverted or that started the step, or the restored revision. */
 export interface HistoryEdit {
   number: number;
   time: string;
@@ -630,6 +630,8 @@ export interface HistoryStep {
   number: number;
   request: string;
   text: string;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /** Arguments of HoldHandTeaching; `hold`, `sent_ms` and `valid_ms` as in JogRobot. */

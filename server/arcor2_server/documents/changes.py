@@ -109,7 +109,8 @@ class Edit(Struct, frozen=True, rename=FILE_NAMES):
         changes: In the order in which they are applied.
         request: The request that made the edit; for an undo or redo, the request of the edit that it reverts.
         kind: The kind of the edit.
-        target: The number of the edit that an undo or redo reverts, or the restored revision.
+        target: The number of the edit that an undo or redo reverts, or the restored revision; for an edit, the number
+            of the one that started its step, 0 if it is itself a step.
     """
 
     number: int

@@ -1,6 +1,6 @@
 """Updates saved projects and generated object types after a scene was saved or deleted."""
 
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 
 from msgspec.structs import replace
 
@@ -131,8 +131,8 @@ class Dependents:
             virtual -= {obj.type for obj in (await self._storage.scene(listed.id)).objects}
         return [await types.remove(name) for name in sorted(virtual)]
 
-    async def uses_object(self, object_id: str) -> set[str]:
-        """Return the saved projects of the open scene, and the open project, that use an object."""
+    async def uses_object(self, object_id: str, after: Sequence[Change] = ()) -> set[str]:
+        """Return the saved projects of the open scene, and the open project after some changes, that use an object."""
         session = self._session
         scene, opened = session.require_scene(), session.project
         found = set()
@@ -141,6 +141,15 @@ class Dependents:
                 await self._storage.project(project_id), object_id
             ):
                 found.add(project_id)
-        if opened is not None and _uses(opened, object_id):
+        if opened is not None and _uses(_with_changes(session.document, after) or opened, object_id):
             found.add(opened.id)
         return found
+
+
+def _with_changes(document: Document, changes: Sequence[Change]) -> Project | None:
+    """Return the project as it would be after changes; the document stays as it is."""
+    document.apply(changes)
+    try:
+        return document.project
+    finally:
+        document.apply([change.inverse() for change in reversed(changes)])

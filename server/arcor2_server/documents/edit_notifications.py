@@ -7,8 +7,9 @@ from typing import Any, Final
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.editor import HistoryChangedData, HistoryStep
 from arcor2_hw.data.events import Event
+from arcor2_hw.messages import Message, translatable
 from arcor2_server.documents import Session
-from arcor2_server.documents.changes import Change, Edit, EditKind, Kind
+from arcor2_server.documents.changes import Change, Edit, EditKind, Kind, net
 from arcor2_server.documents.history import History
 from arcor2_server.events import Connection, EventHub, encode, make_event
 
@@ -79,27 +80,36 @@ class EditNotifications:
         redo: Any = UNSET
         if user is not None:
             if (edit := session.history.undoable(user)) is not None:
-                undo = HistoryStep(edit.number, edit.request, sentence(_original(edit, session.history)))
+                undo = _step(edit, session.history)
             if (edit := session.history.redoable(user)) is not None:
-                redo = HistoryStep(edit.number, edit.request, sentence(_original(edit, session.history)))
+                redo = _step(edit, session.history)
         return make_event(NAME, HistoryChangedData(session.revision, undo, redo))
 
 
-# ---------------------------------------------------------------------------------------------- sentences
-_WORDS: Final = {
-    Kind.SCENE: "the scene",
-    Kind.OBJECT: "the object",
-    Kind.PROJECT: "the project",
-    Kind.POINT: "the action point",
-    Kind.ACTION: "the action",
-    Kind.PARAMETER: "the parameter",
-    Kind.ORIENTATION: "the orientation",
-    Kind.JOINTS: "the joints",
-    Kind.LOGIC: "a connection",
-    Kind.OVERRIDE: "an override",
-}
+# ---------------------------------------------------------------------------------------------- labels
+_ITEMS: Final = translatable(
+    {
+        Kind.SCENE: "the scene {name}",
+        Kind.OBJECT: "the object {name}",
+        Kind.PROJECT: "the project {name}",
+        Kind.POINT: "the action point {name}",
+        Kind.ACTION: "the action {name}",
+        Kind.PARAMETER: "the parameter {name}",
+        Kind.ORIENTATION: "the orientation {name}",
+        Kind.JOINTS: "the joints {name}",
+        Kind.LOGIC: "a connection",
+        Kind.OVERRIDE: "an override",
+    }
+)
 """Kinds of item by importance: an edit of several kinds is named after the first of them."""
-_BY_IMPORTANCE: Final = tuple(_WORDS)
+_OF_EDIT: Final = tuple(_ITEMS)
+_OF_STEP: Final = (Kind.ACTION, *_OF_EDIT)
+"""The order for a step of several edits: the service object and the point of an action are added with it."""
+
+
+def _step(edit: Edit, history: History) -> HistoryStep:
+    text = label(edit, history)
+    return HistoryStep(edit.number, edit.request, str(text), **text.translation())
 
 
 def _original(edit: Edit, history: History) -> Edit:
@@ -109,34 +119,42 @@ def _original(edit: Edit, history: History) -> Edit:
     return edit
 
 
-def sentence(edit: Edit) -> str:
-    """Describe an edit as text after `Undo` on a button: `moving the object gripper`.
+def label(edit: Edit, history: History) -> Message:
+    """Describe what an undo or redo of an edit and its step reverts, as text after `Undo`: `moving the object gripper`.
 
     An undo is described by the edit that it reverted, which Redo would make again.
     """
+    edit = _original(edit, history)
     if edit.kind is EditKind.RESTORE:
-        return f"going back to revision {edit.target}"
+        return Message.of("going back to revision {revision}", revision=edit.target)
+    step = history.step(edit)
+    if len(step) > 1:
+        return _described(net(change for each in step for change in each.changes), _OF_STEP, edit)
     changes = [change.inverse() for change in edit.changes] if edit.kind is EditKind.UNDO else edit.changes
+    return _described(changes, _OF_EDIT, edit)
+
+
+def _described(changes: Sequence[Change], importance: Sequence[Kind], edit: Edit) -> Message:
     if not changes:
-        return edit.request
+        return Message.of("{request}", request=edit.request)
     # Changes of less important kinds are consequences: joints of a moved action point become invalid.
-    kind = min((change.kind for change in changes), key=_BY_IMPORTANCE.index)
+    kind = min((change.kind for change in changes), key=importance.index)
     of_kind = [change for change in changes if change.kind is kind]
-    first = of_kind[0]
-    value = first.before if first.after is None else first.after
-    name = getattr(value, "name", "")
-    what = f"{_WORDS[kind]} {name}".rstrip()
-    old, new = first.before, first.after
-    if old is None or new is None:
-        text = f"{'adding' if old is None else 'removing'} {what}"
+    old, new = of_kind[0].before, of_kind[0].after
+    name = getattr(old if new is None else new, "name", "")
+    item = Message.of(_ITEMS[kind], name=name)
+    if old is None:
+        done = Message.of("adding {item}", item=item)
+    elif new is None:
+        done = Message.of("removing {item}", item=item)
     elif name and old.name != name:
-        text = f"renaming {_WORDS[kind]} {old.name} to {name}"
+        done = Message.of("renaming {item} to {name}", item=Message.of(_ITEMS[kind], name=old.name), name=name)
     elif kind is Kind.POINT and old.parent != new.parent:
-        text = f"changing the parent of {what}"
+        done = Message.of("changing the parent of {item}", item=item)
     elif any(getattr(old, field, None) != getattr(new, field, None) for field in ("pose", "position")):
-        text = f"moving {what}"
+        done = Message.of("moving {item}", item=item)
     else:
-        text = f"changing {what}"
+        done = Message.of("changing {item}", item=item)
     others = len({change.id for change in of_kind}) - 1
     # Action points below an action point move with it.
-    return text + (f" and {others} more" if others and kind is not Kind.POINT else "")
+    return Message.of("{done} and {count} more", done=done, count=others) if others and kind is not Kind.POINT else done

@@ -2,15 +2,16 @@
 
 import itertools
 from collections import defaultdict, deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
-from arcor2_server.documents.changes import Edit, EditKind
+from arcor2_server.documents.changes import Change, Edit, EditKind
 
 
 class History:
     """Edits with consecutive numbers, oldest first. The oldest are dropped if there are more than `limit`.
 
-    An undo is an edit that reverts another one; a redo is an edit that reverts an undo.
+    An undo is an edit that reverts another one; a redo is an edit that reverts an undo. Edits that one action of the
+    user causes form a step: they are undone together, and the number of the first is that of the step.
     """
 
     def __init__(self, limit: int) -> None:
@@ -18,6 +19,8 @@ class History:
         self._undoable: defaultdict[str, deque[int]] = defaultdict(deque)
         self._redoable: defaultdict[str, deque[int]] = defaultdict(deque)
         self._reverted: set[int] = set()
+        self._latest_step: dict[str, tuple[str, int]] = {}
+        """Name and number of the latest named step of each user."""
 
     def __iter__(self) -> Iterator[Edit]:
         return iter(self._edits)
@@ -29,8 +32,8 @@ class History:
         return len(self._edits)
 
     # ------------------------------------------------------------------------------------------ changes
-    def append(self, edit: Edit) -> None:
-        """Append the next edit."""
+    def append(self, edit: Edit, step: str = "") -> None:
+        """Append the next edit, which later edits with the same name of a step continue."""
         if self._edits and len(self._edits) == self._edits.maxlen:
             self._remove_from_lists(self._edits[0])
         self._edits.append(edit)
@@ -42,8 +45,11 @@ class History:
                 source.remove(edit.target)
             target.append(edit.number)
         else:
-            undoable.append(edit.number)
+            if not (edit.kind is EditKind.EDIT and edit.target in undoable):
+                undoable.append(edit.number)
             redoable.clear()
+        if step:
+            self._latest_step[edit.user] = step, edit.target or edit.number
 
     def pop(self) -> Edit:
         """Remove and return the newest edit."""
@@ -60,6 +66,7 @@ class History:
         self._undoable.clear()
         self._redoable.clear()
         self._reverted.clear()
+        self._latest_step.clear()
 
     def _remove_from_lists(self, edit: Edit) -> None:
         self._reverted.discard(edit.number)
@@ -75,7 +82,25 @@ class History:
 
     def in_force(self, edit: Edit) -> bool:
         """Return whether an edit is not reverted."""
-        return edit.number not in self._reverted
+        step = edit.target if edit.kind is EditKind.EDIT else 0
+        return edit.number not in self._reverted and step not in self._reverted
+
+    def step(self, edit: Edit) -> list[Edit]:
+        """Return the edits of the step that an edit starts, oldest first."""
+        later = self.since(edit.number) if edit.kind is EditKind.EDIT else []
+        return [edit, *(each for each in later if each.kind is EditKind.EDIT and each.target == edit.number)]
+
+    def start_of_step(self, user: str, step: str, changes: Iterable[Change]) -> int:
+        """Return the number of the step that an edit continues, 0 if it starts a new one.
+
+        An edit does not continue a step if it was undone or dropped, or if another edit changed one of the items since.
+        """
+        name, number = self._latest_step.get(user, ("", 0))
+        if name != step or not self.can_undo(user, number):
+            return 0
+        ids = {change.id for change in changes}
+        others = (edit for edit in self.since(number) if edit.target != number or edit.kind is not EditKind.EDIT)
+        return 0 if any(change.id in ids for edit in others for change in edit.changes) else number
 
     def undoable(self, user: str) -> Edit | None:
         """Return the latest edit of a user that is in force and is not an undo."""

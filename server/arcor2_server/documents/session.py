@@ -156,7 +156,13 @@ class Session(OpenDocument):
         return self._number - len(self.history)
 
     async def commit(
-        self, user: str, changes: Sequence[Change], request: str = "", kind: EditKind = EditKind.EDIT, target: int = 0
+        self,
+        user: str,
+        changes: Sequence[Change],
+        request: str = "",
+        kind: EditKind = EditKind.EDIT,
+        target: int = 0,
+        step: str = "",
     ) -> None:
         """Apply changes as one edit; return when they are on disk. Other requests see them at once.
 
@@ -166,16 +172,19 @@ class Session(OpenDocument):
             request: See `Edit`.
             kind: See `Edit`.
             target: See `Edit`.
+            step: Name of the step of undo that this edit starts or continues; empty if it is a step by itself.
 
         Raises:
             StorageError: The changes cannot be stored, and are reverted.
         """
+        if step:
+            target = self.history.start_of_step(user, step, changes)
         edit = Edit(self._number + 1, now(), user, list(changes), request, kind, target)
         stored = self._journal.append(edit)
         self._pending.append(_Pending(edit, self._scene_times, self._project_times))
         stored.add_done_callback(self._edit_stored)
         self._apply(edit)
-        self.history.append(edit)
+        self.history.append(edit, step)
         if self._number - self._based_on >= self._limit:
             self._shorten()
         await asyncio.shield(stored)  # the edit is valid even if the caller is cancelled

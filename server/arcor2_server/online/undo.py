@@ -128,5 +128,9 @@ class Undo:
                 }
                 if (found | opened) - {None, change.id}:
                     raise RequestRefused("There is now a scene or project called {name}.", name=name)
-            if change.kind is Kind.OBJECT and change.after is None and await self._dependents.uses_object(change.id):
+            if (
+                change.kind is Kind.OBJECT
+                and change.after is None
+                and await self._dependents.uses_object(change.id, changes)
+            ):
                 raise RequestRefused("{name} is now used in projects.", name=change.before.name)

@@ -32,7 +32,7 @@ class Editing:
         """Commit changes as one edit, except in a dry run; return whether they were made."""
         if context.dry_run:
             return False
-        await self._session.commit(context.client.user or "", changes, context.request)
+        await self._session.commit(context.client.user or "", changes, context.request, step=context.step)
         return True
 
     async def commit_one(self, context: Context, change: Change, update: ChangeType = ChangeType.UPDATE) -> bool:

@@ -43,7 +43,7 @@ def _described(edit: Edit, *, in_force: bool) -> HistoryEdit:
         in_force=in_force,
         items=items,
         touched=len(changes),
-        of=UNSET if edit.kind is EditKind.EDIT else edit.target,
+        of=UNSET if edit.kind is EditKind.EDIT and not edit.target else edit.target,
     )
 
 
@@ -99,10 +99,12 @@ class HistoryRequests:
         self._session.require_scene_open()
         while True:
             edit = self._undo.find_edit(context.user, number, kind)
-            changes = inverse_changes([edit])
+            step = self._session.history.step(edit)
+            changes = inverse_changes(step)
             async with self._undo.locked(context.user, changes):
-                # Another request of the same user may have reverted the edit meanwhile.
-                if self._undo.find_edit(context.user, number, kind) is edit:
+                # Another request of the same user may have reverted or continued the step meanwhile.
+                same = self._undo.find_edit(context.user, number, kind) is edit
+                if same and len(self._session.history.step(edit)) == len(step):
                     revision = await self._apply(context, changes, edit.number, edit.request, kind)
                     return UndoData(edit.number, edit.request, revision)
 

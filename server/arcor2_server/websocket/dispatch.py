@@ -92,7 +92,7 @@ class Dispatcher:
         if route.handler is None:
             refuse(client, request, f"{rpc.name} is not available in this version.", "not_available")
             return
-        context = Context(client, request.dry_run and rpc.dry_run, rpc.name, request.codes)
+        context = Context(client, request.dry_run and rpc.dry_run, rpc.name, request.codes, request.step)
         try:
             data = await route.handler(context, args)
         except Arcor2Error as error:

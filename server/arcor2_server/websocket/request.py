@@ -31,14 +31,19 @@ class Context:
         "events_to_caller",
         "received_at",
         "request",
+        "step",
     )
 
-    def __init__(self, client: Client, dry_run: bool = False, request: str = "", codes: bool = False) -> None:
+    def __init__(
+        self, client: Client, dry_run: bool = False, request: str = "", codes: bool = False, step: str = ""
+    ) -> None:
         self.client = client
         self.dry_run = dry_run
         self.request = request
         self.codes = codes
         """Whether the caller asked for what is needed to translate messages."""
+        self.step = step
+        """Name of the step of undo that the edits of this request belong to; empty if each is a step."""
         self.received_at = time.monotonic()
         """Time of receipt, s of the monotonic clock."""
         self.events_before: list[Event] = []

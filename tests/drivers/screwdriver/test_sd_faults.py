@@ -252,7 +252,7 @@ def test_silence_is_detected_by_the_keep_alive_message(
 ) -> None:
     fake.control.do("silence")
     wait_for(lambda: screwdriver.connection is Connection.LOST)
-    assert "did not answer the keep-alive message within 2 s" in screwdriver.observing.reason
+    assert "did not answer the keep-alive message within 2 s" in str(screwdriver.observing.reason)
     fake.control.do("heal")
     wait_for(lambda: screwdriver.connection is Connection.BACK)
     assert screwdriver.ready()

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from arcor2_hw.data.events import SceneStateEnum
+from arcor2_server.documents.edit_notifications import label
 from tests.server.session.edits import EDITS, TURNED, Edit, Watcher, make, refused, rich_project, shown
 from tests.server.session.session_server import Person, Refused, SessionServer, open_server
 from tests.server.session.work import ORIGIN, URL, Work
@@ -85,6 +86,59 @@ async def test_all_edits_can_be_undone_and_redone_in_a_row(
     await alice.ask("Undo")
     watcher.look()
     assert shown(server) == states[-1]
+
+
+async def test_edits_of_one_step_are_undone_and_redone_together(
+    server: SessionServer, alice: Person, bob: Person, work: Work
+) -> None:
+    await work.project()
+    before, revision = shown(server), server.session.revision
+    for name in ("wait", "stop"):
+        await alice.ask("AddSceneObject", name=name, type="TimeActions", step=name)
+        await alice.ask("AddActionPoint", name=name, position=ORIGIN, step=name)
+        point = work.point(name)
+        kind = f"{next(o.id for o in server.session.document.scene.objects if o.name == name)}/sleep"
+        parameters = [{"name": "seconds", "type": "double", "value": "1.0"}]
+        added = {"action_point_id": point, "name": f"do_{name}", "type": kind, "parameters": parameters}
+        await alice.ask("AddAction", **added, flows=[{"type": "default", "outputs": []}], step=name)
+        await alice.ask("AddLogicItem", start="START", end=work.action(f"do_{name}").id, step=name)
+        if name == "wait":
+            between = shown(server)
+            await alice.ask("RemoveLogicItem", logic_item_id=server.session.document.project.logic[0].id)
+            unconnected = shown(server)
+    after = shown(server)
+    undoable = server.session.history.undoable("alice")
+    assert str(label(undoable, server.session.history)) == "adding the action do_stop"
+    edits = (await alice.ask("History"))["edits"]
+    assert [edit.get("of") for edit in edits] == [revision + 6] * 3 + [None] + [None] + [revision + 1] * 3 + [None]
+    for wanted in (unconnected, between, before):
+        await alice.ask("Undo")
+        assert shown(server) == wanted
+    with pytest.raises(Refused, match="nothing"):
+        await alice.ask("Undo")
+    for wanted in (between, unconnected, after):
+        await alice.ask("Redo")
+        assert shown(server) == wanted
+
+
+async def test_a_step_does_not_continue_after_an_undo_or_an_edit_of_another_user(
+    server: SessionServer, alice: Person, bob: Person, work: Work
+) -> None:
+    await work.project()
+    point = await work.add_point("a")
+    history = server.session.history
+
+    async def rename(user: Person, name: str, step: str = "") -> None:
+        await user.ask("WriteLock", object_id=point)
+        await user.ask("RenameActionPoint", action_point_id=point, new_name=name, step=step)
+
+    await rename(alice, "b", "s")
+    await rename(bob, "c")
+    await rename(alice, "d", "s")
+    assert [edit.target for edit in history][-3:] == [0, 0, 0]
+    await alice.ask("Undo")
+    await rename(alice, "e", "s")
+    assert [edit.target for edit in history][-1] == 0
 
 
 async def test_every_edit_of_a_scene_can_be_undone(
@@ -199,7 +253,8 @@ async def test_undo_works_after_saving_and_after_a_restart(tmp_path: Path) -> No
         work = Work(alice)
         await work.project("a", "b")
         await alice.ask("SaveProject")
-        await work.add_point("c")
+        for name in ("c", "d"):
+            await alice.ask("AddActionPoint", name=name, position=ORIGIN, step="two points")
         await alice.ask("Undo")
         assert not server.session.has_changes
         history = list(server.session.history)
@@ -208,7 +263,7 @@ async def test_undo_works_after_saving_and_after_a_restart(tmp_path: Path) -> No
         assert list(server.session.history) == history
         assert not server.session.has_changes
         told = await alice.ask("History")
-        assert (told["undo"], told["redo"]) == (2, 4)
+        assert (told["undo"], told["redo"]) == (2, 5)
         assert "undo" not in await bob.ask("History")
         await alice.ask("Redo")
         assert server.session.has_changes

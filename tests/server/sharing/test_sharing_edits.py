@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from arcor2_server.documents.edit_notifications import sentence
+from arcor2_server.documents.edit_notifications import label
 from arcor2_server.execution import breakpoints
 from tests.server.session.edits import EDITS, make, rich_project
 from tests.server.session.session_server import Person, Refused, SessionServer, open_server
@@ -108,7 +108,19 @@ async def test_each_user_is_notified_of_possible_undo(alice: Person, bob: Person
     told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 1)
     assert told == {
         "revision": 1,
-        "undo": {"number": 1, "request": "AddActionPoint", "text": "adding the action point p"},
+        "undo": {
+            "number": 1,
+            "request": "AddActionPoint",
+            "text": "adding the action point p",
+            "key": "adding {item}",
+            "values": {
+                "item": {
+                    "text": "the action point p",
+                    "key": "the action point {name}",
+                    "values": {"name": "p"},
+                },
+            },
+        },
     }
     assert await came(bob, "HistoryChanged", lambda data: data["revision"] == 1) == {"revision": 1}
     await alice.lock(point, tree=True)
@@ -182,7 +194,7 @@ async def test_every_edit_has_a_name(server: SessionServer, alice: Person, work:
         await make(alice, edit, ids)
         undo = server.session.history.undoable("alice")
         assert undo is not None
-        found[name] = sentence(undo)
+        found[name] = str(label(undo, server.session.history))
         await alice.ask("Undo")
     assert found == SENTENCES
     await alice.ask("CloseProject", force=True)
@@ -193,7 +205,7 @@ async def test_every_edit_has_a_name(server: SessionServer, alice: Person, work:
     )
     undo = server.session.history.undoable("alice")
     assert undo is not None
-    assert sentence(undo) == "moving the object robot"
+    assert str(label(undo, server.session.history)) == "moving the object robot"
 
 
 async def test_consecutive_edits_are_announced_together_after_the_answers(

@@ -7,6 +7,7 @@ import { chooseLanguage } from "../../commands/language";
 import { goOffline, goOnline, stopMotion } from "../../commands/operation";
 import { storeGeneralState } from "../../commands/viewstate";
 import { LANGUAGES, type Language } from "../../i18n/catalogue";
+import { translate } from "../../i18n/serverMessages";
 import { aimsAlways } from "../../session/aiming";
 import { theEngine } from "../../session/engine";
 import { remember } from "../../session/localStorage";
@@ -54,13 +55,13 @@ function ofWorkplace(state: State): Entry[] {
     entry("save", t`Save`, cannotSave, documents.save),
     entry(
       "undo",
-      history?.undo ? t`Undo ${history.undo.text}` : t`Undo`,
+      history?.undo ? t`Undo ${translate(history.undo)}` : t`Undo`,
       cannotUndo || (history?.undo ? "" : t`There is nothing to undo.`),
       documents.undo,
     ),
     entry(
       "redo",
-      history?.redo ? t`Redo ${history.redo.text}` : t`Redo`,
+      history?.redo ? t`Redo ${translate(history.redo)}` : t`Redo`,
       cannotUndo || (history?.redo ? "" : t`There is nothing to redo.`),
       documents.redo,
     ),

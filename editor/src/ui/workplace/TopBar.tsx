@@ -5,6 +5,7 @@ import { msg, plural, t } from "@lingui/core/macro";
 import { useState } from "react";
 import * as documents from "../../commands/documents";
 import { goOffline, goOnline } from "../../commands/operation";
+import { translate } from "../../i18n/serverMessages";
 import { whyUnavailable } from "../../store/permissions";
 import { isClosed } from "../../store/selectors";
 import { notify, useEditor } from "../../store/store";
@@ -59,14 +60,14 @@ export function TopBar() {
       <Button
         look="plain"
         icon="undo"
-        aria-label={history?.undo ? t`Undo ${history.undo.text}` : t`Undo`}
+        aria-label={history?.undo ? t`Undo ${translate(history.undo)}` : t`Undo`}
         why={cannotUndo || (history?.undo ? "" : t`There is nothing to undo.`)}
         onPress={() => void documents.undo()}
       />
       <Button
         look="plain"
         icon="redo"
-        aria-label={history?.redo ? t`Redo ${history.redo.text}` : t`Redo`}
+        aria-label={history?.redo ? t`Redo ${translate(history.redo)}` : t`Redo`}
         why={cannotUndo || (history?.redo ? "" : t`There is nothing to redo.`)}
         onPress={() => void documents.redo()}
       />
