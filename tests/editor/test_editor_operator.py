@@ -1,5 +1,6 @@
 """The operator's screen: packages, start, pause, stop and results of runs."""
 
+import json
 import re
 from collections.abc import AsyncIterator
 
@@ -11,6 +12,8 @@ from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
 from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
+from arcor2_hw.data.project import START, ActionParameter, Flow, Project
+from arcor2_hw.data.scene import Scene
 from tests.e2e.harness import Cell
 from tests.editor import texts
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
@@ -30,9 +33,25 @@ async def at_the_machine(screen: Screen, kiosk: bool = False) -> None:
     await screen.join("Olga", f"/?q=low#/operator{'?kiosk' if kiosk else ''}")
 
 
-async def built(cell: Cell, colleague: Client) -> PackageSummary:
+async def with_message(client: Client, scene: Scene, project: Project, text: str) -> None:
+    """Let the open project start with a message."""
+    flow = next(each.id for each in scene.objects if each.type == "FlowActions")
+    first = next(each for each in project.logic if each.start == START)
+    point, parameters = project.action_points[0].id, [ActionParameter("text", "string", json.dumps(text))]
+    await client.call("AddAction", rpc.AddActionArgs(point, "say", f"{flow}/show_message", parameters, [Flow()]))
+    await client.call("SaveProject")
+    points = (await client.get_project(project.id)).action_points
+    say = next(action.id for each in points for action in each.actions if action.name == "say")
+    await client.call("UpdateLogicItem", rpc.UpdateLogicItemArgs(first.id, START, say))
+    await client.call("AddLogicItem", rpc.AddLogicItemArgs(say, first.end))
+    await client.call("SaveProject")
+
+
+async def built(cell: Cell, colleague: Client, message: str = "") -> PackageSummary:
     """Build the package of the project and close the project."""
-    _, project = await cell.open(colleague)
+    scene, project = await cell.open(colleague)
+    if message:
+        await with_message(colleague, scene, project, message)
     package_id = await cell.build(colleague, project)
     return next(each for each in await colleague.list_packages() if each.id == package_id)
 
@@ -110,13 +129,17 @@ async def test_failed_run_is_shown_on_every_screen_until_it_is_dismissed(
 
 
 async def test_pause_step_and_stop(cell: Cell, colleague: Client, browser: Browser) -> None:
-    package = await built(cell, colleague)
+    package = await built(cell, colleague, "Refill the labels.")
     async with screen_of(browser, cell.url) as screen:
         page = screen.page
         await at_the_machine(screen)
         # A run that another user has started paused can be stepped and stopped from here.
         await colleague.call("RunPackage", rpc.RunPackageArgs(package.id, start_paused=True))
-        await page.get_by_text("before more_boards").wait_for(timeout=BEGUN)
+        await page.get_by_text("before say").wait_for(timeout=BEGUN)
+        await screen.press(texts.STEP)
+        await page.get_by_text("before more_boards").wait_for()
+        await page.get_by_text("Refill the labels.").wait_for()
+        await screen.picture("operator message")
         await screen.press(texts.STEP)
         await page.get_by_text("before scan").wait_for()
         await screen.press(texts.STOP)
@@ -124,6 +147,7 @@ async def test_pause_step_and_stop(cell: Cell, colleague: Client, browser: Brows
             pass
         await page.get_by_role("button", name="Start", exact=True).wait_for()
         await screen.sees("Run stopped by Olga")
+        await expect(page.get_by_text("Refill the labels.")).to_be_hidden()
         run = (await colleague.call("ListRuns")).runs[0]
         assert (run.end.value, run.stopped_by) == ("stopped", "Olga")
         await screen.press("Open the editor")

@@ -83,6 +83,12 @@ def test_repeat_counts_separately_for_each_action() -> None:
     assert flow.repeat(0, an="never") is False
 
 
+def test_a_message_is_logged(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level("INFO"):
+        FlowActions("obj", "flow").show_message("Refill 100 % of {labels}", an="refill")
+    assert caplog.messages == ["flow: message: Refill 100 % of {labels}"]
+
+
 def test_counters() -> None:
     counter = CounterActions("obj", "boards", CounterSettings(start=3))
     assert counter.value(an="a") == 3

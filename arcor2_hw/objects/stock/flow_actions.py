@@ -1,5 +1,6 @@
-"""Program flow: end the program, wait, repeat."""
+"""Program flow: end the program, wait, repeat, show a message."""
 
+import logging
 import threading
 from typing import ClassVar
 
@@ -7,9 +8,11 @@ from arcor2_hw.actions import action
 from arcor2_hw.exceptions import Cancelled, ProgramFinished
 from arcor2_hw.objects import Generic, Settings
 
+log = logging.getLogger(__name__)
+
 
 class FlowActions(Generic):
-    """Ends a program, waits, and repeats."""
+    """Ends a program, waits, repeats, and shows messages."""
 
     category = "Program"
     icon = "flow"
@@ -42,6 +45,14 @@ class FlowActions(Generic):
     def cancel(self) -> None:
         """Cancel the present wait."""
         self._cancelled.set()
+
+    @action
+    def show_message(self, text: str, *, an: str | None = None) -> None:
+        """Show a message on the operator's screen until the next one or the end of the program. Does not wait.
+
+        :param text: message, such as "Refill the labels"
+        """
+        log.info("%s: message: %s", self.name, text)
 
     @action
     def repeat(self, times: int = 2, *, an: str | None = None) -> bool:

@@ -8,6 +8,7 @@ import { useEffect, useState } from "react";
 import * as commands from "../../commands/run";
 import { storeGeneralState } from "../../commands/viewstate";
 import { ago } from "../../formats";
+import { shownMessage } from "../../program/messages";
 import { dismissal, lastRun, type Result, resultOf, undismissedRun } from "../../program/results";
 import { theSession } from "../../session/session";
 import { usersOfDocument } from "../../store/absentUsers";
@@ -84,6 +85,7 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
     await commands.runPackage(known.id);
     setStarting(false);
   };
+  const message = runs ? shownMessage(state) : "";
   const doing = program.running
     .map((id) => nameOf(state, id))
     .filter(Boolean)
@@ -104,6 +106,7 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
           <div>
             <p className="operator-word">{word}</p>
             {doing && <p>{program.state === "paused" ? t`before ${doing}` : doing}</p>}
+            {message && <p className="operator-message">{message}</p>}
             {run && result && (
               <p>
                 {result.name}, {ago(run.ended ?? run.started)}
