@@ -33,7 +33,7 @@ export function Start() {
   return (
     <section className="start" aria-label={t`Start`}>
       {proposal.kind === "continue" ? (
-        <Button look="primary" icon="play" onPress={() => void open()}>
+        <Button look="primary" icon="play" className="wraps" onPress={() => void open()}>
           {t`Continue with ${name}`}
         </Button>
       ) : (

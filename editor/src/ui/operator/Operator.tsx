@@ -96,7 +96,7 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
         {!kiosk && (
           <Button look="plain" icon="home" aria-label={t`Open the editor`} onPress={() => (location.hash = "")} />
         )}
-        <h1>{runs ? program.packageName || t`Program` : t`Operator`}</h1>
+        <h1 data-name={runs || undefined}>{runs ? program.packageName || t`Program` : t`Operator`}</h1>
         <People />
         <Settings />
       </header>
@@ -131,26 +131,24 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
           </div>
         ) : (
           <section className="operator-start" aria-label={t`Start`}>
-            <ul className="operator-packages" role="radiogroup" aria-label={t`Packages`}>
+            <div className="operator-packages" role="radiogroup" aria-label={t`Packages`}>
               {packages.map((each) => (
-                <li key={each.id}>
-                  <label className="operator-package" data-selected={each.id === known?.id}>
-                    <input
-                      type="radio"
-                      className="hidden-but-read"
-                      name="package"
-                      checked={each.id === known?.id}
-                      onChange={() => setChosen(each.id)}
-                    />
-                    <strong>{each.package_meta.name}</strong>
-                    <span className="quiet small">{each.project_meta ? t`from ${each.project_meta.name}` : ""}</span>
-                  </label>
-                </li>
+                <label key={each.id} className="operator-package" data-selected={each.id === known?.id}>
+                  <input
+                    type="radio"
+                    className="hidden-but-read"
+                    name="package"
+                    checked={each.id === known?.id}
+                    onChange={() => setChosen(each.id)}
+                  />
+                  <strong>{each.package_meta.name}</strong>
+                  <span className="quiet small">{each.project_meta ? t`from ${each.project_meta.name}` : ""}</span>
+                </label>
               ))}
               {packages.length === 0 && (
                 <p className="quiet">{t`No packages yet. Build one in the editor, under Run.`}</p>
               )}
-            </ul>
+            </div>
             <Button
               look="primary"
               icon="play"

@@ -26,16 +26,15 @@ export function phaseName(phase: string): string | undefined {
 export default function RunBar() {
   const state = useEditor((each) => each);
   const { state: phase, running } = state.program;
-  const at = running.map((id) => nameOf(state, id)).filter(Boolean);
+  const doing = running
+    .map((id) => nameOf(state, id))
+    .filter(Boolean)
+    .join(", ");
   return (
     <div className="runbar" role="group" aria-label={t`The program`}>
       <span className="runbar-state" role="status">
         <strong>{phaseName(phase)}</strong>
-        {at.length > 0 && (
-          <span className="small quiet">
-            {phase === "paused" ? ` ${t`before ${at.join(", ")}`}` : ` ${at.join(", ")}`}
-          </span>
-        )}
+        {doing && <span className="small quiet"> {phase === "paused" ? t`before ${doing}` : doing}</span>}
       </span>
       <RunButtons />
     </div>

@@ -29,6 +29,7 @@ export default function RunPanel() {
     await run({ paused });
     setBusy(false);
   };
+  const doing = program.running.map((id) => nameOf(state, id)).join(", ");
   const broken = Object.keys(breakpoints).filter((id) => nameOf(state, id));
   return (
     <>
@@ -36,13 +37,7 @@ export default function RunPanel() {
       {(runs || busy) && (
         <p className="run-state" role="status">
           <strong>{runs ? phaseName(program.state) : t`Building…`}</strong>
-          {program.running.length > 0 && (
-            <span>
-              {" "}
-              {program.state === "paused" && "before "}
-              {program.running.map((id) => nameOf(state, id)).join(", ")}
-            </span>
-          )}
+          {program.running.length > 0 && <span> {program.state === "paused" ? t`before ${doing}` : doing}</span>}
         </p>
       )}
       {runs ? (

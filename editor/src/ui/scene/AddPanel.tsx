@@ -85,7 +85,7 @@ export default function AddPanel() {
                         : setChosen(each.type)
                     }
                   >
-                    <Icon name={CATEGORY_ICONS[group] ?? "box"} />
+                    <Icon name={CATEGORY_ICONS[each.category ?? ""] ?? "box"} />
                     <span>
                       <strong>{shownName(each)}</strong>
                       <span className={`small ${each.disabled ? "error" : "quiet"}`}>

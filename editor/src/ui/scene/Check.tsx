@@ -36,7 +36,7 @@ export function Check({ type, values, id = "" }: CheckProps) {
   if (connected) return null;
   return (
     <div className="check">
-      <Button icon="plug" why={why} isDisabled={busy} onPress={() => void check()}>
+      <Button icon="plug" className="wraps" why={why} isDisabled={busy} onPress={() => void check()}>
         {busy ? t`Connecting…` : t`Test connection`}
       </Button>
       <div role="status">

@@ -61,7 +61,7 @@ export function ThingTree({ label, rows, unfolded }: ThingTreeProps) {
   };
   const item = (row: Row) => {
     const holder = heldBy(now(), row.id);
-    const detail = holder ? t`In use by ${holder}` : hidden.includes(row.id) ? "hidden" : row.detail;
+    const detail = holder ? t`In use by ${holder}` : hidden.includes(row.id) ? t`hidden` : row.detail;
     return (
       <TreeItem
         id={row.id}
