@@ -14,26 +14,51 @@ hypothesis.settings.load_profile("tests")
 
 WAITING = ("tests/drivers/", "tests/fakes/", "tests/objects/", "tests/runtime/", "tests/testing/", "tests/e2e/")
 """Directories whose tests mostly wait for simulated devices."""
+LONG = (
+    "tests/demo/",
+    "tests/docs/",
+    "tests/client/",
+    "tests/compatibility/",
+    "tests/calibration/",
+    "tests/server/cli/",
+)
+"""Directories with long tests. The short ones come last, so that no worker is left with a long one."""
 BROWSER = "tests/editor/"
 """The directory of browser tests. They need most of the processor time."""
+APART = (
+    "tests/docs/test_tutorials.py",
+    "tests/server/cli/test_device_new.py",
+    "tests/testing/first_day/test_first_day.py",
+    "tests/testing/test_suite_finds_the_fault.py",
+    "tests/testing/test_time_limit.py",
+)
+"""Files of long tests that share no fixture."""
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Sort the tests of a parallel run: first those that wait for devices, at the end browser tests."""
+    """Sort the tests of a parallel run for a queue with two ends, in whose middle the short tests are left to the end.
+
+    At the beginning of the queue are tests that wait for devices, at its end browser tests and before them long ones.
+    """
     if hasattr(config, "workerinput"):
         items.sort(key=_order)
 
 
 def _order(item: pytest.Item) -> int:
-    return 0 if item.nodeid.startswith(WAITING) else 2 if item.nodeid.startswith(BROWSER) else 1
+    for order, places in ((0, WAITING), (2, LONG), (3, BROWSER)):
+        if item.nodeid.startswith(places):
+            return order
+    return 1
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """Run tests that share a fake in one worker: those of a module, or the conformance tests of one driver.
 
-    Half of the workers start with the browser tests, at the end of the queue. So browsers use the processor while
+    The tests of the files in `APART` run in any worker.
+
+    Half of the workers take from the end of the queue, where the browser tests are. So browsers use the processor while
     other tests wait for devices, and a worker starts its browser, server and fakes once. The scopes come from test ids
     because the marker xdist_group has no effect with pytest 9.2 and xdist 3.8.
     """
@@ -44,6 +69,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     class FakeScheduling(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file, _, rest = nodeid.partition("::")
+            if file in APART:
+                return nodeid
             bench = rest.rpartition("[")[2] if rest.startswith("TestConformance::") else ""
             return f"{file}:{bench}"
 

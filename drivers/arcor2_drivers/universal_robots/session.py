@@ -361,7 +361,9 @@ class ControlSession:
                 gone_since = None
             elif gone_since is None:  # the controller's clock: an old sample was taken before the program was sent
                 gone_since = newest.timestamp
-            elif newest.timestamp - gone_since > timing.PROGRAM_GONE and not self._ending.wait(timing.PROCESS_ENDS):
+            elif newest.timestamp - gone_since > timing.PROGRAM_GONE and not once_within(
+                self._ending.is_set, timing.PROCESS_ENDS, timing.GUARD_PERIOD
+            ):
                 self.end(self.left_remote_control())
             if not self._ending.is_set() and (now := time.monotonic()) >= due:
                 due = now + PULSE_PERIOD

@@ -111,7 +111,7 @@ def test_a_loss_during_a_test(
         if fault == "refuse":  # only new connections are refused: the test goes on until this one breaks too
             slow_fake.control.do("reset")
     assert isinstance(outcome[0], ConnectionLost)
-    assert f"tester at {slow_fake.ready['modbus']}: the connection was lost" in str(outcome[0])
+    assert f"tester at {slow_fake.ready['modbus']}" in str(outcome[0])
     assert outcome[1] - began < (within or 0.3) + 0.3
     # The station is left alone until it has ended the test by itself, and nothing begins again.
     wait_for(slow_fake.truth, lambda truth: truth["fault"] == 105)
