@@ -45,12 +45,15 @@ class Looks:
         page = self.screen.page
         self._dark = not self._dark
         await page.emulate_media(color_scheme="dark" if self._dark else "light")
-        for name in sizes:
-            await page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
-            await self.screen.settle()
-            fonts = FONTS if name in FEW else ("wide",)
-            await self._note(f"{what}, {name}", await self.screen.faults_with(fonts))
-            await self.screen.picture(f"{what} {name}{' dark' if self._dark else ''}")
+        for font, in_sizes in {"wide": list(sizes), "narrow": [each for each in sizes if each in FEW]}.items():
+            await self.screen.use_font(font)
+            for name in in_sizes:
+                await page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
+                await self.screen.settle()
+                await self._note(f"{what}, {name}, {font} font", await self.screen.faults())
+                if font == "wide":
+                    await self.screen.picture(f"{what} {name}{' dark' if self._dark else ''}")
+        await self.screen.use_font()
         await page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
         await self.screen.settle()
         await self._note(f"{what}, {'dark' if self._dark else 'light'}", await self.screen.barriers())
