@@ -55,11 +55,14 @@ export function loadThumbnailOnce(document: string, time: string): void {
 
 async function loadThumbnail(document: string): Promise<void> {
   if (!serves("GetViewState")) return;
+  const before = now().thumbnails[document];
   const { values } = await call("GetViewState", { scope: "shared", document });
   const { thumbnail, picture } = values as { thumbnail?: unknown; picture?: unknown };
   const [own, taken] = [picture, thumbnail].map((each) =>
     typeof each === "string" && each.startsWith("data:image/") ? each : "",
   );
+  // After a quick close, the thumbnail of the save may be taken and stored while this answer is under way.
+  if (!own && !taken && now().thumbnails[document] !== before) return;
   setThumbnail(document, { picture: own || taken || "", own: !!own });
 }
 
