@@ -131,10 +131,9 @@ async function storingOldPose(id: string, begin: () => Promise<unknown>): Promis
   setUi({ beforeCalibration: pose && { id, pose } });
 }
 
-/** Take a picture. Return a JPEG with one character per byte. Reject with the reason if refused. */
+/** Take a picture. Reject with the reason if refused. */
 export async function takePicture(id: string): Promise<Blob> {
-  const text = await held(id, () => call("CameraColorImage", { id }, { deadline: 20 }));
-  return new Blob([Uint8Array.from(text, (each) => each.charCodeAt(0))], { type: "image/jpeg" });
+  return (await rest(`/api/cameras/${encodeURIComponent(id)}/picture`)).blob();
 }
 
 // -------------------------------------------------------------------------------- history and touched points

@@ -7,6 +7,7 @@ from arcor2_server.rest.build import BuildOperations
 from arcor2_server.rest.calibration_methods import CalibrationMethodOperations
 from arcor2_server.rest.calibration_records import CalibrationRecordOperations
 from arcor2_server.rest.calibration_service import CalibrationServiceOperations
+from arcor2_server.rest.cameras import CameraOperations
 from arcor2_server.rest.diagnosis import DiagnosisOperations
 from arcor2_server.rest.diagnosis_bundle import Diagnosis
 from arcor2_server.rest.display_models import DisplayModelOperations
@@ -113,6 +114,7 @@ def rest_groups(s: Server) -> list[object]:
         ApiPageOperations(),
         AssetOperations(s.assets, s.type_notifications),
         BuildOperations(s.storage, s.build, s.package_import),
+        CameraOperations(s.session, s.online, s.cameras),
         CalibrationServiceOperations(s.calibration, s.robots),
         CalibrationRecordOperations(s.calibration_records),
         CalibrationMethodOperations(s.calibration_records, s.compute, s.markers, s.robots),

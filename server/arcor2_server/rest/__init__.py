@@ -15,6 +15,7 @@ from arcor2_server.rest import (  # noqa: F401
     calibration_methods,
     calibration_records,
     calibration_service,
+    cameras,
     diagnosis,
     display_models,
     documents,

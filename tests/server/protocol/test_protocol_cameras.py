@@ -22,6 +22,8 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.rpc import ListCalibrationsArgs
 from arcor2_hw.exceptions import Arcor2Error, NotFound
 from arcor2_server.compute.process import ProgressCallback
+from arcor2_server.errors import RequestRefused
+from arcor2_server.rest.cameras import CameraOperations
 from arcor2_server.workspace.calibration import RobotView
 from tests.server.protocol.stage import Actor, Stage, happens, open_stage, refused
 
@@ -145,11 +147,25 @@ async def test_a_camera_returns_its_picture_and_parameters(tmp_path: Path) -> No
         assert isinstance(red, tuple)
         assert red[0] > 240 > 20 > max(red[1:])
         assert await alice.ask("CameraColorParameters", id=eye) == PARAMETERS
+        # A viewer needs neither a name nor the lock.
+        s = stage.services
+        cameras = CameraOperations(s.session, s.online, s.cameras)
+        assert Image.open(io.BytesIO((await cameras.take_picture(eye)).content)).size == (64, 48)  # type: ignore[arg-type]
+        with pytest.raises(RequestRefused, match="part is not a camera"):
+            await cameras.take_picture(part)
+        with pytest.raises(NotFound):
+            await cameras.take_picture("obj_nobody")
 
         for name in ("CameraColorImage", "CameraColorParameters"):
             assert "part is not a camera" in await refused(alice, name, id=part)
             assert "lock" in await refused(bob, name, id=eye)
         assert "has no camera parameters" in await refused(alice, "CameraColorParameters", id=blind)
+        for item in (eye, blind, part):
+            await alice.ask("WriteUnlock", object_id=item)
+        await alice.ask("StopScene")
+        await happens(alice, "SceneState", state="stopped")
+        with pytest.raises(RequestRefused, match="offline"):
+            await cameras.take_picture(eye)
 
 
 @pytest.mark.parametrize("request_name", ["GetCameraPose", "MarkersCorners"])
