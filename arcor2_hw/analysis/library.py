@@ -308,7 +308,14 @@ class Library:
         if problem is not None:
             meta = meta.disabled_because(problem.message)
         category, icon = of_type(info, hierarchy)
-        meta = msgspec.structs.replace(meta, display_name=display_name(info, hierarchy), category=category, icon=icon)
+        observes = hierarchy.method(info, "observations")
+        meta = msgspec.structs.replace(
+            meta,
+            display_name=display_name(info, hierarchy),
+            category=category,
+            icon=icon,
+            observable=True if observes is not None and observes[0].name != "Generic" else UNSET,
+        )
         direct = hierarchy.bases(info)
         actions = tuple(self._all_actions(info, bases))
         return TypeAnalysis(

@@ -2,7 +2,7 @@
 
 import enum
 import time
-from typing import Final, Generic, TypeVar
+from typing import Any, Final, Generic, TypeVar
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset, now
 from arcor2_hw.messages import Message
@@ -40,6 +40,24 @@ class Reading(Data, Generic[T], frozen=True):
     def age(self) -> float:
         """Return the age in s."""
         return time.monotonic() - self.monotonic
+
+
+class Observation(Data, frozen=True):
+    """A value of a device for display and trends. It is None if its quality is bad.
+
+    name: English words, which clients translate, or the user's name of a point. unit: SI; empty for a boolean.
+    """
+
+    name: str
+    value: float | bool | None
+    unit: str = ""
+    quality: Quality = Quality.GOOD
+
+    @classmethod
+    def of(cls, name: str, reading: "Reading[Any]", unit: str = "") -> "Observation":
+        """Return the value of a reading."""
+        bad = reading.quality is Quality.BAD
+        return cls(name, None if bad else reading.value, unit, reading.quality)
 
 
 class Identity(Data, frozen=True):

@@ -6,13 +6,14 @@ from typing import Any, Final
 from msgspec import Struct, field
 
 from arcor2_hw.data.base import UNSET, Data, TranslatableData, Unset
-from arcor2_hw.data.device import Connection
+from arcor2_hw.data.device import Connection, Observation
 from arcor2_hw.data.editor import (
     HistoryChangedData,
     MovePreviewData,
     ProjectBreakpoints,
     ReachabilityData,
     Run,
+    RunStatisticsData,
     TaskStateData,
     TraceEntry,
     UserPresenceData,
@@ -291,6 +292,18 @@ class ObjectStateData(TranslatableData, frozen=True):
     answering: bool | Unset = UNSET
 
 
+class ObjectObservationsData(TranslatableData, frozen=True):
+    """Data of the event ObjectObservations: present values of a device.
+
+    time_ms: time of reading on the steady clock of the cell. reason: why no value is known.
+    """
+
+    object_id: str
+    time_ms: float
+    observations: list[Observation] = field(default_factory=list)
+    reason: str | Unset = UNSET
+
+
 class ChangeType(enum.StrEnum):
     """Kind of change of the item in an event."""
 
@@ -344,6 +357,7 @@ EVENTS: Final = {
         EventType("ProjectException", ProjectExceptionData, Role.OPERATOR),
         EventType("ObjectState", ObjectStateData, Role.OPERATOR, additional=True),
         EventType("ObjectHealth", ObjectHealthData, Role.OPERATOR, additional=True),
+        EventType("ObjectObservations", ObjectObservationsData, Role.OPERATOR, additional=True),
         EventType("RobotHold", RobotHoldData, Role.OPERATOR, additional=True),
         EventType("BreakpointsChanged", ProjectBreakpoints, Role.OPERATOR, additional=True),
         EventType("ExecutionTrace", TraceEntry, Role.OPERATOR, additional=True),
@@ -351,6 +365,7 @@ EVENTS: Final = {
         EventType("MovePreview", MovePreviewData, Role.OPERATOR, additional=True),
         EventType("ReachabilityChanged", ReachabilityData, Role.OPERATOR, additional=True),
         EventType("RunChanged", Run, Role.OPERATOR, additional=True),
+        EventType("RunStatistics", RunStatisticsData, Role.OPERATOR, additional=True),
         EventType("TaskState", TaskStateData, Role.OPERATOR, additional=True),
         EventType("UserPresence", UserPresenceData, Role.OPERATOR, additional=True),
         EventType("ViewStateChanged", ViewState, Role.OPERATOR, additional=True),

@@ -129,11 +129,15 @@ class ParameterMeta(Data, frozen=True):
 
 
 class ActionMetadata(Data, frozen=True):
-    """How an action is executed. `composite` actions may call others; `hidden` ones are not offered to users."""
+    """How an action is executed. `composite` actions may call others; `hidden` ones are not offered to users.
+
+    verdict (not in ARCOR2): whether the returned boolean says that a part is good.
+    """
 
     composite: bool = False
     hidden: bool = False
     cancellable: bool = False
+    verdict: bool | Unset = UNSET
 
 
 class Disableable(TranslatableData, frozen=True, kw_only=True):
@@ -187,11 +191,12 @@ def find_action(actions: Iterable[ObjectAction], name: str) -> ObjectAction | No
 
 
 class ObjectTypeMeta(Disableable, frozen=True):
-    """Metadata of an object type; display_name, category, icon, shadows, key and values are not in ARCOR2.
+    """Metadata of an object type; all fields from display_name on, key and values are not in ARCOR2.
 
     display_name: name for users; omitted when the type declares none.
     built_in: a base class or an installed type, which cannot be deleted. shadows: distribution and version of the
-    installed type of the same name that this uploaded type replaces.
+    installed type of the same name that this uploaded type replaces. observable: whether StreamObservations returns
+    values of its objects.
     """
 
     type: str
@@ -208,6 +213,7 @@ class ObjectTypeMeta(Disableable, frozen=True):
     category: str | Unset = UNSET
     icon: str | Unset = UNSET
     shadows: str | Unset = UNSET
+    observable: bool | Unset = UNSET
 
     @property
     def shown_name(self) -> str:

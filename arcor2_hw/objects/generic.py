@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from arcor2_hw.actions import action
-from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction
+from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction, Observation
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models
 from arcor2_hw.data.scene import SceneObject
@@ -127,6 +127,17 @@ class Generic(abc.ABC):
 
     def alarms(self) -> list[Alarm]:
         """Return the active alarms."""
+        return []
+
+    def observations(self) -> list[Observation]:
+        """Return the present values of the device, for display and trends.
+
+        It is called up to ten times per second while a user watches them, on another thread than the actions and also
+        while an action runs. Return the newest values instead of waiting for the device.
+
+        Raises:
+            DeviceError: No value is known.
+        """
         return []
 
     def acknowledge(self, code: str) -> None:

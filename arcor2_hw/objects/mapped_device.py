@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, ClassVar, Final, TypeAlias
 
-from arcor2_hw.data.device import Identity, Reading
+from arcor2_hw.data.device import Identity, Observation, Reading
 from arcor2_hw.data.modbus_point import Point, Table, Value
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused
 from arcor2_hw.objects.edges import Debounced
@@ -97,6 +97,15 @@ class MappedDevice(ModbusDevice[dict[str, Any]]):
         if name not in values:
             raise NotFound("{device} has no point {name!r} that can be read", device=self.who, name=name)
         return Reading(values[name], stamp, asked)
+
+    def observations(self) -> list[Observation]:
+        """Return all points that are numbers or booleans. Raises Stale, NotConnected, ConnectionLost."""
+        values = self.current()
+        return [
+            Observation(name, value, self.POINTS[name].unit)
+            for name, value in values.items()
+            if isinstance(value, bool | int | float)
+        ]
 
     def wait_for_value(self, name: str, value: Value, timeout: float) -> None:
         """Wait until a point has a value. Raises DeviceTimeout after `timeout` s, Cancelled."""

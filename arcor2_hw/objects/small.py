@@ -2,14 +2,18 @@
 
 import abc
 import enum
-from typing import ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
+from typing import ClassVar, Final, Literal, NamedTuple, Protocol, runtime_checkable
 
 from arcor2_hw.data.base import UNSET, Data, Unset
-from arcor2_hw.data.device import LossReaction, Reading
+from arcor2_hw.data.device import LossReaction, Observation, Quality, Reading
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.exceptions import Arcor2NotImplemented
+from arcor2_hw.exceptions import Arcor2NotImplemented, DeviceFault, Refused, Stale
+from arcor2_hw.messages import translatable
 from arcor2_hw.objects.generic import Generic
 from arcor2_hw.objects.gripping import HoldsParts
+
+MOST_POINTS: Final = 32
+"""Maximum number of points of an IOBlock among its observations."""
 
 
 class GripperState(enum.StrEnum):
@@ -93,6 +97,13 @@ class Suction(HoldsParts, Generic):
         """Return the vacuum below ambient pressure, Pa."""
         raise Arcor2NotImplemented("vacuum")
 
+    def observations(self) -> list[Observation]:
+        """Return the vacuum if it is measured."""
+        try:
+            return [Observation.of(translatable("Vacuum"), self.vacuum(), "Pa")]
+        except (Arcor2NotImplemented, Refused):
+            return []
+
 
 class PointKind(enum.StrEnum):
     """Whether a point is digital or analogue."""
@@ -173,6 +184,16 @@ class IOBlock(Generic):
     def read(self, name: str) -> Reading[bool | float]:
         """Read a point."""
 
+    def observations(self) -> list[Observation]:
+        """Return the first MOST_POINTS points. A point that cannot be read has bad quality."""
+        return [self._observation(point) for point in self.points()[:MOST_POINTS]]
+
+    def _observation(self, point: IOPoint) -> Observation:
+        try:
+            return Observation.of(point.name, self.read(point.name), point.unit)
+        except (DeviceFault, Stale):
+            return Observation(point.name, None, point.unit, Quality.BAD)
+
     @abc.abstractmethod
     def write(self, name: str, value: bool | float) -> None:
         """Write an output.
@@ -195,8 +216,13 @@ class IOBlock(Generic):
 
 
 class Axis(Generic):
-    """A single driven axis, m or rad depending on its settings."""
+    """A single driven axis.
 
+    Class Attributes:
+        position_unit: Unit of positions, m or rad.
+    """
+
+    position_unit: ClassVar[str] = "m"
     category: ClassVar[str] = "Axes"
     icon: ClassVar[str] = "axis"
 
@@ -239,6 +265,13 @@ class Axis(Generic):
     @abc.abstractmethod
     def velocity(self) -> Reading[float]:
         """Return the present velocity."""
+
+    def observations(self) -> list[Observation]:
+        """Return position and velocity."""
+        return [
+            Observation.of(translatable("Position"), self.position(), self.position_unit),
+            Observation.of(translatable("Velocity"), self.velocity(), f"{self.position_unit}/s"),
+        ]
 
 
 class Code(Data, frozen=True):

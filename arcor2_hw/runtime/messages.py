@@ -172,11 +172,12 @@ class Subscribe(ToHost, frozen=True):
 
 
 class Stream(ToHost, frozen=True):
-    """Set the rates, Hz, at which joints and end effector poses of a robot are sent with timestamps."""
+    """Set the rates, Hz, at which joints, end effector poses and observations are sent with timestamps."""
 
     object_id: str
     joints: list[float]
     eef: list[float]
+    observations: list[float] = field(default_factory=list)
 
 
 class Lease(ToHost, frozen=True):
@@ -271,7 +272,9 @@ class CallFailed(ToServer, frozen=True):
 
 
 class StreamEvent(ToServer, frozen=True):
-    """An encoded RobotJoints or RobotEef event for subscribers, or for all clients while a program runs.
+    """An encoded RobotJoints, RobotEef or ObjectObservations event.
+
+    The first two are for subscribers, or for all clients while a program runs, the last one is for subscribers.
 
     rate: of the Stream to which it belongs, Hz; 0 for the streaming period.
     """

@@ -13,7 +13,16 @@ NO_STOP: Final = (Robot.stop, MultiArmRobot.stop)
 
 OBSERVING: Final = frozenset(
     {
-        *("alarms", "connection", "control_owner", "health", "state", "move_in_progress", "robot_joints"),
+        *(
+            "alarms",
+            "connection",
+            "control_owner",
+            "health",
+            "observations",
+            "state",
+            "move_in_progress",
+            "robot_joints",
+        ),
         *("joint_limits", "max_tcp_speed", "forward_kinematics", "get_hand_teaching_mode", "grippers", "suctions"),
         *("get_arm_ids", "get_end_effectors_ids", "get_end_effector_pose"),
     }

@@ -1,23 +1,27 @@
-"""Streaming of robot joints and end effector poses, at the streaming period and at other rates."""
+"""Streaming of robot joints, end effector poses and observations, at the streaming period and at other rates."""
 
 import contextlib
 import threading
 import time
 from collections.abc import Callable
+from typing import Final, Literal
 
 import msgspec
 
 from arcor2_hw.data.base import UNSET, Unset
-from arcor2_hw.data.events import Event, RobotEefData, RobotJointsData
+from arcor2_hw.data.events import Event, ObjectObservationsData, RobotEefData, RobotJointsData
 from arcor2_hw.data.robot import EefPose
-from arcor2_hw.exceptions import Arcor2Error
-from arcor2_hw.objects import MultiArmRobot, Robot
+from arcor2_hw.exceptions import Arcor2Error, message_of
+from arcor2_hw.objects import Generic, MultiArmRobot, Robot
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.clock import Clock
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.messages import Stream, StreamEvent
 
+OBSERVATIONS: Final = "ObjectObservations"
+"""The event with the observations of a device."""
+_Kind = Literal["joints", "eef", "observations"]
 _encode = msgspec.json.Encoder().encode
 
 
@@ -42,12 +46,26 @@ def _eef(robot: Robot, time_ms: float | Unset) -> bytes:
     return _encode(Event("RobotEef", data=RobotEefData(robot.id, poses, time_ms)))
 
 
+def _observations(instance: Generic, time_ms: float) -> bytes:
+    try:
+        data = ObjectObservationsData(instance.id, time_ms, instance.observations())
+    except Exception as error:  # noqa: BLE001 - a driver may raise anything
+        why = message_of(error)
+        data = ObjectObservationsData(instance.id, time_ms, reason=why.text, **why.translation())
+    return _encode(Event(OBSERVATIONS, data=data))
+
+
 class Streams:
-    """Read and send the state of robots. A robot is not queried again before it has answered."""
+    """Read and send the state of devices. A device is not queried again before it has answered."""
 
     def __init__(self, send: Send) -> None:
         self._send = send
         self._pending: dict[tuple[str, bool, bool, float], Job] = {}
+
+    def send_observations(self, device: Device, rate: float) -> None:
+        """Start to read and send the observations of a device. `rate`: of the stream, Hz."""
+        if (instance := device.instance) is not None and not device.closing:
+            self._begin(device, (device.id, False, False, rate), self._observe, instance, rate)
 
     def send(self, device: Device, *, joints: bool, eef: bool, rate: float = 0.0) -> None:
         """Start to read and send joints or end effector poses of a robot. Other devices are ignored.
@@ -57,13 +75,20 @@ class Streams:
         robot = device.instance
         if not isinstance(robot, Robot) or device.closing:
             return
-        key = (device.id, joints, eef, rate)
+        self._begin(device, (device.id, joints, eef, rate), self._read_and_send, robot, joints, eef, rate)
+
+    def _begin(
+        self, device: Device, key: tuple[str, bool, bool, float], function: Callable[..., None], *arguments: object
+    ) -> None:
         before = self._pending.get(key)
         if before is not None and not before.ended:
             return
-        job = Job("stream", self._read_and_send, (robot, joints, eef, rate))
-        self._pending[key] = job
+        job = self._pending[key] = Job("stream", function, arguments)
         device.watch_lane.submit_or_fail(job)
+
+    def _observe(self, instance: Generic, rate: float) -> None:
+        encoded = _observations(instance, round(time.monotonic() * 1e3, 3))
+        self._send(StreamEvent(OBSERVATIONS, instance.id, encoded, rate))
 
     def _read_and_send(self, robot: Robot, joints: bool, eef: bool, rate: float) -> None:
         # A read error sends no event: clients see the age of the last one.
@@ -75,33 +100,42 @@ class Streams:
 
 
 class RatedStreams:
-    """Schedule streams at other rates. Each robot, event and rate is read and encoded once per period."""
+    """Schedule streams at other rates. Each device, event and rate is read and encoded once per period."""
 
     def __init__(self, cell: Callable[[], Cell], clock: Clock, streams: Streams) -> None:
         self._cell = cell
         self._clock = clock
         self._streams = streams
         self._lock = threading.Lock()
-        self._rates: dict[tuple[str, bool], frozenset[float]] = {}
-        self._scheduled: set[tuple[str, bool, float]] = set()
+        self._rates: dict[tuple[str, _Kind], frozenset[float]] = {}
+        self._scheduled: set[tuple[str, _Kind, float]] = set()
 
     def set_rates(self, message: Stream) -> None:
-        """Replace the stream rates of a robot. Runs on the reader thread."""
-        for joints, rates in ((True, message.joints), (False, message.eef)):
+        """Replace the stream rates of a device. Runs on the reader thread."""
+        wanted: tuple[tuple[_Kind, list[float]], ...] = (
+            ("joints", message.joints),
+            ("eef", message.eef),
+            ("observations", message.observations),
+        )
+        for kind, rates in wanted:
             with self._lock:
-                self._rates[message.object_id, joints] = frozenset(rates)
-                new = [rate for rate in rates if (message.object_id, joints, rate) not in self._scheduled]
-                self._scheduled.update((message.object_id, joints, rate) for rate in new)
+                self._rates[message.object_id, kind] = frozenset(rates)
+                new = [rate for rate in rates if (message.object_id, kind, rate) not in self._scheduled]
+                self._scheduled.update((message.object_id, kind, rate) for rate in new)
             for rate in new:
-                self._send_periodically(message.object_id, joints, rate, time.monotonic())
+                self._send_periodically(message.object_id, kind, rate, time.monotonic())
 
-    def _send_periodically(self, object_id: str, joints: bool, rate: float, due: float) -> None:
+    def _send_periodically(self, object_id: str, kind: "_Kind", rate: float, due: float) -> None:
         with self._lock:
-            if rate not in self._rates[object_id, joints]:
-                self._scheduled.discard((object_id, joints, rate))
+            if rate not in self._rates[object_id, kind]:
+                self._scheduled.discard((object_id, kind, rate))
                 return
         with contextlib.suppress(Arcor2Error):  # the device has failed and may be retried later
-            self._streams.send(self._cell()[object_id], joints=joints, eef=not joints, rate=rate)
+            device = self._cell()[object_id]
+            if kind == "observations":
+                self._streams.send_observations(device, rate)
+            else:
+                self._streams.send(device, joints=kind == "joints", eef=kind == "eef", rate=rate)
         now = time.monotonic()
         following = max(due + 1.0 / rate, now)  # missed periods are skipped
-        self._clock.after(following - now, lambda: self._send_periodically(object_id, joints, rate, following))
+        self._clock.after(following - now, lambda: self._send_periodically(object_id, kind, rate, following))

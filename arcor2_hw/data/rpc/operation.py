@@ -15,6 +15,10 @@ LONGEST_LEASE_MS: Final = 300
 FASTEST_STREAM: Final = 30
 """Maximum rate of a stream, Hz."""
 
+SLOWEST_OBSERVATIONS: Final = 0.2
+FASTEST_OBSERVATIONS: Final = 10.0
+"""Limits of the rate of observations, Hz."""
+
 
 class JogFrame(enum.StrEnum):
     """The frame whose axes are used for jogging. The moving point is always the end effector."""
@@ -72,6 +76,14 @@ class StreamRobotArgs(Data, frozen=True):
     send: bool = True
 
 
+class StreamObservationsArgs(Data, frozen=True):
+    """Arguments of StreamObservations: ObjectObservations of a device, 0.2 to 10 times per second, or off."""
+
+    object_id: str
+    rate: float = 1.0
+    send: bool = True
+
+
 class StopKind(enum.StrEnum):
     """What a stop applies to."""
 
@@ -117,6 +129,7 @@ OPERATION_RPCS: Final = (
     Rpc("HoldHandTeaching", HoldHandTeachingArgs, None, Role.STANDARD_USER, additional=True),
     Rpc("JogRobot", JogRobotArgs, JogRobotData, Role.STANDARD_USER, additional=True),
     Rpc("StopAll", None, StopAllData, Role.OPERATOR, additional=True),
+    Rpc("StreamObservations", StreamObservationsArgs, None, Role.OPERATOR, additional=True),
     Rpc("StreamRobot", StreamRobotArgs, None, Role.OPERATOR, additional=True),
 )
 """Requests that operate devices."""

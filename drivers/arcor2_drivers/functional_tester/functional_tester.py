@@ -4,10 +4,11 @@ import contextlib
 from typing import ClassVar, Final
 
 from arcor2_hw.actions import action
-from arcor2_hw.data.device import Alarm, Health, LossReaction
+from arcor2_hw.data.device import Alarm, Health, LossReaction, Observation, Quality
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models
 from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, DeviceTimeout, NotFound, Refused
+from arcor2_hw.messages import translatable
 from arcor2_hw.objects import CollisionObject, Machine, MachineCommand, MachineState, UnitMode
 
 from .registers import DOOR_CLOSE, DOOR_OPEN, FALLEN, PASSING, STATES, Holding, Inputs, fault_of, title
@@ -82,6 +83,26 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         inputs = self.current()
         return {"tested": inputs.tested, "passed": inputs.passed, "failed": inputs.failed}
 
+    def observations(self) -> list[Observation]:
+        """Return the measurements of the last tested board and the counters since power-on."""
+        inputs = self.current()
+        measured = (
+            (translatable("Supply voltage"), inputs.supply_voltage, "V"),
+            (translatable("Supply current"), inputs.supply_current, "A"),
+            (translatable("Contact resistance"), inputs.contact_resistance, "Ω"),
+        )
+        counted = (
+            (translatable("Boards tested"), inputs.tested),
+            (translatable("Boards passed"), inputs.passed),
+            (translatable("Boards failed"), inputs.failed),
+        )
+        tested = inputs.result != 0  # otherwise nothing has been measured yet
+        quality = Quality.GOOD if tested else Quality.BAD
+        return [
+            *(Observation(name, value if tested else None, unit, quality) for name, value, unit in measured),
+            *(Observation(name, value) for name, value in counted),
+        ]
+
     def permissives(self) -> list[tuple[str, bool]]:
         """Return the conditions of a test, each with whether it is met."""
         inputs = self.current()
@@ -147,7 +168,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         self.require_command("close_door")
         self.move_door(DOOR_CLOSE, "close_door", lambda now: now.door_closed)
 
-    @action(deadline=LONGEST_TEST + MARGIN)
+    @action(deadline=LONGEST_TEST + MARGIN, verdict=True)
     def test(self, program: int = 1, *, an: str | None = None) -> bool:
         """Test the board in the fixture; return whether it passes.
 

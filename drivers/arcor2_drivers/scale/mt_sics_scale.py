@@ -8,9 +8,9 @@ from typing import ClassVar, Final
 
 from arcor2_hw.actions import action
 from arcor2_hw.data.base import now
-from arcor2_hw.data.device import Health, Identity, LossReaction, Reading, Severity
+from arcor2_hw.data.device import Health, Identity, LossReaction, Observation, Quality, Reading, Severity
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused, Stale
-from arcor2_hw.messages import Message
+from arcor2_hw.messages import Message, translatable
 from arcor2_hw.objects import Scale
 from arcor2_hw.objects.connected import AlarmText
 from arcor2_hw.objects.line_device import LineDevice
@@ -21,6 +21,8 @@ from .sics import Answer
 
 STATUS_PERIOD: Final = 0.5
 """Time between status requests while the line is free, s."""
+RECENT: Final = 2.0
+"""Age up to which a weight is shown as present, s."""
 STABLE_PERIOD: Final = 0.03
 """Time between requests while waiting for a stable value, s; a scale measures about 20 times per second."""
 OUTSIDE_FOR: Final = 0.5
@@ -166,6 +168,15 @@ class MtSicsScale(LineDevice, Scale):
                 max_age=max_age,
             )
         return reading
+
+    def observations(self) -> list[Observation]:
+        """Return the newest weight. It is uncertain when the scale has not been asked recently."""
+        self.observing.check()
+        newest = self._newest
+        if newest is None:
+            return [Observation(translatable("Net weight"), None, "kg", Quality.BAD)]
+        quality = newest.quality if newest.age <= RECENT else Quality.UNCERTAIN
+        return [Observation(translatable("Net weight"), newest.value, "kg", quality)]
 
     # -------------------------------------------------------------------------------- actions
     @action(deadline=DEADLINE)

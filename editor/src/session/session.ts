@@ -6,7 +6,7 @@
 import { t } from "@lingui/core/macro";
 import type { ConnectionState, ProtocolClient } from "../protocol/client";
 import { Refused } from "../protocol/errors";
-import { ADDITIONAL_EVENTS, ROLES, type ServerEvent } from "../protocol/types";
+import { ADDITIONAL_EVENTS, type ObjectObservationsData, ROLES, type ServerEvent } from "../protocol/types";
 import { isRunning } from "../store/selectors";
 import { OFFLINE, type State } from "../store/state";
 import { applyEvent, notify, now, setConnection, store } from "../store/store";
@@ -30,6 +30,8 @@ const TOKEN_NEEDED = "token_needed";
 declare module "../store/runtime" {
   interface Runtime {
     session?: Session;
+    /** Receives the observations of devices, which bypass the store, while trends are shown. */
+    takeObservations?: ((data: ObjectObservationsData) => void) | undefined;
   }
 }
 
@@ -91,6 +93,7 @@ export class Session {
   private onEvent(event: ServerEvent): void {
     if (event.event === "RobotJoints") telemetry.takeJoints(event.data);
     else if (event.event === "RobotEef") telemetry.takeEef(event.data);
+    else if (event.event === "ObjectObservations") now().runtime.takeObservations?.(event.data);
     else {
       // Frequent events would push everything else out of the diary.
       if (event.event !== "MovePreview" && event.event !== "UserPresence")

@@ -1,4 +1,4 @@
-"""Subscriptions to joints and end effector poses of robots, at the streaming period or at a rate set by the client."""
+"""Subscriptions to joints, end effector poses and observations, at the streaming period or at a rate of the client."""
 
 from collections.abc import Callable
 from typing import Final
@@ -8,11 +8,17 @@ from arcor2_hw.runtime import messages as m
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import Connection, EventHub
 
-_KINDS: Final = {"RobotJoints": RobotEventKind.JOINTS, "RobotEef": RobotEventKind.EEF_POSE}
+OBSERVATIONS: Final = "observations"
+"""The kind of the streams of observations, next to those of RobotEventKind."""
+_KINDS: Final[dict[str, str]] = {
+    "RobotJoints": RobotEventKind.JOINTS,
+    "RobotEef": RobotEventKind.EEF_POSE,
+    "ObjectObservations": OBSERVATIONS,
+}
 
 
 class RobotStreams:
-    """The subscriptions to the streams of robots.
+    """The subscriptions to the streams of robots and other devices.
 
     Args:
         hub: publishes the streams.
@@ -26,8 +32,8 @@ class RobotStreams:
         self._hub = hub
         self._send = send_message
         self._to_all_clients = to_all_clients
-        self._subscribers: dict[tuple[str, RobotEventKind], set[Connection]] = {}
-        self._rates: dict[tuple[str, RobotEventKind], dict[Connection, float]] = {}
+        self._subscribers: dict[tuple[str, str], set[Connection]] = {}
+        self._rates: dict[tuple[str, str], dict[Connection, float]] = {}
 
     def subscribe(self, client: Connection, robot_id: str, what: RobotEventKind, send: bool) -> None:
         """Start or stop a stream at the streaming period. Raise RequestRefused if it was not subscribed to."""
@@ -40,7 +46,7 @@ class RobotStreams:
             clients.discard(client)
         self._update_host(robot_id)
 
-    def at_rate(self, client: Connection, robot_id: str, what: RobotEventKind, rate: float, send: bool) -> None:
+    def at_rate(self, client: Connection, robot_id: str, what: str, rate: float, send: bool) -> None:
         """Start or stop a stream at `rate`, 1/s. Raise RequestRefused if it was not subscribed to."""
         rates = self._rates.setdefault((robot_id, what), {})
         if send:
@@ -84,5 +90,7 @@ class RobotStreams:
         self._send(m.Subscribe(robot_id, wanted[RobotEventKind.JOINTS], wanted[RobotEventKind.EEF_POSE]))
 
     def _update_host_rates(self, robot_id: str) -> None:
-        rates = {what: sorted(set(self._rates.get((robot_id, what), {}).values())) for what in RobotEventKind}
-        self._send(m.Stream(robot_id, rates[RobotEventKind.JOINTS], rates[RobotEventKind.EEF_POSE]))
+        joints, eef, observations = (
+            sorted(set(self._rates.get((robot_id, what), {}).values())) for what in _KINDS.values()
+        )
+        self._send(m.Stream(robot_id, joints, eef, observations))

@@ -37,6 +37,7 @@ CLIENT_STATE: Final = frozenset(
         "RegisterForRobotEvent",
         "RegisterUser",
         "SetViewState",
+        "StreamObservations",
         "StreamRobot",
         "SubscribeEvents",
         "UpdateLock",

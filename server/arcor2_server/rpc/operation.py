@@ -21,13 +21,15 @@ from arcor2_hw.data.rpc import (
     RetryObjectArgs,
     StopAllData,
     StopKind,
+    StreamObservationsArgs,
     StreamRobotArgs,
 )
-from arcor2_hw.data.rpc.operation import FASTEST_STREAM
+from arcor2_hw.data.rpc.operation import FASTEST_OBSERVATIONS, FASTEST_STREAM, SLOWEST_OBSERVATIONS
 from arcor2_server.documents import Session
 from arcor2_server.errors import RequestRefused
 from arcor2_server.execution.service import Execution
 from arcor2_server.execution.stop_all import StopAll
+from arcor2_server.hosts.streams import OBSERVATIONS
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.motion import RobotMotion
 from arcor2_server.online.online_scene import OnlineScene
@@ -161,6 +163,28 @@ class OperationRequests:
                 rate=args.rate,
             )
         streams.at_rate(context.client, args.robot_id, args.what, args.rate, args.send)
+
+    @rpc("StreamObservations")
+    async def stream_observations(self, context: Context, args: StreamObservationsArgs) -> None:
+        """Start or stop sending the observations of a device to this client at a given rate.
+
+        The device belongs to the online scene or to the running program.
+        """
+        if self._execution.busy:
+            streams = self._execution.streams_of_object(args.object_id)
+        else:
+            self._session.require_scene_open()
+            self._online.require_online()
+            self._session.document.scene_object(args.object_id)
+            streams = self._online.host.streams
+        if args.send and not SLOWEST_OBSERVATIONS <= args.rate <= FASTEST_OBSERVATIONS:
+            raise RequestRefused(
+                "The rate must be {slowest:g} to {fastest:g} Hz, not {rate:g}.",
+                slowest=SLOWEST_OBSERVATIONS,
+                fastest=FASTEST_OBSERVATIONS,
+                rate=args.rate,
+            )
+        streams.at_rate(context.client, args.object_id, OBSERVATIONS, args.rate, args.send)
 
     # ------------------------------------------------------------------------------------------------ devices
     @rpc("RetryObject")

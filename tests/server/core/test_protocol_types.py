@@ -13,7 +13,8 @@ from tests.protocol import PROTOCOL
 
 TRANSLATION = {"key", "values"}
 ADDED = {
-    "ObjectTypeMeta": {"category", "display_name", "icon", "shadows"} | TRANSLATION,
+    "ActionMetadata": {"verdict"},
+    "ObjectTypeMeta": {"category", "display_name", "icon", "observable", "shadows"} | TRANSLATION,
     "ParameterMeta": {"address", "for_control", "former_names", "secret"},
     "ObjectAction": {"category", "former_names", "icon"} | TRANSLATION,
     "RobotEef.Data": {"time_ms"},

@@ -18,6 +18,7 @@ ASKED: dict[str, dict[str, Any] | None] = {
     "JogRobot": HOLD | {"linear": {"x": 0.1}},
     "HoldHandTeaching": HOLD,
     "StreamRobot": {"robot_id": "nobody", "what": "joints"},
+    "StreamObservations": {"object_id": "nobody"},
     "StartSceneKeepGoing": None,
     "RetryObject": {"object_id": "nobody"},
     "AcknowledgeStop": {"object_id": "nobody"},
@@ -27,6 +28,7 @@ ROLES = {
     "JogRobot": Role.STANDARD_USER,
     "HoldHandTeaching": Role.STANDARD_USER,
     "StreamRobot": Role.OPERATOR,
+    "StreamObservations": Role.OPERATOR,
     "StartSceneKeepGoing": Role.STANDARD_USER,
     "RetryObject": Role.STANDARD_USER,
     "AcknowledgeStop": Role.OPERATOR,
@@ -96,7 +98,13 @@ async def test_a_robot_is_streamed_while_a_program_runs(tmp_path: Path) -> None:
         await alice.ask("TemporaryPackage")
         with pytest.raises(Refused, match="not connected yet"):
             await viewer.ask("StreamRobot", **what)
+        with pytest.raises(Refused, match="not connected yet"):
+            await viewer.ask("StreamObservations", object_id=arm)
         await happens(viewer, "ActionStateBefore")
+        await viewer.ask("StreamObservations", object_id=clock, rate=5)
+        await happens(viewer, "ObjectObservations", object_id=clock)
+        assert not [message for message in other.waiting if message.get("event") == "ObjectObservations"]
+        await viewer.ask("StreamObservations", object_id=clock, send=False)
 
         await viewer.ask("StreamRobot", **what, rate=30)
         viewer.take(), other.take()

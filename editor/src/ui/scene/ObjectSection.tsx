@@ -1,18 +1,21 @@
 /** The selected object: name, copies, users, visibility. */
 
 import { t } from "@lingui/core/macro";
-import { useState } from "react";
+import { Suspense, useState } from "react";
 import { duplicateObject, notBuildable, projectsUsing, removeObject, renameObject } from "../../commands/scene";
 import { storeViewState } from "../../commands/viewstate";
 import { heldBy } from "../../store/selectors";
 import { now, useEditor } from "../../store/store";
 import { MoreOrLess, OnOff } from "../kit/fields";
-import { Button } from "../kit/kit";
+import { Button, Waiting } from "../kit/kit";
+import { lazyComponent } from "../kit/lazy";
 import { Confirm } from "../kit/lazyControls";
 import { NameField } from "../points/NameField";
 import type { Section } from "../workplace/section";
 import { setHidden } from "./hidden";
 import "./scene.css";
+
+const Trends = lazyComponent(() => import("../trends/Trends"));
 
 const Body: Section["Body"] = ({ selection: { id } }) => {
   const object = useEditor((state) => state.doc?.objects[id]);
@@ -46,6 +49,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
         </Button>
       </div>
       <Seeing id={id} />
+      <Values key={id} id={id} />
       {needing && (
         <Confirm
           title={t`Remove ${object.name}?`}
@@ -64,6 +68,25 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
     </>
   );
 };
+
+/** Trends of the device's values, which are read only while they are shown. */
+function Values({ id }: { id: string }) {
+  const [shown, setShown] = useState(false);
+  const observable = useEditor((state) => state.types.byName[state.doc?.objects[id]?.type ?? ""]?.observable);
+  if (!observable) return null;
+  return (
+    <>
+      <OnOff isSelected={shown} onChange={setShown}>
+        {t`Trends of values`}
+      </OnOff>
+      {shown && (
+        <Suspense fallback={<Waiting>{t`Loading…`}</Waiting>}>
+          <Trends id={id} />
+        </Suspense>
+      )}
+    </>
+  );
+}
 
 /** Visibility for this user only. */
 function Seeing({ id }: { id: string }) {

@@ -1,0 +1,79 @@
+/** Trends of the values of a device, while the panel is open and the page is visible. */
+
+import { t } from "@lingui/core/macro";
+import { useEffect, useState } from "react";
+import { sentence } from "../../commands/requests";
+import { decimal } from "../../formats";
+import { inUserLanguage } from "../../i18n/serverMessages";
+import { call } from "../../session/connection";
+import { isLive } from "../../store/selectors";
+import { now, useEditor } from "../../store/store";
+import { RefusedText } from "../points/Refusal";
+import { Chart, MOST } from "./Chart";
+import { charts, type History, NO_HISTORY, RATE, type Series, shownValue, withObservations } from "./history";
+import "./trends.css";
+
+export default function Trends({ id }: { id: string }) {
+  const [history, setHistory] = useState<History>(NO_HISTORY);
+  const [failed, setFailed] = useState("");
+  const live = useEditor((state) => isLive(state) && state.connection.status === "ready");
+  const seen = useVisible();
+  useEffect(() => {
+    if (!live || !seen) return;
+    const { runtime } = now();
+    runtime.takeObservations = (data) => {
+      if (data.object_id !== id) return;
+      setFailed("");
+      setHistory((known) => withObservations(known, inUserLanguage(data), Date.now() / 1000));
+    };
+    call("StreamObservations", { object_id: id, rate: RATE }).catch((error: unknown) => setFailed(sentence(error)));
+    return () => {
+      runtime.takeObservations = undefined;
+      // Refused if the scene went offline meanwhile, which ends the stream too.
+      call("StreamObservations", { object_id: id, send: false }).catch(() => {});
+    };
+  }, [id, live, seen]);
+  if (!live && history.times.length === 0) return <p className="quiet">{t`Go online to see values of the device.`}</p>;
+  return (
+    <>
+      {charts(history.series, MOST).map((group) => (
+        <section className="trend" key={group.map((each) => each.id).join()}>
+          <ul>
+            {group.map((each, n) => (
+              <li key={each.id}>
+                <span className="trend-line" data-line={n + 1} aria-hidden="true" />
+                <span>{each.name}</span>
+                <strong data-quality={each.last.quality}>{textOf(each)}</strong>
+              </li>
+            ))}
+          </ul>
+          <Chart times={history.times} series={group} />
+        </section>
+      ))}
+      {live && !failed && history.times.length === 0 && <p className="quiet">{t`Waiting for values…`}</p>}
+      {history.times.length > 0 && history.series.length === 0 && !history.failure && (
+        <p className="quiet">{t`The device has no values now.`}</p>
+      )}
+      <RefusedText>{failed || history.failure}</RefusedText>
+    </>
+  );
+}
+
+function textOf({ binary, unit, last }: Series): string {
+  const value = shownValue(last);
+  if (value === null) return t`unknown`;
+  if (binary) return value ? t`on` : t`off`;
+  const text = decimal(value, Math.abs(value) < 10 ? 3 : 1);
+  return unit ? `${text}\u00a0${unit}` : text;
+}
+
+/** Return whether the page is visible. */
+function useVisible(): boolean {
+  const [visible, setVisible] = useState(!document.hidden);
+  useEffect(() => {
+    const changed = () => setVisible(!document.hidden);
+    document.addEventListener("visibilitychange", changed);
+    return () => document.removeEventListener("visibilitychange", changed);
+  }, []);
+  return visible;
+}
