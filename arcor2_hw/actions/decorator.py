@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Final, TypeVar, overload
 
+from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.object_type import ActionMetadata
 
 DEFAULT_DEADLINE: Final = 120.0
@@ -50,6 +51,7 @@ def action(
     category: str = "",
     icon: str = "",
     renamed: Mapping[str, str] = NOTHING_RENAMED,
+    verdict: bool = False,
 ) -> Callable[[F], F]: ...
 
 
@@ -64,6 +66,7 @@ def action(
     category: str = "",  # noqa: ARG001 - read from the source
     icon: str = "",  # noqa: ARG001
     renamed: Mapping[str, str] = NOTHING_RENAMED,
+    verdict: bool = False,
 ) -> F | Callable[[F], F]:
     """Mark a method as an action.
 
@@ -76,10 +79,11 @@ def action(
         category: Category in the editor; default: that of the type.
         icon: Icon in the editor; default: that of the type.
         renamed: Present names of parameters by former names, which older projects and scripts use.
+        verdict: Whether the returned boolean says that a part is good. Good and bad parts of a run are counted.
     """
 
     def mark(function: F) -> F:
-        function.__action__ = ActionMetadata(composite=composite, hidden=hidden)  # type: ignore[attr-defined]
+        function.__action__ = ActionMetadata(composite, hidden, verdict=verdict or UNSET)  # type: ignore[attr-defined]
         function.__deadline__ = deadline  # type: ignore[attr-defined]
         function.__quick__ = quick  # type: ignore[attr-defined]
         function.__renamed__ = renamed  # type: ignore[attr-defined]

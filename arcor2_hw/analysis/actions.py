@@ -23,6 +23,7 @@ from arcor2_hw.exceptions import InvalidData
 
 _LITERALS: Final = {"boolean": bool, "integer": int, "double": float, "string": str}
 NUMBERS: Final = ("integer", "double")
+_METADATA: Final = ("composite", "hidden", "verdict")
 _NOT_ORDINARY: Final = ("builtins.staticmethod", "builtins.classmethod", "builtins.property")
 
 
@@ -51,7 +52,7 @@ class ActionReader:
 
     def _metadata(self, owner: ClassInfo, call: ast.Call) -> ActionMetadata:
         given: dict[str, Any] = dict(zip(("composite", "hidden"), call.args, strict=False))
-        given |= {keyword.arg: keyword.value for keyword in call.keywords if keyword.arg in ("composite", "hidden")}
+        given |= {keyword.arg: keyword.value for keyword in call.keywords if keyword.arg in _METADATA}
         values = {name: bool(constant(value, owner.module, owner, self._resolver)) for name, value in given.items()}
         return ActionMetadata(**values)
 
@@ -131,7 +132,7 @@ class ActionReader:
         try:
             cancelled = self._hierarchy.attribute(seen_from, "CANCEL_MAPPING", {})
             if isinstance(cancelled, dict) and node.name in cancelled:
-                metadata = ActionMetadata(metadata.composite, metadata.hidden, cancellable=True)
+                metadata = replace(metadata, cancellable=True)
             self._check_form(info, node)
             returns = self._returns(info, node)
             parameters = self._parameters(info, node, seen_from, text)

@@ -16,6 +16,7 @@ from arcor2_hw.data.editor import (
     ProjectBreakpoints,
     ReachabilityData,
     Run,
+    RunStatisticsData,
     TaskStateData,
     TraceEntry,
     UserPresenceData,
@@ -31,6 +32,7 @@ from arcor2_hw.data.events import (
     HandTeachingModeData,
     LockData,
     NotificationData,
+    ObjectObservationsData,
     ObjectStateData,
     OpenProjectData,
     OpenSceneData,
@@ -557,6 +559,7 @@ class Requests(ABC):
         category: str | Unset = UNSET,
         icon: str | Unset = UNSET,
         shadows: str | Unset = UNSET,
+        observable: bool | Unset = UNSET,
         key: str | Unset = UNSET,
         values: dict[str, str | Message] | Unset = UNSET,
         disabled: bool = False,
@@ -828,6 +831,14 @@ class Requests(ABC):
     async def stop_scene(self, *, dry_run: bool = False, timeout: float | None = None) -> None:
         """StopScene. Needs the role standard user."""
 
+    async def stream_observations(
+        self, object_id: str, *, rate: float = 1.0, send: bool = True, timeout: float | None = None
+    ) -> None:
+        """StreamObservations: ObjectObservations of a device, 0.2 to 10 times per second, or off.
+
+        Needs the role operator.
+        """
+
     async def stream_robot(
         self,
         *,
@@ -1090,6 +1101,10 @@ class Requests(ABC):
     ) -> EventStream[TypedEvent[ObjectHealthData]]: ...
     @overload
     def follow(
+        self, name: Literal["ObjectObservations"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[ObjectObservationsData]]: ...
+    @overload
+    def follow(
         self, name: Literal["ObjectState"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[ObjectStateData]]: ...
     @overload
@@ -1178,6 +1193,10 @@ class Requests(ABC):
     ) -> EventStream[TypedEvent[RobotMoveToPoseData]]: ...
     @overload
     def follow(self, name: Literal["RunChanged"], /, *, limit: int = LIMIT) -> EventStream[TypedEvent[Run]]: ...
+    @overload
+    def follow(
+        self, name: Literal["RunStatistics"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[RunStatisticsData]]: ...
     @overload
     def follow(self, name: Literal["SceneChanged"], /, *, limit: int = LIMIT) -> EventStream[TypedEvent[BareScene]]: ...
     @overload

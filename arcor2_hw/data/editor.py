@@ -162,6 +162,37 @@ class RunEnd(enum.StrEnum):
     LOST = "lost"
 
 
+class CounterValue(Data, frozen=True):
+    """The value of a counter of the program; `id` and `name` are those of its object."""
+
+    id: str
+    name: str
+    value: int
+
+
+class RunStatistics(Data, frozen=True):
+    """What a run has produced so far.
+
+    cycles: completed passes of the program from its start to its end. last_cycle, mean_cycle: durations of the last
+    cycle and of all cycles, s, without cycles during which the program was paused; omitted before the first one. good,
+    bad: results of actions that judge a part (`verdict`); omitted if the program has no such action. counters: counters
+    that the program has used.
+    """
+
+    cycles: int = 0
+    last_cycle: float | Unset = UNSET
+    mean_cycle: float | Unset = UNSET
+    good: int | Unset = UNSET
+    bad: int | Unset = UNSET
+    counters: list[CounterValue] = field(default_factory=list)
+
+
+class RunStatisticsData(RunStatistics, frozen=True, kw_only=True):
+    """Data of the event RunStatistics; `run` is the number of the run."""
+
+    run: int
+
+
 class ActionOfRun(Data, frozen=True):
     """An action of a run; `name` is empty when the project does not contain it."""
 
@@ -175,7 +206,7 @@ class Run(TranslatableData, frozen=True):
     project_modified: modification time of the built project, which identifies its revision. temporary: run from the
     editor; its package is deleted. started_by, stopped_by: name of a user or token. actions: number of started actions.
     last_action: action that was active at the end. error: error that ended the run, with `key` and `values` as in
-    ProjectException.
+    ProjectException. statistics: omitted until the devices are connected, and in runs of older servers.
     """
 
     number: int
@@ -195,6 +226,7 @@ class Run(TranslatableData, frozen=True):
     last_action: ActionOfRun | Unset = UNSET
     error: str | Unset = UNSET
     error_type: str | Unset = UNSET
+    statistics: RunStatistics | Unset = UNSET
 
 
 class TraceEntry(TranslatableData, frozen=True):

@@ -48,6 +48,10 @@ class Oven(Generic):
         """
         assert 0.0 <= power <= 900.0
 
+    @action(verdict=True)
+    def done(self, *, an: str | None = None) -> bool:
+        """Return whether it is done."""
+
     @action(category="Door", icon="door-open")
     def open(self, *, an: str | None = None) -> None:
         """Open."""
@@ -93,7 +97,13 @@ def test_category_and_icon_come_from_the_class(library: Library) -> None:
     assert (oven.meta.display_name, grill.meta.display_name) == ("Oven 3000", UNSET)
     assert (grill.meta.category, grill.meta.icon) == ("Heat", "grill")
     shown = {action.name: (action.category, action.icon) for action in grill.actions}
-    assert shown == {"heat": ("Heat", "grill"), "open": ("Door", "door-open"), "close": (UNSET, UNSET)}
+    assert shown == {
+        "heat": ("Heat", "grill"),
+        "done": ("Heat", "grill"),
+        "open": ("Door", "door-open"),
+        "close": (UNSET, UNSET),
+    }
+    assert {action.name for action in oven.actions if action.meta.verdict is True} == {"done"}
     (close,) = [action for action in oven.actions if action.name == "close"]
     assert close.disabled
     assert "'Door Open' is not a valid icon" in str(close.problem)

@@ -69,6 +69,20 @@ async def test_object_is_placed_at_the_tool(cell: Cell, colleague: Client, brows
         await screen.until("id => window.__engine?.item(id)?.endEffectors?.length > 0", robot)
         await page.get_by_role("navigation").get_by_role("button").filter(has_text=texts.OBJECTS).click()
         await page.get_by_role("complementary").get_by_text("tester", exact=True).first.click()
+        # Its values are read and drawn while they are shown.
+        await page.get_by_text("Trends of values").click()
+        trend = page.get_by_role("img", name=re.compile("Boards tested.*, last 5 minutes"))
+        await expect(page.get_by_role("listitem").filter(has_text="Supply voltage")).to_contain_text("unknown")
+        await expect(page.get_by_role("listitem").filter(has_text="Boards tested")).to_contain_text("0")
+        assert await trend.locator("canvas").count() == 1
+        await trend.scroll_into_view_if_needed()
+        for name in ("tablet", "ipad", "phone"):
+            await page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
+            await screen.settle()
+            await screen.picture(f"trends {name}")
+            assert await screen.faults() == [], name
+        await page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
+        await page.get_by_text("Trends of values").click()
         await page.get_by_role("radio", name="Middle").click()
         await page.get_by_role("button", name="Set pose from tool", exact=True).click()
         touched = await _tool(screen, robot)
@@ -191,6 +205,17 @@ async def test_camera_and_robot_are_calibrated_from_pictures(
         picture = page.get_by_role("img", name="Camera picture")
         await picture.wait_for()
         assert await picture.evaluate("image => image.decode().then(() => image.naturalWidth)") == 1280
+        # Live: one picture after the other. Without a new one, the old one stays with its age.
+        await page.get_by_text("Live picture").click()
+        await screen.sees(re.compile("pictures per second"))
+        await screen.picture("live camera")
+        await page.route("**/picture", lambda route: route.abort())
+        screen.expected_errors += ("ERR_FAILED",)
+        await screen.sees(re.compile(r"\d+ s old"))
+        await screen.picture("old camera picture")
+        await page.unroute("**/picture")
+        await screen.sees(re.compile("pictures per second"))
+        await page.get_by_text("Live picture").click()
         await screen.press(texts.FIND_BY_MARKERS)
         # The message bar and the panel show the server's reason.
         failed = bar.locator(".task[data-state=failed]")

@@ -142,6 +142,19 @@ async def test_pause_step_and_stop(cell: Cell, colleague: Client, browser: Brows
         await screen.picture("operator message")
         await screen.press(texts.STEP)
         await page.get_by_text("before scan").wait_for()
+        # The step in words, with the cell and the numbers of this run.
+        state = page.get_by_role("status", name="State")
+        await expect(state).to_contain_text("reader: Read the code in front of the reader")
+        await expect(state).to_contain_text("Press Resume to continue, or Step for one action.")
+        numbers = page.get_by_role("region", name="This run")
+        await expect(numbers).to_contain_text("Good0Bad0Cycles0")
+        shown = await screen.until("window.__engine?.ids().length > 0 && __engine.ids()")
+        assert all(each.startswith("obj_") for each in shown), "devices without points and actions"
+        for name in ("tablet", "ipad", "phone"):
+            await page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
+            await screen.settle()
+            assert await screen.faults() == [], name
+            await screen.picture(f"operator, paused {name}")
         await screen.press(texts.STOP)
         while (await colleague.next_event("PackageState")).data.state is not PackageStateEnum.STOPPED:
             pass

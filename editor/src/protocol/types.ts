@@ -24,11 +24,16 @@ export interface ActionExecutionData {
   action_id: string;
 }
 
-/** How an action is executed. `composite` actions may call others; `hidden` ones are not offered to users. */
+/**
+ * How an action is executed. `composite` actions may call others; `hidden` ones are not offered to users.
+ *
+ * verdict (not in ARCOR2): whether the returned boolean says that a part is good.
+ */
 export interface ActionMetadata {
   composite: boolean;
   hidden: boolean;
   cancellable: boolean;
+  verdict?: boolean;
 }
 
 /** An action of a run; `name` is empty when the project does not contain it. */
@@ -416,6 +421,13 @@ export interface CopySceneArgs {
 export interface Corner {
   x: number;
   y: number;
+}
+
+/** The value of a counter of the program; `id` and `name` are those of its object. */
+export interface CounterValue {
+  id: string;
+  name: string;
+  value: number;
 }
 
 /** A cylinder around its origin along z, m. */
@@ -975,6 +987,20 @@ export interface ObjectModel {
 }
 
 /**
+ * Data of the event ObjectObservations: present values of a device.
+ *
+ * time_ms: time of reading on the steady clock of the cell. reason: why no value is known.
+ */
+export interface ObjectObservationsData {
+  object_id: string;
+  time_ms: number;
+  observations: Observation[];
+  reason?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
+}
+
+/**
  * Data of the event ObjectState: the connection of an object of the online scene or the running program.
  *
  * reason: why it is lost or failed, or why all connections ended. overlaid: settings from the server's cell file.
@@ -991,11 +1017,12 @@ export interface ObjectStateData {
 }
 
 /**
- * Metadata of an object type; display_name, category, icon, shadows, key and values are not in ARCOR2.
+ * Metadata of an object type; all fields from display_name on, key and values are not in ARCOR2.
  *
  * display_name: name for users; omitted when the type declares none.
  * built_in: a base class or an installed type, which cannot be deleted. shadows: distribution and version of the
- * installed type of the same name that this uploaded type replaces.
+ * installed type of the same name that this uploaded type replaces. observable: whether StreamObservations returns
+ * values of its objects.
  */
 export interface ObjectTypeMeta {
   type: string;
@@ -1012,10 +1039,23 @@ export interface ObjectTypeMeta {
   category?: string;
   icon?: string;
   shadows?: string;
+  observable?: boolean;
   key?: string;
   values?: Record<string, string | Message>;
   disabled: boolean;
   problem?: string;
+}
+
+/**
+ * A value of a device for display and trends. It is None if its quality is bad.
+ *
+ * name: English words, which clients translate, or the user's name of a point. unit: SI; empty for a boolean.
+ */
+export interface Observation {
+  name: string;
+  value: number | boolean | null;
+  unit: string;
+  quality: Quality;
 }
 
 /** Data of the event OpenProject. */
@@ -1224,6 +1264,9 @@ export interface ProjectRobotJoints {
   end_effector_id?: string;
   id: string;
 }
+
+/** Reliability of a reading (good, uncertain, bad, as in OPC UA). */
+export type Quality = "good" | "uncertain" | "bad";
 
 /** An inclusive range. */
 export interface Range {
@@ -1512,7 +1555,7 @@ export type RobotType = "articulated" | "cartesian" | "scara";
  * project_modified: modification time of the built project, which identifies its revision. temporary: run from the
  * editor; its package is deleted. started_by, stopped_by: name of a user or token. actions: number of started actions.
  * last_action: action that was active at the end. error: error that ended the run, with `key` and `values` as in
- * ProjectException.
+ * ProjectException. statistics: omitted until the devices are connected, and in runs of older servers.
  */
 export interface Run {
   number: number;
@@ -1532,6 +1575,7 @@ export interface Run {
   last_action?: ActionOfRun;
   error?: string;
   error_type?: string;
+  statistics?: RunStatistics;
   key?: string;
   values?: Record<string, string | Message>;
 }
@@ -1549,6 +1593,34 @@ export interface RunPackageArgs {
   start_paused?: boolean;
   breakpoints?: string[];
   shared_breakpoints?: boolean;
+}
+
+/**
+ * What a run has produced so far.
+ *
+ * cycles: completed passes of the program from its start to its end. last_cycle, mean_cycle: durations of the last
+ * cycle and of all cycles, s, without cycles during which the program was paused; omitted before the first one. good,
+ * bad: results of actions that judge a part (`verdict`); omitted if the program has no such action. counters: counters
+ * that the program has used.
+ */
+export interface RunStatistics {
+  cycles: number;
+  last_cycle?: number;
+  mean_cycle?: number;
+  good?: number;
+  bad?: number;
+  counters: CounterValue[];
+}
+
+/** Data of the event RunStatistics; `run` is the number of the run. */
+export interface RunStatisticsData {
+  cycles: number;
+  last_cycle?: number;
+  mean_cycle?: number;
+  good?: number;
+  bad?: number;
+  counters: CounterValue[];
+  run: number;
 }
 
 /** A scene with its objects. */
@@ -1682,6 +1754,13 @@ export interface StopOutcome {
 /** Arguments of StopRobot. */
 export interface StopRobotArgs {
   robot_id: string;
+}
+
+/** Arguments of StreamObservations: ObjectObservations of a device, 0.2 to 10 times per second, or off. */
+export interface StreamObservationsArgs {
+  object_id: string;
+  rate?: number;
+  send?: boolean;
 }
 
 /** Arguments of StreamRobot: RobotJoints or RobotEef of a robot, 1 to 30 times per second, or off. */
@@ -2079,6 +2158,7 @@ export interface Requests {
   StopPackage: { args: undefined; data: undefined };
   StopRobot: { args: StopRobotArgs; data: undefined };
   StopScene: { args: undefined; data: undefined };
+  StreamObservations: { args: StreamObservationsArgs; data: undefined };
   StreamRobot: { args: StreamRobotArgs; data: undefined };
   SubscribeEvents: { args: SubscribeEventsArgs; data: undefined };
   SystemInfo: { args: undefined; data: SystemInfoData };
@@ -2132,6 +2212,7 @@ export interface Events {
   MovePreview: MovePreviewData;
   Notification: NotificationData;
   ObjectHealth: ObjectHealthData;
+  ObjectObservations: ObjectObservationsData;
   ObjectState: ObjectStateData;
   ObjectsLocked: LockData;
   ObjectsUnlocked: LockData;
@@ -2157,6 +2238,7 @@ export interface Events {
   RobotMoveToJoints: RobotMoveToJointsData;
   RobotMoveToPose: RobotMoveToPoseData;
   RunChanged: Run;
+  RunStatistics: RunStatisticsData;
   SceneChanged: BareScene;
   SceneClosed: undefined;
   SceneObjectChanged: SceneObject;
@@ -2307,6 +2389,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   StopPackage: 1,
   StopRobot: 1,
   StopScene: 2,
+  StreamObservations: 1,
   StreamRobot: 1,
   SubscribeEvents: 1,
   SystemInfo: 1,
@@ -2348,10 +2431,12 @@ export const ADDITIONAL_EVENTS = [
   "HistoryChanged",
   "MovePreview",
   "ObjectHealth",
+  "ObjectObservations",
   "ObjectState",
   "ReachabilityChanged",
   "RobotHold",
   "RunChanged",
+  "RunStatistics",
   "TaskState",
   "UserPresence",
   "ViewStateChanged",

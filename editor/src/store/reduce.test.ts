@@ -309,3 +309,15 @@ test("reasons of reachability are in the user's language", () => {
   setTranslations({});
   expect(row?.items[0]?.reason).toBe("j1 by byl blízko meze.");
 });
+
+test("statistics change the run they belong to", () => {
+  const run = { number: 3, package_id: "p", package_name: "p", started: "", end: "running", actions: 0 } as never;
+  const changed = after(
+    { event: "RunChanged", data: run },
+    { event: "RunStatistics", data: { run: 3, cycles: 2, good: 1, bad: 0, counters: [] } },
+    { event: "RunStatistics", data: { run: 2, cycles: 9, counters: [] } },
+  );
+  expect(changed.program.runs.map(({ statistics }) => statistics)).toEqual([
+    { cycles: 2, good: 1, bad: 0, counters: [] },
+  ]);
+});

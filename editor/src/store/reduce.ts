@@ -338,6 +338,10 @@ function program(state: State, event: ServerEvent): Partial<State> | null {
     }
     case "RunChanged":
       return { program: withRuns(now, [event.data]) };
+    case "RunStatistics": {
+      const { run: number, ...statistics } = event.data;
+      return become({ runs: now.runs.map((each) => (each.number === number ? { ...each, statistics } : each)) });
+    }
     default:
       return null;
   }

@@ -3,6 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { Suspense, useEffect, useState, useSyncExternalStore } from "react";
 import { useLanguage } from "../i18n/catalogue";
+import { ROLES } from "../protocol/types";
 import { rememberPerson } from "../session/localStorage";
 import { isLive, isRunning, openId } from "../store/selectors";
 import { now, useEditor } from "../store/store";
@@ -13,6 +14,7 @@ import { Waiting } from "./kit/kit";
 import { lazyComponent } from "./kit/lazy";
 import { Overlays } from "./search/Overlays";
 import { useScreenSettings } from "./settings/Settings";
+import { CellView } from "./workplace/CellView";
 import { uncontrolledOnline } from "./workplace/uncontrolled";
 import { Workplace } from "./workplace/Workplace";
 
@@ -51,7 +53,11 @@ export function App() {
     if (document) storeOpened(document);
   }, [document]);
   useEffect(() => {
-    if (status === "ready") rememberPerson(now().connection.user);
+    if (status !== "ready") return;
+    const { user, role } = now().connection;
+    rememberPerson(user);
+    // Operators see their screen first; a hash shows that they have chosen one.
+    if (role === ROLES.operator && !location.href.includes("#")) location.hash = "#/operator";
   }, [status]);
   // A lost connection does not bring users back to the join screen.
   const [been, setBeen] = useState(false);
@@ -80,7 +86,7 @@ export function App() {
       <div className="screen">
         {operator ? (
           <Suspense fallback={<Waiting>{t`Loading…`}</Waiting>}>
-            <Operator key={language} kiosk={hash.includes("kiosk")} />
+            <Operator key={language} kiosk={hash.includes("kiosk")} Cell={CellView} />
           </Suspense>
         ) : open ? (
           <Workplace />

@@ -2,11 +2,12 @@
 
 import { useEffect, useState } from "react";
 
-/** Redraw the component every 20 s. */
-export function useTicking(): void {
+/** Redraw the component every `period` s; 0 for never. */
+export function useTicking(period = 20): void {
   const [, tick] = useState(0);
   useEffect(() => {
-    const timer = setInterval(() => tick((count) => count + 1), 20_000);
+    if (!period) return;
+    const timer = setInterval(() => tick((count) => count + 1), period * 1000);
     return () => clearInterval(timer);
-  }, []);
+  }, [period]);
 }

@@ -1,6 +1,7 @@
 """One run of a package: what its program reports, its error, and its entry in the history of runs."""
 
 import asyncio
+from collections.abc import Set
 from typing import Any
 
 import msgspec
@@ -9,10 +10,11 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import RunEnd
-from arcor2_hw.data.events import ProjectExceptionData
+from arcor2_hw.data.events import PackageInfoData, ProjectExceptionData
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
+from arcor2_server.execution.run_statistics import RunStatisticsCollector
 from arcor2_server.execution.runs import How, Runs
 from arcor2_server.storage.package_versions import check_versions
 from arcor2_server.storage.packages import Packages
@@ -43,6 +45,7 @@ class ProgramRun:
         self.action: bytes | None = None
         """The encoded ActionStateBefore of the running action, or of the action before which the program is paused."""
         self._runs = runs
+        self._statistics: RunStatisticsCollector | None = None
         self._exception: ProjectExceptionData | None = None
         self._number = 0
 
@@ -65,17 +68,32 @@ class ProgramRun:
         except Arcor2Error as error:
             log.warning("run not described", package=self.package_id, reason=str(error))
 
+    def collect_statistics(self, info: PackageInfoData, verdicts: Set[str]) -> None:
+        """Start to collect statistics. `verdicts`: ids of the actions whose result says that a part is good."""
+        self._statistics = RunStatisticsCollector(info, verdicts)
+        self._runs.set_statistics(self._number, self._statistics.statistics())
+
+    def handle_paused(self) -> None:
+        """Handle that the program is paused."""
+        if self._statistics is not None:
+            self._statistics.handle_paused()
+
     def handle_event(self, message: m.ProgramEvent) -> None:
         """Store an event of the program."""
         if message.number:
             self._runs.announced(message)
+        statistics, changed = self._statistics, False
         match message.event:
             case "ActionStateBefore":
                 self.action = message.encoded
+                changed = statistics is not None and statistics.handle_start(message.encoded)
             case "ActionStateAfter":
                 self.action = None
+                changed = statistics is not None and statistics.handle_result(message.encoded)
             case "ProjectException":
                 self._exception = msgspec.json.decode(message.encoded, type=_ExceptionEvent).data
+        if statistics is not None and changed:
+            self._runs.set_statistics(self._number, statistics.statistics())
 
     def handle_end(self, error: m.ErrorData | None) -> None:
         """Store the error with which the program ended, None if it finished."""
@@ -90,6 +108,10 @@ class ProgramRun:
         end = RunEnd.FINISHED if error is None else RunEnd.LOST if lost else RunEnd.FAILED
         if self.stopped_by is not None:
             end = RunEnd.STOPPED
+        if self._statistics is not None:
+            if end is RunEnd.FINISHED:
+                self._statistics.handle_finished()
+            self._runs.set_statistics(self._number, self._statistics.statistics())
         self._runs.end(
             self._number,
             end,

@@ -13,7 +13,7 @@ from msgspec import UNSET, Struct
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset, now
-from arcor2_hw.data.editor import ActionOfRun, Run, RunEnd, TraceEntry
+from arcor2_hw.data.editor import ActionOfRun, Run, RunEnd, RunStatistics, RunStatisticsData, TraceEntry
 from arcor2_hw.data.events import ActionStateAfterData, ActionStateBeforeData
 from arcor2_hw.data.rpc import ListRunsArgs
 from arcor2_hw.exceptions import StorageError
@@ -28,6 +28,8 @@ MAX_RUNS: Final = 1000
 """Maximum number of stored runs."""
 TRACE: Final = "ExecutionTrace"
 """The additional event with the start and end of actions."""
+STATISTICS: Final = "RunStatistics"
+"""The additional event with cycles and counts of a run."""
 MAX_ACTIONS: Final = 1000
 """Maximum number of stored actions of the last run."""
 
@@ -166,6 +168,15 @@ class Runs:
                 stopped_by=stopped_by or UNSET,
             )
         )
+
+    def set_statistics(self, number: int, statistics: RunStatistics) -> None:
+        """Store the statistics of the present run and publish them. They reach the database with the end of the run."""
+        if (run := self._runs.get(number)) is None or run.statistics == statistics:
+            return
+        self._runs[number] = replace(run, statistics=statistics)
+        if self._hub.subscribers(STATISTICS):
+            data = RunStatisticsData(**msgspec.structs.asdict(statistics), run=number)
+            self._hub.broadcast(make_event(STATISTICS, data))
 
     def announced(self, announced: m.ProgramEvent) -> None:
         """Handle ActionStateBefore or ActionStateAfter of the present run."""

@@ -114,17 +114,27 @@ class Execution(PackageLibrary):
         if self.busy:
             raise RequestRefused("A program is running. Stop it first.")
 
+    def streams_of_object(self, object_id: str) -> RobotStreams:
+        """Return the subscriptions to a device of the running program. Raise RequestRefused while it starts."""
+        self._require_devices()
+        self.board.object(object_id)
+        return self.streams
+
     def streams_of(self, robot_id: str) -> RobotStreams:
         """Return the subscriptions to a robot of the running program. Raise RequestRefused while it starts."""
-        if self._host.package_info is None:
-            raise RequestRefused(
-                "The devices of the program are not connected yet. Try again after the event PackageInfo."
-            )
+        self._require_devices()
         found = self.board.object(robot_id)
         with contextlib.suppress(NotFound):  # the type may be only in the package
             if not self._types.derives_from(found.type, "Robot"):
                 raise RequestRefused("{name} is not a robot.", name=found.name)
         return self.streams
+
+    def _require_devices(self) -> None:
+        """Raise RequestRefused while the devices of the program are not connected yet."""
+        if self._host.package_info is None:
+            raise RequestRefused(
+                "The devices of the program are not connected yet. Try again after the event PackageInfo."
+            )
 
     def state_and_info(self) -> tuple[Event, bytes | None]:
         """Return the present PackageState, and the encoded PackageInfo while a program runs."""
@@ -310,7 +320,19 @@ class Execution(PackageLibrary):
         info = msgspec.json.decode(package_info, type=_InfoEvent)
         _, overlaid = overlay_for(self._settings.cell, self._secrets.is_secret, info.data.scene)
         self.board.show(info.data.scene.objects, overlaid)
+        self.program.collect_statistics(info.data, self._verdicts(info.data))
         asyncio.get_running_loop().call_later(SPARE_AFTER, self._host.prepare)
+
+    def _verdicts(self, info: e.PackageInfoData) -> set[str]:
+        """Return the ids of the actions whose result says that a part is good."""
+        types = {each.id: each.type for each in info.scene.objects}
+        found = set()
+        for action in (action for point in info.project.action_points for action in point.actions):
+            object_id, _, method = action.type.partition("/")
+            with contextlib.suppress(Arcor2Error):  # the type may be only in the package
+                if self._types.action(types.get(object_id, ""), method).meta.verdict is True:
+                    found.add(action.id)
+        return found
 
     def _program_changed(self, host: CellHost, message: m.ProgramChanged) -> None:
         if message.state == "stopped":
@@ -321,6 +343,8 @@ class Execution(PackageLibrary):
             state = S(message.state)
             if self.state is not state:
                 self._enter(state)
+            if state is S.PAUSED:
+                self.program.handle_paused()
 
     def _host_ended(self, reason: str) -> None:
         """Report that the host has ended before the program."""

@@ -23,7 +23,7 @@ from tests.runtime.conftest import scene_object
 from tests.server.cell.conftest import Recorder, Server, serving
 from tests.server.cell.test_execution import LAMP, PROJECT, until_stopped, write
 
-EVENTS = {"RunChanged", "ExecutionTrace"}
+EVENTS = {"RunChanged", "RunStatistics", "ExecutionTrace"}
 BEFORE = b'{"event": "ActionStateBefore", "data": {"action_id": "act", "thread_id": 7}}'
 LOST = Message.of("{device}: {reason}", device="lamp", reason=ConnectionLost("No answer on {port}.", port="COM1"))
 AFTER = b'{"event": "ActionStateAfter", "data": {"action_id": "act", "results": ["1"]}}'
@@ -63,6 +63,7 @@ async def test_a_run_is_recorded_from_start_to_end(server: Server) -> None:
     ends = [event["end"] for event in data_of(server, "RunChanged")]
     assert (ends[0], ends[-1]) == ("running", "finished")
     trace = data_of(server, "ExecutionTrace")
+    assert (run.statistics.cycles, data_of(server, "RunStatistics")[0]) == (1, {"run": 1, "cycles": 0, "counters": []})  # type: ignore[union-attr]
     assert [(entry["number"], "duration" in entry) for entry in trace] == [(1, False), (1, True), (2, False), (2, True)]
     assert trace[0] | {"started": ""} == {
         "run": 1,

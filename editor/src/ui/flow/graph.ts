@@ -2,15 +2,13 @@
 
 import { Graph, layout } from "@dagrejs/dagre";
 import { plural, t } from "@lingui/core/macro";
-import { conditionWords, END, metaOf, outgoing, placeOf, resultsOf, START } from "../../program/logic";
-import { decoded, type Extra, extraOf, textOf } from "../../program/values";
-import type { Action, ActionParameter } from "../../protocol/types";
-import type { Of, OpenDocument, State } from "../../store/state";
+import { conditionWords, END, outgoing, placeOf, resultsOf, START } from "../../program/logic";
+import { valuesOf } from "../../program/step";
+import type { OpenDocument, State } from "../../store/state";
 
 const NODE = { width: 250, height: 66 };
-/** Additional height for a line of parameters, and the largest number of them. */
+/** Additional height for a line of parameters. */
 const LINE = 21;
-const SHOWN = 3;
 /** Additional height for the free branches. */
 const BRANCHES = 22;
 const BORDER = { width: 132, height: 68 };
@@ -125,37 +123,6 @@ export const lastIn = (box: Pick<Box, "id" | "kind" | "run">): string =>
   box.kind === "fold" ? (box.run.at(-1) ?? box.id) : box.id;
 export const firstIn = (box: Pick<Box, "id" | "kind" | "run">): string =>
   box.kind === "fold" ? (box.run[0] ?? box.id) : box.id;
-
-/** Return the first values that the name and the point of an action do not already tell, with their units. */
-export function valuesOf(doc: OpenDocument, types: State["types"], action: Of<Action>): string {
-  const meta = metaOf(types, doc, action);
-  return action.parameters
-    .flatMap((parameter) => {
-      const value = shortValue(
-        doc,
-        action,
-        parameter,
-        extraOf(meta?.parameters.find((each) => each.name === parameter.name)),
-      );
-      return value ? [`${parameter.name.replaceAll("_", " ")} ${value}`] : [];
-    })
-    .slice(0, SHOWN)
-    .join(" · ");
-}
-
-function shortValue(doc: OpenDocument, action: Of<Action>, { type, value }: ActionParameter, { unit }: Extra): string {
-  const read = decoded(value);
-  if (type === "project_parameter") return doc.parameters[String(read)]?.name ?? "";
-  if (type === "link") {
-    const [from = "", , index] = String(read).split("/");
-    const source = doc.actions[from]?.flows.find((flow) => flow.type === "default");
-    return source?.outputs?.[Number(index)] ?? "";
-  }
-  const at = doc.orientations[String(read)] ?? doc.joints[String(read)];
-  if (at) return at.pointId === action.pointId ? "" : (doc.points[at.pointId]?.name ?? "");
-  const text = typeof read === "object" || type === "pose" ? "" : textOf(type, value);
-  return text && unit ? `${text}\u00a0${unit}` : text;
-}
 
 function sized(branches: Branch[], values = false): Pick<Box, "branches" | "width" | "height"> {
   const height = NODE.height + (branches.length > 0 ? BRANCHES : 0) + (values ? LINE : 0);

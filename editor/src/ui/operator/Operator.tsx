@@ -4,7 +4,7 @@
  */
 
 import { t } from "@lingui/core/macro";
-import { useEffect, useState } from "react";
+import { type ComponentType, useEffect, useState } from "react";
 import * as commands from "../../commands/run";
 import { storeGeneralState } from "../../commands/viewstate";
 import { ago } from "../../formats";
@@ -16,7 +16,7 @@ import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";
-import { nameOf, withNames } from "../../viewmodel/names";
+import { withNames } from "../../viewmodel/names";
 import { Icon, type IconName } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { Notices } from "../notices/Notices";
@@ -26,6 +26,8 @@ import { ICONS } from "../run/Result";
 import { phaseName, RunButtons } from "../run/RunBar";
 import { Settings } from "../settings/Settings";
 import { useTicking } from "../times";
+import { CurrentStep } from "./CurrentStep";
+import { Production } from "./Production";
 import "../run/run.css";
 import "./operator.css";
 
@@ -51,7 +53,8 @@ function shownState(state: State, starting: boolean, result: Result | null): Sho
   return { tone: "idle", word: t`Ready`, icon: "check" };
 }
 
-export default function Operator({ kiosk }: { kiosk: boolean }) {
+/** `Cell` is the picture of the cell. */
+export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: ComponentType }) {
   const state = useEditor((each) => each);
   const { program, lists, doc } = state;
   const runs = isRunning(state);
@@ -86,10 +89,6 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
     setStarting(false);
   };
   const message = runs ? shownMessage(state) : "";
-  const doing = program.running
-    .map((id) => nameOf(state, id))
-    .filter(Boolean)
-    .join(", ");
   return (
     <div className="operator" data-tone={tone}>
       <header className="bar">
@@ -100,12 +99,12 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
         <People />
         <Settings />
       </header>
-      <main>
+      <main data-runs={runs}>
         <section className="operator-state" aria-label={t`State`} role="status">
           <Icon name={icon} size={56} />
           <div>
             <p className="operator-word">{word}</p>
-            {doing && <p>{program.state === "paused" ? t`before ${doing}` : doing}</p>}
+            {runs && <CurrentStep />}
             {message && <p className="operator-message">{message}</p>}
             {run && result && (
               <p>
@@ -117,6 +116,7 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
               <p className="operator-advice">{t`Fix the cause, then press Start. If it fails again, call for help.`}</p>
             )}
             {idle && !run && <LastRun />}
+            {idle && !result && !why && <p className="operator-advice">{t`Choose a package, then press Start.`}</p>}
           </div>
           {run && (
             <Button className="operator-dismiss" onPress={() => storeGeneralState(dismissal(run))}>
@@ -124,11 +124,15 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
             </Button>
           )}
         </section>
-        <Devices />
+        {!runs && <Devices />}
         {runs ? (
-          <div className="operator-buttons">
-            <RunButtons />
-          </div>
+          <>
+            <div className="operator-buttons">
+              <RunButtons />
+            </div>
+            {doc && <Cell />}
+            <Devices />
+          </>
         ) : (
           <section className="operator-start" aria-label={t`Start`}>
             <div className="operator-packages" role="radiogroup" aria-label={t`Packages`}>
@@ -168,6 +172,7 @@ export default function Operator({ kiosk }: { kiosk: boolean }) {
             )}
           </section>
         )}
+        <Production />
         <History />
       </main>
       <Notices />

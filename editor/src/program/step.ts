@@ -1,0 +1,105 @@
+/** The running action in words: what it does, its parameters, and how long it usually takes. Pure functions. */
+
+import type { Action, ActionParameter, TraceEntry } from "../protocol/types";
+import type { Of, OpenDocument, State } from "../store/state";
+import { metaOf } from "./logic";
+import { words } from "./naming";
+import { decoded, type Extra, extraOf, shownUnit, textOf } from "./values";
+
+/** Largest number of shown parameters. */
+const SHOWN = 3;
+/** An action takes unusually long after this multiple of its usual duration and this additional time, s. */
+const LONG = 2;
+const GRACE = 3;
+
+/** The action that runs, or before which the program is paused. */
+export interface Step {
+  id: string;
+  name: string;
+  /** Name of its device. */
+  device: string;
+  /** What it does, as its object type describes it; empty if unknown. */
+  does: string;
+  /** Its most telling parameters as text; empty if it has none. */
+  values: string;
+  /** When it was announced, ms since 1970; undefined if unknown. */
+  started: number | undefined;
+  /** Mean of its earlier durations, s; undefined the first time. */
+  usual: number | undefined;
+}
+
+/** Return the steps that run now; several if the program has threads. */
+export function stepsOf(state: State): Step[] {
+  const { doc, types, program } = state;
+  if (!doc) return [];
+  return program.running.flatMap((id) => {
+    const action = doc.actions[id];
+    if (!action) return [];
+    const calls = program.trace.filter((each) => each.action_id === id);
+    return [
+      {
+        id,
+        name: action.name,
+        device: doc.objects[action.type.split("/")[0] ?? ""]?.name ?? "",
+        does: firstSentence(metaOf(types, doc, action)?.description),
+        values: valuesOf(doc, types, action),
+        started: startOf(calls),
+        usual: meanDuration(calls),
+      },
+    ];
+  });
+}
+
+/** Return whether a step takes unusually long at a time, ms since 1970. */
+export function isLate({ started, usual }: Step, time: number): boolean {
+  return started !== undefined && usual !== undefined && (time - started) / 1000 > LONG * usual + GRACE;
+}
+
+function startOf(calls: readonly TraceEntry[]): number | undefined {
+  const last = calls.at(-1);
+  return last && last.duration === undefined && last.error === undefined ? Date.parse(last.started) : undefined;
+}
+
+function meanDuration(calls: readonly TraceEntry[]): number | undefined {
+  const durations = calls.flatMap(({ duration, error }) =>
+    duration === undefined || error !== undefined ? [] : [duration],
+  );
+  return durations.length === 0 ? undefined : durations.reduce((sum, each) => sum + each, 0) / durations.length;
+}
+
+/** Return the first sentence of a description, up to its details. */
+function firstSentence(description = ""): string {
+  return (/^[^.;\n]+/.exec(description.trim())?.[0] ?? "").trim();
+}
+
+/** Return the first values that the name and the point of an action do not already tell, with their units. */
+export function valuesOf(doc: OpenDocument, types: State["types"], action: Of<Action>): string {
+  const meta = metaOf(types, doc, action);
+  return action.parameters
+    .flatMap((parameter) => {
+      const value = shortValue(
+        doc,
+        action,
+        parameter,
+        extraOf(meta?.parameters.find((each) => each.name === parameter.name)),
+      );
+      return value ? [`${words(parameter.name)} ${value}`] : [];
+    })
+    .slice(0, SHOWN)
+    .join(" · ");
+}
+
+function shortValue(doc: OpenDocument, action: Of<Action>, { type, value }: ActionParameter, extra: Extra): string {
+  const read = decoded(value);
+  if (type === "project_parameter") return doc.parameters[String(read)]?.name ?? "";
+  if (type === "link") {
+    const [from = "", , index] = String(read).split("/");
+    const source = doc.actions[from]?.flows.find((flow) => flow.type === "default");
+    return source?.outputs?.[Number(index)] ?? "";
+  }
+  const at = doc.orientations[String(read)] ?? doc.joints[String(read)];
+  if (at) return at.pointId === action.pointId ? "" : (doc.points[at.pointId]?.name ?? "");
+  const text = typeof read === "object" || type === "pose" ? "" : textOf(type, value, extra);
+  const [unit] = shownUnit(type, extra);
+  return text && unit ? `${text}\u00a0${unit}` : text;
+}
