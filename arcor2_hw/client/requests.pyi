@@ -51,7 +51,7 @@ from arcor2_hw.data.events import (
 )
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import ObjectAction, ObjectModel, ObjectTypeMeta, ParameterMeta
-from arcor2_hw.data.operation import ObjectHealthData, RobotHoldData
+from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHoldData
 from arcor2_hw.data.package import PackageSummary
 from arcor2_hw.data.parameter import IdValue, Parameter
 from arcor2_hw.data.project import (
@@ -1107,6 +1107,10 @@ class Requests(ABC):
     def follow(
         self, name: Literal["ObjectState"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[ObjectStateData]]: ...
+    @overload
+    def follow(
+        self, name: Literal["ObjectValues"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[ObjectValuesData]]: ...
     @overload
     def follow(self, name: Literal["ObjectsLocked"], /, *, limit: int = LIMIT) -> EventStream[TypedEvent[LockData]]: ...
     @overload

@@ -21,7 +21,7 @@ from arcor2_hw.data.editor import (
 )
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import ObjectTypeMeta
-from arcor2_hw.data.operation import ObjectHealthData, RobotHoldData
+from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHoldData
 from arcor2_hw.data.package import CollisionModels, PackageStateEnum, PackageSummary
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import (
@@ -358,6 +358,7 @@ EVENTS: Final = {
         EventType("ObjectState", ObjectStateData, Role.OPERATOR, additional=True),
         EventType("ObjectHealth", ObjectHealthData, Role.OPERATOR, additional=True),
         EventType("ObjectObservations", ObjectObservationsData, Role.OPERATOR, additional=True),
+        EventType("ObjectValues", ObjectValuesData, Role.OPERATOR, additional=True),
         EventType("RobotHold", RobotHoldData, Role.OPERATOR, additional=True),
         EventType("BreakpointsChanged", ProjectBreakpoints, Role.OPERATOR, additional=True),
         EventType("ExecutionTrace", TraceEntry, Role.OPERATOR, additional=True),

@@ -6,6 +6,8 @@ from msgspec import field
 
 from arcor2_hw.data.base import UNSET, Data, TranslatableData, Unset
 from arcor2_hw.data.device import Alarm, Health
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.object_type import ObjectModel
 
 
 class HoldKind(enum.StrEnum):
@@ -39,3 +41,27 @@ class ObjectHealthData(Data, frozen=True):
     health: Health
     alarms: list[Alarm] = field(default_factory=list)
     control_owner: str | Unset = UNSET
+
+
+class CarriedPart(Data, frozen=True):
+    """A part that a robot carries.
+
+    link: end effector, or link of the robot. pose: in its frame. model: omitted for a collision object of the scene,
+    which has the same name.
+    """
+
+    name: str
+    link: str
+    pose: Pose
+    model: ObjectModel | Unset = UNSET
+
+
+class ObjectValuesData(Data, frozen=True):
+    """Data of the event ObjectValues: what one can see of a device, for displays. Missing values are unknown.
+
+    values: by name, in SI units, such as the width of a gripper; 1 for on. parts: carried by a robot.
+    """
+
+    object_id: str
+    values: dict[str, float] = field(default_factory=dict)
+    parts: list[CarriedPart] = field(default_factory=list)

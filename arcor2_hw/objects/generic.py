@@ -121,6 +121,16 @@ class Generic(abc.ABC):
         """Return the condition of the device (NAMUR NE 107)."""
         return Health.NORMAL
 
+    @property
+    def shown_values(self) -> dict[str, float]:
+        """Return what the device last reported of what one can see, by name, for displays. It does no I/O.
+
+        Names that the editor draws: `width` of a gripper, m; `gripped`, 1 for a closed gripper; `velocity` of a belt,
+        m/s; `door`, 1 when open, 0 when closed, 0.5 in between; `red`, `amber`, `green`, `blue` and `white`, 1 for a
+        lit lamp. Round them, because every change is sent to all clients.
+        """
+        return {}
+
     def identify(self) -> Identity:
         """Read the identity of the device."""
         raise Arcor2NotImplemented("identify")

@@ -338,9 +338,10 @@ class HandTeachingEnded(ToServer, frozen=True):
 
 
 class DeviceChanged(ToServer, frozen=True):
-    """The connection, health, alarms or control owner of a device has changed.
+    """The connection, health, alarms, control owner or shown values of a device have changed.
 
     reason: of a lost connection. in_the_way: false for a disabled collision object. held: the parts that a robot holds.
+    values: what the device reports of what one can see (`Generic.shown_values`).
     """
 
     object_id: str
@@ -351,6 +352,7 @@ class DeviceChanged(ToServer, frozen=True):
     reason: Message | None = None
     in_the_way: bool = True
     held: list[HeldPart] = field(default_factory=list)
+    values: dict[str, float] = field(default_factory=dict)
 
 
 class LogLine(ToServer, frozen=True):

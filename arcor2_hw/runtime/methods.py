@@ -30,7 +30,10 @@ OBSERVING: Final = frozenset(
 """Methods of a robot that run on its watch lane, so that they return while an action runs."""
 
 WITHOUT_IO: Final = frozenset(
-    {"id", "name", "settings", "pose", "collision_model", "enabled", "connection", "health", "move_in_progress"}
+    {
+        *("id", "name", "settings", "pose", "collision_model", "enabled"),
+        *("connection", "health", "move_in_progress", "shown_values"),
+    }
 )
 """Properties of the base classes that do no I/O. They are read on any thread."""
 

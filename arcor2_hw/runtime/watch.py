@@ -1,4 +1,4 @@
-"""Observation of devices: reports changes of connection, health, alarms and control owner."""
+"""Observation of devices: reports changes of connection, health, alarms, control owner, and of what one can see."""
 
 import threading
 import time
@@ -20,6 +20,9 @@ OBSERVE_PERIOD: Final = 0.25
 INQUIRY_PERIOD: Final = 1.0
 """Period of the check of alarms and control owner, s. A driver may query the device for them."""
 
+_OBSERVED: Final = (Connection.ONLINE, Connection.BACK)
+_CHANGING: Final = ("connection", "health", "alarms", "control_owner", "shown_values")
+"""Members of Generic that a device with a changing state overrides."""
 _WITH_REASON: Final = (Connection.LOST, Connection.FAILED)
 
 
@@ -50,7 +53,7 @@ class Watch:
             cls = device.recipe.cls
             if device.instance is None or device.closing:
                 continue
-            static = not any(overrides(cls, name) for name in ("connection", "health", "alarms", "control_owner"))
+            static = not any(overrides(cls, name) for name in _CHANGING)
             if static and device.id in self._reported:
                 continue
             before = self._pending.get(device.id)
@@ -103,7 +106,8 @@ class Watch:
                 why = before.reason  # keep the reason of the loss; later attempts to connect may fail for others
             in_the_way = _value_or(lambda: not isinstance(instance, CollisionObject) or instance.enabled, True)
             held = _value_or(lambda: _held_parts(instance), [])
-            found = DeviceChanged(device.id, connection, *queried, why, in_the_way, held)
+            values = _value_or(lambda: dict(instance.shown_values), {}) if connection in _OBSERVED else {}
+            found = DeviceChanged(device.id, connection, *queried, why, in_the_way, held, values)
             if found == before:
                 return
             self._reported[device.id] = found

@@ -14,6 +14,7 @@ NAMES: Final = (
     "connection",
     "connection_reason",
     "health",
+    "shown_values",
     "move_in_progress",
     "parts",
 )

@@ -176,6 +176,12 @@ class Conveyor(PolledControl[State], Machine, Axis):
         return Reading(self._units.metres(now.velocity), stamp, asked)
 
     @property
+    def shown_values(self) -> dict[str, float]:
+        """Return the velocity of the belt, m/s."""
+        now = self.newest()
+        return {} if now is None else {"velocity": round(self._units.metres(now.velocity), 2)}
+
+    @property
     def homed(self) -> bool:
         """Return whether the drive was homed since the last connection loss."""
         return self._homed

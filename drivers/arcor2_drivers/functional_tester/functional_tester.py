@@ -69,6 +69,12 @@ class FunctionalTester(Tester, Machine, CollisionObject):
             raise NotFound("{device} has no alarm {code}", device=self.who, code=code)
         self.clear()
 
+    @property
+    def shown_values(self) -> dict[str, float]:
+        """Return whether the door is open."""
+        inputs = self.newest()
+        return {} if inputs is None else {"door": (1.0 + inputs.door_open - inputs.door_closed) / 2.0}
+
     # -------------------------------------------------------------------------------- machine
     def machine_state(self) -> MachineState:
         """Return the present state. Raises Stale when the newest is too old, NotConnected, ConnectionLost."""

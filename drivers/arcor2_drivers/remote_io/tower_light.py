@@ -49,6 +49,12 @@ class TowerLight(Block, Generic):
         self.fresh()
         return {color: self.digital(color) for color in self._lamps}
 
+    @property
+    def shown_values(self) -> dict[str, float]:
+        """Return for each lamp whether it is lit."""
+        states = {color: self.digital_points.value(color) for color in self._lamps}
+        return {color: float(lit) for color, lit in states.items() if lit is not None}
+
     # -------------------------------------------------------------------------------- actions
     @action
     def show(self, color: LampColor, blinking: bool = False, *, an: str | None = None) -> None:

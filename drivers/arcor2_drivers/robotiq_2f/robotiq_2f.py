@@ -212,6 +212,12 @@ class Robotiq2F(PolledControl[Status], Gripper):
         """Return the width between the fingers, m. Raise Stale, NotConnected or ConnectionLost."""
         return scaling.width(self._s, self.current().position)
 
+    @property
+    def shown_values(self) -> dict[str, float]:
+        """Return the width between the fingers, m."""
+        status = self.newest()
+        return {} if status is None else {"width": round(scaling.width(self._s, status.position), 3)}
+
     # -------------------------------------------------------------------------------- motion
     def stop(self) -> None:
         """Stop moving fingers and wait for standstill. A gripped part stays gripped."""

@@ -133,6 +133,12 @@ class UniversalRobot(MoveActions, DigitalGripper, SingleArm):
             self._control.obstacles(sample, control),
         )
 
+    @property
+    def shown_values(self) -> dict[str, float]:
+        """Return whether the gripper on a digital output is closed."""
+        sample, output = self._observer.newest(), self._ur.gripper_output
+        return {} if sample is None or output < 0 else {"gripped": float(sample.outputs >> output & 1)}
+
     def get_end_effector_pose(self, end_effector: str) -> Pose:
         """Return the TCP of the settings in the world. Raise NotFound, NotConnected, ConnectionLost or Stale.
 

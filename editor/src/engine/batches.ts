@@ -1,8 +1,18 @@
 /** Many equal small items in one draw call: points, pucks, arrows. Each has its frame in the scene graph. */
 
-import { type BufferGeometry, Color, DynamicDrawUsage, InstancedMesh, type Material, Matrix4, type Scene } from "three";
-import { Baked, type Instance } from "./baked";
+import {
+  type BufferGeometry,
+  Color,
+  DynamicDrawUsage,
+  InstancedMesh,
+  type Material,
+  Matrix4,
+  MeshLambertMaterial,
+  type Scene,
+} from "three";
+import type { Baked, Instance } from "./baked";
 import { LinkLines } from "./linkLines";
+import type { LowQuality } from "./surface";
 
 const FIRST_SIZE = 64;
 const matrix = new Matrix4();
@@ -77,7 +87,7 @@ export class Batches {
 
   constructor(
     private readonly scene: Scene,
-    private readonly cheap: boolean,
+    private readonly low: LowQuality | null,
   ) {
     this.links = new LinkLines(scene);
   }
@@ -87,7 +97,9 @@ export class Batches {
     let batch = this.byName.get(name);
     if (!batch) {
       const [geometry, material] = make();
-      batch = new Batch(this.scene, geometry, material, this.cheap ? new Baked(this.scene, geometry, ball) : null);
+      const painted = () => new MeshLambertMaterial({ vertexColors: true });
+      const baked = this.low && new this.low.Baked(this.scene, geometry, ball, painted());
+      batch = new Batch(this.scene, geometry, material, baked);
       this.byName.set(name, batch);
     }
     return batch;

@@ -1,7 +1,6 @@
 import { CylinderGeometry, Matrix4, Mesh, SphereGeometry, Vector3 } from "three";
 import { expect, it } from "vitest";
 import { dressed } from "./dress";
-import { modelOf } from "./models";
 
 it("spheres on the axis of a joint become housings along it, others stay", () => {
   const sphere = (x: number) => ({
@@ -21,12 +20,4 @@ it("spheres on the axis of a joint become housings along it, others stay", () =>
   const whole = dressed([arm, sphere(0), sphere(0)], [axis]);
   expect(whole.getAttribute("color").count).toBe(whole.getAttribute("position").count);
   expect((whole.index?.count ?? 0) / 3).toBeLessThan(500);
-});
-
-it("devices have models of a few hundred triangles, unknown ones have none", () => {
-  for (const icon of ["machine", "camera", "light", "printer", "reader", "io", "scale", "gripper", "suction", "axis"])
-    expect((modelOf(icon)?.index?.count ?? Infinity) / 3, icon).toBeLessThan(800);
-  expect(modelOf("service")).toBeNull();
-  // The label of a station is above its nest, not above the open door.
-  expect(modelOf("machine")?.userData.top).toBeCloseTo(0.026);
 });

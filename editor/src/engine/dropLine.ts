@@ -1,6 +1,5 @@
-/** Height of an item: a dashed line down to the floor with a ring at its end. */
+/** Height of an item: a dashed line down to the floor with a ring at its end. A separate chunk. */
 
-import { t } from "@lingui/core/macro";
 import {
   BufferGeometry,
   Group,
@@ -13,9 +12,6 @@ import {
   Vector3,
 } from "three";
 import type { Palette } from "./palette";
-
-/** Lowest height that is shown, m. */
-const LOW = 0.005;
 
 export class DropLine {
   private readonly root = new Group();
@@ -35,10 +31,10 @@ export class DropLine {
     scene.add(this.root);
   }
 
-  /** Show the line below a point in the world; null hides it. Return the height, m. */
-  show(at: Vector3 | null, palette: Palette): number {
-    this.root.visible = at !== null && Math.abs(at.z) > LOW;
-    if (!at || !this.root.visible) return at?.z ?? 0;
+  /** Show the line below a point in the world; null hides it. */
+  show(at: Vector3 | null, palette: Palette): void {
+    this.root.visible = at !== null;
+    if (!at) return;
     this.line.material.color.copy(palette.selected);
     this.ring.material.color.copy(palette.selected);
     this.line.position.copy(at);
@@ -48,7 +44,6 @@ export class DropLine {
     this.line.computeLineDistances();
     this.ring.position.set(at.x, at.y, 0.001);
     this.root.updateMatrixWorld(true);
-    return at.z;
   }
 
   dispose(): void {
@@ -58,11 +53,4 @@ export class DropLine {
     this.ring.geometry.dispose();
     this.ring.material.dispose();
   }
-}
-
-/** Return a height as text, mm. */
-export function heightWords(z: number): string {
-  if (Math.abs(z) <= LOW) return "";
-  const height = Math.round(Math.abs(z) * 1000);
-  return z > 0 ? t`${height} mm above the floor` : t`${height} mm below the floor`;
 }

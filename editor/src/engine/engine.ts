@@ -1,15 +1,17 @@
 /** The 3D view: shows items, follows robots, reports taps. It does not use React, and draws only after changes. */
 
-import { Fog, Scene, Vector3, type WebGLRenderer } from "three";
+import { Fog, Scene, type Vector3, type WebGLRenderer } from "three";
 import type { Telemetry } from "../store/telemetry";
+import { Animation } from "./animation";
 import { Batches } from "./batches";
 import { View } from "./camera";
-import { DropLine, heightWords } from "./dropLine";
+import { Fitting } from "./fitting";
 import { Floor, lowest } from "./floor";
-import { corners } from "./framing";
+import { Frames } from "./frames";
 import type { Item } from "./items";
 import { labelsOf, placeConditions } from "./labelling";
 import { Labels } from "./labels";
+import { LazyDrop } from "./lazyDrop";
 import { LazyGizmo } from "./lazyGizmo";
 import { LazyPath } from "./lazyPath";
 import { light } from "./light";
@@ -20,8 +22,9 @@ import { type Hit, onFloor, pick } from "./picking";
 import { followPointer } from "./pointer";
 import { type Probe, probe } from "./probe";
 import { rendererOf } from "./renderer";
-import type { Quality } from "./surface";
-import { boundsOf, type Context, type Thing } from "./thing";
+import { Resolution } from "./resolution";
+import type { LowQuality, Quality } from "./surface";
+import type { Context, Thing } from "./thing";
 import { make } from "./things/make";
 import { type JointLimit, RobotThing } from "./things/robot";
 
@@ -33,7 +36,8 @@ export interface EngineOptions {
   telemetry: Telemetry;
   asset: Context["asset"];
   reportFault: Context["reportFault"];
-  quality: Quality;
+  /** What draws cheaply, at low quality; null at high quality. */
+  low: LowQuality | null;
   dark: boolean;
 }
 
@@ -57,11 +61,10 @@ export class Engine {
   private readonly labels: Labels;
   private readonly context: Context;
   private readonly floorGrid: Floor;
+  private readonly animation: Animation;
   private palette: Palette = LIGHT;
-  private scheduled = 0;
-  private last = 0;
-  /** Earliest time of the next frame, ms. */
-  private due = 0;
+  private readonly requests: Frames;
+  private readonly resolution: Resolution;
   /** Frames of items may have changed since the last frame. */
   private dirty = true;
   /** Robots whose joints changed since the last frame. */
@@ -69,30 +72,41 @@ export class Engine {
   private width = 1;
   private height = 1;
   private hovered = "";
-  /** Position of the camera after the last fit to all items. */
-  private fitted: Vector3 | null = null;
-  /** Items of that fit whose models may not be loaded yet. */
-  private awaited = new Set<string>();
+  private readonly fitting: Fitting;
   private readonly notes = new Map<string, string>();
   /** Text shown next to an item while it is moved, instead of its height. */
   private messageLog = { id: "", text: "" };
-  private readonly drop: DropLine;
+  private readonly drop: LazyDrop;
   /** Lines from points to their parents. */
   readonly parentLines: ParentLines;
   private readonly pathLine: LazyPath;
   private readonly ends: (() => void)[] = [];
 
   constructor(private readonly options: EngineOptions) {
-    const { canvas, quality } = options;
+    const { canvas, low } = options;
+    const quality: Quality = low ? "low" : "high";
     this.renderer = rendererOf(canvas, quality);
+    this.resolution = new Resolution(
+      quality === "low",
+      (width, height) => this.renderer.setSize(width, height, false),
+      () => this.draw(),
+    );
+    this.requests = new Frames(PERIODS[quality], quality === "low", (seconds) => this.frame(seconds));
     this.view = new View(canvas, () => this.draw());
-    this.batches = new Batches(this.scene, quality === "low");
+    this.fitting = new Fitting(this.view, this.things);
+    this.batches = new Batches(this.scene, low);
     this.labels = new Labels(options.labels, () => this.draw());
+    this.animation = new Animation(
+      quality,
+      () => this.draw(),
+      () => this.invalidate(),
+    );
     this.context = {
       telemetry: options.telemetry,
       palette: this.palette,
       batches: this.batches,
       quality,
+      low,
       period: PERIODS[quality],
       asset: options.asset,
       reportFault: options.reportFault,
@@ -101,8 +115,9 @@ export class Engine {
         (2 * this.view.camera.position.distanceTo(at) * Math.tan((this.view.camera.fov * Math.PI) / 360)) / this.height,
       invalidate: () => this.invalidate(),
       loaded: (id) => this.loaded(id),
+      animate: (thing) => this.animation.add(thing),
     };
-    this.drop = new DropLine(this.scene);
+    this.drop = new LazyDrop(this.scene, () => this.draw());
     this.parentLines = new ParentLines(this.scene);
     this.pathLine = new LazyPath(this.scene, () => this.draw());
     this.gizmo = new LazyGizmo({
@@ -147,6 +162,7 @@ export class Engine {
       if (!thing) {
         thing = make(item, this.context);
         this.things.set(item.id, thing);
+        this.fitting.added(item);
       }
       thing.update(item);
     }
@@ -221,28 +237,14 @@ export class Engine {
 
   /** Bring an item, or all items, into the view; `best` chooses the direction too. */
   focus(id?: string, best = false): void {
-    this.fit(id, best);
-    this.awaited = new Set(id === undefined ? this.things.keys() : []);
-  }
-
-  private fit(id?: string, best = false): void {
     this.place();
-    const boxes = [...this.things.values()]
-      .filter(({ item }) => (id === undefined ? item.faint < 1 : item.id === id))
-      .map((thing) => boundsOf(thing).expandByScalar(id === undefined ? 0.01 : 0.12));
-    this.view.fit(corners(boxes), best);
-    this.fitted = id === undefined ? this.view.camera.position.clone() : null;
+    this.fitting.focus(id, best);
   }
 
-  /** Fit the view to all items again, unless the user has moved the camera. */
-  private refit(): void {
-    if (this.fitted && this.fitted.distanceTo(this.view.camera.position) < 1e-6) this.fit();
-  }
-
-  /** A model appears: fit the view again, if it was to show this item. Later ones do not move the camera. */
   private loaded(id: string): void {
     this.dirty = true;
-    if (this.awaited.delete(id)) this.refit();
+    this.place();
+    this.fitting.loaded(id);
     this.invalidate();
   }
 
@@ -271,13 +273,15 @@ export class Engine {
 
   /** Return a picture of the view. */
   async picture(type = "image/webp"): Promise<Blob | null> {
+    this.resolution.full();
     this.render();
     return new Promise((resolve) => this.options.canvas.toBlob(resolve, type, 0.8));
   }
 
   dispose(): void {
     for (const end of this.ends) end();
-    cancelAnimationFrame(this.scheduled);
+    this.requests.dispose();
+    this.resolution.dispose();
     for (const [id, thing] of [...this.things]) this.remove(id, thing);
     this.batches.dispose();
     this.labels.dispose();
@@ -292,6 +296,7 @@ export class Engine {
 
   private remove(id: string, thing: Thing): void {
     if (thing instanceof RobotThing) this.movedRobots.delete(thing);
+    this.animation.remove(thing);
     // Children get another frame by `hang`, or are removed themselves.
     for (const other of this.things.values()) if (other.root.parent === thing.root) other.root.removeFromParent();
     thing.dispose();
@@ -320,29 +325,31 @@ export class Engine {
     const host = this.options.canvas.parentElement ?? this.options.canvas;
     this.width = Math.max(1, host.clientWidth);
     this.height = Math.max(1, host.clientHeight);
-    this.renderer.setSize(this.width, this.height, false);
+    this.resolution.resize(this.width, this.height);
     this.view.resize(this.width, this.height);
-    if (this.view.resizedSinceFit) this.refit();
+    if (this.view.resizedSinceFit) {
+      this.place();
+      this.fitting.refit();
+    }
     this.draw();
   }
 
+  /** Whether a frame is requested, for tests. */
+  get scheduled(): number {
+    return this.requests.pending;
+  }
+
   private draw(): void {
-    if (this.scheduled) return;
-    this.scheduled = requestAnimationFrame((time) => {
-      this.scheduled = 0;
-      const seconds = (time - this.last) / 1000;
-      if (this.options.quality === "low" && time < this.due - 3) {
-        this.draw();
-        return;
-      }
-      this.last = time;
-      // A late frame does not delay the next one.
-      const period = this.context.period * 1000;
-      this.due = Math.max(this.due + period, time + period / 2);
-      const flying = this.view.fly(seconds);
-      this.render();
-      if (flying) this.draw();
-    });
+    this.requests.request();
+  }
+
+  /** Draw a frame; return whether another one is needed. */
+  private frame(seconds: number): boolean {
+    const flying = this.view.fly(seconds);
+    const moving = this.animation.step(seconds);
+    if (moving) this.renderer.shadowMap.needsUpdate = true;
+    this.render();
+    return flying || moving;
   }
 
   /** Update all frames, or only those of robots, whose joints have no children. */
@@ -375,24 +382,17 @@ export class Engine {
     for (const thing of this.things.values()) if (thing.resized()) this.dirty = true;
     this.place();
     this.gizmo.place();
-    this.tellHeight();
+    this.drop.tell(this.things.values(), this.palette, this.notes);
+    if (this.messageLog.id) this.notes.set(this.messageLog.id, this.messageLog.text);
     const { camera } = this.view;
     camera.updateMatrixWorld();
-    this.labels.show(labelsOf(this.things, this.hovered, this.notes, camera.position), camera, this.width, this.height);
+    this.resolution.follow(camera);
+    const labels = labelsOf(this.things, this.hovered, this.notes, camera.position, this.width);
+    this.labels.show(labels, camera, this.width, this.height);
     placeConditions(this.things, this.labels, camera, this.width, this.height);
     this.renderer.render(this.scene, camera);
     this.frames++;
     for (const watcher of this.watchers) watcher();
     if (this.movedRobots.size > 0) this.draw();
-  }
-
-  /** Show the line below the selected item, and its height. */
-  private tellHeight(): void {
-    this.notes.clear();
-    const chosen = [...this.things.values()].find((each) => each.item.selected && each.item.kind !== "logic");
-    const at = chosen && chosen.item.faint < 1 ? chosen.root.getWorldPosition(new Vector3()) : null;
-    const height = this.drop.show(at, this.palette);
-    if (chosen) this.notes.set(chosen.item.id, heightWords(height));
-    if (this.messageLog.id) this.notes.set(this.messageLog.id, this.messageLog.text);
   }
 }

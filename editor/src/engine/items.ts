@@ -29,6 +29,15 @@ export interface ObjectItem extends Base {
   pose: Pose;
   shape: Shape;
   fault: boolean;
+  /** What the device reports of what one can see, by name; undefined while it is unknown. */
+  values?: Readonly<Record<string, number>> | undefined;
+}
+
+/** A part that a robot carries, in the frame of an end effector. */
+export interface CarriedItem {
+  link: string;
+  pose: Pose;
+  shape: Shape;
 }
 
 export interface RobotItem extends Base {
@@ -41,6 +50,9 @@ export interface RobotItem extends Base {
   /** Joints are expected; without reports it is marked as outdated. */
   online: boolean;
   fault: boolean;
+  /** Icon and values of the gripper at its flange; undefined without one. */
+  tool?: { icon: string; values: Readonly<Record<string, number>> } | undefined;
+  parts?: readonly CarriedItem[] | undefined;
   /** Pose of the ghost, shown in addition to the robot. */
   ghost?: { joints: Record<string, number>; possible: boolean; at?: Pose | undefined } | undefined;
 }

@@ -15,6 +15,8 @@ const WEIGHTS: Record<Item["kind"], number> = {
   logic: 0,
 };
 
+/** Width of the view below which only what matters most has a label, pixels: on a phone. */
+const NARROW = 600;
 /** Distance from the camera within which points and actions are labelled, m. */
 const NEAR = 0.9;
 const place = new Vector3();
@@ -39,12 +41,16 @@ export function placeConditions(
   }
 }
 
-/** Priority: selected, under the pointer or crosshair, with a badge, near. */
+/**
+ * Priority: selected, under the pointer or crosshair, with a badge, near. In a narrow view only these, what runs, and
+ * robots; the others when they are tapped.
+ */
 export function labelsOf(
-  things: Map<string, Thing>,
+  things: ReadonlyMap<string, Thing>,
   hovered: string,
   notes: ReadonlyMap<string, string>,
   eye: Vector3,
+  width: number,
 ): Label[] {
   const found: Label[] = [];
   for (const [id, thing] of things) {
@@ -63,6 +69,7 @@ export function labelsOf(
       (item.kind === "action" && (item.running || item.role !== "action"));
     const small = item.kind === "point" || item.kind === "action";
     const important = item.selected || under || badge !== "";
+    if (width < NARROW && !important && item.kind !== "robot" && !(item.kind === "action" && item.running)) continue;
     if (!always && !small && !important) continue;
     const distance = thing.anchor(place).distanceTo(eye);
     if (!always && !important && distance > NEAR) continue;

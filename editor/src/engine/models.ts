@@ -1,4 +1,7 @@
-/** Models of devices that have no collision shape of their own, built from boxes and cylinders. A separate chunk. */
+/**
+ * Models of devices that have no collision shape of their own, built from boxes and cylinders. Their moving parts and
+ * lamps follow the reported values. A separate chunk.
+ */
 
 import {
   type Box3,
@@ -7,6 +10,7 @@ import {
   type BufferGeometry,
   Color,
   CylinderGeometry,
+  type Object3D,
   SphereGeometry,
 } from "three";
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
@@ -28,15 +32,14 @@ const round = (radius: number, length: number, axis: "x" | "y" | "z", at: Triple
   color,
 });
 
-/** A station whose door is open, around a nest at its origin. */
+/** A station around a nest at its origin; its door is a moving part. */
 const MACHINE: Part[] = [
   box([0.19, 0.17, 0.06], [0, 0, -0.02], BODY),
   box([0.19, 0.004, 0.03], [0, -0.086, -0.02], BLUE),
   box([0.12, 0.1, 0.012], [0, 0, 0.016], DARK),
   box([0.1, 0.08, 0.004], [0, 0, 0.024], METAL),
-  box([0.18, 0.012, 0.13], [0, 0.082, 0.075], BODY),
-  box([0.12, 0.004, 0.08], [0, 0.075, 0.08], GLASS),
-  round(0.006, 0.19, "x", [0, 0.082, 0.01], METAL),
+  box([0.18, 0.012, 0.03], [0, 0.082, 0.02], BODY),
+  round(0.006, 0.19, "x", [0, 0.082, 0.038], METAL),
   box([0.03, 0.004, 0.014], [-0.065, -0.088, -0.02], GLASS),
 ];
 
@@ -51,15 +54,7 @@ const MODELS: Record<string, Part[]> = {
     round(0.006, 0.005, "z", [0.04, 0, 0.003], GLASS),
     round(0.008, 0.05, "z", [0, 0, -0.045], METAL),
   ],
-  light: [
-    round(0.03, 0.012, "z", [0, 0, 0.006], DARK),
-    round(0.008, 0.1, "z", [0, 0, 0.06], METAL),
-    round(0.022, 0.038, "z", [0, 0, 0.13], 0xf2f4f5),
-    round(0.022, 0.038, "z", [0, 0, 0.17], 0x2f9e58),
-    round(0.022, 0.038, "z", [0, 0, 0.21], 0xe6a117),
-    round(0.022, 0.038, "z", [0, 0, 0.25], 0xcc3328),
-    round(0.022, 0.008, "z", [0, 0, 0.273], DARK),
-  ],
+  light: [round(0.03, 0.012, "z", [0, 0, 0.006], DARK), round(0.008, 0.1, "z", [0, 0, 0.06], METAL)],
   printer: [
     box([0.2, 0.22, 0.1], [0, 0, 0.05], BODY),
     box([0.19, 0.2, 0.05], [0, 0.005, 0.124], DARK),
@@ -77,12 +72,7 @@ const MODELS: Record<string, Part[]> = {
     round(0.08, 0.008, "z", [0, 0.03, 0.06], METAL),
     box([0.1, 0.03, 0.004], [0, -0.095, 0.051], GLASS),
   ],
-  gripper: [
-    round(0.032, 0.012, "z", [0, 0, 0.006], METAL),
-    box([0.09, 0.05, 0.06], [0, 0, 0.042], DARK),
-    box([0.014, 0.024, 0.06], [-0.03, 0, 0.1], METAL),
-    box([0.014, 0.024, 0.06], [0.03, 0, 0.1], METAL),
-  ],
+  gripper: [round(0.032, 0.012, "z", [0, 0, 0.006], METAL), box([0.05, 0.12, 0.05], [0, 0, 0.037], DARK)],
   suction: [
     round(0.03, 0.02, "z", [0, 0, 0.01], METAL),
     round(0.012, 0.06, "z", [0, 0, 0.05], DARK),
@@ -98,26 +88,180 @@ const MODELS: Record<string, Part[]> = {
   ],
 };
 
-/**
- * Return the model for an icon of an object type with its colours; null if there is none. `userData.top` is the height
- * of its surface above its origin, m.
- */
-export function modelOf(icon: string): BufferGeometry | null {
-  const parts = MODELS[icon];
-  if (!parts) return null;
-  let top = 0;
-  const whole = coloured(
-    parts.map((part) => {
-      const [x, y, z] = part.at;
-      const geometry = ("box" in part ? new BoxGeometry(...part.box) : tube(...part.round)).translate(x, y, z);
-      geometry.computeBoundingBox();
+/** A part of a model that moves by a value: door, belt, finger. */
+interface Mover {
+  value: string;
+  parts: Part[];
+  /** Origin of its parts in the frame of the model, m. */
+  pivot: Triple;
+  /** Value while none is reported. */
+  unknown: number;
+  /** Change of the drawn value per second until it has the reported one; 0: the reported value is a speed. */
+  speed: number;
+  pose: (part: Object3D, at: number, pivot: Triple) => void;
+}
+
+/** Distance of the marks on a belt, m, and their colours. */
+const PITCH = 0.1;
+const RUNNING = 0xf2f4f6;
+const STOPPED = 0x666e76;
+const MARKS = [0, 1, 2, 3, 4, 5].map((n) => box([0.012, 0.09, 0.002], [-0.29 + n * PITCH, 0, 0.0555], STOPPED));
+const finger = (side: 1 | -1): Mover => ({
+  value: "width",
+  parts: [box([0.024, 0.014, 0.088], [0, 0.007 * side, 0.106], METAL)],
+  pivot: [0, 0, 0],
+  unknown: 0.09,
+  speed: 0.15,
+  pose: (part, at) => part.position.setY((side * at) / 2),
+});
+const MOVERS: Record<string, Mover[]> = {
+  machine: [
+    {
+      value: "door",
+      parts: [box([0.18, 0.012, 0.13], [0, 0, 0.065], BODY), box([0.12, 0.016, 0.08], [0, 0, 0.07], GLASS)],
+      pivot: [0, 0.082, 0.04],
+      unknown: 1,
+      speed: 1.5,
+      // Open it is upright, closed it lies on the nest.
+      pose: (part, at) => part.rotation.set(((1 - at) * Math.PI) / 2, 0, 0),
+    },
+  ],
+  axis: [
+    {
+      value: "velocity",
+      parts: MARKS,
+      pivot: [0, 0, 0],
+      unknown: 0,
+      speed: 0,
+      pose: (part, at) => part.position.setX(at - PITCH * Math.floor(at / PITCH)),
+    },
+  ],
+  gripper: [finger(1), finger(-1)],
+};
+
+/** Colours of lamps from the lowest to the highest, and how much of it is left of one that is not lit. */
+const LAMPS: Record<string, number> = {
+  white: 0xffffff,
+  blue: 0x3d8bff,
+  green: 0x2fe070,
+  amber: 0xffb020,
+  red: 0xff3a2c,
+};
+const UNLIT = 0.3;
+const USUAL = ["white", "green", "amber", "red"];
+
+/** Return the names of the lamps among reported values; the usual ones if none is reported. */
+export function lampsOf(values: Values | undefined): string[] {
+  const fitted = Object.keys(LAMPS).filter((name) => values?.[name] !== undefined);
+  return fitted.length > 0 ? fitted : USUAL;
+}
+
+export type Values = Readonly<Record<string, number>>;
+
+/** The model of a device: its body, and parts that follow what it reports. */
+export class DeviceModel {
+  readonly body: BufferGeometry;
+  /** Height of its surface above its origin, m. */
+  readonly top: number = 0;
+  /** Distance of its farthest part from its origin along z, m. */
+  readonly length: number = 0;
+  /** Moving parts with their geometry, and the object that draws it. */
+  readonly moving: { mover: Mover; geometry: BufferGeometry; object: Object3D | null; at: number }[];
+  /** Lamps with the vertices of the body that show them. */
+  private readonly lamps: { name: string; first: number; count: number }[] = [];
+  private values: Values = {};
+
+  constructor(
+    private readonly icon: string,
+    parts: readonly Part[],
+    lamps: readonly string[],
+  ) {
+    const pieces = parts.map(pieceOf);
+    for (const [geometry] of pieces) {
       const { min, max } = geometry.boundingBox as Box3;
-      if (min.x <= 0 && max.x >= 0 && min.y <= 0 && max.y >= 0) top = Math.max(top, max.z);
-      return [geometry, part.color];
-    }),
-  );
-  whole.userData.top = top;
-  return whole;
+      if (min.x <= 0 && max.x >= 0 && min.y <= 0 && max.y >= 0) this.top = Math.max(this.top, max.z);
+    }
+    if (icon === "light") {
+      let first = pieces.reduce((sum, [each]) => sum + each.getAttribute("position").count, 0);
+      lamps.forEach((name, n) => {
+        const piece = pieceOf(round(0.022, 0.038, "z", [0, 0, 0.13 + 0.04 * n], LAMPS[name] ?? BODY));
+        const count = piece[0].getAttribute("position").count;
+        this.lamps.push({ name, first, count });
+        first += count;
+        pieces.push(piece);
+      });
+      this.top = 0.117 + 0.04 * lamps.length;
+      pieces.push(pieceOf(round(0.022, 0.008, "z", [0, 0, this.top - 0.004], DARK)));
+    }
+    const movers = MOVERS[icon] ?? [];
+    const all = [...pieces, ...movers.flatMap((mover) => mover.parts.map(pieceOf))];
+    this.length = Math.max(...all.map(([each]) => (each.boundingBox as Box3).max.z));
+    this.body = coloured(pieces);
+    this.moving = movers.map((mover) => ({
+      mover,
+      geometry: coloured(mover.parts.map(pieceOf)),
+      object: null,
+      at: mover.unknown,
+    }));
+    this.show({});
+  }
+
+  /** Return whether it has the lamps that are reported. */
+  fits(values: Values): boolean {
+    return this.icon !== "light" || lampsOf(values).join() === this.lamps.map(({ name }) => name).join();
+  }
+
+  /** Show reported values: lamps at once, moving parts by `step`. */
+  show(values: Values): void {
+    this.values = values;
+    const colors = this.body.getAttribute("color");
+    for (const { name, first, count } of this.lamps) {
+      const { r, g, b } = new Color(LAMPS[name]).multiplyScalar(values[name] ? 1 : UNLIT);
+      for (let n = first; n < first + count; n++) colors.setXYZ(n, r, g, b);
+      colors.needsUpdate = true;
+    }
+    for (const { mover, geometry } of this.moving) {
+      if (mover.speed !== 0) continue;
+      const { r, g, b } = new Color(values[mover.value] ? RUNNING : STOPPED);
+      const shown = geometry.getAttribute("color");
+      for (let n = 0; n < shown.count; n++) shown.setXYZ(n, r, g, b);
+      shown.needsUpdate = true;
+    }
+  }
+
+  /** Move the parts for a time, s; Infinity: to where they are reported, once. Return whether they move further. */
+  step(seconds: number): boolean {
+    let more = false;
+    for (const part of this.moving) {
+      const { value, unknown, speed, pose, pivot } = part.mover;
+      const wanted = this.values[value] ?? unknown;
+      if (speed === 0) {
+        if (Number.isFinite(seconds)) part.at += wanted * seconds;
+        more ||= wanted !== 0;
+      } else {
+        const most = speed * seconds;
+        part.at += Math.min(most, Math.max(-most, wanted - part.at));
+        more ||= part.at !== wanted;
+      }
+      if (part.object) {
+        part.object.position.set(...pivot);
+        pose(part.object, part.at, pivot);
+      }
+    }
+    return more;
+  }
+}
+
+/** Return the model for an icon of an object type, a tower light with these lamps; null if there is none. */
+export function modelOf(icon: string, lamps: readonly string[] = USUAL): DeviceModel | null {
+  const parts = MODELS[icon];
+  return parts ? new DeviceModel(icon, parts, lamps) : null;
+}
+
+function pieceOf(part: Part): [BufferGeometry, number] {
+  const geometry = ("box" in part ? new BoxGeometry(...part.box) : tube(...part.round)).translate(...part.at);
+  geometry.computeBoundingBox();
+  return [geometry, part.color];
 }
 
 /** Return a cylinder along an axis. */

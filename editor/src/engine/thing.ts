@@ -5,13 +5,15 @@ import type { Telemetry } from "../store/telemetry";
 import type { Batches } from "./batches";
 import type { Item } from "./items";
 import type { Palette } from "./palette";
-import type { Quality } from "./surface";
+import type { LowQuality, Quality } from "./surface";
 
 export interface Context {
   telemetry: Telemetry;
   palette: Palette;
   batches: Batches;
   quality: Quality;
+  /** What draws cheaply at low quality; else null. */
+  low: LowQuality | null;
   /** Time between two frames during a motion, s. */
   period: number;
   /** Load an asset of the server for display. */
@@ -24,6 +26,8 @@ export interface Context {
   metresPerPixel: (at: Vector3) => number;
   /** Request a new frame. */
   invalidate: () => void;
+  /** Call `step` of a model before each frame until it returns false. */
+  animate: (thing: Thing) => void;
   /** Report that the model of an item was loaded. */
   loaded: (id: string) => void;
 }
@@ -40,6 +44,11 @@ export abstract class Thing<I extends Item = Item> {
 
   /** Called before each frame, also if only the camera moved. Return whether the size changed. */
   resized(): boolean {
+    return false;
+  }
+
+  /** Move parts of the model for a time, s. Return whether they move further. */
+  step(_seconds: number): boolean {
     return false;
   }
 

@@ -344,6 +344,19 @@ export interface CameraParameters {
   dist_coefs: number[];
 }
 
+/**
+ * A part that a robot carries.
+ *
+ * link: end effector, or link of the robot. pose: in its frame. model: omitted for a collision object of the scene,
+ * which has the same name.
+ */
+export interface CarriedPart {
+  name: string;
+  link: string;
+  pose: Pose;
+  model?: ObjectModel;
+}
+
 /** Kind of change of the item in an event. */
 export type ChangeType = "add" | "update" | "remove" | "update_base";
 
@@ -1044,6 +1057,17 @@ export interface ObjectTypeMeta {
   values?: Record<string, string | Message>;
   disabled: boolean;
   problem?: string;
+}
+
+/**
+ * Data of the event ObjectValues: what one can see of a device, for displays. Missing values are unknown.
+ *
+ * values: by name, in SI units, such as the width of a gripper; 1 for on. parts: carried by a robot.
+ */
+export interface ObjectValuesData {
+  object_id: string;
+  values: Record<string, number>;
+  parts: CarriedPart[];
 }
 
 /**
@@ -2214,6 +2238,7 @@ export interface Events {
   ObjectHealth: ObjectHealthData;
   ObjectObservations: ObjectObservationsData;
   ObjectState: ObjectStateData;
+  ObjectValues: ObjectValuesData;
   ObjectsLocked: LockData;
   ObjectsUnlocked: LockData;
   OpenProject: OpenProjectData;
@@ -2433,6 +2458,7 @@ export const ADDITIONAL_EVENTS = [
   "ObjectHealth",
   "ObjectObservations",
   "ObjectState",
+  "ObjectValues",
   "ReachabilityChanged",
   "RobotHold",
   "RunChanged",

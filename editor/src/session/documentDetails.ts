@@ -21,7 +21,7 @@ export class DocumentDetails implements Follower {
     this.current = id;
     const isCurrent = () => this.current === id;
     void loadGeneral(isCurrent);
-    if (state.doc) void loadDetails(id, state.doc.project !== null, isCurrent);
+    if (state.doc) void loadDetails(id, state.doc.scene.id, state.doc.project !== null, isCurrent);
   }
 }
 
@@ -36,15 +36,21 @@ async function loadGeneral(isCurrent: () => boolean): Promise<void> {
   if (isCurrent()) store.setState((state) => ({ view: { ...state.view, general: { ...shared, ...own } } }));
 }
 
-async function loadDetails(document: string, project: boolean, isCurrent: () => boolean): Promise<void> {
+async function loadDetails(document: string, scene: string, project: boolean, isCurrent: () => boolean): Promise<void> {
   const ask = async (work: Promise<Partial<State>>) => {
     const change = await work.catch(() => null); // refused if the document was closed meanwhile
     if (change && isCurrent()) store.setState(change);
   };
   if (serves("GetViewState")) {
-    for (const scope of ["user", "shared"] as const) {
+    for (const [part, scope, of] of [
+      ["user", "user", document],
+      ["shared", "shared", document],
+      ["scene", "shared", scene],
+    ] as const) {
       void ask(
-        call("GetViewState", { scope, document }).then(({ values }) => ({ view: { ...now().view, [scope]: values } })),
+        call("GetViewState", { scope, document: of }).then(({ values }) => ({
+          view: { ...now().view, [part]: values },
+        })),
       );
     }
   }

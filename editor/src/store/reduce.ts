@@ -57,7 +57,7 @@ export function reduce(state: State, event: ServerEvent, time: number): Partial<
     case "ShowMainScreen":
       return {
         ...CLOSED,
-        view: { ...state.view, user: {}, shared: {} },
+        view: { ...state.view, user: {}, shared: {}, scene: {} },
         ui: shut(state),
         program: { ...state.program, running: [] },
         lists: { ...state.lists, shown: event.data.what, highlight: event.data.highlight ?? "" },
@@ -204,17 +204,22 @@ function lists(state: State, event: ServerEvent): Partial<State> {
 }
 
 function viewState(state: State, data: import("../protocol/types").ViewState): Partial<State> {
-  const open = state.doc?.project?.id ?? state.doc?.scene.id;
-  const part = data.document === "" ? "general" : data.document === open ? data.scope : null;
-  if (part === null || (data.scope === "user" && data.user !== undefined && data.user !== state.connection.user)) {
-    return {};
+  const { doc, connection } = state;
+  const parts: (keyof State["view"])[] = [];
+  if (data.document === "") parts.push("general");
+  else if (data.document === (doc?.project?.id ?? doc?.scene.id)) parts.push(data.scope);
+  if (doc && data.document === doc.scene.id && data.scope === "shared") parts.push("scene");
+  if (data.scope === "user" && data.user !== undefined && data.user !== connection.user) return {};
+  const view = { ...state.view };
+  for (const part of parts) {
+    const values = { ...view[part] };
+    for (const [key, value] of Object.entries(data.values)) {
+      if (value === null) delete values[key];
+      else values[key] = value;
+    }
+    view[part] = values;
   }
-  const values = { ...state.view[part] };
-  for (const [key, value] of Object.entries(data.values)) {
-    if (value === null) delete values[key];
-    else values[key] = value;
-  }
-  return { view: { ...state.view, [part]: values } };
+  return parts.length > 0 ? { view } : {};
 }
 
 function isAnswering(objects: State["live"]["objects"]): boolean {
@@ -253,6 +258,8 @@ function live(state: State, event: ServerEvent, time: number): Partial<State> | 
     }
     case "ObjectHealth":
       return become({ health: put(now.health, event.data.object_id, event.data) });
+    case "ObjectValues":
+      return become({ values: put(now.values, event.data.object_id, event.data) });
     case "RobotHold": {
       const { robot_id, held } = event.data;
       return become({ holds: held ? put(now.holds, robot_id, event.data) : without(now.holds, robot_id) });

@@ -19,6 +19,7 @@ import type {
   ObjectHealthData,
   ObjectStateData,
   ObjectTypeMeta,
+  ObjectValuesData,
   PackageStateEnum,
   PackageSummary,
   Parameter,
@@ -112,6 +113,8 @@ export interface Live {
   message: string;
   objects: Record<string, ObjectStateData>;
   health: Record<string, ObjectHealthData>;
+  /** What one can see of devices, and the parts that robots carry. */
+  values: Record<string, ObjectValuesData>;
   holds: Record<string, RobotHoldData>;
   /** Moving robots with the kind of motion. */
   moving: Record<string, string>;
@@ -174,10 +177,10 @@ export interface State {
   /** By robot, arm and end effector, then by orientation or joints. */
   reach: Record<string, ReachabilityData>;
   /**
-   * View state of the open document, shared and of the user, and the view state without a document (favorites,
-   * settings).
+   * View state of the open document, shared and of the user; the shared one of its scene; and the view state without a
+   * document (favorites, settings).
    */
-  view: { user: Record<string, unknown>; shared: Record<string, unknown>; general: Record<string, unknown> };
+  view: Record<"user" | "shared" | "scene" | "general", Record<string, unknown>>;
   live: Live;
   program: Program;
   /** Last known values of dynamic parameters, so that they can be chosen offline too. */
@@ -199,6 +202,7 @@ export const OFFLINE: Live = {
   message: "",
   objects: {},
   health: {},
+  values: {},
   holds: {},
   moving: {},
   motions: {},
@@ -231,7 +235,7 @@ export function initialState(): State {
     history: null,
     breakpoints: {},
     reach: {},
-    view: { user: {}, shared: {}, general: {} },
+    view: { user: {}, shared: {}, scene: {}, general: {} },
     live: OFFLINE,
     program: NO_PROGRAM,
     tried: [],

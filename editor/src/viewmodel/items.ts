@@ -8,6 +8,7 @@ import type { LogicItem, Pose, Position, Reach } from "../protocol/types";
 import { isRunning } from "../store/selectors";
 import type { OpenDocument, State } from "../store/state";
 import type { Draft, Ghost } from "../store/ui";
+import { gripperOf, placeOf, toolOf } from "./devices";
 import { borders, isDim, isOpen } from "./program";
 import { shapeOf } from "./shapes";
 import { faintness } from "./visibility";
@@ -56,33 +57,36 @@ export class ItemMaker {
     for (const object of Object.values(doc.objects)) {
       const type = state.types.byName[object.type];
       const robot = state.types.robots[object.type];
-      if (!object.pose && !robot) continue; // shown in lists only
+      const place = placeOf(state, object);
+      if (!place && !robot) continue; // shown in lists only
       const fault = hasFault(state, object.id);
       const online = state.live.state === "started" || isRunning(state);
       const preview = drafted(draft, object) ?? state.previews[object.id];
       const model = type && draft?.type === type ? draft.model : undefined;
       const ghost = state.ui.ghost?.robotId === object.id ? state.ui.ghost : null;
-      add(
-        object.id,
-        [object, type, robot, fault, robot && online, preview, model, ghost, robot && axes, ...notify(object.id)],
-        () => {
-          const pose = {
-            position: preview?.position ?? object.pose?.position ?? NO_PLACE,
-            orientation: preview?.orientation ?? object.pose?.orientation ?? UPRIGHT.orientation,
+      const { values } = state.live.values[object.id] ?? {};
+      const gripper = robot && gripperOf(state, object);
+      const live = [robot ? state.live.values[object.id] : values, gripper, gripper && state.live.values[gripper.id]];
+      const looks = [type, robot, fault, robot && online, model, ghost, robot && axes, ...live];
+      add(object.id, [object, place, preview, ...looks, ...notify(object.id)], () => {
+        const pose = {
+          position: preview?.position ?? place?.position ?? NO_PLACE,
+          orientation: preview?.orientation ?? place?.orientation ?? UPRIGHT.orientation,
+        };
+        const base = { ...common(object.id, object.name), pose, fault };
+        if (robot)
+          return {
+            ...base,
+            kind: "robot",
+            urdf: robot.urdf_package_filename ?? "",
+            online,
+            axes,
+            ghost: ghost ? ghostOf(ghost) : undefined,
+            ...toolOf(state, object),
           };
-          const base = { ...common(object.id, object.name), pose, fault };
-          if (robot)
-            return {
-              ...base,
-              kind: "robot",
-              urdf: robot.urdf_package_filename ?? "",
-              online,
-              axes,
-              ghost: ghost ? ghostOf(ghost) : undefined,
-            };
-          return { ...base, kind: "object", shape: shapeOf(type && model ? { ...type, object_model: model } : type) };
-        },
-      );
+        const shape = shapeOf(type && model ? { ...type, object_model: model } : type);
+        return { ...base, kind: "object", shape, values };
+      });
     }
     const size = pointSize(state);
     const lines = parentLines(state);

@@ -11,6 +11,7 @@ from msgspec import UNSET, Struct, field
 from arcor2_hw.client import Client, RequestFailed
 from arcor2_hw.data import rpc
 from arcor2_hw.data.base import Unset
+from arcor2_hw.data.editor import ViewScope
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box, Model3dType, ObjectAction, ObjectModel
 from arcor2_hw.data.parameter import Parameter
@@ -30,6 +31,14 @@ class Object(Struct, frozen=True, forbid_unknown_fields=True):
     position: Vector3 | None = None
     rotation: Vector3 = (0.0, 0.0, 0.0)
     settings: dict[str, Scalar] = field(default_factory=dict)
+
+
+class Place(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where the editor draws a device whose type has no pose."""
+
+    object: str
+    position: Vector3
+    rotation: Vector3 = (0.0, 0.0, 0.0)
 
 
 class Obstacle(Struct, frozen=True, forbid_unknown_fields=True):
@@ -85,6 +94,7 @@ class Workplace(Struct, frozen=True, forbid_unknown_fields=True):
     steps: list[Step]
     logic: list[Link]
     constants: dict[str, Scalar]
+    places: list[Place] = field(default_factory=list)
 
 
 def load(file: Path | None = None) -> Workplace:
@@ -175,7 +185,20 @@ class Creation:
                     rpc.AddVirtualCollisionObjectToSceneArgs(box.name, _pose(box.position, (0.0, 0.0, 0.0)), model),
                 )
         await self._client.save_scene()
-        return await self._client.get_scene(scene.id)
+        created = await self._client.get_scene(scene.id)
+        if self._workplace.scene not in known:
+            await self._place(created)
+        return created
+
+    async def _place(self, scene: Scene) -> None:
+        """Store where the editor draws the devices without a pose."""
+        ids = {obj.name: obj.id for obj in scene.objects}
+        values = {
+            f"place/{ids[place.object]}": msgspec.to_builtins(_pose(place.position, place.rotation))
+            for place in self._workplace.places
+        }
+        if values:
+            await self._client.call("SetViewState", rpc.SetViewStateArgs(ViewScope.SHARED, values, scene.id))
 
     # ------------------------------------------------------------------------------------------------ project
     async def open_project(self, scene: Scene, constants: dict[str, Scalar]) -> Project:

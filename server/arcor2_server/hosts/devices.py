@@ -10,7 +10,7 @@ from arcor2_hw.data.base import UNSET, Data
 from arcor2_hw.data.cell import Cell, overlay, strangers
 from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.data.events import ObjectStateData
-from arcor2_hw.data.operation import ObjectHealthData
+from arcor2_hw.data.operation import CarriedPart, ObjectHealthData, ObjectValuesData
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.data.secret import HIDDEN
 from arcor2_hw.exceptions import NotFound
@@ -147,12 +147,18 @@ class DeviceBoard:
             self._publish(self._state(message))
         if before is None or _health(before) != _health(message):
             self._hub.broadcast(make_event("ObjectHealth", _health(message)))
+        if before is None or _values(before) != _values(message):
+            self._hub.broadcast(make_event("ObjectValues", _values(message)))
         if _obstacles(before) != _obstacles(message):
             self._notify_obstacles()
 
     def healths(self) -> list[ObjectHealthData]:
         """Return the health of every object, in the order of the scene."""
         return [_health(self._report(object_id)) for object_id in self._objects]
+
+    def values(self) -> list[ObjectValuesData]:
+        """Return the shown values and carried parts of every object, in the order of the scene."""
+        return [_values(self._report(object_id)) for object_id in self._objects]
 
     def failed(self) -> list[str]:
         """Return the names of the objects that failed to connect, in the order of the scene."""
@@ -218,3 +224,8 @@ def _obstacles(report: DeviceChanged | None) -> tuple[bool, list[HeldPart]]:
 
 def _health(report: DeviceChanged) -> ObjectHealthData:
     return ObjectHealthData(report.object_id, report.health, report.alarms, report.control_owner or UNSET)
+
+
+def _values(report: DeviceChanged) -> ObjectValuesData:
+    parts = [CarriedPart(part.name, part.link, part.pose, part.model or UNSET) for part in report.held]
+    return ObjectValuesData(report.object_id, report.values, parts)

@@ -132,6 +132,9 @@ class GeneralRequests:
         if "ObjectHealth" in args.events:
             healths = self._execution.board.healths() or self._online.board.healths()
             events += [make_event("ObjectHealth", health) for health in healths]
+        if "ObjectValues" in args.events:
+            values = self._execution.board.values() or self._online.board.values()
+            events += [make_event("ObjectValues", each) for each in values]
         if "RobotHold" in args.events:
             events += [make_event("RobotHold", hold) for hold in self._online.held.states()]
         if "UserPresence" in args.events:

@@ -81,6 +81,7 @@ def test_a_belt_homes_moves_runs_and_halts(fake: FakeProcess, make: Callable[...
     belt.run(0.2)
     assert fake.truth()["velocity"] == pytest.approx(2000)
     assert belt.velocity().value == pytest.approx(0.2)
+    assert belt.shown_values == {"velocity": 0.2}
     belt.run(-0.1)
     assert fake.truth()["velocity"] == pytest.approx(-1000)
     with pytest.raises(Refused, match=r"move_by .* while the belt moves"):

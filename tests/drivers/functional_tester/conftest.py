@@ -79,6 +79,8 @@ def tester(observed: FunctionalTester) -> FunctionalTester:
 def loaded(fake: FakeProcess, tester: FunctionalTester) -> FunctionalTester:
     """With a good board behind the closed door."""
     tester.open_door()
+    assert tester.shown_values == {"door": 1.0}
     fake.control.do("put_board", code="GOOD-1")
     tester.close_door()
+    assert tester.shown_values == {"door": 0.0}
     return tester

@@ -45,6 +45,7 @@ def test_colours_are_switched(fake: FakeProcess, tower: TowerLight) -> None:
     tower.show(LampColor.GREEN)
     assert lamps(fake) == [False, False, True]
     assert tower.lit() == {"red": False, "amber": False, "green": True}
+    assert tower.shown_values == {"red": 0.0, "amber": 0.0, "green": 1.0}
     with pytest.raises(OutOfRange, match="has no blue lamp; there are red, amber, green"):
         tower.show(LampColor.BLUE)
     tower.off()

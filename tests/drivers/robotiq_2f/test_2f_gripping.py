@@ -86,6 +86,7 @@ def test_a_complete_cycle(fake: FakeProcess, gripper: Robotiq2F) -> None:
     gripper.release()
     assert not gripper.part_held()
     assert gripper.width() == pytest.approx(0.085)
+    assert gripper.shown_values == {"width": 0.085}
     fake.control.do("remove_part")
     assert gripper.grip(0.03, speed=0.15) == (False, pytest.approx(0.03, abs=0.0002))
     assert gripper.state() is GripperState.AT_POSITION

@@ -40,6 +40,8 @@ class Box(Generic):
     def alarms(self):
         stamp = "2026-01-01T00:00:00+00:00"
         return [Alarm("hot", Severity.WARNING, "it is hot", "let it cool", stamp)] if self.hot else []
+    @property
+    def shown_values(self): return {"lid": float(self.hot)}
     def heat(self) -> None: self.hot = True
     @action
     def open(self, *, an: str | None = None) -> bool: return True
@@ -194,6 +196,18 @@ async def test_health_and_alarms_are_announced(server: Server) -> None:
     assert hot["object_id"] == "obj_here"
     assert [alarm["remedy"] for alarm in hot["alarms"]] == ["let it cool"]
     assert [one.health for one in server.services.online.board.healths()] == ["off_spec", "normal"]
+
+
+@serving()
+async def test_what_one_can_see_is_announced(server: Server) -> None:
+    boxes, client = Boxes(server), subscribed(server, "ObjectValues")
+    await boxes.open()
+    boxes.away.touch()
+    await server.start()
+    await server.services.online.call("obj_here", "heat")
+    opened = await client.event("ObjectValues", lambda data: data["values"] == {"lid": 1.0})
+    assert opened == {"object_id": "obj_here", "values": {"lid": 1.0}, "parts": []}
+    assert [one.values for one in server.services.online.board.values()] == [{"lid": 1.0}, {"lid": 0.0}]
 
 
 ARM = """

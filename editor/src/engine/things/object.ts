@@ -17,6 +17,7 @@ import {
 } from "three";
 import type { ObjectItem, Shape } from "../items";
 import { readMesh } from "../loaders/glb";
+import type { DeviceModel } from "../models";
 import { setPose } from "../poses";
 import { surface } from "../surface";
 import { type Context, disposeTree, ownedBy, seenThrough, Thing } from "../thing";
@@ -32,6 +33,8 @@ export class ObjectThing extends Thing<ObjectItem> {
   private height = 0.05;
   private coloured = false;
   private reason = "";
+  private model: DeviceModel | null = null;
+  private values: ObjectItem["values"];
 
   constructor(item: ObjectItem, context: Context) {
     super(context);
@@ -46,6 +49,7 @@ export class ObjectThing extends Thing<ObjectItem> {
       this.shape = shape;
       this.build(item.shape);
     }
+    if (item.values !== this.values) this.showValues(item);
     const { palette } = this.context;
     const color = item.selected
       ? palette.selected
@@ -77,6 +81,10 @@ export class ObjectThing extends Thing<ObjectItem> {
     return this.reason;
   }
 
+  override step(seconds: number): boolean {
+    return this.model?.step(seconds) ?? false;
+  }
+
   override dispose(): void {
     this.loading++;
     super.dispose();
@@ -87,6 +95,7 @@ export class ObjectThing extends Thing<ObjectItem> {
   private build(shape: Shape): void {
     const mine = ++this.loading;
     this.reason = "";
+    this.model = null;
     for (const child of [...this.root.children]) {
       // Children of the item stay.
       if (child.userData.item !== this.item.id) continue;
@@ -118,14 +127,40 @@ export class ObjectThing extends Thing<ObjectItem> {
 
   /** Show the model for an icon; a marker if there is none. */
   private async device(icon: string, mine: number): Promise<void> {
-    const geometry = await import("../models").then(
-      ({ modelOf }) => modelOf(icon),
+    const model = await import("../models").then(
+      ({ modelOf, lampsOf }) => modelOf(icon, lampsOf(this.item.values)),
       () => null,
     );
-    if (mine !== this.loading) return geometry?.dispose();
-    if (geometry) this.show(geometry);
+    if (mine !== this.loading) {
+      model?.body.dispose();
+      for (const { geometry } of model?.moving ?? []) geometry.dispose();
+      return;
+    }
+    if (model) this.showModel(model);
     else this.marker();
     this.context.loaded(this.item.id);
+  }
+
+  private showModel(model: DeviceModel): void {
+    this.model = model;
+    this.show(model.body, model.top);
+    for (const part of model.moving) {
+      part.object = new Mesh(part.geometry, this.material);
+      part.object.castShadow = part.object.receiveShadow = true;
+      ownedBy(part.object, this.item.id);
+      this.root.add(part.object);
+    }
+    this.showValues(this.item);
+    this.step(Infinity);
+  }
+
+  /** Show what the device reports. A tower light is built of the lamps that it reports. */
+  private showValues(item: ObjectItem): void {
+    this.values = item.values;
+    if (!this.model) return;
+    if (item.values && !this.model.fits(item.values)) return this.build(item.shape);
+    this.model.show(item.values ?? {});
+    this.context.animate(this);
   }
 
   private async load(asset: string, mine: number): Promise<void> {
@@ -142,7 +177,7 @@ export class ObjectThing extends Thing<ObjectItem> {
     }
   }
 
-  private show(geometry: BufferGeometry): void {
+  private show(geometry: BufferGeometry, top?: number): void {
     const coloured = geometry.hasAttribute("color");
     if (coloured !== this.coloured) {
       this.coloured = this.material.vertexColors = coloured;
@@ -153,7 +188,6 @@ export class ObjectThing extends Thing<ObjectItem> {
     mesh.castShadow = mesh.receiveShadow = true;
     geometry.computeBoundingBox();
     // A tap on the label's place hits the surface.
-    const top = geometry.userData.top as number | undefined;
     this.height = top ?? Math.max(0.02, geometry.boundingBox?.max.z ?? 0);
     const count = geometry.index?.count ?? geometry.getAttribute("position").count;
     // Edges make shapes readable without shadows; dense meshes would have too many.

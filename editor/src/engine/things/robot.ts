@@ -1,7 +1,17 @@
 /** A robot: its URDF moved by live joints, or a stand-in; a frame at each end effector; grey without a signal. */
 
 import { t } from "@lingui/core/macro";
-import { AxesHelper, CylinderGeometry, Group, Matrix4, Mesh, type Object3D, SphereGeometry, Vector3 } from "three";
+import {
+  AxesHelper,
+  CylinderGeometry,
+  Group,
+  Matrix4,
+  Mesh,
+  type Object3D,
+  Quaternion,
+  SphereGeometry,
+  Vector3,
+} from "three";
 import type { URDFRobot } from "urdf-loader";
 import { STALE, STILL } from "../../store/telemetry";
 import type { RobotItem } from "../items";
@@ -9,6 +19,7 @@ import { setPose } from "../poses";
 import { surface } from "../surface";
 import { type Context, disposeTree, ownedBy, seenThrough, Thing } from "../thing";
 import { GhostRobot } from "./ghost";
+import type { ToolModel } from "./tool";
 
 /** Limits of a joint, rad; m if prismatic. */
 export interface JointLimit {
@@ -22,6 +33,8 @@ export interface JointLimit {
 const GREY = 0.72;
 const inverse = new Matrix4();
 const tip = new Vector3();
+const tipPose = new Matrix4();
+const whole = new Vector3(1, 1, 1);
 
 export class RobotThing extends Thing<RobotItem> {
   readonly root = new Group();
@@ -36,6 +49,8 @@ export class RobotThing extends Thing<RobotItem> {
   private readonly coloured = surface(this.context, { vertexColors: true });
   private reason = "";
   private readonly ghost = new GhostRobot(this.root);
+  private tool: ToolModel | null = null;
+  private arming = false;
   private urdf: string | null = null;
   private stale = false;
 
@@ -52,6 +67,8 @@ export class RobotThing extends Thing<RobotItem> {
       this.urdf = item.urdf;
       void this.load(item.urdf);
     }
+    if (this.tool) this.tool.update(item);
+    else if ((item.tool || item.parts?.length) && !this.arming) void this.arm();
     this.root.visible = item.faint < 1;
     for (const frame of this.tips.values()) frame.visible = item.axes;
     this.ghost.show(item.ghost, this.robot, this.context.palette);
@@ -103,12 +120,42 @@ export class RobotThing extends Thing<RobotItem> {
     const drawn = this.context.telemetry.interpolated(this.item.id, this.context.period);
     if (!drawn || !this.robot) return false;
     const first = this.shown.size === 0;
+    let still = true;
     for (const [name, value] of drawn.joints) {
+      still &&= this.shown.get(name) === value;
       this.shown.set(name, value);
       this.robot.joints[name]?.setJointValue(value);
     }
     if (first) this.paint();
+    // While it moves, joints and tip are not of the same time.
+    if (still || !this.tool?.mounted) this.mountTool(this.robot);
     return !drawn.settled;
+  }
+
+  override step(seconds: number): boolean {
+    return this.tool?.step(seconds) ?? false;
+  }
+
+  private async arm(): Promise<void> {
+    this.arming = true;
+    const { ToolModel } = await import("./tool");
+    if (this.urdf === null) return; // removed meanwhile
+    const { id } = this.item;
+    const materials = { plain: this.material, coloured: this.coloured };
+    this.tool = new ToolModel(id, this.context, materials, () => this.context.animate(this));
+    this.tool.update(this.item);
+    if (this.robot) this.mountTool(this.robot);
+    this.context.invalidate();
+  }
+
+  private mountTool({ links }: URDFRobot): void {
+    const [first] = this.context.telemetry.endEffectors(this.item.id);
+    const flange = links.flange ?? links.tool0 ?? Object.values(links).at(-1);
+    if (!first || !flange || !this.tool) return;
+    const { x, y, z, w } = first.pose.orientation;
+    tipPose.compose(tip.copy(first.pose.position as Vector3), new Quaternion(x, y, z, w).normalize(), whole);
+    flange.updateWorldMatrix(true, false);
+    this.tool?.mount(flange, tipPose);
   }
 
   /** Check whether the robot still reports. Return whether that changed. */
@@ -136,6 +183,7 @@ export class RobotThing extends Thing<RobotItem> {
 
   override dispose(): void {
     this.urdf = null;
+    this.tool?.dispose();
     this.ghost.dispose();
     super.dispose();
     this.material.dispose();
@@ -211,6 +259,7 @@ export class RobotThing extends Thing<RobotItem> {
           ? t`Part of ${this.item.name} cannot be shown. ${reason}`
           : t`The model of ${this.item.name} cannot be shown. ${reason}`,
       );
+    this.tool?.tip.removeFromParent();
     for (const child of [...this.body.children]) {
       child.removeFromParent();
       disposeTree(child);

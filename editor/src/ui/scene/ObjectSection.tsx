@@ -6,6 +6,7 @@ import { duplicateObject, notBuildable, projectsUsing, removeObject, renameObjec
 import { storeViewState } from "../../commands/viewstate";
 import { heldBy } from "../../store/selectors";
 import { now, useEditor } from "../../store/store";
+import { isPlaceable } from "../../viewmodel/devices";
 import { MoreOrLess, OnOff } from "../kit/fields";
 import { Button, Waiting } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
@@ -13,6 +14,7 @@ import { Confirm } from "../kit/lazyControls";
 import { NameField } from "../points/NameField";
 import type { Section } from "../workplace/section";
 import { setHidden } from "./hidden";
+import { Placing } from "./Placing";
 import "./scene.css";
 
 const Trends = lazyComponent(() => import("../trends/Trends"));
@@ -24,6 +26,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
   const why = useEditor((state) => inUse || notBuildable(state, "RemoveFromScene"));
   const cannotCopy = useEditor((state) => notBuildable(state, "AddSceneShape"));
   const cannotRename = useEditor((state) => inUse || (state.doc?.project ? notBuildable(state, "RenameObject") : ""));
+  const placeable = useEditor((state) => object !== undefined && isPlaceable(state, object));
   const [needing, setNeeding] = useState<string[] | null>(null);
   if (!object) return null;
   const remove = async () => {
@@ -48,6 +51,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
           {t`Remove`}
         </Button>
       </div>
+      {placeable && <Placing id={id} />}
       <Seeing id={id} />
       <Values key={id} id={id} />
       {needing && (

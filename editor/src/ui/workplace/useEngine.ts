@@ -49,7 +49,10 @@ export function useEngine({ shown, begin }: Use): UsedEngine {
     };
     let stop = () => {};
     const start = async () => {
-      const { Engine } = await persistently(() => import("../../engine/engine"));
+      const [{ Engine }, low] = await Promise.all([
+        persistently(() => import("../../engine/engine")),
+        chosen(quality) === "low" ? persistently(() => import("../../engine/baked")) : null,
+      ]);
       if (ended || !canvas.current || !labels.current) return;
       const view = new Engine({
         canvas: canvas.current,
@@ -57,7 +60,7 @@ export function useEngine({ shown, begin }: Use): UsedEngine {
         telemetry,
         asset: readShown,
         reportFault: once,
-        quality: chosen(quality),
+        low,
         dark: themeAtStart.current === "dark",
       });
       made = view;

@@ -1,0 +1,53 @@
+/** Fit the view to the items, also when their models appear a little later. */
+
+import type { Vector3 } from "three";
+import type { View } from "./camera";
+import { corners } from "./framing";
+import type { Item } from "./items";
+import { boundsOf, type Thing } from "./thing";
+
+/** Time after a fit in which the places of devices arrive, ms. */
+const SOON = 1500;
+
+export class Fitting {
+  /** Position of the camera after the last fit to all items. */
+  private fitted: Vector3 | null = null;
+  private fittedAt = -Infinity;
+  /** Items of that fit whose models may not be loaded yet. */
+  private awaited = new Set<string>();
+
+  constructor(
+    private readonly view: View,
+    private readonly things: ReadonlyMap<string, Thing>,
+  ) {}
+
+  /** Bring an item, or all items, into the view. Frames have to be up to date. */
+  focus(id?: string, best = false): void {
+    this.fit(id, best);
+    this.awaited = new Set(id === undefined ? this.things.keys() : []);
+    this.fittedAt = performance.now();
+  }
+
+  /** Fit the view to all items again, unless the user has moved the camera. */
+  refit(): void {
+    if (this.fitted && this.fitted.distanceTo(this.view.camera.position) < 1e-6) this.fit();
+  }
+
+  /** An item was added: if it is a device soon after a fit, it belongs to it. */
+  added({ kind, id }: Item): void {
+    if (kind === "object" && performance.now() - this.fittedAt < SOON) this.awaited.add(id);
+  }
+
+  /** A model appears: fit the view again, if it was to show this item. Later ones do not move the camera. */
+  loaded(id: string): void {
+    if (this.awaited.delete(id)) this.refit();
+  }
+
+  private fit(id?: string, best = false): void {
+    const boxes = [...this.things.values()]
+      .filter(({ item }) => (id === undefined ? item.faint < 1 : item.id === id))
+      .map((thing) => boundsOf(thing).expandByScalar(id === undefined ? 0.01 : 0.12));
+    this.view.fit(corners(boxes), best);
+    this.fitted = id === undefined ? this.view.camera.position.clone() : null;
+  }
+}

@@ -1,0 +1,58 @@
+/** Resolution of the picture: at low quality half of it while the camera moves, because pixels cost most of a frame. */
+
+import { type Camera, Matrix4 } from "three";
+
+/** Part of the resolution while the camera moves. */
+const MOVING = 0.5;
+/** Time without a motion after which the picture is drawn in full, ms. */
+const REST = 150;
+
+export class Resolution {
+  private readonly last = new Matrix4();
+  private size: [number, number] = [1, 1];
+  private part = 1;
+  private movedAt = -Infinity;
+  private timer: ReturnType<typeof setTimeout> | undefined;
+
+  /** `apply` changes the size of the canvas, pixels; `draw` requests a frame. */
+  constructor(
+    private readonly changes: boolean,
+    private readonly apply: (width: number, height: number) => void,
+    private readonly draw: () => void,
+  ) {}
+
+  resize(width: number, height: number): void {
+    this.size = [width, height];
+    this.set(this.part, true);
+  }
+
+  /** Called before each frame. A single jump of the camera is drawn in full at once. */
+  follow({ matrixWorld }: Camera, now = performance.now()): void {
+    if (!this.changes) return;
+    if (this.last.equals(matrixWorld)) {
+      if (now - this.movedAt >= REST) this.set(1);
+      return;
+    }
+    this.last.copy(matrixWorld);
+    if (now - this.movedAt < REST) this.set(MOVING);
+    this.movedAt = now;
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.part !== 1 && this.draw(), REST);
+  }
+
+  /** Draw the next frame in full. */
+  full(): void {
+    this.set(1);
+  }
+
+  dispose(): void {
+    clearTimeout(this.timer);
+  }
+
+  private set(part: number, resized = false): void {
+    if (part === this.part && !resized) return;
+    this.part = part;
+    const [width, height] = this.size;
+    this.apply(Math.max(1, Math.round(width * part)), Math.max(1, Math.round(height * part)));
+  }
+}

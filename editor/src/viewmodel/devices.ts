@@ -1,0 +1,63 @@
+/** What one can see of devices: their place, reported values, grippers and parts at robots. Pure functions. */
+
+import type { CarriedItem, RobotItem } from "../engine/items";
+import type { Pose, SceneObject } from "../protocol/types";
+import type { State } from "../store/state";
+import { shapeOf } from "./shapes";
+
+/** Widths of a gripper that only reports whether it is closed, m. */
+const OPEN = 0.09;
+const CLOSED = 0;
+const GRIPPERS = ["gripper", "suction"];
+/** Icons of types without a pose that the view can draw; the rest are services, and grippers, which are at robots. */
+const DRAWN = ["light", "printer", "reader", "io", "scale", "axis", "machine"];
+
+/** Return where an object is drawn: its pose, or where users put a device that has none; undefined without both. */
+export function placeOf({ view }: Pick<State, "view">, object: SceneObject): Pose | undefined {
+  if (object.pose) return object.pose;
+  const place = view.scene[`place/${object.id}`];
+  return isPose(place) ? place : undefined;
+}
+
+/** Return whether users can put an object into the view that has no pose. */
+export function isPlaceable({ types }: Pick<State, "types">, object: SceneObject): boolean {
+  return !object.pose && DRAWN.includes(types.byName[object.type]?.icon ?? "");
+}
+
+function isPose(value: unknown): value is Pose {
+  const { position, orientation } = (value ?? {}) as Partial<Record<keyof Pose, Record<string, unknown>>>;
+  const finite = (part: Record<string, unknown> | undefined, names: string) =>
+    [...names].every((name) => Number.isFinite(part?.[name]));
+  return finite(position, "xyz") && finite(orientation, "xyzw");
+}
+
+/** Return the object of a separate gripper that a robot carries; undefined without one. */
+export function gripperOf({ doc, types }: Pick<State, "doc" | "types">, robot: SceneObject): SceneObject | undefined {
+  const objects = Object.values(doc?.objects ?? {});
+  const alone = objects.filter(({ type }) => types.robots[type]).length === 1;
+  return objects.find((object) => {
+    if (object.pose || !GRIPPERS.includes(types.byName[object.type]?.icon ?? "")) return false;
+    const carrier = JSON.parse(object.parameters?.find(({ name }) => name === "robot")?.value ?? '""');
+    return carrier === robot.name || carrier === robot.id || (alone && !carrier);
+  });
+}
+
+/** Return what the view shows at the flange of a robot: its gripper, and what it carries. */
+export function toolOf(state: State, robot: SceneObject): Pick<RobotItem, "tool" | "parts"> {
+  const own = state.live.values[robot.id];
+  const parts = own?.parts.map(({ name, link, pose, model }): CarriedItem => {
+    const object = Object.values(state.doc?.objects ?? {}).find((each) => each.name === name);
+    const type = model ? { object_model: model } : state.types.byName[object?.type ?? ""];
+    return { link, pose, shape: shapeOf(type) };
+  });
+  const gripper = gripperOf(state, robot);
+  const gripped = own?.values.gripped;
+  if (gripper) {
+    const values = state.live.values[gripper.id]?.values ?? {};
+    return { parts, tool: { icon: state.types.byName[gripper.type]?.icon ?? "", values } };
+  }
+  if (gripped === undefined) return { parts };
+  const [box] = parts?.flatMap(({ shape }) => (shape.kind === "box" ? [shape] : [])) ?? [];
+  const width = gripped ? Math.min(OPEN, box?.size[1] ?? CLOSED) : OPEN;
+  return { parts, tool: { icon: "gripper", values: { width } } };
+}
