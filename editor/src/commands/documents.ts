@@ -5,7 +5,6 @@ import type { State } from "../store/state";
 import { now } from "../store/store";
 import { awaited } from "./awaited";
 import { ask, held, refusal } from "./requests";
-import { keepThumbnail } from "./thumbnail";
 
 export const openScene = (id: string) => ask("OpenScene", { id });
 export const openProject = (id: string) => ask("OpenProject", { id });
@@ -43,7 +42,8 @@ function listed(kind: "scene" | "project", name: string): Promise<string> {
 
 export async function save() {
   const saved = await (now().doc?.project ? ask("SaveProject") : ask("SaveScene"));
-  if (saved) void keepThumbnail().catch(() => {}); // a missing picture is harmless
+  // A missing picture is harmless.
+  if (saved) void import("./thumbnail").then(({ keepThumbnail }) => keepThumbnail()).catch(() => {});
   return saved;
 }
 
