@@ -34,11 +34,11 @@ def found_benches() -> list[type[Bench]]:
 def collected_tests(config: pytest.Config) -> Mapping[str, frozenset[str]]:
     """Return the names of the tests of the drivers, by file: those of this run, or else those that pytest collects."""
     found = config.stash[COLLECTED]
-    return found if {str(path) for path in FOLDER.rglob("test_*.py")} <= found.keys() else tests_of_drivers()
+    return found if {str(path) for path in FOLDER.rglob("test_*.py")} <= found.keys() else all_driver_tests()
 
 
 @lru_cache(maxsize=1)
-def tests_of_drivers() -> dict[str, frozenset[str]]:
+def all_driver_tests() -> dict[str, frozenset[str]]:
     """Return the names of the tests that pytest collects for the drivers, by file."""
     command = (sys.executable, "-m", "pytest", "--collect-only", "-q", "-p", "no:cacheprovider", "tests/drivers")
     listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
