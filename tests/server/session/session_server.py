@@ -226,13 +226,13 @@ class Person:
         return answer.result()
 
     async def ask(
-        self, request_name: str, /, *, dry_run: bool = False, codes: bool = False, step: str = "", **args: Any
+        self, request_name: str, /, *, dry_run: bool = False, codes: bool = False, undo_step: str = "", **args: Any
     ) -> Any:
         """Send a request; gives the answer's data, raises Refused with its message."""
         self._number += 1
         request: dict[str, Any] = {"id": self._number, "request": request_name, "dry_run": dry_run, "codes": codes}
-        if step:
-            request["step"] = step
+        if undo_step:
+            request["step"] = undo_step
         if args:
             request["args"] = args
         answer = await self.send(request)

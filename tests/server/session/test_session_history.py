@@ -94,14 +94,14 @@ async def test_edits_of_one_step_are_undone_and_redone_together(
     await work.project()
     before, revision = shown(server), server.session.revision
     for name in ("wait", "stop"):
-        await alice.ask("AddSceneObject", name=name, type="TimeActions", step=name)
-        await alice.ask("AddActionPoint", name=name, position=ORIGIN, step=name)
+        await alice.ask("AddSceneObject", name=name, type="TimeActions", undo_step=name)
+        await alice.ask("AddActionPoint", name=name, position=ORIGIN, undo_step=name)
         point = work.point(name)
         kind = f"{next(o.id for o in server.session.document.scene.objects if o.name == name)}/sleep"
         parameters = [{"name": "seconds", "type": "double", "value": "1.0"}]
         added = {"action_point_id": point, "name": f"do_{name}", "type": kind, "parameters": parameters}
-        await alice.ask("AddAction", **added, flows=[{"type": "default", "outputs": []}], step=name)
-        await alice.ask("AddLogicItem", start="START", end=work.action(f"do_{name}").id, step=name)
+        await alice.ask("AddAction", **added, flows=[{"type": "default", "outputs": []}], undo_step=name)
+        await alice.ask("AddLogicItem", start="START", end=work.action(f"do_{name}").id, undo_step=name)
         if name == "wait":
             between = shown(server)
             await alice.ask("RemoveLogicItem", logic_item_id=server.session.document.project.logic[0].id)
@@ -130,7 +130,7 @@ async def test_a_step_does_not_continue_after_an_undo_or_an_edit_of_another_user
 
     async def rename(user: Person, name: str, step: str = "") -> None:
         await user.ask("WriteLock", object_id=point)
-        await user.ask("RenameActionPoint", action_point_id=point, new_name=name, step=step)
+        await user.ask("RenameActionPoint", action_point_id=point, new_name=name, undo_step=step)
 
     await rename(alice, "b", "s")
     await rename(bob, "c")
@@ -254,7 +254,7 @@ async def test_undo_works_after_saving_and_after_a_restart(tmp_path: Path) -> No
         await work.project("a", "b")
         await alice.ask("SaveProject")
         for name in ("c", "d"):
-            await alice.ask("AddActionPoint", name=name, position=ORIGIN, step="two points")
+            await alice.ask("AddActionPoint", name=name, position=ORIGIN, undo_step="two points")
         await alice.ask("Undo")
         assert not server.session.has_changes
         history = list(server.session.history)
