@@ -63,7 +63,7 @@ async def test_token_is_requested_remembered_and_revoked(server: ServerProcess, 
 
 async def test_token_in_the_address_is_used_and_removed(server: ServerProcess, browser: Browser) -> None:
     async with screen_of(browser, server.url) as screen:
-        await screen.join("Operator", f"/?token={secret(server, Role.OPERATOR)}&q=low")
+        await screen.join("Operator", f"/?token={secret(server, Role.OPERATOR)}&q=low#/")
         await home(screen)
         assert "token" not in screen.page.url
         # An operator cannot create scenes; the button is disabled.
