@@ -103,6 +103,8 @@ def _run(options: argparse.Namespace, terminal: Terminal) -> int:
     if options.plan:
         show_plan(bench, terminal)
         return 0
+    # Started with an ignored SIGINT, as from a script in the background, Python would not install this handler.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         terminal.listen()
         return 0 if Session(bench, terminal, options.folder).run() else EXIT_FAILED

@@ -32,9 +32,10 @@ class Operator:
         self._ours, theirs = pty.openpty()
         fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 60, 220, 0, 0))
         command = [sys.executable, "-m", "arcor2_server.cli.main", "device", "check", "cell.yaml", "--real", name]
-        # setsid makes the pseudo terminal the controlling one, so that Ctrl-C becomes a signal.
+        # setsid makes the pseudo terminal the controlling one, so that Ctrl-C becomes a signal. A script in the
+        # background starts its commands with SIGINT ignored; Ctrl-C must work then, too.
         self.process = subprocess.Popen(
-            ["setsid", "--ctty", "--wait", *command, "--report", "report", *arguments],
+            ["env", "--ignore-signal=INT", "setsid", "--ctty", "--wait", *command, "--report", "report", *arguments],
             cwd=folder,
             stdin=theirs,
             stdout=theirs,
