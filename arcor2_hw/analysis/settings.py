@@ -1,7 +1,7 @@
 """Settings of an object type: the dataclass in the signature of its constructor."""
 
 import ast
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from arcor2_hw.actions.json_values import encode
 from arcor2_hw.actions.parameter_types import Extra
@@ -13,6 +13,7 @@ from arcor2_hw.analysis.module import ClassInfo, Value
 from arcor2_hw.analysis.source import Broken
 from arcor2_hw.analysis.symbols import External, is_framework
 from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.discovery import Search
 from arcor2_hw.data.object_type import ParameterMeta
 from arcor2_hw.data.secret import HIDDEN, is_secret_name
 from arcor2_hw.exceptions import InvalidData
@@ -21,7 +22,7 @@ _KINDS: Final = frozenset({"boolean", "integer", "double", "string", "string_enu
 
 
 class _Field(NamedTuple):
-    """A field of a dataclass. `secret`, `address`, `for_control` are None where its metadata lacks them."""
+    """A field of a dataclass. `secret`, `address`, `for_control`, `found_by` are None where its metadata lacks them."""
 
     default: ast.expr | None
     in_constructor: bool = True
@@ -29,6 +30,7 @@ class _Field(NamedTuple):
     secret: bool | None = None
     address: bool | None = None
     for_control: bool | None = None
+    found_by: str | None = None
 
 
 class SettingsReader:
@@ -118,8 +120,15 @@ class SettingsReader:
             if "default_factory" in given:
                 raise info.problem("the default of a setting must be a constant in the source", expression)
             in_constructor = not _is(given.get("init"), False)
-            declared = (_declared(given.get("metadata"), key) for key in ("secret", "address", "for_control"))
-            return _Field(given.get("default"), in_constructor, _is(given.get("kw_only"), True), *declared)
+            metadata = given.get("metadata")
+            search = _declared(metadata, "found_by")
+            if search is not None and search not in tuple(Search):
+                raise info.problem(
+                    "found_by must be {searches}, not {search!r}", expression, searches=", ".join(Search), search=search
+                )
+            secret, address, for_control = (_flag(metadata, key) for key in ("secret", "address", "for_control"))
+            keyword_only = _is(given.get("kw_only"), True)
+            return _Field(given.get("default"), in_constructor, keyword_only, secret, address, for_control, search)
         return _Field(expression)
 
     def _setting(
@@ -156,6 +165,7 @@ class SettingsReader:
             secret=secret or UNSET,
             address=UNSET if field.address is None else field.address,
             for_control=field.for_control or UNSET,
+            found_by=field.found_by or UNSET,
         )
 
 
@@ -163,13 +173,18 @@ def _is(expression: ast.expr | None, value: bool) -> bool:
     return isinstance(expression, ast.Constant) and expression.value is value
 
 
-def _declared(metadata: ast.expr | None, name: str) -> bool | None:
+def _declared(metadata: ast.expr | None, name: str) -> Any:
     """Return the value of `field(metadata={name: ...})`, None where it is missing."""
     if isinstance(metadata, ast.Dict):
         for key, value in zip(metadata.keys, metadata.values, strict=True):
             if isinstance(key, ast.Constant) and key.value == name and isinstance(value, ast.Constant):
-                return bool(value.value)
+                return value.value
     return None
+
+
+def _flag(metadata: ast.expr | None, name: str) -> bool | None:
+    value = _declared(metadata, name)
+    return None if value is None else bool(value)
 
 
 def _keyword(decorator: ast.expr, name: str) -> bool:

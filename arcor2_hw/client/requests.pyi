@@ -78,7 +78,7 @@ from arcor2_hw.data.rpc.object_types import DeleteObjectTypesData, ObjectAimingA
 from arcor2_hw.data.rpc.operation import JogFrame, JogRobotData, StopAllData
 from arcor2_hw.data.rpc.projects import ListProjectsData
 from arcor2_hw.data.rpc.robots import RobotEventKind, StepAxis, StepMode, StepWhat
-from arcor2_hw.data.rpc.scenes import CheckConnectionData, ListScenesData, Pivot
+from arcor2_hw.data.rpc.scenes import CheckConnectionData, FoundDevice, ListScenesData, Pivot
 from arcor2_hw.data.scene import BareScene, Scene, SceneObject
 from arcor2_hw.messages import Message
 
@@ -320,6 +320,14 @@ class Requests(ABC):
 
     async def execute_action(self, action_id: str, *, dry_run: bool = False, timeout: float | None = None) -> None:
         """ExecuteAction. Needs the role standard user."""
+
+    async def find_devices(
+        self, *, type: str, setting: str, parameters: Sequence[Parameter] = (), timeout: float | None = None
+    ) -> list[FoundDevice]:
+        """FindDevices: a type of devices, the setting whose values are searched, and the other settings.
+
+        Needs the role technician.
+        """
 
     async def forward_kinematics(
         self,

@@ -1,18 +1,29 @@
 """Results of the integrator's commands: devices found on a machine, and the state of the devices of a cell."""
 
+import enum
+
 from msgspec import field
 
-from arcor2_hw.data.base import Data
+from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.device import Alarm, Connection, Health, Identity
 
 
+class Search(enum.StrEnum):
+    """What can be searched for: serial ports, nodes of a CAN bus, OAK cameras."""
+
+    SERIAL = "serial"
+    CAN = "can"
+    OAK = "oak"
+
+
 class Found(Data, frozen=True):
-    """A device found: its kind, its address (as in a setting), and its identity."""
+    """A device found: its kind, its address (as in a setting), and its identity. node: number on a CAN bus."""
 
     kind: str
     address: str
     description: str = ""
     serial: str = ""
+    node: int | Unset = UNSET
 
 
 class Checked(Data, frozen=True):

@@ -113,6 +113,7 @@ class ParameterMeta(Data, frozen=True):
     former_names (not in ARCOR2): names in older projects. secret: the value of this setting is stored by the server and
     never sent to clients. address: whether this setting contains the address of the device; omitted when its name
     decides. for_control: whether the device can only be observed while this setting has its default value.
+    found_by: the search (arcor2_hw.data.discovery.Search) that finds values of this setting.
     """
 
     name: str
@@ -126,6 +127,7 @@ class ParameterMeta(Data, frozen=True):
     secret: bool | Unset = UNSET
     address: bool | Unset = UNSET
     for_control: bool | Unset = UNSET
+    found_by: str | Unset = UNSET
 
 
 class ActionMetadata(Data, frozen=True):

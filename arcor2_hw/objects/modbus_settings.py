@@ -32,7 +32,7 @@ class ModbusSettings(Settings):
 
     host: str = ""
     port: int = 502
-    serial_port: str = ""
+    serial_port: str = dataclasses.field(default="", metadata={"found_by": "serial"})
     baudrate: Annotated[int, Range(300, 921600)] = 19200
     parity: Parity = Parity.NONE
     stopbits: Annotated[int, Range(1, 2)] = 1

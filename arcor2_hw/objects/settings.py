@@ -63,6 +63,10 @@ class Settings:
 
     A setting with the metadata `"for_control": True` must be set before the device can be controlled. Its default means
     "not set". The editor asks for it when a device is added, and names it where it is missing.
+
+    The metadata `"found_by"` names the search (arcor2_hw.data.discovery.Search) that finds values of a setting:
+    `serial` or `oak` for an address, `can` for the number of a node on the bus of the settings interface, channel and
+    bitrate. The editor then offers what it finds.
     """
 
     def __post_init__(self) -> None:

@@ -1,6 +1,7 @@
 """Scan for connected devices. Runs in its own process, because vendor libraries may hang or crash.
 
-`python -m arcor2_hw.runtime.scanning serial | can BUS | oak` prints a JSON list of Found. Serial ports are not
+`python -m arcor2_hw.runtime.scanning serial | can BUS | oak` prints a JSON list of Found, or on stderr the message of
+an error in JSON. Serial ports are not
 opened. On a CAN bus it listens, then reads the identity object of each node by SDO, which does not change the nodes.
 """
 
@@ -14,8 +15,9 @@ from typing import Any, Final
 
 import msgspec
 
-from arcor2_hw.data.discovery import Found
+from arcor2_hw.data.discovery import Found, Search
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotConnected, NotFound
+from arcor2_hw.objects.settings import check_serial_port
 
 LISTEN_TIME: Final = 1.2
 """Time of listening on a CAN bus, s. Nodes usually send a heartbeat at least once a second."""
@@ -55,6 +57,7 @@ def bus_options(named: str) -> dict[str, Any]:
         channel, _, rate = rest.partition("@")
         if rate and not rate.isdigit():
             raise InvalidData("{named}: {rate!r} is not a bit rate", named=named, rate=rate)
+        check_serial_port("channel", channel)
         return {
             "interface": "slcan",
             "channel": channel,
@@ -128,7 +131,7 @@ def _node(network: Any, named: str, number: int) -> Found:
         if value := read(IDENTITY, sub):
             texts.append(f"{label} 0x{int.from_bytes(value, 'little'):x}")
     serial = read(IDENTITY, 4)
-    return Found("CAN node", named, ", ".join(texts), str(int.from_bytes(serial, "little")) if serial else "")
+    return Found("CAN node", named, ", ".join(texts), str(int.from_bytes(serial, "little")) if serial else "", number)
 
 
 def oak_cameras() -> list[Found]:
@@ -147,20 +150,20 @@ def oak_cameras() -> list[Found]:
 def main() -> None:
     """Scan for one kind of device and print the result."""
     parser = argparse.ArgumentParser(description="Scan for connected devices.")
-    parser.add_argument("kind", choices=("serial", "can", "oak"))
+    parser.add_argument("kind", choices=tuple(Search))
     parser.add_argument("bus", nargs="?", default="")
     options = parser.parse_args()
     results = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # so that output of vendor libraries does not mix with the result
     kinds: dict[str, Callable[[], list[Found]]] = {
-        "serial": serial_ports,
-        "oak": oak_cameras,
-        "can": lambda: can_nodes(options.bus),
+        Search.SERIAL: serial_ports,
+        Search.OAK: oak_cameras,
+        Search.CAN: lambda: can_nodes(options.bus),
     }
     try:
         found = kinds[options.kind]()
     except Arcor2Error as error:
-        sys.stderr.write(f"{error}\n")
+        sys.stderr.write(msgspec.json.encode(error.message).decode() + "\n")
         sys.stderr.flush()
         os._exit(EXIT_FAILED)
     results.write(msgspec.json.encode(found))

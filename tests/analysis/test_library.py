@@ -704,6 +704,7 @@ def test_secret_settings_are_marked() -> None:
             pin: int = 3
             empty_secret: str = ""
             mass: float = field(default=-1.0, metadata={"for_control": True})
+            door: str = field(default="", metadata={"found_by": "serial"})
         class Bank(Generic):
             def __init__(self, obj_id: str, name: str, settings: BankSettings) -> None: ...
         """,
@@ -714,6 +715,14 @@ def test_secret_settings_are_marked() -> None:
             pin: int = field(default=1, metadata={"secret": True})
         class Wrong(Generic):
             def __init__(self, obj_id: str, name: str, settings: WrongSettings) -> None: ...
+        """,
+        Lost="""
+        from dataclasses import dataclass, field
+        @dataclass
+        class LostSettings(Settings):
+            door: str = field(default="", metadata={"found_by": "dowsing"})
+        class Lost(Generic):
+            def __init__(self, obj_id: str, name: str, settings: LostSettings) -> None: ...
         """,
     )
     settings = {each.name: (each.secret, each.default_value) for each in lib.analyse("Bank").meta.settings}
@@ -728,8 +737,11 @@ def test_secret_settings_are_marked() -> None:
         "pin": (msgspec.UNSET, "3"),
         "empty_secret": (True, '""'),
         "mass": (msgspec.UNSET, "-1.0"),
+        "door": (msgspec.UNSET, '""'),
     }
     assert [each.name for each in lib.analyse("Bank").meta.settings if each.for_control is True] == ["mass"]
+    searches = {each.name: each.found_by for each in lib.analyse("Bank").meta.settings}
+    assert {name: search for name, search in searches.items() if search} == {"door": "serial"}
     declared = {
         each.name: each.address for each in lib.analyse("Bank").meta.settings if each.address is not msgspec.UNSET
     }
@@ -737,6 +749,7 @@ def test_secret_settings_are_marked() -> None:
     problem = lib.analyse("Wrong").problem
     assert problem is not None
     assert "a secret setting must be of type str" in str(problem)
+    assert "found_by must be serial, can, oak, not 'dowsing'" in str(lib.analyse("Lost").problem)
 
 
 ROBOT = """

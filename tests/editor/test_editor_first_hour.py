@@ -184,12 +184,21 @@ async def test_from_an_empty_server_to_a_stepped_program(cell: Cell, browser: Br
 
 
 async def test_a_missing_payload_is_named_and_set(cell: Cell, browser: Browser) -> None:
-    """On a phone, too; what was typed survives closing the panel."""
+    """On a phone, too; what was typed survives closing the panel. Elsewhere, devices on serial ports are searched."""
     async with screen_of(browser, cell.url, "phone", dark=True, touch=True) as screen:
         user, page = Counting(screen), screen.page
         await screen.join("Observer")
         await user.button("Start here")
         await user.add()
+        await user.choose("Barcode reader")
+        await user.button("Find serial ports", user.panel)
+        await (
+            user.panel.get_by_text("Nothing found.")
+            .or_(user.panel.get_by_role("list", name="Found devices"))
+            .wait_for()
+        )
+        await screen.picture("first hour search")
+        await user.button("← All types", user.panel)
         await user.choose("UR5e")
         await user.text("host", str(cell.addresses()["robot"]))
         await user.button(texts.CLOSE_PANEL)

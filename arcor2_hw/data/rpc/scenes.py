@@ -88,6 +88,23 @@ class CopySceneArgs(Data, frozen=True):
     target_name: str
 
 
+class FindDevicesArgs(Data, frozen=True):
+    """Arguments of FindDevices: a type of devices, the setting whose values are searched, and the other settings."""
+
+    type: str
+    setting: str
+    parameters: list[Parameter] = field(default_factory=list)
+
+
+class FoundDevice(Data, frozen=True):
+    """Answer to FindDevices: JSON of the setting's value that selects a device, and what is known about the device."""
+
+    value: str
+    address: str
+    description: str
+    serial: str
+
+
 class ListScenesData(Data, frozen=True):
     """Answer to ListScenes. `problem_messages`: the problems with what is needed to translate them, if requested."""
 
@@ -161,6 +178,7 @@ SCENE_RPCS: Final = (
     Rpc("CloseScene", CloseSceneArgs, None, Role.STANDARD_USER, args_optional=True, dry_run=True),
     Rpc("CopyScene", CopySceneArgs, str, Role.TECHNICIAN),
     Rpc("DeleteScene", IdArgs, set[str], Role.TECHNICIAN, dry_run=True),
+    Rpc("FindDevices", FindDevicesArgs, list[FoundDevice], Role.TECHNICIAN, additional=True),
     Rpc("GetScene", IdArgs, Scene, Role.OPERATOR),
     Rpc("ListScenes", None, list[ListScenesData], Role.OPERATOR),
     Rpc("NewScene", NewSceneArgs, None, Role.TECHNICIAN, dry_run=True),

@@ -16,7 +16,7 @@ class BarcodeReaderSettings(Settings):
     :param answer_timeout: time the reader has to answer, except to a trigger, s
     """
 
-    port: str
+    port: str = dataclasses.field(metadata={"found_by": "serial"})
     baud_rate: Annotated[int, Range(300, 921600)] = 9600
     answer_timeout: Annotated[float, Range(0.1, 10.0, "s")] = 0.5
 

@@ -50,16 +50,16 @@ class ConveyorSettings(Settings):
     :param homing_speed: speed of homing, m/s
     :param homing_timeout: time limit of homing, s
     :param tolerance: largest distance of the end of a move from its target, m
-    :param heartbeat_ms: time without our heartbeat after which the drive stops, ms; a busy computer needs 700 or more
+    :param heartbeat_ms: time without our heartbeat after which the drive stops, ms; a busy computer needs 0.7 s or more
     :param sdo_timeout: time the drive has to answer a request, s
     :param pdo_period_ms: period of the PDOs with the state of the drive while we have control, ms; 0: read by SDO
     :param belt_speed: speed of the belt when it is started as a machine, m/s; negative for backwards
     """
 
-    channel: str
+    channel: str = dataclasses.field(metadata={"found_by": "serial"})
     interface: CanInterface = CanInterface.SLCAN
     bitrate: int = 500000
-    node_id: Annotated[int, Range(1, 127)] = 5
+    node_id: Annotated[int, Range(1, 127)] = dataclasses.field(default=5, metadata={"found_by": "can"})
     master_id: Annotated[int, Range(1, 127)] = 127
     counts_per_metre: float = 10000.0
     max_speed: Annotated[float, Range(0.001, 10.0, "m/s")] = 0.5

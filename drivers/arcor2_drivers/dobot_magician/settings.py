@@ -33,7 +33,7 @@ class DobotMagicianSettings(Settings):
     :param part_size_z: size of a gripped part along the z axis of the tool, m
     """
 
-    port: str
+    port: str = dataclasses.field(metadata={"found_by": "serial"})
     answer_timeout: Annotated[float, Range(0.05, 5.0)] = 0.3
     tool_x: Annotated[float, Range(0.0, 0.3)] = 0.0597
     tool_z: Annotated[float, Range(-0.3, 0.3)] = 0.0

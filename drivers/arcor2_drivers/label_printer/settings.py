@@ -21,7 +21,7 @@ class ZplPrinterSettings(Settings):
     :param template: ZPL of a label, with {title}, {text} and {code} (Code 128) where fields go; ^CI28 for UTF-8
     """
 
-    port: str
+    port: str = dataclasses.field(metadata={"found_by": "serial"})
     baud_rate: Annotated[int, Range(300, 921600)] = 9600
     answer_timeout: Annotated[float, Range(0.1, 10.0, "s")] = 1.0
     print_timeout: Annotated[float, Range(0.1, 90.0, "s")] = 15.0

@@ -47,7 +47,7 @@ class OakDSettings(Settings):
     :param white_limit: part of the image (0 to 1) that may be white before it counts as overexposed
     """
 
-    address: str = ""
+    address: str = dataclasses.field(default="", metadata={"found_by": "oak"})
     resolution: Resolution = Resolution.HD
     fps: Annotated[float, Range(1.0, 60.0)] = 30.0
     max_age: float = 0.5

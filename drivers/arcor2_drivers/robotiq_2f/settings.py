@@ -76,7 +76,7 @@ class Robotiq2FSettings(Settings):
     wire: Wire = Wire.URCAP
     host: str = ""
     port: int = 63352
-    serial_port: str = ""
+    serial_port: str = dataclasses.field(default="", metadata={"found_by": "serial"})
     baud_rate: Annotated[int, Range(9600, 115200)] = 115200
     unit_id: Annotated[int, Range(1, 247)] = 9
     request_timeout: Annotated[float, Range(0.05, 5.0, "s")] = 0.5

@@ -17,7 +17,7 @@ class MtSicsScaleSettings(Settings):
     :param stable_timeout: time the load has to become stable, s
     """
 
-    port: str
+    port: str = dataclasses.field(metadata={"found_by": "serial"})
     baud_rate: Annotated[int, Range(300, 921600)] = 9600
     answer_timeout: Annotated[float, Range(0.1, 10.0, "s")] = 0.5
     stable_timeout: Annotated[float, Range(0.1, 60.0, "s")] = 10.0

@@ -39,7 +39,7 @@ class TwoAxisRobotSettings(Settings):
     :param watchdog: time without communication after which a servo stops, s
     """
 
-    port: str
+    port: str = dataclasses.field(metadata={"found_by": "serial"})
     baud_rate: int = 1_000_000
     id_1: Annotated[int, Range(0, 252)] = 1
     id_2: Annotated[int, Range(0, 252)] = 2

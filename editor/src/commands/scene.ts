@@ -7,6 +7,7 @@ import { t } from "@lingui/core/macro";
 import { freeName } from "../program/naming";
 import type {
   CheckConnectionData,
+  FoundDevice,
   ObjectModel,
   ObjectTypeMeta,
   Parameter,
@@ -88,6 +89,22 @@ export async function checkConnection(
 ): Promise<{ found: CheckConnectionData } | { refused: string }> {
   try {
     return { found: await call("CheckConnection", { type, parameters, id }, { deadline: CHECKED_WITHIN }) };
+  } catch (error) {
+    return { refused: sentence(error) };
+  }
+}
+
+/** Time limit of a search, s; the server has a shorter one. */
+const FOUND_WITHIN = 30;
+
+/** Search for values of a setting of a device, or return why it failed. */
+export async function findDevices(
+  type: string,
+  setting: string,
+  parameters: Parameter[],
+): Promise<{ found: FoundDevice[] } | { refused: string }> {
+  try {
+    return { found: await call("FindDevices", { type, setting, parameters }, { deadline: FOUND_WITHIN }) };
   } catch (error) {
     return { refused: sentence(error) };
   }

@@ -8,7 +8,7 @@ import { freeName, newOutputs } from "./naming";
 import { problemsOf, usersOf } from "./problems";
 import { reachOfAction } from "./reach";
 import { program, TYPES } from "./testing";
-import { double, extraOf, initial, rangeWords, read, textOf, withoutUnit } from "./values";
+import { double, extraOf, initial, nameWithoutUnit, rangeWords, read, textOf, withoutUnit } from "./values";
 
 describe("steps", () => {
   test("the first next step is unconditional, a second one makes both conditional", () => {
@@ -168,9 +168,17 @@ describe("values", () => {
     const ratio = { minimum: 0, maximum: 1 };
     expect([textOf("double", "0.29", ratio), rangeWords("double", ratio)]).toEqual(["29", "0 to 100 %"]);
     expect(rangeWords("double", { minimum: 0.01, maximum: 1 })).toBe("1 to 100 %");
+    const period = { unit: "ms", minimum: 200, maximum: 1000 };
+    expect([textOf("integer", "800", period), rangeWords("integer", period)]).toEqual(["0.8", "0.2 to 1 s"]);
+    expect(read("integer", "0,25", period)).toEqual({ json: "250" });
+    expect(read("integer", "0.2505", period)).toEqual({ problem: "Enter a multiple of 0.001." });
+    expect([nameWithoutUnit("heartbeat_ms", period), nameWithoutUnit("items", {})]).toEqual(["heartbeat", "items"]);
+    expect(withoutUnit("time until the drive stops, ms; 0: never", "integer", period)).toBe(
+      "time until the drive stops; 0: never",
+    );
     expect(textOf("double", "1.5707963267948966", { unit: "rad" })).toBe("90");
     expect(read("double", "90", { unit: "rad" })).toEqual({ json: "1.5707963267949" });
-    expect(textOf("integer", "2000", { unit: "ms" })).toBe("2000");
+    expect(textOf("integer", "2000", { unit: "ms" })).toBe("2");
     expect(extraOf({ extra: "no json" })).toEqual({});
   });
 

@@ -21,17 +21,25 @@ const SHOWN: Record<string, readonly [unit: string, factor: number]> = {
   rad: ["°", 180 / Math.PI],
   "rad/s": ["°/s", 180 / Math.PI],
   "rad/s²": ["°/s²", 180 / Math.PI],
+  deg: ["°", 1],
+  degrees: ["°", 1],
+  ms: ["s", 0.001],
 };
 
 /** Return the unit that users see for a number, and the factor from the stored value. A ratio is a percentage. */
 export function shownUnit(type: string, { unit = "", minimum, maximum }: Extra): readonly [string, number] {
-  if (type !== "double") return [unit, 1];
-  if (!unit && minimum !== undefined && minimum >= 0 && maximum === 1) return ["%", 100];
+  if (type !== "double" && type !== "integer") return [unit, 1];
+  if (type === "double" && !unit && minimum !== undefined && minimum >= 0 && maximum === 1) return ["%", 100];
   return SHOWN[unit] ?? [unit, 1];
 }
 
 /** Return a number without the noise of a conversion. */
 const exact = (value: number): number => Number(value.toPrecision(12));
+
+/** Return the name of a setting without the stored unit at its end, since the field shows another one. */
+export function nameWithoutUnit(name: string, { unit = "" }: Extra): string {
+  return unit in SHOWN && name.endsWith(`_${unit}`) ? name.slice(0, -unit.length - 1) : name;
+}
 
 /** Return a description without the stored unit at its end, since the field shows another one. */
 export function withoutUnit(description: string, type: string, extra: Extra): string {
@@ -126,7 +134,8 @@ function readNumber(type: "integer" | "double", text: string, extra: Extra): Rea
   const [, factor] = shownUnit(type, extra);
   const value = Number((numberFrom(text) / factor).toPrecision(15));
   if (!Number.isFinite(value)) return { problem: t`Enter a number.` };
-  if (type === "integer" && !Number.isInteger(value)) return { problem: t`Enter a whole number.` };
+  if (type === "integer" && !Number.isInteger(value))
+    return { problem: factor === 1 ? t`Enter a whole number.` : t`Enter a multiple of ${decimal(factor)}.` };
   if (minimum !== undefined && value < minimum) return { problem: t`At least ${decimal(exact(minimum * factor))}.` };
   if (maximum !== undefined && value > maximum) return { problem: t`At most ${decimal(exact(maximum * factor))}.` };
   return { json: type === "double" ? double(value) : String(value) };

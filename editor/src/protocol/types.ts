@@ -480,6 +480,13 @@ export interface ExecuteActionArgs {
   action_id: string;
 }
 
+/** Arguments of FindDevices: a type of devices, the setting whose values are searched, and the other settings. */
+export interface FindDevicesArgs {
+  type: string;
+  setting: string;
+  parameters?: Parameter[];
+}
+
 /**
  * Names of the results of an action; without names the results are not stored.
  *
@@ -499,6 +506,14 @@ export interface ForwardKinematicsArgs {
   end_effector_id: string;
   joints: Joint[];
   arm_id?: string;
+}
+
+/** Answer to FindDevices: JSON of the setting's value that selects a device, and what is known about the device. */
+export interface FoundDevice {
+  value: string;
+  address: string;
+  description: string;
+  serial: string;
 }
 
 /** A result of a project function. */
@@ -1150,6 +1165,7 @@ export interface Parameter {
  * former_names (not in ARCOR2): names in older projects. secret: the value of this setting is stored by the server and
  * never sent to clients. address: whether this setting contains the address of the device; omitted when its name
  * decides. for_control: whether the device can only be observed while this setting has its default value.
+ * found_by: the search (arcor2_hw.data.discovery.Search) that finds values of this setting.
  */
 export interface ParameterMeta {
   name: string;
@@ -1163,6 +1179,7 @@ export interface ParameterMeta {
   secret?: boolean;
   address?: boolean;
   for_control?: boolean;
+  found_by?: string;
 }
 
 /** Values of PivotEnum in UpdateObjectPoseUsingRobot. */
@@ -2099,6 +2116,7 @@ export interface Requests {
   DeleteProject: { args: IdArgs; data: undefined };
   DeleteScene: { args: IdArgs; data: string[] };
   ExecuteAction: { args: ExecuteActionArgs; data: undefined };
+  FindDevices: { args: FindDevicesArgs; data: FoundDevice[] };
   ForwardKinematics: { args: ForwardKinematicsArgs; data: Pose };
   GetActions: { args: TypeArgs; data: ObjectAction[] };
   GetBreakpoints: { args: GetBreakpointsArgs | undefined; data: ProjectBreakpoints };
@@ -2331,6 +2349,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   DeleteProject: 2,
   DeleteScene: 4,
   ExecuteAction: 2,
+  FindDevices: 4,
   ForwardKinematics: 2,
   GetActions: 1,
   GetBreakpoints: 1,

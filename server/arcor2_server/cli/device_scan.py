@@ -1,19 +1,18 @@
 """`arcor2-hw device scan`: find connected devices. Each kind is searched in its own process with a time limit."""
 
-import subprocess
+import asyncio
 import sys
-from typing import Annotated, Final, NamedTuple
+from typing import Annotated, NamedTuple
 
 import msgspec
 from cyclopts import Parameter
 from rich.table import Table
 
-from arcor2_hw.data.discovery import Found
+from arcor2_hw.data.discovery import Found, Search
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.cli.tables import console
-
-SCAN_TIMEOUT: Final = 15.0
-"""Time limit for one kind of devices, s; 127 answering CAN nodes take about 10 s."""
+from arcor2_server.errors import RequestRefused
+from arcor2_server.online.device_search import search
 
 
 class Scan(NamedTuple):
@@ -36,10 +35,10 @@ def scan(
     json: Annotated[bool, Parameter(negative=(), help="Print the result as JSON.")] = False,
 ) -> int:
     """Find serial ports, OAK cameras, and the nodes of the given CAN buses. Nothing is switched or moved."""
-    wanted = [("serial ports", ["serial"]), *((bus, ["can", bus]) for bus in can)]
+    wanted = [("serial ports", Search.SERIAL, ""), *((bus, Search.CAN, bus) for bus in can)]
     if oak:
-        wanted.append(("OAK cameras", ["oak"]))
-    scans = _scan(wanted)
+        wanted.append(("OAK cameras", Search.OAK, ""))
+    scans = asyncio.run(_scan(wanted))
     found = [one for each in scans for one in each.found]
     if json:
         sys.stdout.write(msgspec.json.encode(found).decode() + "\n")
@@ -55,25 +54,13 @@ def scan(
     return ExitStatus.FAILED if any(each.problem and each.what in can for each in scans) else ExitStatus.OK
 
 
-def _scan(wanted: list[tuple[str, list[str]]]) -> list[Scan]:
+async def _scan(wanted: list[tuple[str, Search, str]]) -> list[Scan]:
     """Search for all kinds concurrently."""
-    command = [sys.executable, "-P", "-m", "arcor2_hw.runtime.scanning"]
-    running = [
-        (what, subprocess.Popen([*command, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE))  # noqa: S603
-        for what, arguments in wanted
-    ]
-    scans = []
-    for what, process in running:
+
+    async def one(what: str, kind: Search, bus: str) -> Scan:
         try:
-            output, errors = process.communicate(timeout=SCAN_TIMEOUT)
-            problem = ""
-            if process.returncode:
-                last = errors.decode(errors="replace").strip().splitlines()[-1:]
-                problem = "".join(last) or f"the library ended the process with status {process.returncode}"
-        except subprocess.TimeoutExpired:
-            process.kill()
-            output, _ = process.communicate()
-            problem = f"no answer within {SCAN_TIMEOUT:g} s"
-        found = [] if problem else msgspec.json.decode(output, type=list[Found])
-        scans.append(Scan(what, found, problem))
-    return scans
+            return Scan(what, await search(kind, bus), "")
+        except RequestRefused as error:
+            return Scan(what, [], str(error))
+
+    return await asyncio.gather(*(one(*each) for each in wanted))

@@ -4,7 +4,9 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace
 
+from arcor2_hw.actions.json_values import decode_json, encode
 from arcor2_hw.data.base import UNSET, Unset, new_id
+from arcor2_hw.data.discovery import Search
 from arcor2_hw.data.events import ChangeType, SceneStateEnum
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models, ObjectModel, ObjectTypeSource
@@ -13,6 +15,8 @@ from arcor2_hw.data.rpc import (
     AddVirtualCollisionObjectToSceneArgs,
     CheckConnectionArgs,
     CheckConnectionData,
+    FindDevicesArgs,
+    FoundDevice,
     RemoveFromSceneArgs,
     RenameArgs,
     UpdateObjectModelArgs,
@@ -34,6 +38,7 @@ from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.derived_types import virtual_source
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.connection_check import ConnectionCheck
+from arcor2_server.online.device_search import BUS, bus_of, search, value_of
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.rpc.change_events import emit_all
 from arcor2_server.rpc.editing import Editing
@@ -143,6 +148,24 @@ class SceneObjectRequests:
         if problems := object_problems(obj, self._types):
             raise InvalidData(Message.joined(problems))
         return await self._connection_check.run(obj)
+
+    @rpc("FindDevices")
+    async def find_devices(self, context: Context, args: FindDevicesArgs) -> list[FoundDevice]:
+        """Search for values of a setting of a device."""
+        settings = {each.name: each for each in self._types.meta(args.type).settings}
+        wanted = settings.get(args.setting)
+        if wanted is None or isinstance(wanted.found_by, Unset):
+            raise InvalidData("No search finds the setting {setting} of {type}.", setting=args.setting, type=args.type)
+        kind, bus = Search(wanted.found_by), ""
+        if kind is Search.CAN:
+            self._online.require_offline()  # a serial adapter serves only one program
+            values = {each.name: each.default_value for each in settings.values() if each.default_value is not UNSET}
+            values |= {each.name: each.value for each in args.parameters}
+            bus = bus_of({name: decode_json(value, str | int) for name, value in values.items() if name in BUS})
+        return [
+            FoundDevice(encode(value_of(found, kind)), found.address, found.description, found.serial)
+            for found in await search(kind, bus)
+        ]
 
     # ------------------------------------------------------------------------------------ changing
     @rpc("RemoveFromScene")

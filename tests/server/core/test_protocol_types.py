@@ -15,7 +15,7 @@ TRANSLATION = {"key", "values"}
 ADDED = {
     "ActionMetadata": {"verdict"},
     "ObjectTypeMeta": {"category", "display_name", "icon", "observable", "shadows"} | TRANSLATION,
-    "ParameterMeta": {"address", "for_control", "former_names", "secret"},
+    "ParameterMeta": {"address", "for_control", "former_names", "found_by", "secret"},
     "ObjectAction": {"category", "former_names", "icon"} | TRANSLATION,
     "RobotEef.Data": {"time_ms"},
     "RobotFeatures": {"jog", "acknowledge_stop", "kinematic_calibration"},

@@ -40,7 +40,7 @@ export function AddObject({ type, why, onBack }: { type: ObjectTypeMeta; why: st
       <p className="quiet small description">{type.description}</p>
       {type.has_pose && <p className="quiet small">{t`The object is added at the view center.`}</p>}
       <SettingsFields
-        settings={type.settings}
+        type={type}
         values={values}
         why=""
         autoFocus

@@ -3,12 +3,13 @@
 import { t } from "@lingui/core/macro";
 import { words } from "../../program/naming";
 import { grouped, type Values } from "../../program/settings";
-import { extraOf } from "../../program/values";
-import type { ParameterMeta } from "../../protocol/types";
+import { extraOf, nameWithoutUnit } from "../../program/values";
+import type { ObjectTypeMeta, ParameterMeta } from "../../protocol/types";
 import { ValueField } from "../program/ValueField";
+import { FindDevices } from "./FindDevices";
 
 interface SettingsFieldsProps {
-  settings: ParameterMeta[];
+  type: ObjectTypeMeta;
   values: Values;
   why: string;
   /** Focus the first required field. */
@@ -16,7 +17,8 @@ interface SettingsFieldsProps {
   onChange: (values: Values) => void;
 }
 
-export function SettingsFields({ settings, values, why, autoFocus = false, onChange }: SettingsFieldsProps) {
+export function SettingsFields({ type: owner, values, why, autoFocus = false, onChange }: SettingsFieldsProps) {
+  const { settings } = owner;
   const needed = settings.filter((each) => each.default_value === undefined || each.for_control);
   // The port belongs to the address.
   const first = [...needed, ...settings.filter((each) => each.name === "port" && !needed.includes(each))];
@@ -28,14 +30,16 @@ export function SettingsFields({ settings, values, why, autoFocus = false, onCha
   };
   const field = (each: ParameterMeta) => {
     const { name, type, default_value, for_control } = each;
-    return (
+    const extra = extraOf(each);
+    const label = words(nameWithoutUnit(name, extra));
+    const control = (
       <ValueField
         key={name}
-        label={words(name)}
-        name={words(name)}
+        label={label}
+        name={label}
         type={type}
         json={values[name] ?? (for_control ? undefined : default_value)}
-        extra={extraOf(each)}
+        extra={extra}
         hint={each.description}
         secret={each.secret}
         why={why}
@@ -47,6 +51,13 @@ export function SettingsFields({ settings, values, why, autoFocus = false, onCha
           return Promise.resolve("");
         }}
       />
+    );
+    if (!each.found_by || why) return control;
+    return (
+      <div key={name} className="found-setting">
+        {control}
+        <FindDevices type={owner} setting={each} values={values} onFound={(json) => set(name, json, default_value)} />
+      </div>
     );
   };
   return (

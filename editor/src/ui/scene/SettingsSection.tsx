@@ -34,7 +34,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
       )}
       <SettingsFields
         key={id}
-        settings={settings}
+        type={type}
         values={values}
         why={why}
         onChange={(next) => keepForm(id, { values: next })}
