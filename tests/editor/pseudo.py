@@ -12,12 +12,10 @@ from typing import Any, Final
 import msgspec
 from playwright.async_api import Page, Route
 
-from arcor2_hw.analysis.translations import FOLDER
-from tests.editor.words import Words
+from tests.editor.words import ROOT, Words, server_texts
 
 LOCALE: Final = "de"
 """The language that the pseudo-locale replaces in the browser."""
-_ROOT: Final = Path(__file__).resolve().parents[2]
 _PLAIN: Final = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _ACCENTED: Final = "áƀçđéƒǵĥíĵķļɱñóƥɋŕšťúṽŵẋýžÁƁÇĐÉƑǴĤÍĴĶĻṀÑÓƤɊŔŠŤÚṼŴẊÝŽ"
 _LETTERS: Final = str.maketrans(_PLAIN, _ACCENTED)
@@ -71,12 +69,14 @@ class PseudoWords(Words):
             text = text.replace(f"{{{name}}}", value)
         return text
 
+    def server(self, english: str) -> str:
+        return pseudo(english)
+
 
 async def use_pseudo_locale(page: Page) -> None:
     """Show the page in the pseudo-locale, when its language is `LOCALE`: the catalogue, and the texts of the server."""
-    files = [*(_ROOT / "drivers").rglob(f"{FOLDER}/{LOCALE}.json"), *_ROOT.glob(f"*/**/{FOLDER}/{LOCALE}.json")]
-    texts = {key: pseudo(key) for file in files if "tests" not in file.parts for key in json.loads(file.read_text())}
-    assets = _ROOT / "server" / "arcor2_server" / "editor_files" / "assets"
+    texts = {key: pseudo(key) for key in server_texts(LOCALE)}
+    assets = ROOT / "server" / "arcor2_server" / "editor_files" / "assets"
     content = next(assets.glob("en-*.js")).read_text()
     found = _MESSAGES.search(content)
     assert found is not None, "the catalogue of the built editor has another form"

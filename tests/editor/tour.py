@@ -1,4 +1,4 @@
-"""A tour of the screens of the editor in any language."""
+"""A tour of the screens and dialogs of the editor in any language."""
 
 from collections.abc import AsyncIterator
 
@@ -7,15 +7,19 @@ from playwright.async_api import Locator
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from tests.editor import texts
-from tests.editor.screen import Screen
+from tests.editor.screen import USERS, Screen
 from tests.editor.words import Words
 
 
 class Tour:
-    """Visits the screens of a workplace. Each method is a generator of the names of the screens when they are shown."""
+    """Visits the screens of a workplace. Each method is a generator of the names of the screens when they are shown.
 
-    def __init__(self, screen: Screen, words: Words, scene: Scene, project: Project) -> None:
+    The caller opens and closes documents, goes online and runs programs, so that several pages visit the same state.
+    """
+
+    def __init__(self, screen: Screen, user: str, words: Words, scene: Scene, project: Project) -> None:
         self.screen = screen
+        self.user = user
         self.words = words
         self.project = project
         self.scene = scene
@@ -27,63 +31,107 @@ class Tour:
     def _choice(self, english: str) -> Locator:
         return self.screen.page.get_by_role("radio", name=self.words(english), exact=True)
 
-    async def home(self, user: str) -> AsyncIterator[str]:
-        """Join, and visit the lists and dialogs of the home screen."""
+    @property
+    def _panel(self) -> Locator:
+        return self.screen.page.get_by_role("complementary")
+
+    async def join(self) -> AsyncIterator[str]:
+        """Visit the screen for joining, and join."""
         page, words = self.screen.page, self.words
+        USERS.add(self.user)
         await page.goto(f"{self.screen.url}/?q=low")
         await page.get_by_label(words(texts.YOUR_NAME)).wait_for()
         yield "join"
-        await page.get_by_label(words(texts.YOUR_NAME)).fill(user)
+        await page.get_by_label(words(texts.YOUR_NAME)).fill("colleague")
+        await self._button(texts.JOIN).click()
+        await page.get_by_role("alert").first.wait_for()
+        yield "join refused"
+        await page.get_by_label(words(texts.YOUR_NAME)).fill(self.user)
         await self._button(texts.JOIN).click()
         await page.get_by_role("heading", name=words(texts.HOME_HEADING)).wait_for()
+
+    async def home(self) -> AsyncIterator[str]:
+        """Visit the lists and dialogs of the home screen."""
+        page, words = self.screen.page, self.words
         await page.get_by_role("button", name=self.project.name).first.wait_for()
         yield "projects"
-        await self._button("More about {name}", name=self.project.name).click()
+        more = self._button("More about {name}", name=self.project.name)
+        await more.click()
         await page.get_by_role("menu").wait_for()
         yield "menu of a project"
-        await page.keyboard.press("Escape")
+        await page.get_by_role("menuitem", name=words("Duplicate…")).click()
+        async for shown in self._dialog("duplicate"):
+            yield shown
+        await more.click()
+        await page.get_by_role("menuitem", name=words("Delete…")).click()
+        async for shown in self._dialog("delete"):
+            yield shown
         await self._button(texts.NEW_PROJECT).click()
-        await page.get_by_role("dialog").wait_for()
-        yield "new project"
-        await page.keyboard.press("Escape")
+        async for shown in self._dialog("new project"):
+            yield shown
         await self._list(texts.PACKAGES)
+        await self._button("Run {name}", name=self.project.name).wait_for()
         yield "packages"
         await self._button(texts.SETTINGS).click()
         await page.get_by_role("menu").wait_for()
         yield "settings"
-        await page.keyboard.press("Escape")
+        await page.get_by_role("menuitem", name=words("Messages"), exact=True).click()
+        async for shown in self._dialog("messages"):
+            yield shown
         for key, name in (("?", "about"), ("/", "search")):
             await page.keyboard.press(key)
-            await page.get_by_role("dialog").wait_for()
-            yield name
-            await page.keyboard.press("Escape")
-            await page.get_by_role("dialog").wait_for(state="hidden")
+            async for shown in self._dialog(name):
+                yield shown
         await self._list(texts.SCENES)
         yield "scenes"
+        await self._button(texts.NEW_SCENE).click()
+        async for shown in self._dialog("new scene"):
+            yield shown
+        await self._button("More about {name}", name=self.scene.name).click()
+        await page.get_by_role("menuitem", name=words("Delete…")).click()
+        async for shown in self._dialog("delete a scene in use"):
+            yield shown
 
     async def scene_editor(self) -> AsyncIterator[str]:
-        """Open the scene from its list, and visit its tools, a device form and a selected device."""
-        page = self.screen.page
-        await self._button("Open {name}", name=self.scene.name).click()
+        """Visit the tools of the open scene, the wizard of a device and a selected device."""
+        page, words = self.screen.page, self.words
         await self.screen.item(self.scene.objects[0].id)
         yield "scene"
         await self._tool(texts.ADD)
         await page.locator(".kind").first.wait_for()
         yield "add"
-        await page.locator(".kind").first.click()
+        await page.locator(".kind").filter(has_text=words.server("Universal Robots UR5e")).click()
         await page.locator(".value-field").first.wait_for(state="attached")
         await self._open_details()
         yield "form of a new device"
+        await self._button(texts.ADD).last.click()
+        await page.get_by_role("alert").first.wait_for()
+        yield "required settings"
+        await self._panel.locator(".value-field input").first.fill("127.0.0.1")
+        await self._button("Test connection").click()
+        await self._panel.get_by_role("status").get_by_role("alert").wait_for()
+        yield "failed test of a connection"
+        await self._button("← All types").click()
+        await self._button("Mesh…").click()
+        yield "mesh"
         await self._select("robot")
         yield "selected device"
+        await self._panel.get_by_role("button", name=words(texts.REMOVE), exact=True).first.click()
+        yield "remove a device"
+        await page.keyboard.press("Escape")
         await self._button(texts.CLOSE_PANEL).click()
-        await self._close()
+
+    async def _dialog(self, name: str) -> AsyncIterator[str]:
+        """Visit the dialog that opens, and close it."""
+        dialog = self.screen.page.locator("[role=dialog], [role=alertdialog]")
+        await dialog.wait_for()
+        yield name
+        await self.screen.page.keyboard.press("Escape")
+        await dialog.wait_for(state="hidden")
 
     async def project_editor(self) -> AsyncIterator[str]:
-        """Open the project, and visit its tools, its views and selected items."""
+        """Visit the tools, the views and selected items of the open project."""
         page, words = self.screen.page, self.words
-        await self._list(texts.PROJECTS)
-        await self._button("Open {name}", name=self.project.name).click()
         await self.screen.item(self.project.action_points[0].id)
         yield "workplace"
         for tool in texts.TOOLS:
@@ -91,24 +139,34 @@ class Tour:
             yield tool
             if tool == texts.PROGRAM:
                 for tab in ("Actions", "Check", texts.VARIABLES):
-                    await page.get_by_role("complementary").get_by_role("radio").filter(has_text=words(tab)).click()
+                    await self._panel.get_by_role("radio").filter(has_text=words(tab)).click()
                     yield f"{tool}, {tab}"
+            if tool == texts.RUN:
+                await self._button("Build…").click()
+                async for shown in self._dialog("build"):
+                    yield shown
         await self._button(texts.CLOSE_PANEL).click()
         point = self.project.action_points[0]
-        for item in (point.name, point.orientations[0].name, point.actions[0].name, "take_out"):
+        for item in (point.name, point.orientations[0].name, point.actions[0].name, "take_out", "test"):
             await self._select(item)
             yield f"selected {item}"
+        await self._button("Branch").click()
+        yield "connecting"
+        await page.keyboard.press("Escape")
         await self._button(texts.CLOSE_PANEL).click()
         for mode in ("Flow", "Code", "3D"):
             await self._choice(mode).click()
             await page.locator(".centre .waiting").wait_for(state="detached")
             yield f"view {mode}"
+        await self._button("Views").click()
+        await page.get_by_role("menuitem", name=words("Save view…")).click()
+        async for shown in self._dialog("save view"):
+            yield shown
 
     async def online(self) -> AsyncIterator[str]:
-        """Go online, and visit the panel of the robot."""
+        """Visit the panels of the robot and the devices of the open project, which is online."""
         page, words = self.screen.page, self.words
-        await self._button(texts.GO_ONLINE).click()
-        await page.get_by_role("button", name=words(texts.STOP_MOTION)).wait_for(timeout=60_000)
+        await page.get_by_role("button", name=words(texts.STOP_MOTION)).wait_for()
         await self._tool(texts.ROBOT)
         for tab in ("Tool", "Joints", "By hand", "Go to"):
             tabs = page.get_by_role("radiogroup", name=words(texts.HOW_TO_MOVE))
@@ -116,36 +174,43 @@ class Tour:
             yield f"robot, {tab}"
         await self._tool(texts.DEVICES)
         yield "devices online"
-        await page.locator(".topbar .live").click()
-        await self._button(texts.GO_ONLINE).wait_for()
-        await self._close()
+        await self._button(texts.CLOSE_PANEL).click()
 
-    async def all(self, user: str) -> AsyncIterator[str]:
-        """Visit all screens as this user."""
-        for part in (self.home(user), self.scene_editor(), self.project_editor(), self.online(), self.operator()):
-            async for shown in part:
-                yield shown
+    async def running(self) -> AsyncIterator[str]:
+        """Visit the screens of the program, which is paused before its first action."""
+        page, words = self.screen.page, self.words
+        bar = page.get_by_role("group", name=words(texts.PROGRAM_STATE))
+        await bar.get_by_role("button", name=words(texts.STEP), exact=True).wait_for()
+        await self._tool(texts.RUN)
+        yield "paused program"
+        await self._operator()
+        yield "operator, paused program"
 
-    async def operator(self) -> AsyncIterator[str]:
-        """Visit the operator's screen."""
-        await self.screen.page.goto(f"{self.screen.url}/?q=low#/operator")
-        await self.screen.page.locator(".operator").wait_for()
+    async def failed(self) -> AsyncIterator[str]:
+        """Visit the screens after a run that failed, from the operator's screen."""
+        page, words = self.screen.page, self.words
+        await page.get_by_role("button", name=words("Dismiss"), exact=True).wait_for()
+        yield "operator, failed run"
+        await self._button("Dismiss").click()
+        await page.get_by_role("button", name=words("Dismiss"), exact=True).wait_for(state="detached")
         yield "operator"
+        await page.evaluate("location.hash = ''")
+        await page.get_by_role("heading", name=words(texts.HOME_HEADING)).wait_for()
+        yield "failed run"
+
+    async def _operator(self) -> None:
+        await self.screen.page.evaluate("location.hash = '#/operator'")
+        await self.screen.page.locator(".operator").wait_for()
 
     async def _list(self, english: str) -> None:
         await self.screen.page.get_by_role("radio", name=self.words(english)).click()
-
-    async def _close(self) -> None:
-        bar = self.screen.page.get_by_role("banner")
-        await bar.get_by_role("button", name=self.words(texts.CLOSE_DOCUMENT), exact=True).click()
-        await self.screen.page.get_by_role("heading", name=self.words(texts.HOME_HEADING)).wait_for()
 
     async def _tool(self, english: str) -> None:
         page, name = self.screen.page, self.words(english, "tool")
         button = page.get_by_role("navigation").get_by_role("button", name=name, exact=True)
         if await button.get_attribute("aria-pressed") != "true":
             await button.click()
-        await page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
+        await self._panel.get_by_role("heading", name=name, exact=True).wait_for()
         await page.locator(".panel-body .waiting").wait_for(state="detached")
 
     async def _select(self, item: str) -> None:
@@ -153,7 +218,7 @@ class Tour:
         page = self.screen.page
         await self._tool(texts.OBJECTS)
         await page.get_by_role("row").filter(has=page.get_by_text(item, exact=True)).first.click()
-        await page.get_by_role("complementary").get_by_role("heading", name=item, exact=True).wait_for()
+        await self._panel.get_by_role("heading", name=item, exact=True).wait_for()
         await page.locator(".panel-body .waiting").wait_for(state="detached")
         await self._open_details()
 

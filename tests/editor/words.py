@@ -5,8 +5,20 @@ import re
 from pathlib import Path
 from typing import Final
 
-CATALOGUES: Final = Path(__file__).resolve().parents[2] / "editor" / "src" / "i18n"
+from arcor2_hw.analysis.translations import FOLDER
+
+ROOT: Final = Path(__file__).resolve().parents[2]
+CATALOGUES: Final = ROOT / "editor" / "src" / "i18n"
 _ENTRY: Final = re.compile(r'^(?:msgctxt "(.*)"\n)?msgid (".*")\nmsgstr (".*")$', re.MULTILINE)
+
+
+def server_texts(language: str) -> dict[str, str]:
+    """Return the translations of the library, the server and the drivers by English text."""
+    texts: dict[str, str] = {}
+    for folder in ("arcor2_hw", "server", "drivers"):
+        for path in (ROOT / folder).rglob(f"{FOLDER}/{language}.json"):
+            texts |= json.loads(path.read_text())
+    return texts
 
 
 class Words:
@@ -24,3 +36,7 @@ class Words:
         for name, value in values.items():
             text = text.replace(f"{{{name}}}", value)
         return text
+
+    def server(self, english: str) -> str:
+        """Return the translation of a text of the server or of a driver."""
+        return server_texts(self.language)[english]
