@@ -77,3 +77,8 @@ class Message(Struct, frozen=True, omit_defaults=True):
     def translation(self) -> dict[str, Any]:
         """Return the fields `key` and `values` that are sent next to the text; empty if the text itself is the key."""
         return {"key": self.key, "values": self.values} if self.values else {}
+
+
+def device_at(device: str, address: "str | Message") -> Message:
+    """Return the name of a device with its address, as a value of messages."""
+    return Message.of("{device} at {address}", device=device, address=address)

@@ -25,6 +25,7 @@ from arcor2_hw.calibration.rigid import inverted
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.messages import Message
 
 MOST_PICTURES: Final = 100
 _GOOD: Final = 0.002
@@ -198,8 +199,9 @@ def _result(
         method=options.method,
         pictures=pictures,
         grade=grade,
-        verdict=verdict,
+        verdict=verdict.text,
         lens=checked.lens,
+        **verdict.translation(),
     )
 
 
@@ -217,19 +219,21 @@ def _check_known(found: Found, lens: LensCheck, position: float, options: PoseOp
             f"factor {lens.factor:.4f}, standard deviation {lens.deviation:.4f}, misfit {lens.misfit:.1f}",
             Reason.WRONG_LENS,
             position=position * 1000,
-            verdict=lens.verdict,
+            verdict=lens.as_message(lens.verdict),
         )
     only = len({each.key for each in found.used}) == 1
     first = found.seen[0]
-    what = (
-        f"Only {first.name} is visible, from nearly straight ahead or far away" if only else "The markers are far away"
-    )
     raise CalibrationRefused(
-        "{what}: the camera's position would be known to {position:.0f} mm only. What helps: a second marker, "
-        "a larger one, a view from the side or from nearer, the direction of gravity, or where the camera roughly is.",
+        "Only {name} is visible, from nearly straight ahead or far away: the camera's position would be known to "
+        "{position:.0f} mm only. What helps: a second marker, a larger one, a view from the side or from nearer, "
+        "the direction of gravity, or where the camera roughly is."
+        if only
+        else "The markers are far away: the camera's position would be known to {position:.0f} mm only. "
+        "What helps: a second marker, a larger one, a view from the side or from nearer, the direction of gravity, "
+        "or where the camera roughly is.",
         f"standard deviation {position * 1000:.1f} mm, at most {options.largest_deviation * 1000:.1f} mm",
         Reason.UNOBSERVABLE,
-        what=what,
+        name=called(first.name),
         position=position * 1000,
     )
 
@@ -243,38 +247,63 @@ def _verdict(
     f: float,
     checked: Checked,
     options: PoseOptions,
-) -> tuple[Grade, str]:
+) -> tuple[Grade, Message]:
     """Return how good a pose is, and what a technician should check."""
     markers = sum(kind == "marker" for kind, _ in places)
     boards = len(places) - markers
-    parts = [f"{n} {name}{'s' if n > 1 else ''}" for n, name in ((markers, "marker"), (boards, "board")) if n]
-    text = (
-        f"The camera's position is known to {position * 1000:.1f} mm and its direction to "
-        f"{math.degrees(orientation):.2f}° (standard deviations; {' and '.join(parts)}, residual {residual:.2f} px), "
-        f"if the focal length is right to {options.focal_deviation:.2%}. {checked.lens.verdict}"
-    )
+    seen = Message.of("markers: {markers}, boards: {boards}", markers=markers, boards=boards)
+    parts = [
+        Message.of(
+            "The camera's position is known to {position:.1f} mm and its direction to {direction:.2f}° "
+            "(standard deviations; {seen}, residual {residual:.2f} px), if the focal length is right to {focal:.2%}.",
+            position=position * 1000,
+            direction=math.degrees(orientation),
+            seen=seen,
+            residual=residual,
+            focal=options.focal_deviation,
+        ),
+        checked.lens.as_message(checked.lens.verdict),
+    ]
     confirmed = checked.lens.state == LensState.CONFIRMED
     grade = Grade.GOOD if position <= _GOOD and confirmed and not checked.misfit else Grade.USABLE
     for name in sorted({e.name for e in errors if not e.used}):
         worst = max((e for e in errors if e.name == name), key=lambda e: e.residual)
-        text += (
-            f" {name.capitalize()} was not used: it is about "
-            f"{worst.residual * worst.distance / f * 1000:.0f} mm from its configured pose."
+        parts.append(
+            Message.of(
+                "Not used, because it is about {distance:.0f} mm from its configured pose: {name}.",
+                name=called(name),
+                distance=worst.residual * worst.distance / f * 1000,
+            )
         )
         grade = Grade.USABLE
     if len(places) == 1 and markers == 1:
-        text += " With only one marker, its pose cannot be checked."
+        parts.append(Message.of("With only one marker, its pose cannot be checked."))
         grade = Grade.USABLE
     elif residual > 0.5:
         off = max(e.residual * e.distance / f for e in errors if e.used)
-        text += f" The poses of the markers differ from each other by about {off * 1000:.1f} mm."
+        parts.append(
+            Message.of(
+                "The poses of the markers differ from each other by about {distance:.1f} mm.", distance=off * 1000
+            )
+        )
         grade = Grade.USABLE
     elif checked.misfit and checked.lens.state != LensState.CONTRADICTED:
-        text += (
-            f" The residual is {checked.lens.misfit:.0f} times what the sharpness of the edges allows: "
-            "check the poses and sizes of the markers, and the lens."
+        parts.append(
+            Message.of(
+                "The residual is {factor:.0f} times what the sharpness of the edges allows: "
+                "check the poses and sizes of the markers, and the lens.",
+                factor=checked.lens.misfit,
+            )
         )
-    return grade, text
+    return grade, Message.joined(parts)
+
+
+def called(name: str) -> Message:
+    """Return the name of a marker or board as a value of messages."""
+    kind, _, number = name.partition(" ")
+    if kind == "marker":
+        return Message.of("marker {number}", number=number)
+    return Message.of("board {number}", number=number)
 
 
 def draw_camera_pose(picture: Picture, parameters: CameraParameters, layout: Layout, result: CameraPose) -> bytes:

@@ -7,7 +7,7 @@ import enum
 from typing import Literal
 
 from arcor2_hw.calibration.results import Grade
-from arcor2_hw.data.base import UNSET, Data, Unset
+from arcor2_hw.data.base import UNSET, Data, TranslatableData, Unset
 from arcor2_hw.data.camera import CameraParameters, EstimatedPose
 from arcor2_hw.data.geometry import Pose, Position
 
@@ -93,7 +93,7 @@ class LensState(enum.StrEnum):
     """Another focal length fits the markers better."""
 
 
-class LensCheck(Data, frozen=True):
+class LensCheck(TranslatableData, frozen=True):
     """Comparison of a lens with the markers of a view.
 
     Attributes:
@@ -114,7 +114,7 @@ class LensCheck(Data, frozen=True):
     verdict: str
 
 
-class CameraPose(Data, frozen=True):
+class CameraPose(TranslatableData, frozen=True):
     """The pose of a camera, and how certain it is.
 
     Attributes:

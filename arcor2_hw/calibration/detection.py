@@ -15,6 +15,7 @@ from arcor2_hw.calibration.markers import detect, measured
 from arcor2_hw.calibration.pictures import Grey
 from arcor2_hw.calibration.pose_problem import Seen
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
+from arcor2_hw.messages import Message
 
 _RESOLVED: Final = 0.25
 """Maximum width (standard deviation) of an edge as a fraction of a cell's width."""
@@ -68,7 +69,7 @@ def detect_layout(
         )
     contents = []
     for picture, grey in enumerate(greys):
-        name = "The picture" if len(greys) == 1 else f"Picture {picture}"
+        name = Message.of("The picture") if len(greys) == 1 else Message.of("Picture {number}", number=picture)
         content = _in_picture(grey, picture, lens, layout, name)
         _check_sharp(grey, content, name, blur_threshold, largest_blur)
         contents.append(content)
@@ -79,7 +80,7 @@ def detect_layout(
     return Detection(seen, float(np.median(blurs)) if blurs else 0.0)
 
 
-def _check_sharp(grey: Grey, content: _ImageContent, name: str, blur_threshold: float, largest_blur: float) -> None:
+def _check_sharp(grey: Grey, content: _ImageContent, name: Message, blur_threshold: float, largest_blur: float) -> None:
     """Require a sharp image.
 
     Raises:
@@ -101,7 +102,7 @@ def _check_sharp(grey: Grey, content: _ImageContent, name: str, blur_threshold: 
     check_visible(grey, name, blur_threshold, largest_blur)
 
 
-def _in_picture(grey: Grey, picture: int, lens: Lens, layout: Layout, name: str) -> _ImageContent:
+def _in_picture(grey: Grey, picture: int, lens: Lens, layout: Layout, name: Message) -> _ImageContent:
     """Detect and measure the targets in one image."""
     found: dict[MarkerDictionary, list[tuple[int, Array]]] = {}
     for dictionary in {layout.dictionary} | {board.dictionary for board in layout.boards}:

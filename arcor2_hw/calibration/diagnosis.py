@@ -11,6 +11,7 @@ from arcor2_hw.calibration.layout import Layout, MarkerDictionary
 from arcor2_hw.calibration.markers import detect
 from arcor2_hw.calibration.pictures import Grey, sharpness_of
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
+from arcor2_hw.messages import Message
 
 _UNIFORM: Final = 12.0
 """Contrast (99th percentile) below which an image shows nothing, grey levels."""
@@ -62,7 +63,7 @@ def edge_width(grey: Grey) -> float:
     return math.sqrt(max(max(widths) ** 2 - _SMOOTHING**2, 0.0)) if widths else math.inf
 
 
-def check_visible(grey: Grey, name: str, blur_threshold: float, largest_blur: float) -> None:
+def check_visible(grey: Grey, name: Message, blur_threshold: float, largest_blur: float) -> None:
     """Require that an image without markers shows something, sharply.
 
     Raises:
@@ -73,14 +74,12 @@ def check_visible(grey: Grey, name: str, blur_threshold: float, largest_blur: fl
     if (contrast := contrast_of(grey)) < _UNIFORM:
         mean = float(grey.mean())
         if mean < _DARK:
-            reason, what = Reason.COVERED, "is dark. Uncover the lens, and check the light and the exposure."
+            reason, text = Reason.COVERED, "{name} is dark. Uncover the lens, and check the light and the exposure."
         elif mean > _LIGHT:
-            reason, what = Reason.OVEREXPOSED, "is overexposed. Reduce the light or the exposure time."
+            reason, text = Reason.OVEREXPOSED, "{name} is overexposed. Reduce the light or the exposure time."
         else:
-            reason, what = Reason.COVERED, "shows nothing. Uncover the lens, and check where the camera looks."
-        raise CalibrationRefused(
-            "{name} {what}", f"mean grey level {mean:.0f}, contrast {contrast:.0f}", reason, name=name, what=what
-        )
+            reason, text = Reason.COVERED, "{name} shows nothing. Uncover the lens, and check where the camera looks."
+        raise CalibrationRefused(text, f"mean grey level {mean:.0f}, contrast {contrast:.0f}", reason, name=name)
     if (width := edge_width(grey)) > largest_blur:
         raise CalibrationRefused(
             "{name} is blurred: its edges are {width:.1f} px wide. Check the focus, and hold the camera still.",

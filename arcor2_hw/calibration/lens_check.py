@@ -14,6 +14,7 @@ from arcor2_hw.calibration.pose_search import Found, covariance_of, lens_changes
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.rigid import inverted, rotation_vector
 from arcor2_hw.data.camera import CameraParameters
+from arcor2_hw.messages import Message
 
 SIGNIFICANT: Final = 0.001
 """Probability of a misfit by chance below which measurement and model disagree."""
@@ -95,7 +96,7 @@ def check_of_lens(lens: Lens, found: Found, hints: Hints, options: PoseOptions) 
     parameters = CameraParameters(p.fx * factor, p.fy * factor, p.cx, p.cy, p.dist_coefs)
     distance = float(np.median([np.linalg.norm(inverted(pose)[:3, 3] - each.middle) for each in seen]))
     verdict = _verdict(state, factor, deviation, distance)
-    check = LensCheck(state, factor, deviation, misfit, left, parameters, verdict)
+    check = LensCheck(state, factor, deviation, misfit, left, parameters, verdict.text, **verdict.translation())
     return Checked(check, is_large, covariance)
 
 
@@ -118,18 +119,23 @@ def _between(a: Solution, b: Solution) -> Array:
     return np.concatenate((other[:3, 3] - one[:3, 3], rotation_vector(other[:3, :3] @ one[:3, :3].T)))
 
 
-def _verdict(state: LensState, factor: float, deviation: float, distance: float) -> str:
+def _verdict(state: LensState, factor: float, deviation: float, distance: float) -> Message:
     """Return what the markers say about the focal length, and what to do."""
     match state:
         case LensState.CONFIRMED:
-            return f"The markers confirm the focal length to {deviation:.1%}."
+            return Message.of("The markers confirm the focal length to {deviation:.1%}.", deviation=deviation)
         case LensState.CONTRADICTED:
-            return (
-                f"The markers fit a focal length that is {abs(factor - 1):.1%} {'larger' if factor > 1 else 'smaller'} "
-                f"(± {deviation:.1%}). Determine the intrinsic parameters of the camera again, and measure the markers."
+            text = (
+                "The markers fit a focal length that is {change:.1%} larger (± {deviation:.1%}). "
+                "Determine the intrinsic parameters of the camera again, and measure the markers."
+                if factor > 1
+                else "The markers fit a focal length that is {change:.1%} smaller (± {deviation:.1%}). "
+                "Determine the intrinsic parameters of the camera again, and measure the markers."
             )
+            return Message.of(text, change=abs(factor - 1), deviation=deviation)
         case LensState.UNCHECKED:
-            return (
-                f"This view does not check the focal length: an error of 1 % moves the camera by "
-                f"{distance * 10:.0f} mm. Look from the side, or add markers at another height."
+            return Message.of(
+                "This view does not check the focal length: an error of 1 % moves the camera by {shift:.0f} mm. "
+                "Look from the side, or add markers at another height.",
+                shift=distance * 10,
             )

@@ -112,12 +112,12 @@ def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
         found = sorted((each for each in again if each), key=lambda each: each.cost)
     allowed = [each for each in found if _allowed(each.pose, options)]
     if not allowed:
-        what = "is below its minimum height" if found else "could not be found"
         raise CalibrationRefused(
-            "The position of the camera according to the picture is impossible: it {what}.",
+            "The position of the camera according to the picture is impossible: it is below its minimum height."
+            if found
+            else "The position of the camera according to the picture is impossible: it could not be found.",
             "" if not found else f"z = {inverted(found[0].pose)[2, 3]:.3f} m, at least {options.lowest} m",
             Reason.IMPLAUSIBLE if found else Reason.NOT_CONVERGED,
-            what=what,
         )
     best = allowed[0]
     if worst_of(problem, best)[0] > options.largest_residual:

@@ -1,8 +1,11 @@
-"""Results of the calibrations of robots, frames and tools. Imports no numerics, because they are sent and stored."""
+"""Results of the calibrations of robots, frames and tools. Imports no numerics, because they are sent and stored.
+
+`key` and `values` translate the verdict.
+"""
 
 import enum
 
-from arcor2_hw.data.base import Data
+from arcor2_hw.data.base import TranslatableData
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 
 
@@ -15,7 +18,7 @@ class Grade(enum.StrEnum):
     """Not contradicted, but less certain than usual or not checked by anything; the verdict says why."""
 
 
-class RobotPose(Data, frozen=True):
+class RobotPose(TranslatableData, frozen=True):
     """The pose of a robot, found from depth images.
 
     Attributes:
@@ -54,7 +57,7 @@ class RobotPose(Data, frozen=True):
     seconds: float
 
 
-class TouchedFrame(Data, frozen=True):
+class TouchedFrame(TranslatableData, frozen=True):
     """A frame from touched points.
 
     Attributes:
@@ -77,7 +80,7 @@ class TouchedFrame(Data, frozen=True):
     angle_deviation: float
 
 
-class TouchedTip(Data, frozen=True):
+class TouchedTip(TranslatableData, frozen=True):
     """The tip of a tool, from one point touched in several orientations.
 
     Attributes:
@@ -99,7 +102,7 @@ class TouchedTip(Data, frozen=True):
     deviation: float
 
 
-class TouchedOrientation(Data, frozen=True):
+class TouchedOrientation(TranslatableData, frozen=True):
     """The orientation of a tool on the flange (flange_from_tool), with the angle of each measurement from it, rad."""
 
     orientation: Orientation

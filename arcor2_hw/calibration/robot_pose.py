@@ -22,6 +22,7 @@ from arcor2_hw.calibration.surface import RobotSurface
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.messages import Message
 
 Floats = npt.NDArray[np.float64]
 
@@ -129,10 +130,12 @@ def find_robot_pose(
     moved, turned = pose.position.distance_to(assumed.position), pose.orientation.angle_to(assumed.orientation)
     _refuse_ambiguous(surface, ends)
     agreed = ends[0].starts
+    verdict = _verdict(surface.name, compared, deviations, moved, turned)
     return RobotPose(
         pose=pose,
         grade=Grade.USABLE,
-        verdict=_verdict(surface.name, compared, deviations, moved, turned),
+        verdict=verdict.text,
+        **verdict.translation(),
         fitness=compared.confirmed,
         occluded=compared.occluded,
         uneven=compared.uneven,
@@ -210,14 +213,26 @@ def _refuse_ambiguous(surface: RobotSurface, ends: list[End]) -> None:
             )
 
 
-def _verdict(name: str, found: Compared, deviations: tuple[float, ...], moved: float, turned: float) -> str:
-    sentence = (
-        f"{name} is {moved * 1e3:.0f} mm and {math.degrees(turned):.1f}° from its assumed pose, known"
-        f" to {deviations[0] * 1e3:.1f} mm and {math.degrees(deviations[1]):.2f}°."
-        f" The picture confirms {found.confirmed:.0%} of what should be seen."
-    )
+def _verdict(name: str, found: Compared, deviations: tuple[float, ...], moved: float, turned: float) -> Message:
+    parts = [
+        Message.of(
+            "{name} is {moved:.0f} mm and {turned:.1f}° from its assumed pose, known to {position:.1f} mm and"
+            " {orientation:.2f}°. The picture confirms {confirmed:.0%} of what should be seen.",
+            name=name,
+            moved=moved * 1e3,
+            turned=math.degrees(turned),
+            position=deviations[0] * 1e3,
+            orientation=math.degrees(deviations[1]),
+            confirmed=found.confirmed,
+        )
+    ]
     if found.uneven > UNEVEN[0]:
-        sentence += f" Parts of it are {found.uneven * 1e3:.0f} mm off: check its joints and its model."
+        parts.append(
+            Message.of(
+                "Parts of it are {uneven:.0f} mm off: check its joints and its model.", uneven=found.uneven * 1e3
+            )
+        )
     if found.occluded > 0.2:
-        sentence += f" {found.occluded:.0%} is hidden."
-    return sentence + " One joint state does not check the joints and the model: compare several."
+        parts.append(Message.of("{occluded:.0%} is hidden.", occluded=found.occluded))
+    parts.append(Message.of("One joint state does not check the joints and the model: compare several."))
+    return Message.joined(parts)

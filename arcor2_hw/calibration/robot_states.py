@@ -19,9 +19,11 @@ from arcor2_hw.calibration.results import Grade, RobotPose
 from arcor2_hw.calibration.rigid import inverted, motion, rotation_vector, turned
 from arcor2_hw.calibration.robot_pose import GOOD, UNEVEN, RobotPoseOptions, find_robot_pose
 from arcor2_hw.calibration.surface import RobotSurface
+from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.messages import Message
 
 Floats = npt.NDArray[np.float64]
 
@@ -80,15 +82,16 @@ def find_robot_pose_of_states(
     squares = float(sum(one @ weight @ one for one, weight in zip(rest, weights, strict=True)))
     freedom = 6 * (len(found) - 1)
     farthest = [float(np.linalg.norm(part, axis=1).max()) for part in (rest[:, :3], rest[:, 3:])]
-    differ = f"{farthest[0] * 1e3:.1f} mm and {math.degrees(farthest[1]):.2f}°"
+    differ = {"distance": farthest[0] * 1e3, "angle": math.degrees(farthest[1])}
     if farthest[0] > FARTHEST[0] or farthest[1] > FARTHEST[1]:
         raise CalibrationRefused(
-            "The joint states contradict each other: their poses of {name} differ by {differ} from the mean. "
-            "Check the zero positions of its joints, its model, and that nothing moved between the images.",
+            "The joint states contradict each other: their poses of {name} differ by {distance:.1f} mm and "
+            "{angle:.2f}° from the mean. Check the zero positions of its joints, its model, and that nothing moved "
+            "between the images.",
             f"chi square {squares:.0f} with {freedom} degrees of freedom",
             Reason.IMPLAUSIBLE,
             name=name,
-            differ=differ,
+            **differ,
         )
     covariance = averaged + rest.T @ rest / (len(found) * (len(found) - 1))
     deviations = [float(np.sqrt(np.linalg.eigvalsh(part)[-1])) for part in (covariance[:3, :3], covariance[3:, 3:])]
@@ -98,20 +101,31 @@ def find_robot_pose_of_states(
     good = good and deviations[0] <= GOOD[0] and deviations[1] <= GOOD[1]
     pose = Pose.from_matrix(first @ motion(turned(mean[3:]), mean[:3]))
     moved, angle = pose.position.distance_to(assumed.position), pose.orientation.angle_to(assumed.orientation)
-    verdict = (
-        f"{name} is {moved * 1e3:.0f} mm and {math.degrees(angle):.1f}° from its assumed pose, known to"
-        f" {deviations[0] * 1e3:.1f} mm and {math.degrees(deviations[1]):.2f}°. The poses of {len(found)} joint states"
-        f" differ by up to {differ} from the mean."
-    )
+    parts = [
+        Message.of(
+            "{name} is {moved:.0f} mm and {turned:.1f}° from its assumed pose, known to {position:.1f} mm and"
+            " {orientation:.2f}°. The poses of {count} joint states differ by up to {distance:.1f} mm and {angle:.2f}°"
+            " from the mean.",
+            name=name,
+            moved=moved * 1e3,
+            turned=math.degrees(angle),
+            position=deviations[0] * 1e3,
+            orientation=math.degrees(deviations[1]),
+            count=len(found),
+            **differ,
+        )
+    ]
     if not agree or uneven > UNEVEN[0]:
-        verdict += " Check the zero positions of its joints and its model."
+        parts.append(Message.of("Check the zero positions of its joints and its model."))
     elif len(found) < ENOUGH_STATES:
-        verdict += f" Compare {ENOUGH_STATES} or more."
+        parts.append(Message.of("Compare {count} or more.", count=ENOUGH_STATES))
+    verdict = Message.joined(parts)
     return replace(
         found[0],
         pose=pose,
         grade=Grade.GOOD if good else Grade.USABLE,
-        verdict=verdict,
+        verdict=verdict.text,
+        **({"key": UNSET, "values": UNSET} | verdict.translation()),
         fitness=min(each.fitness for each in found),
         occluded=max(each.occluded for each in found),
         uneven=uneven,

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,7 @@ from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.results import Grade, TouchedFrame, TouchedOrientation, TouchedTip
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.messages import Message
 
 Floats = npt.NDArray[np.float64]
 
@@ -58,11 +59,11 @@ def frame_by_axes(origin: Position, on_x: Position, in_plane: Sequence[Position]
     points = _points("touched", [origin, on_x, *in_plane], 3)
     along = points[1] - points[0]
     if np.linalg.norm(along) < SHORTEST:
-        raise _too_near("The point on the x axis", "the origin")
+        raise _too_near("x")
     aside = points[2] - points[0]
     upward = np.cross(along, aside)
     if np.linalg.norm(aside) < SHORTEST:
-        raise _too_near("The point in the plane", "the origin")
+        raise _too_near("plane")
     if np.linalg.norm(upward) < LEAST_SINE * np.linalg.norm(along) * np.linalg.norm(aside):
         raise _on_one_line()
     checked = len(points) > 3
@@ -79,11 +80,13 @@ def frame_by_axes(origin: Position, on_x: Position, in_plane: Sequence[Position]
     base_from_frame[:3, :3] = np.column_stack([x, np.cross(normal, x), normal])
     base_from_frame[:3, 3] = points[0] - heights[0] * normal
     residuals = np.abs(heights) if checked else np.zeros(len(points))
-    _refuse_misfit(residuals, points, "The points are not in one plane")
+    _refuse_misfit(residuals, points, Message.of("The points are not in one plane"))
     # Tilt follows from all points of the plane, heading only from the two points of the x axis.
     touch = _touch_deviation(residuals, len(points) - 3)
     deviation = touch * max(1.0 / float(spread[1]), math.sqrt(2.0) / float(np.linalg.norm(along)))
-    return _frame(base_from_frame, residuals, checked, deviation, "Touch a further point of the plane to check it.")
+    return _frame(
+        base_from_frame, residuals, checked, deviation, Message.of("Touch a further point of the plane to check it.")
+    )
 
 
 def frame_by_points(known: Sequence[Position], touched: Sequence[Position]) -> TouchedFrame:
@@ -107,10 +110,10 @@ def frame_by_points(known: Sequence[Position], touched: Sequence[Position]) -> T
             other_count=len(touched),
         )
     ours, theirs = _points("known", known, 3), _points("touched", touched, 3)
-    for name, points in (("known", ours), ("touched", theirs)):
+    for points in (ours, theirs):
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         if spread[0] < SHORTEST:
-            raise _too_near(f"The {name} points", "each other")
+            raise _too_near()
         if spread[1] < LEAST_SINE * spread[0]:
             raise _on_one_line()
     a, b = ours - ours.mean(axis=0), theirs - theirs.mean(axis=0)
@@ -118,14 +121,14 @@ def frame_by_points(known: Sequence[Position], touched: Sequence[Position]) -> T
     rotation = u @ np.diag([1.0, 1.0, math.copysign(1.0, float(np.linalg.det(u @ vt)))]) @ vt
     errors = b - a @ rotation.T
     residuals = np.linalg.norm(errors, axis=1)
-    _refuse_misfit(residuals, ours, "The touched points have another shape than the known points")
+    _refuse_misfit(residuals, ours, Message.of("The touched points have another shape than the known points"))
     base_from_frame = np.eye(4)
     base_from_frame[:3, :3] = rotation
     base_from_frame[:3, 3] = theirs.mean(axis=0) - rotation @ ours.mean(axis=0)
     information = np.eye(3) * np.sum(a * a) - a.T @ a
     touch = _touch_deviation(residuals, 3 * len(ours) - 6)
     deviation = touch / math.sqrt(float(np.linalg.eigvalsh(information)[0]))
-    return _frame(base_from_frame, residuals, True, deviation, "")
+    return _frame(base_from_frame, residuals, True, deviation)
 
 
 def tip_by_touches(flange: Sequence[Pose]) -> TouchedTip:
@@ -171,21 +174,26 @@ def tip_by_touches(flange: Sequence[Pose]) -> TouchedTip:
     covariance = variance * (vt.T / singular**2 @ vt)[:3, :3]
     deviation = float(np.sqrt(max(0.0, np.linalg.eigvalsh(covariance)[-1])))
     good = residual <= TIP_FITS and deviation <= TIP_FITS
-    verdict = (
-        f"The tip is known to {deviation * 1e3:.2f} mm; the {count} touches agree to {residual * 1e3:.2f} mm."
+    verdict = Message.of(
+        "The tip is known to {deviation:.2f} mm; the {count} touches agree to {residual:.2f} mm."
         if good
-        else f"The tip is known to {deviation * 1e3:.2f} mm only: the {count} touches agree to {residual * 1e3:.2f} mm,"
-        f" touch {worst + 1} is worst. More touches, or orientations that differ more, improve the result."
+        else "The tip is known to {deviation:.2f} mm only: the {count} touches agree to {residual:.2f} mm, "
+        "touch {worst} is worst. More touches, or orientations that differ more, improve the result.",
+        deviation=deviation * 1e3,
+        count=count,
+        residual=residual * 1e3,
+        worst=worst + 1,
     )
     return TouchedTip(
         position=_position(solution[:3]),
         point=_position(solution[3:]),
         grade=Grade.GOOD if good else Grade.USABLE,
-        verdict=verdict,
+        verdict=verdict.text,
         residuals=residuals.tolist(),
         residual=residual,
         worst=worst,
         deviation=deviation,
+        **verdict.translation(),
     )
 
 
@@ -223,11 +231,22 @@ def orientation_by_alignment(flange: Sequence[Orientation], reference: Orientati
     checked = len(tools) > 1
     good = checked and residual <= TURN_FITS
     if checked:
-        verdict = f"The {len(tools)} alignments agree to {math.degrees(residual):.2f}°."
+        verdict = Message.of(
+            "The {count} alignments agree to {residual:.2f}°.", count=len(tools), residual=math.degrees(residual)
+        )
     else:
-        verdict = "The orientation follows from one alignment and cannot be checked. Align the tool once more."
+        verdict = Message.of(
+            "The orientation follows from one alignment and cannot be checked. Align the tool once more."
+        )
     return TouchedOrientation(
-        mean, Grade.GOOD if good else Grade.USABLE, verdict, residuals.tolist(), residual, worst, checked
+        mean,
+        Grade.GOOD if good else Grade.USABLE,
+        verdict.text,
+        residuals.tolist(),
+        residual,
+        worst,
+        checked,
+        **verdict.translation(),
     )
 
 
@@ -247,9 +266,8 @@ def orientation_by_points(flange: Orientation, tip: Position, along_z: Position,
     """
     start, forward, side = _points("tip", [tip, along_z, on_x], 3)
     z, x = forward - start, side - start
-    for name, move in (("along z", z), ("to the side of x", x)):
-        if np.linalg.norm(move) < SHORTEST:
-            raise _too_near(f"The point {name}", "the first one")
+    if min(np.linalg.norm(z), np.linalg.norm(x)) < SHORTEST:
+        raise _too_near()
     z, x = z / np.linalg.norm(z), x / np.linalg.norm(x)
     off = abs(math.asin(float(np.clip(x @ z, -1.0, 1.0))))
     if math.cos(off) < LEAST_SINE:
@@ -257,11 +275,13 @@ def orientation_by_points(flange: Orientation, tip: Position, along_z: Position,
     x -= (x @ z) * z
     x /= np.linalg.norm(x)
     base_from_tool = Orientation.from_matrix(np.column_stack([x, np.cross(z, x), z]))
-    verdict = (
-        f"The tool's z is the direction of the move. Its x was {math.degrees(off):.1f}° off a right "
-        "angle and was corrected. Nothing else checks them."
+    verdict = Message.of(
+        "The tool's z is the direction of the move. Its x was {off:.1f}° off a right angle and was corrected. "
+        "Nothing else checks them.",
+        off=math.degrees(off),
     )
-    return TouchedOrientation(flange.inverted() * base_from_tool, Grade.USABLE, verdict, [off], off, 0, False)
+    found = flange.inverted() * base_from_tool
+    return TouchedOrientation(found, Grade.USABLE, verdict.text, [off], off, 0, False, **verdict.translation())
 
 
 # ---------------------------------------------------------------------------------------------------- what they share
@@ -289,14 +309,15 @@ def _points(name: str, points: Sequence[Position], least: int) -> Floats:
     return found
 
 
-def _too_near(what: str, to: str) -> CalibrationRefused:
-    return CalibrationRefused(
-        "{what} and {to} are less than {shortest:.0f} mm apart. Take points farther apart.",
-        reason=Reason.DEGENERATE,
-        what=what,
-        to=to,
-        shortest=SHORTEST * 1000.0,
+def _too_near(what: Literal["points", "x", "plane"] = "points") -> CalibrationRefused:
+    text = (
+        "The points are less than {shortest:.0f} mm apart. Take points farther apart."
+        if what == "points"
+        else "The point on the x axis and the origin are less than {shortest:.0f} mm apart. Take points farther apart."
+        if what == "x"
+        else "The point in the plane and the origin are less than {shortest:.0f} mm apart. Take points farther apart."
     )
+    return CalibrationRefused(text, reason=Reason.DEGENERATE, shortest=SHORTEST * 1000.0)
 
 
 def _on_one_line() -> CalibrationRefused:
@@ -306,7 +327,7 @@ def _on_one_line() -> CalibrationRefused:
     )
 
 
-def _refuse_misfit(residuals: Floats, points: Floats, what: str) -> None:
+def _refuse_misfit(residuals: Floats, points: Floats, what: Message) -> None:
     spread = float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
     if _rms(residuals) > MISFIT * spread:
         raise CalibrationRefused(
@@ -332,30 +353,41 @@ def _touch_deviation(residuals: Floats, freedom: int) -> float:
     return math.sqrt(squares / (freedom + TOUCH_FREEDOM))
 
 
-def _frame(matrix: Floats, residuals: Floats, checked: bool, deviation: float, advice: str) -> TouchedFrame:
+def _frame(matrix: Floats, residuals: Floats, checked: bool, deviation: float, *advice: Message) -> TouchedFrame:
     residual, worst = _rms(residuals), int(np.argmax(residuals))
     good = checked and residual <= FITS and deviation <= ANGLE_GOOD
-    known = f"The frame's orientation is known to {math.degrees(deviation):.2f}° (standard deviation)."
+    known = Message.of(
+        "The frame's orientation is known to {deviation:.2f}° (standard deviation).", deviation=math.degrees(deviation)
+    )
     if not checked:
-        verdict = f"The three points determine the frame, but cannot be checked. {advice}"
+        parts = [Message.of("The three points determine the frame, but cannot be checked."), *advice]
     elif residual > FITS:
-        verdict = (
-            f"The {len(residuals)} points agree to {residual * 1e3:.1f} mm only; point {worst + 1} is"
-            f" {residuals[worst] * 1e3:.1f} mm off: touch it again. {known}"
+        agree = Message.of(
+            "The {count} points agree to {residual:.1f} mm only; point {worst} is {off:.1f} mm off: touch it again.",
+            count=len(residuals),
+            residual=residual * 1e3,
+            worst=worst + 1,
+            off=residuals[worst] * 1e3,
         )
+        parts = [agree, known]
     else:
-        verdict = f"The {len(residuals)} points agree to {residual * 1e3:.2f} mm. {known}"
+        agree = Message.of(
+            "The {count} points agree to {residual:.2f} mm.", count=len(residuals), residual=residual * 1e3
+        )
+        parts = [agree, known]
     if deviation > ANGLE_GOOD:
-        verdict += " Touch points that are farther apart."
+        parts.append(Message.of("Touch points that are farther apart."))
+    verdict = Message.joined(parts)
     return TouchedFrame(
         pose=Pose.from_matrix(matrix),
         grade=Grade.GOOD if good else Grade.USABLE,
-        verdict=verdict,
+        verdict=verdict.text,
         residuals=residuals.tolist(),
         residual=residual,
         worst=worst,
         checked=checked,
         angle_deviation=deviation,
+        **verdict.translation(),
     )
 
 

@@ -27,6 +27,12 @@ class TranslatableData(Data, frozen=True, kw_only=True):
     key: str | UnsetType = UNSET
     values: dict[str, str | Message] | UnsetType = UNSET
 
+    def as_message(self, text: str) -> Message:
+        """Return the text of this data as a message."""
+        if isinstance(self.key, UnsetType):
+            return Message.of(text)
+        return Message(text, self.key, {} if isinstance(self.values, UnsetType) else self.values)
+
     def untranslated(self) -> Self:
         """Return this data without `key` and `values`."""
         return self if self.key is UNSET and self.values is UNSET else replace(self, key=UNSET, values=UNSET)

@@ -6,7 +6,7 @@ from typing import Any
 
 from msgspec import field
 
-from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset, new_id, now
+from arcor2_hw.data.base import UNSET, Data, Timestamp, TranslatableData, Unset, new_id, now
 from arcor2_hw.data.geometry import Pose
 
 
@@ -40,14 +40,14 @@ class CalibrationInput(Data, frozen=True):
         return cls(name, hashlib.sha256(content).hexdigest(), len(content), UNSET if file is None else file)
 
 
-class CalibrationRecord(Data, frozen=True):
+class CalibrationRecord(TranslatableData, frozen=True):
     """One calibration.
 
     person: name of the user who did it. object_id and object_name: scene object whose pose, lens or tool it is; parent:
     name of the frame of the poses ("world", a robot's base or flange). inputs: images and tables it was computed from;
     parameters: other inputs (joints, markers, options), as JSON values. residual: in residual_unit ("m", "rad" or
     "px"); result: the complete result, as JSON values. before and after: pose of the object before and after, where the
-    result is a pose; applied: whether the object's pose was set.
+    result is a pose; applied: whether the object's pose was set. key and values translate the verdict.
     """
 
     kind: CalibrationKind

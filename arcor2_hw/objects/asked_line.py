@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from arcor2_hw.exceptions import DeviceError, DeviceTimeout
+from arcor2_hw.messages import Message
 from arcor2_hw.objects.line_device import LineDevice
 from arcor2_hw.objects.settings import check_serial_port, within
 
@@ -12,7 +13,7 @@ class AskedLine(LineDevice):
 
     def __init__(
         self,
-        who: str,
+        who: str | Message,
         port: str,
         baud_rate: int,
         answer_timeout: float,
@@ -23,7 +24,7 @@ class AskedLine(LineDevice):
         lost: Callable[[DeviceError], None] = lambda _: None,
         overdue: Callable[[DeviceTimeout], DeviceError] = lambda error: error,
     ) -> None:
-        self.name, self.poll_period, self.answer_timeout = who, period, answer_timeout
+        self.name, self.poll_period, self.answer_timeout = str(who), period, answer_timeout
         self._lost = lost
         self.__dict__ |= {"greet": greet, "poll": poll, "on_unasked": unasked, "overdue": overdue}
         self.use_line(port, baud_rate, answer_timeout)

@@ -7,6 +7,7 @@ from typing import ClassVar, Final, NamedTuple
 from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Alarm, Connection, Health, Severity
 from arcor2_hw.exceptions import DeviceError
+from arcor2_hw.messages import Message
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.observing import GoOn, Observing
 
@@ -31,12 +32,12 @@ class Connected:
     ALARMS: ClassVar[Mapping[str, AlarmText]] = {}
     """Texts of the alarms by code, for `set_alarm`."""
     name: str
-    who: str
+    who: str | Message
     """Name and address, for errors."""
     observing: Observing
     _active_alarms: dict[str, Alarm]
 
-    def keep_connection(self, who: str, observing: Observing | None = None) -> None:
+    def keep_connection(self, who: str | Message, observing: Observing | None = None) -> None:
         """Create the connection without opening it."""
         self.who = who
         self.observing = observing or Observing(who, self.open_link, self.watch, self.close_link, self.on_lost)

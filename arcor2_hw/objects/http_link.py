@@ -6,6 +6,7 @@ from typing import Any
 import httpx
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.messages import Message
 
 
 class HttpLink:
@@ -17,7 +18,7 @@ class HttpLink:
         timeout: Time in which the device has to answer a request, s.
     """
 
-    def __init__(self, who: str, url: str, timeout: float = 0.3) -> None:
+    def __init__(self, who: str | Message, url: str, timeout: float = 0.3) -> None:
         self.who = who
         self._url, self._timeout = url, timeout
         self._one_request = threading.Lock()

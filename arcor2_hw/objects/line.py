@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, Final, Protocol, TypeVar
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.messages import Message
 from arcor2_hw.objects.settings import check_serial_port
 
 T = TypeVar("T")
@@ -42,7 +43,7 @@ class Line:
 
     def __init__(
         self,
-        who: str,
+        who: str | Message,
         port: str,
         baud_rate: int = 9600,
         answer_timeout: float = 0.5,

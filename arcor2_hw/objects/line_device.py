@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import Final, TypeVar
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected
+from arcor2_hw.messages import device_at
 from arcor2_hw.objects.connected import Connected
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.line import READ_PERIOD, Line
@@ -41,7 +42,7 @@ class LineDevice(Connected):
         data_bits: int = 8,
     ) -> None:
         """Create the line without opening it; see `Line` for the arguments."""
-        who = f"{self.name} at {port}"
+        who = device_at(self.name, port)
         self.line = Line(who, port, baud_rate, answer_timeout, parity=parity, stopbits=stopbits, data_bits=data_bits)
         self.keep_connection(self.line.who)
         self._ending = False

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from arcor2_hw.data.device import Identity
 from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected, Refused
-from arcor2_hw.messages import Message, translatable
+from arcor2_hw.messages import Message, device_at, translatable
 from arcor2_hw.objects.modbus_settings import ModbusSettings
 from arcor2_hw.objects.settings import check_serial_port
 
@@ -90,7 +90,7 @@ class ModbusLink:
     ) -> None:
         if serial_port:
             check_serial_port("serial_port", serial_port)
-        self.who = f"{name} at {serial_port or f'{host}:{port}'}"
+        self.who: str | Message = device_at(name, serial_port or f"{host}:{port}")
         self.sent = 0.0
         """Time at which the last request was sent (monotonic, s)."""
         self._host, self._port, self._unit = host, port, unit_id

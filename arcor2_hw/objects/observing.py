@@ -58,7 +58,7 @@ class Observing:
 
     def __init__(
         self,
-        what: str,
+        what: str | Message,
         open_: Callable[[float], object],
         watch: Callable[[threading.Event], None],
         close: Callable[[], None],

@@ -7,6 +7,7 @@ from typing import ClassVar, Final
 from arcor2_hw.actions import action
 from arcor2_hw.data.device import Quality, Reading
 from arcor2_hw.exceptions import DeviceFault, OutOfRange, Refused
+from arcor2_hw.messages import Message
 from arcor2_hw.objects.edges import Edge, EdgeListeners
 from arcor2_hw.objects.settings import within
 from arcor2_hw.objects.small import IOPoint, PointDirection, PointKind
@@ -25,7 +26,7 @@ class PointActions(abc.ABC):
     """
 
     DYNAMIC_PARAMS: ClassVar[dict[str, tuple[str, set[str]]]] = {"name": ("point_names", set())}
-    who: str
+    who: str | Message
     io_points: Mapping[str, IOPoint]
     edge_listeners: EdgeListeners
 

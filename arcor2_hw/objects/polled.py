@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from arcor2_hw.exceptions import DeviceError
+from arcor2_hw.messages import Message
 from arcor2_hw.objects.observing import GoOn as GoOn
 from arcor2_hw.objects.state_observer import Snapshot as Snapshot
 from arcor2_hw.objects.state_observer import StateObserver
@@ -16,7 +17,7 @@ class Polled(StateObserver[T]):
 
     def __init__(
         self,
-        who: str,
+        who: str | Message,
         open_: Callable[[float], Snapshot[T]],
         read: Callable[[], T | None],
         close: Callable[[], None],

@@ -9,6 +9,7 @@ from typing import Final, Protocol, TypeVar
 
 from arcor2_hw.data.device import Health
 from arcor2_hw.exceptions import DeviceError, DeviceFault, NotInControl, Refused
+from arcor2_hw.messages import Message
 from arcor2_hw.objects.connected import Connected
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.observing import GoOn
@@ -25,7 +26,7 @@ STANDS_WITHIN: Final = 1.0
 class Link(Protocol):
     """Interface of a connection, such as ModbusLink, Line, or a class of the driver."""
 
-    who: str
+    who: str | Message
     """Name and address, for errors."""
 
     def open(self, timeout: float) -> None:
@@ -283,7 +284,7 @@ class PolledControl(Connected, typing.Generic[T]):
 class _Observer(StateObserver[T]):
     """Observe the state with the hooks of a device."""
 
-    def __init__(self, device: PolledControl[T], who: str) -> None:
+    def __init__(self, device: PolledControl[T], who: str | Message) -> None:
         self._device = device
         self.period, self.busy_period = device.period, device.busy_period
         self.fresh_for, self.answers_within = device.fresh_for, device.answers_within

@@ -8,6 +8,7 @@ from typing import Generic, NamedTuple, TypeVar
 from arcor2_hw.data.base import Timestamp, now
 from arcor2_hw.exceptions import DeviceError, DeviceTimeout, Stale
 from arcor2_hw.keep_alive import BUSY_FOR, LONGEST_STEP, RunningTime, once_within
+from arcor2_hw.messages import Message
 from arcor2_hw.objects.observing import GoOn, Observing
 
 T = TypeVar("T")
@@ -47,7 +48,7 @@ class StateObserver(Generic[T]):
     answers_within: float = 3.0
     """Time limit of `fresh`, s: long enough for a repeated reading after another request."""
 
-    def __init__(self, who: str) -> None:
+    def __init__(self, who: str | Message) -> None:
         self.who = who
         self.observing = Observing(who, self._first, self._watch, self.close, self._lost)
         self._changed = threading.Condition()

@@ -78,7 +78,7 @@ class ArmLine:
 
     def __init__(self, name: str, arm: str, host: str, port: int, on_ended: Callable[[DeviceError], None]) -> None:
         self.arm = arm
-        self.who = f"The {arm} arm of {name} ({host}:{port})"
+        self.who = Message.of("The {arm} arm of {name} ({address})", arm=arm, name=name, address=f"{host}:{port}")
         self.ended: DeviceError | None = None
         self._host, self._port = host, port
         self._on_ended = on_ended

@@ -11,6 +11,7 @@ from typing import Any, Final
 import httpx
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.messages import Message
 
 REQUEST_TIMEOUT: Final = 1.0
 """Time for a request, s: the web server of an IRC5 usually answers within some ten ms, rarely in hundreds."""
@@ -29,7 +30,7 @@ class Rws:
     def __init__(self, name: str, host: str, port: int, user: str, password: str) -> None:
         self.name = name
         self.address = f"{host}:{port}"
-        self.who = f"{name} (RWS of {self.address})"
+        self.who = Message.of("{name} (RWS of {address})", name=name, address=self.address)
         self._user, self._password = user, password
         self._cookies = httpx.Cookies()
         self._client: httpx.Client | None = None

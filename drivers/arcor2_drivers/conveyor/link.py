@@ -17,6 +17,7 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected
 from arcor2_hw.keep_alive import LONGEST_STEP, RunningTime, acquire_within
+from arcor2_hw.messages import Message
 
 from .cia402 import Entry
 from .settings import CanInterface, ConveyorSettings
@@ -90,7 +91,9 @@ class CanLink:
     """
 
     def __init__(self, name: str, settings: ConveyorSettings, hear: Hear) -> None:
-        self.who = f"{name} at {settings.channel} node {settings.node_id}"
+        self.who: str | Message = Message.of(
+            "{device} at {channel} node {node}", device=name, channel=settings.channel, node=settings.node_id
+        )
         self._settings, self._hear = settings, hear
         self._one_request = threading.Lock()
         self._network: _Network | None = None

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from arcor2_hw.exceptions import Refused
+from arcor2_hw.messages import Message
 from arcor2_hw.objects import MachineCommand, MachineState
 from arcor2_hw.objects.machine import ALLOWED
 from arcor2_hw.objects.observing import GoOn
@@ -39,7 +40,7 @@ STATES: Final = frozenset(
 class Unit:
     """The part of the state that the drive does not store: held, aborted, and the running command."""
 
-    def __init__(self, who: str, motion: Motion, speed: int) -> None:
+    def __init__(self, who: str | Message, motion: Motion, speed: int) -> None:
         self._who, self._motion, self._speed = who, motion, speed
         self._held_speed = 0
         self._one_act = threading.Lock()

@@ -9,6 +9,7 @@ from typing import Any, Final
 from arcor2_hw.data.base import Data, Timestamp, now
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected
 from arcor2_hw.keep_alive import acquire_within
+from arcor2_hw.messages import device_at
 from arcor2_hw.objects.state_observer import Snapshot, StateObserver
 
 from .alarms import RESET, codes
@@ -52,7 +53,7 @@ class Observer(StateObserver[Sample]):
     fresh_for = answers_within = MAX_AGE
 
     def __init__(self, name: str, settings: DobotMagicianSettings) -> None:
-        super().__init__(f"{name} at {settings.port}")
+        super().__init__(device_at(name, settings.port))
         self.since: dict[int, Timestamp] = {}
         """Time at which each active alarm was first seen."""
         self._settings = settings

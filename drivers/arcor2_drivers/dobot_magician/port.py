@@ -7,6 +7,7 @@ import serial
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, NotConnected
 from arcor2_hw.keep_alive import RunningTime
+from arcor2_hw.messages import Message
 
 from .frames import FrameBuffer, encode
 
@@ -20,7 +21,7 @@ WRITE_TIMEOUT: Final = 1.0
 class Port:
     """An open port, for one thread at a time."""
 
-    def __init__(self, who: str, path: str) -> None:
+    def __init__(self, who: str | Message, path: str) -> None:
         """Open the port. Raise NotConnected."""
         self.who = who
         self._frames = FrameBuffer()

@@ -21,7 +21,7 @@ from arcor2_hw.exceptions import (
     OutOfRange,
     Refused,
 )
-from arcor2_hw.messages import Message, translatable
+from arcor2_hw.messages import Message, device_at, translatable
 from arcor2_hw.objects import Generic
 from arcor2_hw.objects.connected import Connected
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
@@ -59,7 +59,7 @@ class ErpService(Connected, Generic):
     def __init__(self, obj_id: str, name: str, settings: ErpSettings) -> None:
         super().__init__(obj_id, name, settings)
         self._config = settings
-        self.keep_connection(f"{name} at {settings.url}")
+        self.keep_connection(device_at(name, settings.url))
         self._outbox = Outbox(self.who, file_of(settings.outbox, settings.station, settings.url))
         self._life = threading.Lock()
         self._requesting_order = threading.Lock()

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Final, NamedTuple
 
+from arcor2_hw import messages
 from arcor2_hw.data.base import Data, Timestamp, now
 from arcor2_hw.exceptions import NotConnected, Refused, StorageError
 
@@ -87,7 +88,7 @@ class Outbox:
     NotConnected when it is closed.
     """
 
-    def __init__(self, who: str, file: Path) -> None:
+    def __init__(self, who: str | messages.Message, file: Path) -> None:
         self._who, self.file = who, file
         self._one = threading.Lock()
         self._database: sqlite3.Connection | None = None

@@ -5,6 +5,7 @@ import threading
 import time
 from typing import Final
 
+from arcor2_hw import messages
 from arcor2_hw.exceptions import Arcor2Error, DeviceError, DeviceFault
 
 from .outbox import Message, Outbox
@@ -34,7 +35,7 @@ class Pause:
 class Sender:
     """Delivers messages until `stop`. Its thread closes service and outbox at its end."""
 
-    def __init__(self, who: str, service: Service, outbox: Outbox, longest_pause: float) -> None:
+    def __init__(self, who: str | messages.Message, service: Service, outbox: Outbox, longest_pause: float) -> None:
         self._who, self._service, self._outbox = who, service, outbox
         self._longest = longest_pause
         self._service_pause = Pause(longest_pause)

@@ -13,6 +13,7 @@ import msgspec
 
 from arcor2_hw.data.base import Data
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.messages import Message
 
 from .settings import ErpSettings
 
@@ -90,7 +91,7 @@ class Access(NamedTuple):
     tls: ssl.SSLContext | bool
 
     @classmethod
-    def of(cls, who: str, settings: ErpSettings) -> "Access":
+    def of(cls, who: str | Message, settings: ErpSettings) -> "Access":
         """Read token and certificates. Raises NotConnected, which names the setting."""
         headers: dict[str, str] = {}
         what = "token_file"
@@ -115,7 +116,7 @@ class Access(NamedTuple):
 class Service:
     """A connection to the service. Any thread may call `close`, also during a request."""
 
-    def __init__(self, who: str, settings: ErpSettings, access: Access) -> None:
+    def __init__(self, who: str | Message, settings: ErpSettings, access: Access) -> None:
         self._who, self._settings, self._access = who, settings, access
         self._one = threading.Lock()
         self._client: httpx.Client | None = None

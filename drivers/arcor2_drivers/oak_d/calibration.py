@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.exceptions import DeviceFault
+from arcor2_hw.messages import Message
 
 if TYPE_CHECKING:
     import depthai as dai
@@ -15,7 +16,7 @@ INVALID: Final = "calibration"
 
 
 def parameters(
-    who: str, handler: "dai.CalibrationHandler", width: int, height: int, undistorted: bool
+    who: str | Message, handler: "dai.CalibrationHandler", width: int, height: int, undistorted: bool
 ) -> CameraParameters:
     """Return the parameters of the colour camera.
 
@@ -53,7 +54,7 @@ def parameters(
     return CameraParameters(fx, fy, cx, cy, coefficients)
 
 
-def handler_of(who: str, eeprom: dict[str, Any]) -> "dai.CalibrationHandler":
+def handler_of(who: str | Message, eeprom: dict[str, Any]) -> "dai.CalibrationHandler":
     """Return the calibration that is stored in an EEPROM, given as JSON. Raises DeviceFault."""
     import depthai as dai
 

@@ -10,6 +10,7 @@ import depthai as dai
 
 from arcor2_hw.data.device import Identity
 from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.messages import Message
 
 from .calibration import parameters
 from .feed import Pipeline, Shot
@@ -25,7 +26,7 @@ ISO: Final = 400
 """Sensor sensitivity while the exposure time is set manually."""
 
 
-def find(who: str, address: str, timeout: float) -> dai.DeviceInfo:
+def find(who: str | Message, address: str, timeout: float) -> dai.DeviceInfo:
     """Return the camera with an address. Raises NotConnected.
 
     depthai needs 11.5 s to report a missing camera when it opens one, so this searches first.
@@ -63,7 +64,7 @@ def _is_ip(address: str) -> bool:
     return len(parts) == 4 and all(part.isdigit() and int(part) < 256 for part in parts)
 
 
-def boot(who: str, info: dai.DeviceInfo, timeout: float) -> dai.Device:
+def boot(who: str | Message, info: dai.DeviceInfo, timeout: float) -> dai.Device:
     """Open a camera. One that starts only after `timeout` s is closed again. Raises DeviceTimeout, NotConnected."""
     result: list[dai.Device | BaseException] = []
     late = threading.Event()
@@ -94,7 +95,7 @@ def boot(who: str, info: dai.DeviceInfo, timeout: float) -> dai.Device:
 class DeviceFeed:
     """A camera on USB or Ethernet. The camera undistorts the colour image and aligns the depth image to it."""
 
-    def __init__(self, who: str, settings: OakDSettings, timeout: float) -> None:
+    def __init__(self, who: str | Message, settings: OakDSettings, timeout: float) -> None:
         deadline = time.monotonic() + timeout
         self.who = who
         info = find(who, settings.address, timeout)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, Final
 
 from arcor2_hw.data.device import Health, Severity
 from arcor2_hw.exceptions import DeviceError, DeviceTimeout, NotConnected, Refused, Stale
+from arcor2_hw.messages import Message, device_at
 from arcor2_hw.objects.connected import AlarmText, Connected
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 
@@ -42,7 +43,7 @@ class ImageStream(Connected):
 
     def use_camera(self, settings: OakDSettings) -> None:
         """Prepare the connection; nothing is opened yet."""
-        self.keep_connection(f"{self.name} at {settings.address or 'the only camera'}")
+        self.keep_connection(device_at(self.name, settings.address or Message.of("the only camera")))
         self._config = settings
         self._feed: Feed | None = None
         self._newest: Shot | None = None

@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple
 import msgspec
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.messages import Message
 
 from .stream import (
     PREFIX,
@@ -54,7 +55,9 @@ class NetworkSource:
         on_status: Called with each status that the source sends.
     """
 
-    def __init__(self, who: str, host: str, port: int, coding: str, on_status: Callable[[Status], None]) -> None:
+    def __init__(
+        self, who: str | Message, host: str, port: int, coding: str, on_status: Callable[[Status], None]
+    ) -> None:
         self.who = who
         self._address, self._coding, self._on_status = (host, port), coding, on_status
         self._socket: socket.socket | None = None

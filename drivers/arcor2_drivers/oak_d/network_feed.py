@@ -9,6 +9,7 @@ import numpy as np
 
 from arcor2_hw.data.device import Identity
 from arcor2_hw.exceptions import DeviceError, DeviceFault
+from arcor2_hw.messages import Message
 
 from .calibration import handler_of, parameters
 from .feed import JPEG, Pipeline, Shot
@@ -69,7 +70,7 @@ def _image(
 class NetworkFeed:
     """A network source; see NetworkSource for the connection."""
 
-    def __init__(self, who: str, name: str, settings: OakDSettings, timeout: float) -> None:
+    def __init__(self, who: str | Message, name: str, settings: OakDSettings, timeout: float) -> None:
         deadline = time.monotonic() + timeout
         assert settings.network is not None
         self.who = who

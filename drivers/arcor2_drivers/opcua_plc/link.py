@@ -15,6 +15,7 @@ from asyncua.crypto import security_policies, uacrypto
 from cryptography import x509
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.messages import Message, device_at
 
 from .settings import OpcUaPlcSettings, Security
 
@@ -106,7 +107,7 @@ class Link:
     def __init__(
         self, name: str, settings: OpcUaPlcSettings, nodes: Mapping[str, str], watched: Sequence[str], changed: Changed
     ) -> None:
-        self.who = f"{name} at {settings.url}"
+        self.who: str | Message = device_at(name, settings.url)
         self.nodes = {name: ua.NodeId.from_string(text) for name, text in nodes.items()}
         self._settings, self._watched, self._changed = settings, watched, changed
         self._sending = threading.Lock()
@@ -333,7 +334,7 @@ def _properties(file: str) -> uacrypto.CertProperties:
     return uacrypto.CertProperties(content, extension="pem" if b"-----BEGIN" in content else "der")
 
 
-def _password(who: str, file: str) -> str:
+def _password(who: str | Message, file: str) -> str:
     try:
         return Path(file).read_text("utf-8").rstrip("\r\n")
     except (OSError, ValueError) as e:

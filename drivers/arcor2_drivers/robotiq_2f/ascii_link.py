@@ -4,6 +4,7 @@ import re
 from typing import Final
 
 from arcor2_hw.exceptions import DeviceFault, Refused
+from arcor2_hw.messages import device_at
 from arcor2_hw.objects.line import Line
 
 from .status import Activation, Command, Object, Status
@@ -20,7 +21,7 @@ class AsciiLink(Line):
     """A gripper on a TCP port. A missing or invalid answer breaks the line, see `Line`."""
 
     def __init__(self, name: str, host: str, port: int, request_timeout: float) -> None:
-        super().__init__(f"{name} at {host}:{port}", f"socket://{host}:{port}", answer_timeout=request_timeout)
+        super().__init__(device_at(name, f"{host}:{port}"), f"socket://{host}:{port}", answer_timeout=request_timeout)
 
     def read(self) -> Status:
         """Read all variables. Raise DeviceTimeout, ConnectionLost, DeviceFault, or ValueError for an invalid status."""

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from arcor2_hw.messages import Message
 from arcor2_hw.objects.modbus_link import ModbusLink
 
 from .status import Activation, Command, Object, Status
@@ -40,7 +41,7 @@ class RtuLink(ModbusLink):
 
     def __init__(self, name: str, port: str, baud_rate: int, unit_id: int, request_timeout: float) -> None:
         super().__init__(name, unit_id=unit_id, request_timeout=request_timeout, serial_port=port, baudrate=baud_rate)
-        self.who = f"{name} at {port} unit {unit_id}"
+        self.who: str | Message = Message.of("{device} at {port} unit {unit}", device=name, port=port, unit=unit_id)
         self._requests = [0] * COUNT
 
     def read(self) -> Status:

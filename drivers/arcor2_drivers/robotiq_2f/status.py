@@ -5,6 +5,7 @@ import enum
 from typing import Final, NamedTuple, Protocol
 
 from arcor2_hw.data.device import Health, Severity
+from arcor2_hw.messages import Message
 
 
 class Object(enum.IntEnum):
@@ -66,7 +67,7 @@ class Command:
 class Link(Protocol):
     """A connection to the gripper. Its errors name the device and its address."""
 
-    who: str
+    who: str | Message
 
     def open(self, timeout: float) -> None:
         """Open within `timeout` s; nothing is sent."""

@@ -10,7 +10,7 @@ from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Identity
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotConnected, NotInControl, Refused
 from arcor2_hw.keep_alive import RunningTime
-from arcor2_hw.messages import Message, translatable
+from arcor2_hw.messages import Message, device_at, translatable
 from arcor2_hw.objects.line import READ_PERIOD, Line
 from arcor2_hw.objects.observing import GoOn
 from arcor2_hw.objects.state_observer import Snapshot, StateObserver
@@ -76,7 +76,7 @@ class Controller(StateObserver[State]):
         self, name: str, settings: OpenProtocolScrewdriverSettings, lost: Callable[[DeviceError], None]
     ) -> None:
         host = f"[{settings.host}]" if ":" in settings.host else settings.host
-        who = f"{name} at {host}:{settings.port}"
+        who = device_at(name, f"{host}:{settings.port}")
         self.line = Line(who, f"socket://{host}:{settings.port}", answer_timeout=settings.answer_timeout)
         super().__init__(who)
         self._notify_lost, self._keep_alive = lost, settings.keep_alive

@@ -16,7 +16,7 @@ from dynamixel_sdk import (  # type: ignore[import-untyped]
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, NotConnected, Refused
 from arcor2_hw.keep_alive import KeepAlive, RunningTime
-from arcor2_hw.messages import Message
+from arcor2_hw.messages import Message, device_at
 
 from .registers import LED, STATUS_ERRORS, Register
 
@@ -90,7 +90,7 @@ class Bus:
     """Two servos on one serial port. Each exchange is one instruction and its answers."""
 
     def __init__(self, name: str, port: str, baud_rate: int) -> None:
-        self.who = f"{name} at {port}"
+        self.who = device_at(name, port)
         self._name, self._path, self._baud_rate = name, port, baud_rate
         self._port: _Port | None = None
         self._packets: Any = PacketHandler(2.0)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from arcor2_hw.exceptions import DeviceError, DeviceFault
+from arcor2_hw.messages import Message
 
 _SCRIPT: Final = Path(__file__).with_name("control_process.py")
 
@@ -30,7 +31,7 @@ class ControlClient:
 
     def __init__(
         self,
-        who: str,
+        who: str | Message,
         arguments: dict[str, Any],
         on_output: Callable[[bytes], None],
         on_exit: Callable[[int], DeviceError],

@@ -13,11 +13,12 @@ from collections.abc import Iterator
 
 from arcor2_hw.data.robot import Mode
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, Refused
+from arcor2_hw.messages import Message
 
 from .sockets import connect, exchange
 
 PORT = 29999
-NAME = "dashboard server"
+NAME = Message.of("dashboard server")
 """Name of the port in errors."""
 MAX_LINE = 4096
 """Greatest length of an answer, bytes: the longest ones contain a file name."""

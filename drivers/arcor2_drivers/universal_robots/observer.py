@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, Stale
 from arcor2_hw.keep_alive import RunningTime
+from arcor2_hw.messages import Message, device_at
 from arcor2_hw.objects.observing import Observing
 
 from .program import STATES
@@ -95,7 +96,7 @@ class Observer:
         self.name = name
         self.host = host
         self.address = f"{host}:{PORT}"
-        self.who = f"{name} (UR controller {self.address})"
+        self.who = Message.of("{name} (UR controller {address})", name=name, address=self.address)
         self.version: Version = (0, 0, 0, 0)
         self.period = 0.002
         self.samples_received = 0
@@ -105,7 +106,7 @@ class Observer:
         """The latest sample in which the safety system prevented motion; a slow reader does not miss a short stop."""
         self._newest: Sample | None = None
         self._stream: RtdeStream | None = None
-        self.observing = Observing(f"{name} at {self.address}", self._open, self._watch, self._close)
+        self.observing = Observing(device_at(name, self.address), self._open, self._watch, self._close)
 
     def newest(self) -> Sample | None:
         """Return the latest sample, whatever its age; None before the first."""
@@ -146,7 +147,7 @@ class Observer:
         try:
             self._stream = stream = RtdeStream.open(self.host, FIELDS, timeout)
         except DeviceError as e:
-            raise type(e)(f"{self.name}: {e}", e.detail) from e
+            raise e.with_message(Message.of("{name}: {reason}", name=self.name, reason=e)) from e
         self.version = stream.version
         self.period = 0.002 if self.version[0] >= 5 else 0.008
         self.ring = collections.deque(maxlen=RING)  # other threads may be reading the old one

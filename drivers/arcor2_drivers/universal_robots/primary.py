@@ -14,11 +14,12 @@ from collections.abc import Iterator
 from typing import Final
 
 from arcor2_hw.data.robot import DhParameters, KinematicCalibration
+from arcor2_hw.messages import Message
 
 from .sockets import connect, exchange
 
 PORT: Final = 30001
-NAME: Final = "primary port"
+NAME: Final = Message.of("primary port")
 """Name of the port in errors."""
 TIMEOUT: Final = 2.0
 """Time for the kinematics to arrive, s: the controller sends ten states per second."""

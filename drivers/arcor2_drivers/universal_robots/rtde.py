@@ -12,11 +12,12 @@ import time
 from typing import Final, Self
 
 from arcor2_hw.exceptions import DeviceFault
+from arcor2_hw.messages import Message
 
 from .sockets import connect, exchange
 
 PORT: Final = 30004
-NAME: Final = "RTDE port"
+NAME: Final = Message.of("RTDE port")
 """Name of the port in errors."""
 MAX_FRAME: Final = 4096
 """Greatest size of a frame, bytes; a recipe of all variables is smaller."""

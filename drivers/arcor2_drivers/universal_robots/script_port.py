@@ -5,10 +5,12 @@ import socket
 import time
 from typing import Final, Self
 
+from arcor2_hw.messages import Message
+
 from .sockets import connect, exchange
 
 PORT: Final = 30003
-NAME: Final = "script port"
+NAME: Final = Message.of("script port")
 """Name of the port in errors."""
 _CHUNK: Final = 1 << 16
 

@@ -6,9 +6,10 @@ import struct
 from collections.abc import Iterator
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, NotConnected
+from arcor2_hw.messages import Message
 
 
-def connect(port_name: str, host: str, port: int, timeout: float) -> socket.socket:
+def connect(port_name: Message, host: str, port: int, timeout: float) -> socket.socket:
     """Connect within `timeout` s.
 
     Args:
@@ -33,7 +34,7 @@ def connect(port_name: str, host: str, port: int, timeout: float) -> socket.sock
 
 
 @contextlib.contextmanager
-def exchange(port_name: str, address: str, timeout: float, detail: str = "") -> Iterator[None]:
+def exchange(port_name: Message, address: str, timeout: float, detail: str = "") -> Iterator[None]:
     """Convert the errors of a socket and of decoding to DeviceTimeout (with `detail`) and ConnectionLost."""
     try:
         yield

@@ -7,6 +7,7 @@ from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint, KinematicCalibration, MoveResult, RobotState, RobotType
 from arcor2_hw.exceptions import DeviceError, OutOfRange, Refused
+from arcor2_hw.messages import Message
 from arcor2_hw.objects.arm import TCP, check_end_effector, named_joints, refuse_acknowledgement
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.single_arm import SingleArm
@@ -177,7 +178,7 @@ class UniversalRobot(MoveActions, DigitalGripper, SingleArm):
         try:
             return read_calibration(self._ur.host)
         except DeviceError as e:
-            raise type(e)(f"{self.name}: {e}", e.detail) from e
+            raise e.with_message(Message.of("{name}: {reason}", name=self.name, reason=e)) from e
 
     @property
     def samples_received(self) -> int:

@@ -1,6 +1,7 @@
 /** Poses of objects measured by robots and cameras. Functions return why they were refused, or an empty string. */
 
 import { t } from "@lingui/core/macro";
+import { type ServerMessage, translate } from "../i18n/serverMessages";
 import type { Pivot, Pose, Position } from "../protocol/types";
 import { call } from "../session/connection";
 import { rest } from "../session/rest";
@@ -137,11 +138,18 @@ export async function takePicture(id: string): Promise<Blob> {
 }
 
 // -------------------------------------------------------------------------------- history and touched points
-export interface CalibrationRecord {
+/** A verdict in English, and its translation. */
+interface Judged extends Omit<ServerMessage, "text"> {
+  verdict: string;
+}
+
+/** Return a verdict in the user's language. */
+export const verdictOf = ({ verdict, key, values }: Judged): string => translate({ text: verdict, key, values });
+
+export interface CalibrationRecord extends Judged {
   id: string;
   date: string;
   person: string;
-  verdict: string;
   residual?: number;
   residual_unit?: string;
 }
@@ -161,13 +169,12 @@ export async function checkLens(id: string): Promise<string> {
   const body = new FormData();
   body.append("image", picture, "picture.jpg");
   body.append("args", JSON.stringify({ camera_parameters }));
-  return (await json<{ verdict: string }>("/api/calibration/lens", { method: "PUT", body })).verdict;
+  return verdictOf(await json<Judged>("/api/calibration/lens", { method: "PUT", body }));
 }
 
-export interface TouchedFrame {
+export interface TouchedFrame extends Judged {
   pose: Pose;
   grade: string;
-  verdict: string;
   /**
    * Errors of the points, m, in the given order. `checked`: there are enough points for the errors to be meaningful.
    */

@@ -300,7 +300,7 @@ export type CalibrationKind = "camera_pose" | "robot_pose" | "hand_eye" | "intri
  * name of the frame of the poses ("world", a robot's base or flange). inputs: images and tables it was computed from;
  * parameters: other inputs (joints, markers, options), as JSON values. residual: in residual_unit ("m", "rad" or
  * "px"); result: the complete result, as JSON values. before and after: pose of the object before and after, where the
- * result is a pose; applied: whether the object's pose was set.
+ * result is a pose; applied: whether the object's pose was set. key and values translate the verdict.
  */
 export interface CalibrationRecord {
   kind: CalibrationKind;
@@ -319,6 +319,8 @@ export interface CalibrationRecord {
   applied: boolean;
   id: string;
   date: string;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /** Arguments of CameraColorImage. */

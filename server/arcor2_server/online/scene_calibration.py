@@ -21,7 +21,6 @@ from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.messages import Message
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.collaboration.tasks import Tasks
-from arcor2_server.compute.process import ProgressCallback
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Kind
 from arcor2_server.errors import RequestRefused
@@ -50,7 +49,8 @@ DEPTH_FRAMES: Final = 10
 STANDSTILL: Final = 0.002
 """Maximum change of a joint while a picture is taken, rad or m."""
 
-Find = Callable[[ProgressCallback], Awaitable[tuple[Pose, CalibrationRecord]]]
+Report = Callable[[float, str | Message], None]
+Find = Callable[[Report], Awaitable[tuple[Pose, CalibrationRecord]]]
 """Measures an object; returns its pose and the record of the calibration."""
 
 
@@ -92,13 +92,15 @@ class SceneCalibration:
         self._start(user, camera, CAMERA_CALIBRATION, find)
 
     async def _find_camera(
-        self, user: str, camera: SceneObject, parameters: CameraParameters, on_progress: ProgressCallback
+        self, user: str, camera: SceneObject, parameters: CameraParameters, on_progress: Report
     ) -> tuple[Pose, CalibrationRecord]:
         pictures = []
         for number in range(PICTURES):
-            on_progress(0.1 * number, f"taking picture {number + 1} of {PICTURES}")
+            on_progress(
+                0.1 * number, Message.of("taking picture {number} of {count}", number=number + 1, count=PICTURES)
+            )
             pictures.append(await self._cameras.take_picture(camera, "color_image"))
-        on_progress(0.1 * PICTURES, "looking for the markers")
+        on_progress(0.1 * PICTURES, Message.of("looking for the markers"))
         expected = None if isinstance(camera.pose, Unset) else camera.pose
         found = await self._calibration.camera(parameters, pictures, expected=expected)
         return found.pose, CalibrationRecord(
@@ -116,6 +118,8 @@ class SceneCalibration:
                 "markers": msgspec.to_builtins(self._markers.configuration),
             },
             result=msgspec.to_builtins(found),
+            key=found.key,
+            values=found.values,
             before=camera.pose,
             after=found.pose,
         )
@@ -156,9 +160,9 @@ class SceneCalibration:
         if moves:
             self._online.moving.add(robot.id)
 
-        async def find(on_progress: ProgressCallback) -> tuple[Pose, CalibrationRecord]:
+        async def find(on_progress: Report) -> tuple[Pose, CalibrationRecord]:
             if moves:
-                on_progress(0.0, f"{robot.name} moves to its calibration pose")
+                on_progress(0.0, Message.of("{robot} moves to its calibration pose", robot=robot.name))
                 await self._online.call(robot.id, MOVE_METHOD, control=True, requested_at=requested_at)
             return await self._find_robot(user, robot, camera, parameters, model, on_progress)
 
@@ -184,7 +188,7 @@ class SceneCalibration:
         camera: SceneObject,
         parameters: CameraParameters,
         model: RobotSource,
-        on_progress: ProgressCallback,
+        on_progress: Report,
     ) -> tuple[Pose, CalibrationRecord]:
         if isinstance(robot.pose, Unset) or isinstance(camera.pose, Unset):
             raise RequestRefused(
@@ -194,7 +198,7 @@ class SceneCalibration:
             )
         joints = await self._online.robot_joints(robot.id)
         view = RobotView(joints, robot.pose, camera.pose, parameters)
-        on_progress(0.2, f"{camera.name} takes a depth picture")
+        on_progress(0.2, Message.of("{camera} takes a depth picture", camera=camera.name))
         depth = await self._cameras.take_picture(camera, "depth_image", averaged_frames=DEPTH_FRAMES)
         after = await self._online.robot_joints(robot.id)
         if any(abs(one.value - other.value) > STANDSTILL for one, other in zip(joints, after, strict=False)):
@@ -213,6 +217,8 @@ class SceneCalibration:
             inputs=[CalibrationInput.of("depth picture", depth), CalibrationInput("model", "", 0, model.urdf.name)],
             parameters={"view": msgspec.to_builtins(view), "camera_id": camera.id, "camera_name": camera.name},
             result=msgspec.to_builtins(found),
+            key=found.key,
+            values=found.values,
             before=robot.pose,
             after=found.pose,
         )
@@ -234,7 +240,7 @@ class SceneCalibration:
             self._hub.broadcast(make_event("ProcessState", data))
 
         async def run() -> None:
-            verdict = ""
+            verdict: Message | None = None
             try:
                 with self._tasks.running(
                     TaskKind.CALIBRATION, Message.of("Calibration of {name}", name=obj.name), user
@@ -242,7 +248,7 @@ class SceneCalibration:
                     pose, record = await find(task.at)
                     await self._set_pose(user, obj.id, pose)
                     await self._records.put(record)
-                    verdict = record.verdict
+                    verdict = record.as_message(record.verdict)
                     task.at(1.0, verdict)
             except Arcor2Error as error:
                 log.info("calibration failed", process=process, object=obj.name, reason=str(error), detail=error.detail)
@@ -252,7 +258,7 @@ class SceneCalibration:
                 message = Message.of("An error inside the server: {reason}", reason=error)
                 publish(ProcessStateEnum.FAILED, message)
             else:
-                publish(ProcessStateEnum.FINISHED, Message.of(verdict) if verdict else None)
+                publish(ProcessStateEnum.FINISHED, verdict)
             finally:
                 self._running.discard(obj.id)
                 end()

@@ -356,6 +356,8 @@ class CalibrationMethodOperations:
                 inputs=[CalibrationInput.of(f"picture {number}", each) for number, each in enumerate(pictures, 1)],
                 parameters=msgspec.to_builtins(parameters or {"args": replace(args, record=UNSET)}),
                 result=result,
+                key=getattr(found, "key", UNSET),
+                values=getattr(found, "values", UNSET),
                 before=record_as.before,
                 after=after,
                 applied=record_as.applied,

@@ -11,6 +11,7 @@ from arcor2_hw.data.base import Data
 from arcor2_hw.data.camera import CameraParameters, MarkerCorners
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint
+from arcor2_hw.messages import Message
 from arcor2_server.compute.process import ProgressCallback
 from arcor2_server.compute.workers import Compute
 from arcor2_server.workspace.markers import Markers
@@ -67,7 +68,9 @@ class Calibration:
         distance, angle = EXPECTED_WITHIN
         hinted = replace(task.options, expected=expected, expected_position=distance, expected_orientation=angle)
         found = await run(replace(task, options=hinted), on_progress=on_progress)
-        return replace(found, verdict=f"{found.verdict} Of two solutions, the one near the present pose was chosen.")
+        chosen = Message.of("Of two solutions, the one near the present pose was chosen.")
+        verdict = Message.joined([found.as_message(found.verdict), chosen])
+        return replace(found, verdict=verdict.text, **verdict.translation())
 
     async def markers(self, parameters: CameraParameters, picture: bytes) -> list[MarkerCorners]:
         """Return the corners of every marker in the picture."""

@@ -3,7 +3,7 @@
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
-import { frameByAxes, hideAtTool, placeAt, placeByRobot, showAtTool } from "../../commands/calibrate";
+import { frameByAxes, hideAtTool, placeAt, placeByRobot, showAtTool, verdictOf } from "../../commands/calibrate";
 import { refusal } from "../../commands/requests";
 import { chosenRobot, effectorPose, notReady } from "../../commands/robot";
 import { translated } from "../../i18n/choices";
@@ -94,7 +94,7 @@ function ThreePoints({ id, why }: { id: string; why: string }) {
       const found = await frameByAxes(origin, onX, [inPlane], { object_id: id, object_name: nameOf(now(), id) });
       const refusedPose = await placeAt(id, found.pose);
       if (refusedPose) throw new Error(refusedPose);
-      setVerdict(found.verdict);
+      setVerdict(verdictOf(found));
       setTouched([]);
     });
   return (

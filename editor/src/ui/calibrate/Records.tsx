@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
-import { type CalibrationRecord, recordsOf } from "../../commands/calibrate";
+import { type CalibrationRecord, recordsOf, verdictOf } from "../../commands/calibrate";
 import { dateAndTime, fixed } from "../../formats";
 import { useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
@@ -42,7 +42,7 @@ export function Records({ id }: { id: string }) {
         <ul className="records" aria-label={t`Calibration history`}>
           {records.map((each) => (
             <li key={each.id}>
-              <span>{each.verdict}</span>
+              <span>{verdictOf(each)}</span>
               <span className="quiet small">
                 {dateAndTime(each.date)} · {each.person}
                 {each.residual !== undefined && ` · ${fixed(each.residual, 2)} ${each.residual_unit ?? ""}`}
