@@ -23,6 +23,7 @@ from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ParameterMe
 from arcor2_hw.data.older_names import not_offered
 from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.exceptions import InvalidData, NotFound
+from arcor2_hw.messages import translatable
 
 BUILT_IN: Final = (
     "Camera",
@@ -35,7 +36,7 @@ BUILT_IN: Final = (
 )
 """Object types that are built in according to the protocol. Our other bases are not visible to clients."""
 
-NO_DESCRIPTION: Final = "No description available."
+NO_DESCRIPTION: Final = translatable("No description available.")
 
 _OURS: Final = Path(__file__).resolve().parents[1]
 

@@ -21,7 +21,7 @@ export default function ConnectingBanner() {
   return (
     <div className="banner" role="status">
       <span>{t`Tap the step that follows ${nameOf(now(), connecting.from)}.`}</span>
-      <Button look="plain" onPress={cancelConnecting}>
+      <Button look="plain" className="wraps" onPress={cancelConnecting}>
         {t`Cancel`}
       </Button>
     </div>

@@ -1,5 +1,6 @@
 /** About the selected item: type, lock, state. */
 
+import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { Suspense } from "react";
 import { words } from "../../../program/naming";
@@ -27,7 +28,9 @@ const Body: Section["Body"] = ({ selection: { kind, id } }) => {
     <>
       <p>
         {action ? `${by}: ${words(action.type.split("/")[1] ?? "")}` : typeName || kindName(kind)}
-        {state && <span className={`tag ${limited ? "warn" : (TONE[state.state] ?? "")}`}>{state.state}</span>}
+        {state && (
+          <span className={`tag ${limited ? "warn" : (TONE[state.state] ?? "")}`}>{stateName(state.state)}</span>
+        )}
       </p>
       {state?.reason && <p className="small">{state.reason}</p>}
       {description && <p className="quiet small">{description}</p>}
@@ -42,6 +45,21 @@ const Body: Section["Body"] = ({ selection: { kind, id } }) => {
     </>
   );
 };
+
+const STATES: Record<string, MessageDescriptor> = {
+  offline: msg`offline`,
+  connecting: msg`connecting…`,
+  online: msg`online`,
+  lost: msg`connection lost`,
+  back: msg`online again`,
+  failed: msg`not reachable`,
+};
+
+/** Return the state of a device in words. */
+export function stateName(state: string): string {
+  const name = STATES[state];
+  return name ? i18n._(name) : state;
+}
 
 export const TONE: Record<string, string> = {
   online: "good",

@@ -1,7 +1,6 @@
 /** Connection and health of each device; a failed one can be retried. */
 
-import { i18n, type MessageDescriptor } from "@lingui/core";
-import { msg, t } from "@lingui/core/macro";
+import { t } from "@lingui/core/macro";
 import { retryObject } from "../../../commands/operation";
 import { byName } from "../../../formats";
 import { translatedAlarm } from "../../../i18n/serverMessages";
@@ -11,22 +10,8 @@ import { whyUnavailable } from "../../../store/permissions";
 import { derivesFrom } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
 import { Button } from "../../kit/kit";
-import { TONE } from "../sections/about";
+import { stateName, TONE } from "../sections/about";
 import { uncontrolledOnline } from "../uncontrolled";
-
-const STATES: Record<string, MessageDescriptor> = {
-  offline: msg`offline`,
-  connecting: msg`connecting…`,
-  online: msg`online`,
-  lost: msg`connection lost`,
-  back: msg`online again`,
-  failed: msg`not reachable`,
-};
-
-function stateName(state: string): string {
-  const name = STATES[state];
-  return name ? i18n._(name) : state;
-}
 
 export default function Panel() {
   const live = useEditor((state) => state.live);
@@ -53,7 +38,7 @@ export default function Panel() {
           {t`The workplace is offline.`} {live.message}
         </p>
       )}
-      <ul className="devices">
+      <ul className="devices" tabIndex={0} aria-label={t`Devices`}>
         {objects.map((object) => {
           const state = live.objects[object.id];
           const health = live.health[object.id];
