@@ -17,6 +17,7 @@ from arcor2_hw.client.errors import STATUSES, RequestFailed
 from arcor2_hw.data.base import Data, Timestamp, Unset
 from arcor2_hw.data.object_type import Model3dType, Models, ObjectTypeSource
 from arcor2_hw.data.project import Project, ProjectParameter
+from arcor2_hw.data.run_trace import RunTrace
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
 from arcor2_hw.exceptions import ConnectionLost, DeviceTimeout, InvalidData
 
@@ -312,6 +313,15 @@ class Rest:
     async def diagnosis(self, target: Path) -> None:
         """Save a diagnosis archive to a file: open documents, types, devices and the end of the log; no secrets."""
         await self._file("/api/diagnosis", target)
+
+    # ------------------------------------------------------------------------------------------------ runs
+    async def run_trace(self, number: int) -> RunTrace:
+        """Return the executed actions of a run by device."""
+        return await self.request("GET", f"/api/runs/{number}/trace", RunTrace)
+
+    async def chrome_trace(self, number: int, target: Path) -> None:
+        """Save the executed actions of a run to a file that chrome://tracing and Perfetto open."""
+        await self._file(f"/api/runs/{number}/chrome-trace", target)
 
     # ------------------------------------------------------------------------------------------------ packages
     async def publish(self, project_id: str, target: Path, package_name: str = "") -> None:

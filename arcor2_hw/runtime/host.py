@@ -279,18 +279,27 @@ class Host:
         )
 
     # -------------------------------------------------------------------------------- channel of the program
-    def event(self, name: str, encoded: bytes, number: int = 0, action: str = "", time: float = 0.0) -> None:
+    def event(
+        self,
+        name: str,
+        encoded: bytes,
+        number: int = 0,
+        action: str = "",
+        time: float = 0.0,
+        device: str = "",
+        waited: float = 0.0,
+    ) -> None:
         """Send an encoded event of the program. Wait up to EVENT_WAIT for a server that does not keep up."""
         self.link.wait_for_room(EVENT_WAIT)
-        self.link.post(m.ProgramEvent(name, encoded, number, action, time))
+        self.link.post(m.ProgramEvent(name, encoded, number, action, time, device, waited))
 
     def changed(self, state: str) -> None:
         """Report that the program is running or paused."""
         self.link.post(m.ProgramChanged(state))
 
-    def action_over(self, number: int, duration: float, error: Message | None) -> None:
+    def action_over(self, number: int, duration: float, error: Message | None, waited: float) -> None:
         """Report the end of an action for which there is no event."""
-        self.link.post(m.ActionFailed(number, duration, error))
+        self.link.post(m.ActionFailed(number, duration, error, waited))
 
     # -------------------------------------------------------------------------------- reader thread
     def _read(self) -> None:

@@ -297,7 +297,9 @@ class ProgramEvent(ToServer, frozen=True):
     """An encoded event: PackageInfo, ActionStateBefore, ActionStateAfter or ProjectException.
 
     number: counts the calls of actions from 1. name: of the action, or device and method if it has no name. time: start
-    of the action, s since the epoch (ActionStateBefore); its duration, s (ActionStateAfter).
+    of the action, s since the epoch (ActionStateBefore); its duration, s (ActionStateAfter). device: id of the object
+    (ActionStateBefore). waited: time between ActionStateBefore and the start of the action, s, for which the program
+    was paused (ActionStateAfter).
     """
 
     event: str
@@ -305,17 +307,20 @@ class ProgramEvent(ToServer, frozen=True):
     number: int = 0
     name: str = ""
     time: float = 0.0
+    device: str = ""
+    waited: float = 0.0
 
 
 class ActionFailed(ToServer, frozen=True):
     """An action has ended without an event: it failed, or (`error` None) the project declares no actions.
 
-    number: as in ProgramEvent. duration: s.
+    number, waited: as in ProgramEvent. duration: s.
     """
 
     number: int
     duration: float
     error: Message | None = None
+    waited: float = 0.0
 
 
 class ProgramChanged(ToServer, frozen=True):

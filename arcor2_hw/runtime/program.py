@@ -40,25 +40,38 @@ _encode = msgspec.json.Encoder().encode
 class Channel(Protocol):
     """Destination of the events of a program."""
 
-    def event(self, name: str, encoded: bytes, number: int = 0, action: str = "", time: float = 0.0) -> None:
-        """Send an encoded event. `number`, `action` and `time` describe the call of an action, see ProgramEvent."""
+    def event(
+        self,
+        name: str,
+        encoded: bytes,
+        number: int = 0,
+        action: str = "",
+        time: float = 0.0,
+        device: str = "",
+        waited: float = 0.0,
+    ) -> None:
+        """Send an encoded event. The other arguments describe the call of an action, see ProgramEvent."""
 
     def changed(self, state: str) -> None:
         """Report that the program is running or paused."""
 
-    def action_over(self, number: int, duration: float, error: Message | None) -> None:
-        """Report the end of an action for which there is no event: it failed, or the project declares no actions."""
+    def action_over(self, number: int, duration: float, error: Message | None, waited: float) -> None:
+        """Report the end of an action for which there is no event: it failed, or the project declares no actions.
+
+        See ActionFailed.
+        """
 
 
 class Action:
     """One call of an action. `id` is None in a project that declares no actions."""
 
-    __slots__ = ("began", "id", "number")
+    __slots__ = ("began", "id", "number", "waited")
 
     def __init__(self, number: int, action_id: str | None) -> None:
         self.number = number
         self.id = action_id
         self.began = 0.0
+        self.waited = 0.0
 
 
 class Program:
@@ -152,10 +165,11 @@ class Program:
         """Replace the breakpoints that users share. The breakpoints given at the start remain."""
         self.gate.set_breakpoints(self.breakpoints | ids)
 
-    def action_begins(self, what: str, name: str | None, arguments: Sequence[Any]) -> Action:
+    def action_begins(self, device: str, what: str, name: str | None, arguments: Sequence[Any]) -> Action:
         """Report that an action starts, and wait while the program is paused.
 
         Args:
+            device: Id of the object.
             what: Device and method, for messages.
             name: Name of the action in the project.
             arguments: Values of the parameters.
@@ -182,27 +196,29 @@ class Program:
         )
         action = Action(next(self._numbers), action_id)
         encoded = _encode(Event("ActionStateBefore", data=data))
-        self.channel.event("ActionStateBefore", encoded, action.number, name or what, time.time())
+        self.channel.event("ActionStateBefore", encoded, action.number, name or what, time.time(), device)
+        announced = time.monotonic()
         self.gate.before(points if action_id is None else points | {action_id})
         action.began = time.monotonic()
+        action.waited = action.began - announced
         return action
 
     def action_ended(self, action: Action, value: Any) -> None:
         """Report the result of an action, then wait while the program is paused. Raises ProgramStopped."""
         duration = time.monotonic() - action.began
         if action.id is None:
-            self.channel.action_over(action.number, duration, None)
+            self.channel.action_over(action.number, duration, None, action.waited)
         else:
             data = ActionStateAfterData(action.id, results(value) or msgspec.UNSET)
             encoded = _encode(Event("ActionStateAfter", data=data))
-            self.channel.event("ActionStateAfter", encoded, action.number, time=duration)
+            self.channel.event("ActionStateAfter", encoded, action.number, time=duration, waited=action.waited)
         self.gate.after()
 
     def action_failed(self, action: Action, error: BaseException) -> None:
         """Report that an action has failed, then wait while the program is paused. Raises ProgramStopped."""
         self._failed = error, action
         duration = time.monotonic() - action.began
-        self.channel.action_over(action.number, duration, message_of(error))
+        self.channel.action_over(action.number, duration, message_of(error), action.waited)
         self.gate.after()
 
     def record_error_source(self, device: Device, error: BaseException) -> None:

@@ -60,7 +60,7 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
     def run(an: str | None, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
         keywords = with_present_names(bound, keywords)
         shown = _bind(bound, arguments, keywords) if keywords else arguments
-        action = program.action_begins(what, an, shown)
+        action = program.action_begins(device.id, what, an, shown)
         if an is not None:
             keywords["an"] = an
         try:

@@ -32,7 +32,7 @@ class _StdoutChannel:
             sys.stdout.write(encoded.decode() + "\n")
             sys.stdout.flush()
 
-    def action_over(self, number: int, duration: float, error: Message | None) -> None:
+    def action_over(self, number: int, duration: float, error: Message | None, waited: float) -> None:
         pass  # the protocol has no event for it
 
     def changed(self, state: str) -> None:

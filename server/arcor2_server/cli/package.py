@@ -1,18 +1,21 @@
-"""`arcor2-hw package`: list packages and past runs, and run a package while showing its progress."""
+"""`arcor2-hw package`: list packages, past runs and their traces, and run a package while showing its progress."""
 
 from datetime import datetime
+from pathlib import Path
 from typing import Annotated
 
 from cyclopts import App, Parameter
+from rich.markup import escape
 from rich.table import Table
 
 from arcor2_hw.client import RequestFailed
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.editor import Run
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
+from arcor2_hw.data.run_trace import RunTrace
 from arcor2_hw.exceptions import ConnectionLost, NotFound
 from arcor2_server.cli.exit_status import ExitStatus, fail
-from arcor2_server.cli.server_connection import HERE, Failed, Server, run
+from arcor2_server.cli.server_connection import HERE, Failed, Server, printable, run
 from arcor2_server.cli.tables import console
 
 app = App(name="package", help="List and run packages, and show past runs.")
@@ -81,6 +84,44 @@ def _show_runs(runs: list[Run]) -> None:
 
 def _seconds(start: str, end: str) -> float:
     return (datetime.fromisoformat(end) - datetime.fromisoformat(start)).total_seconds()
+
+
+@app.command(name="trace")
+def show_trace(
+    number: Annotated[int, Parameter(help="Number of the run, see `arcor2-hw package runs`.")],
+    *,
+    output: Annotated[
+        Path | None,
+        Parameter(name=["--output", "-o"], help="Write a file that chrome://tracing and ui.perfetto.dev open."),
+    ] = None,
+    server: Server = HERE,
+) -> int:
+    """Show when each device executed which action in a run, or write it to a file for a trace viewer."""
+
+    async def work() -> None:
+        async with server.rest() as rest:
+            if output is None:
+                _show_trace(await rest.run_trace(number))
+            else:
+                await rest.chrome_trace(number, output)
+
+    return run("package trace", work)
+
+
+def _show_trace(trace: RunTrace) -> None:
+    end = max((span.start + span.duration for span in trace.spans), default=0.0)
+    names = {device.id: device.name for device in trace.devices}
+    out = console()
+    table = Table("start", "duration", "device", "action", "branch", "error", box=None, pad_edge=False)
+    for span in trace.spans:
+        texts = (names[span.device], span.name, span.branch or "", span.error or "")
+        table.add_row(f"{span.start:.3f} s", f"{span.duration:.3f} s", *(escape(printable(text)) for text in texts))
+    out.print(table if trace.spans else "The run has executed no actions.")
+    for device in sorted(trace.devices, key=lambda one: -one.busy):
+        busy = f"{device.busy:.3f} s, {device.busy / end:.0%}" if end else f"{device.busy:.3f} s"
+        out.print(f"[dim]{escape(printable(device.name))}: busy {busy}[/dim]")
+    if trace.omitted:
+        out.print(f"[dim]The first {trace.omitted} actions are not stored.[/dim]")
 
 
 @app.command(name="run")

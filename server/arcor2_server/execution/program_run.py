@@ -69,9 +69,13 @@ class ProgramRun:
             log.warning("run not described", package=self.package_id, reason=str(error))
 
     def collect_statistics(self, info: PackageInfoData, verdicts: Set[str]) -> None:
-        """Start to collect statistics. `verdicts`: ids of the actions whose result says that a part is good."""
+        """Start to collect statistics, and name the devices of the trace.
+
+        `verdicts`: ids of the actions whose result says that a part is good.
+        """
         self._statistics = RunStatisticsCollector(info, verdicts)
         self._runs.set_statistics(self._number, self._statistics.statistics())
+        self._runs.collect_spans(self._number, info)
 
     def handle_paused(self) -> None:
         """Handle that the program is paused."""

@@ -1,4 +1,4 @@
-"""The history of runs, and the trace of the actions of the present or last run."""
+"""The history of runs and their traces, and the actions of the present or last run with parameters and results."""
 
 import asyncio
 from collections import OrderedDict
@@ -14,12 +14,14 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset, now
 from arcor2_hw.data.editor import ActionOfRun, Run, RunEnd, RunStatistics, RunStatisticsData, TraceEntry
-from arcor2_hw.data.events import ActionStateAfterData, ActionStateBeforeData
+from arcor2_hw.data.events import ActionStateAfterData, ActionStateBeforeData, PackageInfoData
 from arcor2_hw.data.rpc import ListRunsArgs
-from arcor2_hw.exceptions import StorageError
+from arcor2_hw.data.run_trace import RunTrace
+from arcor2_hw.exceptions import NotFound, StorageError
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.events import EventHub, make_event
+from arcor2_server.execution.run_trace import RunTraceCollector
 from arcor2_server.storage.shared_data import SharedData
 
 log = structlog.get_logger(__name__)
@@ -98,6 +100,8 @@ class Runs:
         self._data: SharedData | None = None
         self._writing: asyncio.Task[None] | None = None
         self._unwritten: dict[int, Run] = {}
+        self._unwritten_traces: dict[int, RunTrace] = {}
+        self._spans = RunTraceCollector()
         self._trace: OrderedDict[int, _Call] = OrderedDict()
         self._trace_of = 0
 
@@ -137,6 +141,7 @@ class Runs:
         )
         self._trace.clear()
         self._trace_of = number
+        self._spans = RunTraceCollector(number)
         self._put(run)
         return number
 
@@ -145,12 +150,19 @@ class Runs:
         if (run := self._runs.get(number)) is not None:
             self._put(replace(run, **values))
 
+    def collect_spans(self, number: int, info: PackageInfoData) -> None:
+        """Set the scene and project of the package of the present run, whose trace names devices and branches."""
+        if number == self._spans.run:
+            self._spans.describe(info)
+
     def end(
         self, number: int, end: RunEnd, *, error: Message | None = None, error_type: str = "", stopped_by: str = ""
     ) -> None:
         """Store the end of a run."""
         if (run := self._runs.get(number)) is None:
             return
+        if number == self._spans.run and self._data is not None:
+            self._unwritten_traces[number] = self._spans.trace()
         last: ActionOfRun | Any = UNSET
         if self._trace_of == number and self._trace:
             entry = next(reversed(self._trace.values())).entry(number)
@@ -183,6 +195,7 @@ class Runs:
         if announced.event != "ActionStateBefore":
             self.ended(announced)
             return
+        self._spans.started(announced)
         call = self._trace[announced.number] = _Call(announced)
         if len(self._trace) > MAX_ACTIONS:
             self._trace.popitem(last=False)
@@ -190,6 +203,12 @@ class Runs:
 
     def ended(self, announced: m.ProgramEvent | m.ActionFailed) -> None:
         """Handle the end (ActionStateAfter) or failure of an action of the present run."""
+        match announced:
+            case m.ProgramEvent():
+                self._spans.ended(announced.number, announced.time, announced.waited)
+            case m.ActionFailed():
+                error = UNSET if announced.error is None else announced.error.text
+                self._spans.ended(announced.number, announced.duration, announced.waited, error)
         if (call := self._trace.get(announced.number)) is not None:
             call.end = announced
             self._publish(call)
@@ -215,6 +234,22 @@ class Runs:
         calls = (call for number, call in reversed(self._trace.items()) if before is None or number < before)
         return self._trace_of, [call.entry(self._trace_of) for call in islice(calls, limit)]
 
+    async def run_trace(self, number: int) -> RunTrace:
+        """Return the trace of a run, during the run that of the actions that have ended.
+
+        Raises:
+            NotFound: there is no such run, or an older server did not store its trace.
+            StorageError: the trace cannot be read.
+        """
+        if number == self._spans.run:
+            return self._spans.trace()
+        stored = self._unwritten_traces.get(number)
+        if stored is None and self._data is not None:
+            stored = await self._data.run_trace(number)
+        if number not in self._runs or stored is None:
+            raise NotFound("There is no trace of run {number}.", number=number)
+        return stored
+
     # -------------------------------------------------------------------------------- storage
     def _with_action_count(self, run: Run) -> Run:
         if run.end is RunEnd.RUNNING and run.number == self._trace_of and self._trace:
@@ -237,6 +272,11 @@ class Runs:
             while self._unwritten:
                 run = self._unwritten.pop(next(iter(self._unwritten)))
                 await data.put_run(run, next(iter(self._runs)))
+                if (trace := self._unwritten_traces.get(run.number)) is not None:
+                    try:
+                        await data.put_run_trace(trace)
+                    finally:
+                        del self._unwritten_traces[run.number]
         except StorageError as error:
             log.warning("run not stored", reason=str(error))
         finally:

@@ -132,6 +132,15 @@ class RunRow(Base):
     document: Mapped[bytes] = mapped_column(LargeBinary)
 
 
+class RunTraceRow(Base):
+    """The trace of one run, as JSON compressed by zlib."""
+
+    __tablename__ = "run_trace"
+
+    run: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=False)
+    document: Mapped[bytes] = mapped_column(LargeBinary)
+
+
 class CalibrationRow(Base):
     """The record of one calibration, as JSON."""
 

@@ -1,5 +1,7 @@
 """Stores view values, shared breakpoints and the history of runs in the database."""
 
+import asyncio
+import zlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -7,7 +9,9 @@ import msgspec
 from sqlalchemy import delete, func, select
 
 from arcor2_hw.data.editor import Run
-from arcor2_server.storage.models import RunRow, SharedBreakpointsRow, ViewValueRow
+from arcor2_hw.data.run_trace import RunTrace
+from arcor2_hw.exceptions import StorageError
+from arcor2_server.storage.models import RunRow, RunTraceRow, SharedBreakpointsRow, ViewValueRow
 from arcor2_server.storage.store import Storage
 
 
@@ -89,6 +93,27 @@ class SharedData:
         async with self._storage.writing(documents=False) as session:
             await session.merge(RunRow(number=run.number, document=msgspec.json.encode(run)))
             await session.execute(delete(RunRow).where(RunRow.number < oldest))
+            await session.execute(delete(RunTraceRow).where(RunTraceRow.run < oldest))
+
+    async def run_trace(self, run: int) -> RunTrace | None:
+        """Return the trace of a run, None if there is none."""
+        async with self._storage.reading() as session:
+            row = await session.get(RunTraceRow, run)
+            document = None if row is None else row.document
+        return None if document is None else await asyncio.to_thread(_trace, document)
+
+    async def put_run_trace(self, trace: RunTrace) -> None:
+        """Store the trace of a run."""
+        document = await asyncio.to_thread(lambda: zlib.compress(msgspec.json.encode(trace)))
+        async with self._storage.writing(documents=False) as session:
+            await session.merge(RunTraceRow(run=trace.run, document=document))
+
+
+def _trace(document: bytes) -> RunTrace:
+    try:
+        return msgspec.json.decode(zlib.decompress(document), type=RunTrace)
+    except (msgspec.MsgspecError, zlib.error) as error:
+        raise StorageError("The trace of the run cannot be read: {reason}.", reason=error) from error
 
 
 def _run(document: Any) -> Run | None:

@@ -10,7 +10,7 @@ import pytest
 from arcor2_hw.data.editor import Run, RunEnd, TraceEntry
 from arcor2_hw.data.rpc import ListRunsArgs
 from arcor2_hw.data.scene import Scene
-from arcor2_hw.exceptions import ConnectionLost
+from arcor2_hw.exceptions import ConnectionLost, NotFound
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.execution import runs
@@ -210,6 +210,7 @@ async def test_the_newest_runs_and_actions_are_stored(tmp_path: Any, monkeypatch
         _, entries = history.trace(100)
         assert [entry.number for entry in entries] == [5, 4, 3]
         assert entries[0] == TraceEntry(8, 5, "act", entries[0].started, "a", duration=0.1, results=["1"], thread_id=7)
+        assert len((await history.run_trace(8)).spans) == 5
         history.ended(m.ActionFailed(1, 0.1))  # no longer stored
         await history.close()
         again = Runs(Hub())
@@ -220,6 +221,15 @@ async def test_the_newest_runs_and_actions_are_stored(tmp_path: Any, monkeypatch
             (7, "failed"),
             *((number, "finished") for number in (6, 5, 4)),
         ]
+        stored = await again.run_trace(7)
+        assert ([span.number for span in stored.spans], stored.spans[4].duration, stored.spans[4].thread_id) == (
+            [1, 2, 3, 4, 5],
+            0.1,
+            7,
+        )
+        for missing in (3, 8, 9):  # too old, lost, none
+            with pytest.raises(NotFound):
+                await again.run_trace(missing)
         failed = again.find(ListRunsArgs(limit=100))[1]
         assert (failed.error, failed.key, failed.values) == (LOST.text, LOST.key, LOST.values)
         assert again.begin("pkg", by="", temporary=False, start_paused=False) == 9

@@ -2,9 +2,11 @@
 
 import asyncio
 import io
+import json
 import os
 import time
 import zipfile
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -201,7 +203,7 @@ def zipped(files: dict[str, bytes]) -> bytes:
     return buffer.getvalue()
 
 
-async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess) -> None:
+async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess, tmp_path: Path) -> None:
     async with httpx.AsyncClient(timeout=60, base_url=base(server)) as http:
         await prepare(http)
         granted(await http.post("/packages/pkg_r", files=as_file(await published(http))))
@@ -251,6 +253,27 @@ async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess
         assert older[0]["actions"] >= 1
         assert granted(await http.get("/api/runs", params={"projectId": "pro_none"})) == []
         refused(await http.get("/api/runs", params={"limit": 501}), 400, "Argument", "limit")
+        # When each device executed which action.
+        path = f"/api/runs/{older[0]['number']}"
+        trace = granted(await http.get(path + "/trace"))
+        span = trace["spans"][0]
+        assert (span["action_id"], span["start"], trace["omitted"]) == ("act_1", 0, 0)
+        (device,) = trace["devices"]
+        assert (device["id"], device["busy"]) == (
+            span["device"],
+            pytest.approx(sum(one["duration"] for one in trace["spans"])),
+        )
+        exported = await http.get(path + "/chrome-trace")
+        assert "attachment" in exported.headers["Content-Disposition"]
+        assert span["name"] in [event["name"] for event in exported.json()["traceEvents"]]
+        for unknown in ("0", "-1", "x", "9" * 30):
+            refused(await http.get(f"/api/runs/{unknown}/trace"), 404, "NotFound")
+    printed = await package_command(server, "trace", str(older[0]["number"]))
+    assert span["name"] in printed[1]
+    assert "busy" in printed[-1]
+    file = tmp_path / "run.json"
+    assert await package_command(server, "trace", str(older[0]["number"]), "--output", str(file)) == []
+    assert json.loads(file.read_bytes()) == exported.json()
     newest, older, *_ = (await package_command(server, "runs", "pkg_r"))[1:]
     assert "failed" in newest
     assert "acp_nowhere" in newest

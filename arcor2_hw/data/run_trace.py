@@ -1,0 +1,94 @@
+"""The trace of a run: when each device executed which action, also as a Chrome trace."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from msgspec import UNSET, field
+
+from arcor2_hw.data.base import Data, Timestamp, Unset
+
+
+class Span(Data, frozen=True):
+    """One executed action.
+
+    number: number of the action in the run from 1, in the order of their start. device: id of the object. start: since
+    the first action of the run, s. duration: s. branch: value of the condition after which the action followed the one
+    before it, as JSON; omitted without a condition. error: why the action failed. thread_id: omitted in the main thread
+    of the script.
+    """
+
+    number: int
+    action_id: str
+    name: str
+    device: str
+    start: float
+    duration: float
+    branch: str | Unset = UNSET
+    error: str | Unset = UNSET
+    thread_id: int | Unset = UNSET
+
+
+class TracedDevice(Data, frozen=True):
+    """A device of a trace. busy: sum of the durations of its actions, s."""
+
+    id: str
+    name: str
+    busy: float
+
+
+class RunTrace(Data, frozen=True):
+    """The executed actions of a run in the order of their start, and their devices in the order of their first action.
+
+    started: start of the first action. omitted: number of actions at the start of a long run that are not stored.
+    """
+
+    run: int
+    started: Timestamp | Unset = UNSET
+    devices: list[TracedDevice] = field(default_factory=list)
+    spans: list[Span] = field(default_factory=list)
+    omitted: int = 0
+
+
+def chrome_trace(name: str, devices: Sequence[TracedDevice], spans: Sequence[Span]) -> dict[str, Any]:
+    """Return spans in the Trace Event Format, which chrome://tracing and Perfetto open. Each device is a thread.
+
+    Spans of a device that overlap, because a script uses several threads, are shown in further rows of the device.
+
+    Args:
+        name: Name of the process in the viewer.
+        devices: The devices, in the order of the rows.
+        spans: The spans, in the order of their start.
+    """
+    names = {device.id: device.name for device in devices}
+    rows: dict[str, list[tuple[int, float]]] = {device.id: [] for device in devices}
+    events: list[dict[str, Any]] = []
+    titles: list[tuple[int, str]] = []
+    for span in spans:
+        of_device = rows.setdefault(span.device, [])
+        end = span.start + span.duration
+        row = next((row for row, (_, busy_until) in enumerate(of_device) if busy_until <= span.start + 1e-6), None)
+        if row is None:
+            row = len(of_device)
+            title = names.get(span.device, span.device)
+            titles.append((len(titles) + 1, title if row == 0 else f"{title} ({row + 1})"))
+            of_device.append((titles[-1][0], end))
+        thread = of_device[row][0]
+        of_device[row] = (thread, end)
+        details = {"number": span.number, "action_id": span.action_id, "branch": span.branch, "error": span.error}
+        events.append(
+            {
+                "ph": "X",
+                "cat": "action",
+                "name": span.name,
+                "pid": 1,
+                "tid": thread,
+                "ts": round(span.start * 1e6),
+                "dur": round(span.duration * 1e6),
+                "args": {key: value for key, value in details.items() if not isinstance(value, Unset)},
+            }
+        )
+    process = {"ph": "M", "name": "process_name", "pid": 1, "tid": 0, "args": {"name": name}}
+    threads = [
+        {"ph": "M", "name": "thread_name", "pid": 1, "tid": thread, "args": {"name": title}} for thread, title in titles
+    ]
+    return {"traceEvents": [process, *threads, *events], "displayTimeUnit": "ms"}

@@ -1,0 +1,103 @@
+"""Collects the trace of a run from the events of its actions."""
+
+from collections import deque
+from datetime import UTC, datetime
+from typing import Final
+
+import msgspec
+from msgspec import UNSET, Struct
+
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.events import PackageInfoData
+from arcor2_hw.data.run_trace import RunTrace, Span, TracedDevice
+from arcor2_hw.runtime import messages as m
+
+MAX_SPANS: Final = 10_000
+"""Maximum number of stored actions of a run."""
+
+
+class _Data(Struct):
+    action_id: str | Unset = UNSET
+    thread_id: int | Unset = UNSET
+
+
+class _Before(Struct):
+    data: _Data
+
+
+class RunTraceCollector:
+    """Collects the trace of one run; the oldest actions of a long run are dropped."""
+
+    def __init__(self, run: int = 0) -> None:
+        self.run = run
+        self._running: dict[int, m.ProgramEvent] = {}
+        self._spans: deque[Span] = deque(maxlen=MAX_SPANS)
+        self._began: float | None = None
+        self._ended = 0
+        self._names: dict[str, str] = {}
+        self._branches: dict[tuple[str, str], str] = {}
+        self._last: dict[int | Unset, str] = {}
+        """The id of the last action of each thread."""
+
+    def describe(self, info: PackageInfoData) -> None:
+        """Set the scene and project of the running package."""
+        self._names = {each.id: each.name for each in info.scene.objects}
+        self._branches = {
+            (item.start, item.end): item.condition.value
+            for item in info.project.logic
+            if not isinstance(item.condition, Unset)
+        }
+
+    def started(self, announced: m.ProgramEvent) -> None:
+        """Handle the start of an action."""
+        self._running[announced.number] = announced
+
+    def ended(self, number: int, duration: float, waited: float, error: str | Unset = UNSET) -> None:
+        """Handle the end of an action.
+
+        Args:
+            number: the number of the action in the run.
+            duration: the duration, s.
+            waited: the time between announcement and start, s, for which the program was paused.
+            error: why it failed.
+        """
+        before = self._running.pop(number, None)
+        if before is None:
+            return
+        data = msgspec.json.decode(before.encoded, type=_Before).data
+        action_id = "" if isinstance(data.action_id, Unset) else data.action_id
+        start = before.time + waited
+        if self._began is None:
+            self._began = start
+        branch = self._branches.get((self._last.get(data.thread_id, ""), action_id), UNSET)
+        self._last[data.thread_id] = action_id
+        self._ended += 1
+        self._spans.append(
+            Span(
+                number,
+                action_id,
+                before.name,
+                before.device,
+                round(start - self._began, 6),
+                round(duration, 6),
+                branch,
+                error,
+                data.thread_id,
+            )
+        )
+
+    def trace(self) -> RunTrace:
+        """Return the trace of the actions that have ended so far."""
+        if self._began is None:
+            return RunTrace(self.run)
+        busy: dict[str, float] = {}
+        spans = sorted(self._spans, key=lambda span: span.number)
+        for span in spans:
+            busy[span.device] = busy.get(span.device, 0.0) + span.duration
+        return RunTrace(
+            self.run,
+            datetime.fromtimestamp(self._began, UTC).isoformat(timespec="microseconds"),
+            [TracedDevice(key, self._names.get(key, key), round(sum_, 6)) for key, sum_ in busy.items()],
+            spans,
+            self._ended - len(spans),
+        )
