@@ -2,7 +2,7 @@
 
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 from cyclopts import App, Parameter
 from rich.markup import escape
@@ -13,10 +13,14 @@ from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.editor import Run
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.data.run_trace import RunTrace
+from arcor2_hw.data.trace_comparison import compare, summarize
 from arcor2_hw.exceptions import ConnectionLost, NotFound
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.cli.server_connection import HERE, Failed, Server, printable, run
 from arcor2_server.cli.tables import console
+
+LONGEST_WAITS: Final = 3
+"""Number of waits shown with a trace, longest first."""
 
 app = App(name="package", help="List and run packages, and show past runs.")
 
@@ -109,7 +113,7 @@ def show_trace(
 
 
 def _show_trace(trace: RunTrace) -> None:
-    end = max((span.start + span.duration for span in trace.spans), default=0.0)
+    times = summarize(trace)
     names = {device.id: device.name for device in trace.devices}
     out = console()
     table = Table("start", "duration", "device", "action", "branch", "error", box=None, pad_edge=False)
@@ -117,11 +121,52 @@ def _show_trace(trace: RunTrace) -> None:
         texts = (names[span.device], span.name, span.branch or "", span.error or "")
         table.add_row(f"{span.start:.3f} s", f"{span.duration:.3f} s", *(escape(printable(text)) for text in texts))
     out.print(table if trace.spans else "The run has executed no actions.")
-    for device in sorted(trace.devices, key=lambda one: -one.busy):
-        busy = f"{device.busy:.3f} s, {device.busy / end:.0%}" if end else f"{device.busy:.3f} s"
-        out.print(f"[dim]{escape(printable(device.name))}: busy {busy}[/dim]")
+    out.print(f"cycle: {times.cycle:.3f} s, {times.cycles} complete; all: {times.whole:.3f} s")
+    for device in times.devices:
+        out.print(f"{escape(printable(device.name))}: busy {device.busy:.3f} s, {device.share:.0%}")
+    for wait in times.waits[:LONGEST_WAITS]:
+        out.print(f"wait of {wait.duration:.3f} s at {wait.start:.3f} s, before {escape(printable(wait.before))}")
     if trace.omitted:
-        out.print(f"[dim]The first {trace.omitted} actions are not stored.[/dim]")
+        out.print(f"The first {trace.omitted} actions are not stored.")
+
+
+@app.command(name="compare")
+def compare_runs(
+    first: Annotated[int, Parameter(help="Number of a run, see `arcor2-hw package runs`.")],
+    second: Annotated[int, Parameter(help="Number of the run to compare it with.")],
+    *,
+    server: Server = HERE,
+) -> int:
+    """Compare two runs action by action: how long each action, a cycle and the devices took."""
+
+    async def work() -> None:
+        async with server.rest() as rest:
+            _show_comparison(await rest.run_trace(first), await rest.run_trace(second))
+
+    return run("package compare", work)
+
+
+def _show_comparison(first: RunTrace, second: RunTrace) -> None:
+    old, new = summarize(first), summarize(second)
+    names = {device.id: device.name for device in (*first.devices, *second.devices)}
+    out = console()
+    table = Table("device", "action", f"run {first.run}", f"run {second.run}", "difference", box=None, pad_edge=False)
+    for one in compare(old, new):
+        difference = one.difference
+        table.add_row(
+            escape(printable(names[one.device])),
+            escape(printable(one.name)),
+            *("" if isinstance(value, Unset) else f"{value:.3f} s" for value in (one.first, one.second)),
+            "" if difference is None else f"{difference:+.3f} s",
+        )
+    out.print(table)
+    out.print(f"cycle: {old.cycle:.3f} s, {new.cycle:.3f} s, {new.cycle - old.cycle:+.3f} s")
+    shares = {device.id: f"{device.share:.0%}" for device in old.devices}
+    for device in new.devices:
+        before = shares.pop(device.id, "-")
+        out.print(f"{escape(printable(device.name))}: busy {before}, {device.share:.0%}")
+    for key, before in shares.items():
+        out.print(f"{escape(printable(names[key]))}: busy {before}, -")
 
 
 @app.command(name="run")

@@ -270,7 +270,11 @@ async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess
             refused(await http.get(f"/api/runs/{unknown}/trace"), 404, "NotFound")
     printed = await package_command(server, "trace", str(older[0]["number"]))
     assert span["name"] in printed[1]
-    assert "busy" in printed[-1]
+    assert any(line.startswith("cycle: ") for line in printed)
+    assert any(f"{device['name']}: busy" in line for line in printed)
+    compared = await package_command(server, "compare", str(older[0]["number"]), str(older[0]["number"]))
+    assert span["name"] in compared[1]
+    assert "+0.000 s" in compared[1]
     file = tmp_path / "run.json"
     assert await package_command(server, "trace", str(older[0]["number"]), "--output", str(file)) == []
     assert json.loads(file.read_bytes()) == exported.json()

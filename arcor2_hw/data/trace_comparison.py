@@ -1,0 +1,137 @@
+"""What the trace of a run says about its time: cycle time, bottleneck and waits; and the comparison of two runs."""
+
+import itertools
+import statistics
+from collections.abc import Sequence
+
+from msgspec import UNSET
+
+from arcor2_hw.data.base import Data, Unset
+from arcor2_hw.data.run_trace import RunTrace, Span, TracedDevice
+
+
+class DeviceTimes(Data, frozen=True):
+    """A device in a run. busy: time during which it executed actions, s. share: `busy` divided by the whole time."""
+
+    id: str
+    name: str
+    busy: float
+    share: float
+
+
+class ActionTimes(Data, frozen=True):
+    """An action in a run. median: of its durations, s. total: sum of its durations, s."""
+
+    action_id: str
+    name: str
+    device: str
+    count: int
+    median: float
+    total: float
+
+
+class Wait(Data, frozen=True):
+    """A time in which no device executed an action; `before` is the name of the action after it."""
+
+    before: str
+    start: float
+    duration: float
+
+
+class TraceSummary(Data, frozen=True):
+    """The times of a run, s.
+
+    whole: from the start of the first action to the end of the last one. cycles: number of complete cycles; a cycle
+    lasts from the start of the first action to its next start. cycle: median of their durations; without a complete
+    cycle, the whole time. devices: the bottleneck, which is busy for the largest share, first. waits: longest first.
+    """
+
+    whole: float
+    cycles: int
+    cycle: float
+    devices: list[DeviceTimes]
+    actions: list[ActionTimes]
+    waits: list[Wait]
+
+
+class ActionDifference(Data, frozen=True):
+    """The median durations of an action in two runs, s; omitted where a run did not execute it."""
+
+    name: str
+    device: str
+    first: float | Unset = UNSET
+    second: float | Unset = UNSET
+
+    @property
+    def difference(self) -> float | None:
+        """Return by how much the action took longer in the second run, s; None if one run did not execute it."""
+        return None if isinstance(self.first, Unset) or isinstance(self.second, Unset) else self.second - self.first
+
+
+def covered(spans: Sequence[Span]) -> list[tuple[float, float]]:
+    """Return start and end of the times in which at least one of the spans was running, in their order."""
+    found: list[tuple[float, float]] = []
+    for span in sorted(spans, key=lambda one: one.start):
+        start, end = span.start, span.start + span.duration
+        if found and start <= found[-1][1]:
+            found[-1] = found[-1][0], max(found[-1][1], end)
+        else:
+            found.append((start, end))
+    return found
+
+
+def summarize(trace: RunTrace) -> TraceSummary:
+    """Return the times of a run. Overlapping actions of a device, from several threads, count once."""
+    spans = sorted(trace.spans, key=lambda span: span.start)
+    if not spans:
+        return TraceSummary(0.0, 0, 0.0, [], [], [])
+    begin = spans[0].start
+    whole = max(span.start + span.duration for span in spans) - begin
+    starts = [span.start for span in spans if _key(span) == _key(spans[0])]
+    cycles = [after - before for before, after in itertools.pairwise(starts)]
+    devices = [_times(device, spans, whole) for device in trace.devices]
+    by_action: dict[tuple[str, str], list[Span]] = {}
+    for span in spans:
+        by_action.setdefault(_key(span), []).append(span)
+    names = {span.start: span.name for span in reversed(spans)}
+    waits = [
+        Wait(names[after], before, after - before) for (_, before), (after, _) in itertools.pairwise(covered(spans))
+    ]
+    return TraceSummary(
+        whole,
+        len(cycles),
+        statistics.median(cycles) if cycles else whole,
+        sorted(devices, key=lambda device: -device.busy),
+        [_action_times(same) for same in by_action.values()],
+        sorted(waits, key=lambda wait: -wait.duration),
+    )
+
+
+def _key(action: Span | ActionTimes) -> tuple[str, str]:
+    """Return what identifies an action: its id, or its device and name in a script without declared actions."""
+    return (action.action_id, "") if action.action_id else (action.device, action.name)
+
+
+def _times(device: TracedDevice, spans: Sequence[Span], whole: float) -> DeviceTimes:
+    busy = sum(end - start for start, end in covered([span for span in spans if span.device == device.id]))
+    return DeviceTimes(device.id, device.name, busy, busy / whole if whole > 0.0 else 0.0)
+
+
+def _action_times(same: Sequence[Span]) -> ActionTimes:
+    durations = [span.duration for span in same]
+    last = same[-1]
+    return ActionTimes(last.action_id, last.name, last.device, len(same), statistics.median(durations), sum(durations))
+
+
+def compare(first: TraceSummary, second: TraceSummary) -> list[ActionDifference]:
+    """Return the actions of two runs side by side, in the order of the second run; removed actions come last.
+
+    An action that was renamed is the same. Actions of a script without declared actions are compared by device and
+    name.
+    """
+    before = {_key(action): action for action in first.actions}
+    found = []
+    for action in second.actions:
+        old = before.pop(_key(action), None)
+        found.append(ActionDifference(action.name, action.device, UNSET if old is None else old.median, action.median))
+    return found + [ActionDifference(old.name, old.device, old.median) for old in before.values()]
