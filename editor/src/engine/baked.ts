@@ -79,35 +79,82 @@ varying vec3 vShade;
 void main() { gl_FragColor = vec4( vShade, opacity ); }`,
 };
 
-/** Squares that face the camera and show a sphere: the normal contains the corner and the half edge, m. */
-const DISCS = {
-  vertexShader: `
+/**
+ * Squares that face the camera and show a sphere: the normal contains the corner and the half edge, m. They are lit at
+ * their corners, because lighting every pixel takes most of the time.
+ */
+const SQUARES = `
 #include <common>
 #include <color_pars_vertex>
-varying vec3 vPlace;
-void main() {
-  #include <color_vertex>
+${LIT}
+varying vec2 vPlace;
+varying vec3 vShade;
+vec4 square() {
   vec4 middle = modelViewMatrix * vec4( position, 1.0 );
-  vPlace = vec3( normal.xy, - middle.z );
+  vPlace = normal.xy;
   middle.xy += normal.xy * normal.z;
   gl_Position = projectionMatrix * middle;
+  return middle;
+}`;
+const DISCS = {
+  vertexShader: `
+${SQUARES}
+void main() {
+  #include <color_vertex>
+  float far = - square().z;
+  vShade = lit( OWN, vec3( 0.6 * normal.xy, 0.53 ), far );
 }`,
   fragmentShader: `
-#include <color_pars_fragment>
-${LIT}
-varying vec3 vPlace;
+varying vec2 vPlace;
+varying vec3 vShade;
 void main() {
-  float off = dot( vPlace.xy, vPlace.xy );
-  if ( off > 1.0 ) discard;
-  gl_FragColor = vec4( lit( OWN, vec3( vPlace.xy, sqrt( 1.0 - off ) ), vPlace.z ), 1.0 );
+  if ( dot( vPlace, vPlace ) > 1.0 ) discard;
+  gl_FragColor = vec4( vShade, 1.0 );
 }`,
 };
 
-/** Make a diffuse material cheap to draw: as it is, or as spheres on squares. */
-export function cheapen(material: MeshLambertMaterial, discs = false): void {
-  const shaders = discs ? DISCS : CORNERS;
-  material.onBeforeCompile = (shader) => void Object.assign(shader, shaders);
-  material.customProgramCacheKey = () => (discs ? "discs" : "corners");
+/** The same for upright pucks: the squares show the upper side, an ellipse, and the edge below it. */
+const PUCKS = {
+  vertexShader: `
+${SQUARES}
+varying vec3 vUpper;
+varying vec3 vUp;
+void main() {
+  #include <color_vertex>
+  float far = - square().z;
+  vUp = ( viewMatrix * vec4( 0.0, 0.0, 1.0, 0.0 ) ).xyz;
+  if ( vUp.z < 0.0 ) vUp = - vUp;
+  vUpper = lit( OWN, vUp, far );
+  vShade = lit( OWN, vec3( 0.7 * normal.x, - 0.7 * vUp.z, 0.7 * length( vUp.xy ) ), far );
+}`,
+  fragmentShader: `
+varying vec2 vPlace;
+varying vec3 vShade;
+varying vec3 vUpper;
+varying vec3 vUp;
+void main() {
+  float tilt = max( length( vUp.xy ), 1e-4 );
+  vec2 way = vUp.xy / tilt;
+  float across = vPlace.x * way.y - vPlace.y * way.x, along = dot( vPlace, way );
+  float front = vUp.z * sqrt( max( 0.0, 1.0 - across * across ) ), edge = tilt * FLAT;
+  if ( abs( along ) > edge + front ) discard;
+  gl_FragColor = vec4( along > edge - front ? vUpper : vShade, 1.0 );
+}`,
+};
+
+/** What instances are drawn as: their geometry, or squares that show a sphere or an upright puck. */
+export type Drawn = "corners" | "discs" | "pucks";
+const SHADERS: Record<Drawn, { vertexShader: string; fragmentShader: string }> = {
+  corners: CORNERS,
+  discs: DISCS,
+  pucks: PUCKS,
+};
+
+/** Make a diffuse material cheap to draw. `flat` is half the thickness of a puck in radii. */
+export function cheapen(material: MeshLambertMaterial, drawn: Drawn = "corners", flat = 0): void {
+  material.onBeforeCompile = (shader) => void Object.assign(shader, SHADERS[drawn]);
+  material.customProgramCacheKey = () => drawn;
+  if (flat) material.defines = { ...material.defines, FLAT: flat.toFixed(4) };
 }
 
 export interface Instance {
@@ -130,16 +177,17 @@ export class Baked {
   private room = 0;
 
   /**
-   * Draw `shape` at every instance, in a material with vertex colours; spheres with a radius of `ball`, m, if it is
-   * not 0, as squares facing the camera.
+   * Draw `shape` at every instance, in a material with vertex colours; spheres or pucks with a radius of `ball`, m, if
+   * it is not 0, as squares facing the camera. `flat` is half the thickness of a puck in radii, 0 for spheres.
    */
   constructor(
     private readonly scene: Scene,
     private readonly shape: BufferGeometry,
     private readonly ball: number,
     private readonly material: MeshLambertMaterial,
+    flat = 0,
   ) {
-    cheapen(this.material, ball > 0);
+    cheapen(this.material, ball > 0 ? (flat > 0 ? "pucks" : "discs") : "corners", flat);
     this.mesh = new Mesh(new BufferGeometry(), this.material);
     this.mesh.frustumCulled = false;
     this.mesh.raycast = () => {};

@@ -37,7 +37,7 @@ function hit(scene: Scene, x: number): string | undefined {
 
 test("spheres drawn as squares keep position and size and are picked as spheres", () => {
   const scene = new Scene();
-  const batches = new Batches(scene, baked);
+  const batches = new Batches(scene, baked, () => {});
   const batch = batches.of("ball", () => [new SphereGeometry(0.1, 8, 6), new MeshLambertMaterial()], 0.1);
   const [one, other] = [instance("one", 1), instance("other", 2, 3)];
   batch.add(one);
@@ -58,7 +58,7 @@ test("spheres drawn as squares keep position and size and are picked as spheres"
 
 test("shapes are merged at their poses, also beyond the reserved space", () => {
   const scene = new Scene();
-  const batches = new Batches(scene, baked);
+  const batches = new Batches(scene, baked, () => {});
   const shape = new SphereGeometry(0.1, 8, 6);
   const batch = batches.of("shape", () => [shape, new MeshLambertMaterial()]);
   batch.add(instance("0", 0));

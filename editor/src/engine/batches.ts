@@ -88,17 +88,21 @@ export class Batches {
   constructor(
     private readonly scene: Scene,
     private readonly low: LowQuality | null,
+    draw: () => void,
   ) {
-    this.links = new LinkLines(scene);
+    this.links = new LinkLines(scene, draw);
   }
 
-  /** At low quality, spheres with a radius of `ball`, m, are drawn as squares. */
-  of(name: string, make: () => [BufferGeometry, Material], ball = 0): Batch {
+  /**
+   * At low quality, spheres with a radius of `ball`, m, are drawn as squares, and so are upright pucks, whose half
+   * thickness in radii is `flat`.
+   */
+  of(name: string, make: () => [BufferGeometry, Material], ball = 0, flat = 0): Batch {
     let batch = this.byName.get(name);
     if (!batch) {
       const [geometry, material] = make();
       const painted = () => new MeshLambertMaterial({ vertexColors: true });
-      const baked = this.low && new this.low.Baked(this.scene, geometry, ball, painted());
+      const baked = this.low && new this.low.Baked(this.scene, geometry, ball, painted(), flat);
       batch = new Batch(this.scene, geometry, material, baked);
       this.byName.set(name, batch);
     }

@@ -94,7 +94,7 @@ export class Engine {
     this.requests = new Frames(PERIODS[quality], quality === "low", (seconds) => this.frame(seconds));
     this.view = new View(canvas, () => this.draw());
     this.fitting = new Fitting(this.view, this.things);
-    this.batches = new Batches(this.scene, low);
+    this.batches = new Batches(this.scene, low, () => this.draw());
     this.labels = new Labels(options.labels, () => this.draw());
     this.animation = new Animation(
       quality,
@@ -326,6 +326,7 @@ export class Engine {
     this.width = Math.max(1, host.clientWidth);
     this.height = Math.max(1, host.clientHeight);
     this.resolution.resize(this.width, this.height);
+    this.batches.links.height = this.height;
     this.view.resize(this.width, this.height);
     if (this.view.resizedSinceFit) {
       this.place();
@@ -336,7 +337,7 @@ export class Engine {
 
   /** Whether a frame is requested, for tests. */
   get scheduled(): number {
-    return this.requests.pending;
+    return this.requests.pending || Number(this.resolution.moving);
   }
 
   private draw(): void {
@@ -379,14 +380,15 @@ export class Engine {
   }
 
   private render(): void {
-    for (const thing of this.things.values()) if (thing.resized()) this.dirty = true;
+    const { camera } = this.view;
+    camera.updateMatrixWorld();
+    this.resolution.follow(camera);
+    // Sizes on the screen are adjusted when the camera has stopped: to place hundreds of items takes most of a frame.
+    if (!this.resolution.moving) for (const thing of this.things.values()) if (thing.resized()) this.dirty = true;
     this.place();
     this.gizmo.place();
     this.drop.tell(this.things.values(), this.palette, this.notes);
     if (this.messageLog.id) this.notes.set(this.messageLog.id, this.messageLog.text);
-    const { camera } = this.view;
-    camera.updateMatrixWorld();
-    this.resolution.follow(camera);
     const labels = labelsOf(this.things, this.hovered, this.notes, camera.position, this.width);
     this.labels.show(labels, camera, this.width, this.height);
     placeConditions(this.things, this.labels, camera, this.width, this.height);

@@ -1,64 +1,57 @@
-/** The lines of all connections in one draw call: hundreds of meshes take most of the time of a frame. */
+/** The lines of all connections, drawn in one call by what is loaded with the first line. */
 
-import { BufferAttribute, BufferGeometry, type Color, Mesh, MeshBasicMaterial, type Scene } from "three";
-
-interface Line {
-  geometry: BufferGeometry;
-  color: string;
-  rgb: readonly [number, number, number];
-}
+import type { Color, Scene } from "three";
+import type { Arrow, Line, LinkMesh } from "./linkMesh";
 
 export class LinkLines {
-  readonly mesh = new Mesh(new BufferGeometry(), new MeshBasicMaterial({ vertexColors: true }));
   private readonly lines = new Map<string, Line>();
   private changed = false;
+  private mesh: LinkMesh | null = null;
+  private pixels = 1;
+  private loading: Promise<void> | null = null;
 
-  constructor(scene: Scene) {
-    this.mesh.raycast = () => {}; // the meshes of the connections are picked
-    this.mesh.frustumCulled = false;
-    this.mesh.visible = false;
-    scene.add(this.mesh);
+  /** `draw` draws a frame after the first lines were loaded. */
+  constructor(
+    private readonly scene: Scene,
+    private readonly draw: () => void,
+  ) {}
+
+  /** Set the height of the view, pixels. */
+  set height(pixels: number) {
+    this.pixels = pixels;
+    if (this.mesh) this.mesh.height = pixels;
   }
 
-  /** Draw a line in a colour, or no longer. Its geometry has an index. */
-  set(id: string, geometry: BufferGeometry | null, color: Color): void {
+  /** Draw a line in a colour, or no longer. */
+  set(id: string, arrow: Arrow | null, color: Color): void {
     const before = this.lines.get(id);
     const hex = color.getHexString();
-    if (before?.geometry === (geometry ?? undefined) && (!before || before.color === hex)) return;
+    if (before?.arrow === (arrow ?? undefined) && (!before || before.color === hex)) return;
     this.changed = true;
-    if (geometry) this.lines.set(id, { geometry, color: hex, rgb: [color.r, color.g, color.b] });
+    if (arrow) this.lines.set(id, { arrow, color: hex });
     else this.lines.delete(id);
   }
 
   refresh(): void {
     if (!this.changed) return;
-    this.changed = false;
-    const lines = [...this.lines.values()];
-    const sum = (of: (line: Line) => number) => lines.reduce((total, line) => total + of(line), 0);
-    const vertices = sum(({ geometry }) => geometry.getAttribute("position").count);
-    const places = new Float32Array(vertices * 3);
-    const colors = new Float32Array(vertices * 3);
-    const index = new Uint32Array(sum(({ geometry }) => geometry.index?.count ?? 0));
-    let vertex = 0;
-    let corner = 0;
-    for (const { geometry, rgb } of lines) {
-      const position = geometry.getAttribute("position");
-      places.set(position.array, vertex * 3);
-      for (let n = 0; n < position.count; n++) colors.set(rgb, (vertex + n) * 3);
-      for (const one of geometry.index?.array ?? []) index[corner++] = one + vertex;
-      vertex += position.count;
+    if (!this.mesh) {
+      this.loading ??= this.load();
+      return;
     }
-    this.mesh.geometry.dispose();
-    this.mesh.geometry = new BufferGeometry()
-      .setAttribute("position", new BufferAttribute(places, 3))
-      .setAttribute("color", new BufferAttribute(colors, 3))
-      .setIndex(new BufferAttribute(index, 1));
-    this.mesh.visible = vertices > 0;
+    this.changed = false;
+    this.mesh.show([...this.lines.values()]);
   }
 
   dispose(): void {
-    this.mesh.removeFromParent();
-    this.mesh.geometry.dispose();
-    this.mesh.material.dispose();
+    this.lines.clear();
+    this.mesh?.dispose();
+  }
+
+  private async load(): Promise<void> {
+    const { LinkMesh } = await import("./linkMesh");
+    this.mesh = new LinkMesh(this.scene);
+    this.mesh.height = this.pixels;
+    this.refresh();
+    this.draw();
   }
 }

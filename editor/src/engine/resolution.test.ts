@@ -21,15 +21,16 @@ function view(changes = true) {
 }
 
 test("while the camera moves at low quality, a quarter of the pixels is drawn, and all of them when it rests", () => {
-  const { frame, draw } = view();
+  const { frame, draw, resolution } = view();
   frame(0, 1000);
   expect(frame(1, 2000)).toBe("800x600"); // a jump
   expect(frame(2, 2030)).toBe("400x300");
-  expect(frame(2, 2060)).toBe("400x300");
+  expect([frame(2, 2060), resolution.moving]).toEqual(["400x300", false]);
+  expect([frame(3, 2090), resolution.moving]).toEqual(["400x300", true]);
   expect(draw).not.toHaveBeenCalled();
-  vi.advanceTimersByTime(200);
+  vi.advanceTimersByTime(300);
   expect(draw).toHaveBeenCalledTimes(1);
-  expect(frame(2, 2200)).toBe("800x600");
+  expect([frame(3, 2400), resolution.moving]).toEqual(["800x600", false]);
   vi.advanceTimersByTime(1000);
   expect(draw).toHaveBeenCalledTimes(1);
 });

@@ -1,11 +1,14 @@
-/** Resolution of the picture: at low quality half of it while the camera moves, because pixels cost most of a frame. */
+/**
+ * Whether the camera moves, and the resolution of the picture: at low quality half of it meanwhile, because pixels cost
+ * most of a frame.
+ */
 
 import { type Camera, Matrix4 } from "three";
 
 /** Part of the resolution while the camera moves. */
 const MOVING = 0.5;
-/** Time without a motion after which the picture is drawn in full, ms. */
-const REST = 150;
+/** Time without a motion after which the picture is drawn in full, ms: longer than a frame on a slow machine. */
+const REST = 300;
 
 export class Resolution {
   private readonly last = new Matrix4();
@@ -13,6 +16,8 @@ export class Resolution {
   private part = 1;
   private movedAt = -Infinity;
   private timer: ReturnType<typeof setTimeout> | undefined;
+  /** Number of frames since the motion began. */
+  private steps = 0;
 
   /** `apply` changes the size of the canvas, pixels; `draw` requests a frame. */
   constructor(
@@ -28,20 +33,27 @@ export class Resolution {
 
   /** Called before each frame. A single jump of the camera is drawn in full at once. */
   follow({ matrixWorld }: Camera, now = performance.now()): void {
-    if (!this.changes) return;
+    const rested = now - this.movedAt >= REST;
     if (this.last.equals(matrixWorld)) {
-      if (now - this.movedAt >= REST) this.set(1);
+      if (rested) this.full();
       return;
     }
     this.last.copy(matrixWorld);
-    if (now - this.movedAt < REST) this.set(MOVING);
+    this.steps = rested ? 0 : this.steps + 1;
+    if (this.changes && this.steps > 0) this.set(MOVING);
     this.movedAt = now;
     clearTimeout(this.timer);
-    this.timer = setTimeout(() => this.part !== 1 && this.draw(), REST);
+    this.timer = setTimeout(() => this.steps > 0 && this.draw(), REST);
+  }
+
+  /** Whether the camera moves continuously; a frame follows after the motion. */
+  get moving(): boolean {
+    return this.steps > 1;
   }
 
   /** Draw the next frame in full. */
   full(): void {
+    this.steps = 0;
     this.set(1);
   }
 

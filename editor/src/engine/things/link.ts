@@ -1,30 +1,28 @@
 /** A connection of the program: an arc between two pucks, with colour, dashes and label by branch. */
 
 import {
-  type BufferGeometry,
+  BufferGeometry,
   CanvasTexture,
   Color,
-  ConeGeometry,
   Group,
+  type Intersection,
   LinearFilter,
   Mesh,
-  MeshBasicMaterial,
-  QuadraticBezierCurve3,
-  Quaternion,
+  type Raycaster,
   Sprite,
   SpriteMaterial,
   SRGBColorSpace,
-  TubeGeometry,
   Vector3,
 } from "three";
-import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import type { LinkItem } from "../items";
+import type { Arrow, Strip } from "../linkMesh";
 import { type Context, ownedBy, Thing } from "../thing";
 
-/** Thickness of lines, half, pixels, and its limits, m; in steps, since lines are rebuilt with each. */
-const HALF = 1.1;
-const THINNEST = 0.0006;
-const THICKEST = 0.006;
+/** Distance within which a line is hit, pixels. */
+const HIT = 3;
+/** Sections of a line, by quality, and of a dash. */
+const SECTIONS = { low: 5, high: 16 };
+const DASHED = 2;
 /** Part of the background in the colour of pale lines, and opacity of their conditions. */
 const PALE = 0.75;
 const DIM = 0.25;
@@ -37,7 +35,8 @@ const DASHES: Record<LinkItem["branch"], [number, number] | null> = {
   false: [0.014, 0.014],
   value: [0.03, 0.02],
 };
-const Z = new Vector3(0, 1, 0);
+/** Where the arrowhead is, as a part of the line. */
+const HEAD = 0.86;
 /** Height of the label, m, and its limits on the screen, pixels. */
 const PLATE = 0.036;
 const LEAST = 14;
@@ -47,19 +46,21 @@ export class LinkThing extends Thing<LinkItem> {
   readonly root = new Group();
   item: LinkItem;
   private readonly color = new Color();
-  private readonly line = new Mesh(undefined, new MeshBasicMaterial());
+  /** What is picked: its points. */
+  private readonly line = new Mesh();
+  private arrow: Arrow | null = null;
   private label: Sprite | null = null;
   private labelled = "";
   private drawn = "";
   private readonly from = new Vector3();
   private readonly to = new Vector3();
   private readonly middle = new Vector3();
-  private radius = 0.002;
 
   constructor(item: LinkItem, context: Context) {
     super(context);
     this.item = item;
     this.line.layers.set(PICKED);
+    this.line.raycast = (caster, hits) => this.hit(caster, hits);
     this.root.add(this.line);
     ownedBy(this.root, item.id);
   }
@@ -96,29 +97,21 @@ export class LinkThing extends Thing<LinkItem> {
     if (!start || !end || !this.root.visible) return this.context.batches.links.set(this.item.id, null, this.color);
     start.anchor(this.from);
     end.anchor(this.to);
-    const drawn =
-      [...this.from.toArray(), ...this.to.toArray()].map((one) => one.toFixed(4)).join() +
-      this.item.branch +
-      this.radius;
+    const drawn = [...this.from.toArray(), ...this.to.toArray()].map((one) => one.toFixed(4)).join() + this.item.branch;
     if (drawn !== this.drawn) {
       this.drawn = drawn;
-      this.line.geometry.dispose();
-      this.line.geometry = this.bow();
+      this.bow();
       this.label?.position.copy(this.middle);
     }
-    this.context.batches.links.set(this.item.id, this.line.geometry, this.color);
+    this.context.batches.links.set(this.item.id, this.arrow, this.color);
   }
 
   override resized(): boolean {
-    if (!this.root.visible) return false;
+    if (!this.root.visible || !this.label) return false;
     const pixel = this.context.metresPerPixel(this.middle);
-    const wanted = Math.min(THICKEST, Math.max(THINNEST, 2 ** (Math.round(Math.log2(HALF * pixel) * 2) / 2)));
-    const changed = wanted !== this.radius;
-    this.radius = wanted;
-    if (!this.label) return changed;
     const height = Math.min(MOST * pixel, Math.max(LEAST * pixel, PLATE));
     this.label.scale.multiplyScalar(height / this.label.scale.y).setZ(1);
-    return changed;
+    return false;
   }
 
   override anchor(target: Vector3): Vector3 {
@@ -136,44 +129,50 @@ export class LinkThing extends Thing<LinkItem> {
     return this.label && this.root.visible ? { label: this.label, at: this.middle } : null;
   }
 
-  private bow(): BufferGeometry {
-    const length = Math.max(1e-3, this.from.distanceTo(this.to));
-    const control = new Vector3().addVectors(this.from, this.to).multiplyScalar(0.5);
-    control.z += Math.min(0.25, 0.03 + length * 0.3);
-    const [around, along] = this.context.quality === "low" ? [3, 8] : [5, 14];
-    const curve = new QuadraticBezierCurve3(this.from.clone(), control, this.to.clone());
-    curve.getPoint(0.5, this.middle);
-    const pieces: BufferGeometry[] = [];
+  /** Report a hit where the ray passes the line closely. */
+  private hit(caster: Raycaster, hits: Intersection[]): void {
+    const points = this.arrow?.strips.flatMap(({ places }) => places) ?? [];
+    for (let n = 1; n < points.length; n++) {
+      const [a, b] = [points[n - 1], points[n]] as [Vector3, Vector3];
+      const off = caster.ray.distanceSqToSegment(a, b, onRay, onLine);
+      if (off > (HIT * this.context.metresPerPixel(onLine)) ** 2) continue;
+      const distance = caster.ray.origin.distanceTo(onLine);
+      hits.push({ distance, point: onLine.clone(), object: this.line });
+    }
+  }
+
+  private bow(): void {
+    const { from, to } = this;
+    const length = Math.max(1e-3, from.distanceTo(to));
+    const top = new Vector3().addVectors(from, to).multiplyScalar(0.5);
+    top.z += Math.min(0.25, 0.03 + length * 0.3);
+    // A quadratic curve and its directions.
+    const place = (t: number) => new Vector3().lerpVectors(from, top, t).lerp(new Vector3().lerpVectors(top, to, t), t);
+    const way = (t: number) =>
+      new Vector3().subVectors(top, from).lerp(new Vector3().subVectors(to, top), t).normalize();
+    const strip = (start: number, end: number, sections: number): Strip => {
+      const at = [...Array(sections + 1).keys()].map((n) => start + ((end - start) * n) / sections);
+      return { places: at.map(place), ways: at.map(way) };
+    };
+    this.middle.copy(place(0.5));
+    const strips: Strip[] = [];
     const dash = DASHES[this.item.branch];
-    const full = curve.getLength();
-    if (!dash) pieces.push(new TubeGeometry(curve, along, this.radius, around));
+    if (!dash) strips.push(strip(0, 1, SECTIONS[this.context.quality]));
     else {
       const [on, off] = dash;
+      const full = from.distanceTo(this.middle) + this.middle.distanceTo(to);
       const most = Math.max(on + off, full / 40); // long lines have longer dashes, not more of them
-      for (let at = 0; at < full; at += most) {
-        const from = at / full;
-        const to = Math.min(1, (at + (most * on) / (on + off)) / full);
-        const part = new QuadraticBezierCurve3(...subdivided(curve, from, to));
-        pieces.push(new TubeGeometry(part, 3, this.radius, around));
-      }
+      for (let at = 0; at < full; at += most)
+        strips.push(strip(at / full, Math.min(1, (at + (most * on) / (on + off)) / full), DASHED));
     }
-    const head = new ConeGeometry(this.radius * 3.6, this.radius * 11, around + 1);
-    head.applyQuaternion(new Quaternion().setFromUnitVectors(Z, curve.getTangentAt(0.86)));
-    const at = curve.getPointAt(0.86);
-    pieces.push(head.translate(at.x, at.y, at.z));
-    const whole = mergeGeometries(pieces);
-    for (const piece of pieces) piece.dispose();
-    return whole;
+    this.arrow = { strips, head: [place(HEAD), way(HEAD)] };
+    this.line.geometry.dispose();
+    this.line.geometry = new BufferGeometry().setFromPoints(strips.flatMap(({ places }) => places));
   }
 }
 
-/** A section of a quadratic curve is a quadratic curve. */
-function subdivided(curve: QuadraticBezierCurve3, a: number, b: number): [Vector3, Vector3, Vector3] {
-  const start = curve.getPoint(a);
-  const end = curve.getPoint(b);
-  const tangent = new Vector3().subVectors(curve.v1, curve.v0).lerp(new Vector3().subVectors(curve.v2, curve.v1), a);
-  return [start, start.clone().addScaledVector(tangent, b - a), end];
-}
+const onRay = new Vector3();
+const onLine = new Vector3();
 
 /** A label that always faces the camera. */
 function text(word: string, ink: string, plate: string): Sprite {

@@ -76,13 +76,18 @@ export class PuckThing extends Thing<PuckItem> {
     super(context);
     this.item = item;
     const edge = item.role === "action";
-    this.batch = context.batches.of(edge ? "puck" : "start and end", () => [
-      (edge
-        ? new CylinderGeometry(RADIUS, RADIUS, THICK, context.quality === "low" ? 12 : 24)
-        : new CylinderGeometry(BORDER, BORDER, 0.014, 6)
-      ).rotateX(Math.PI / 2),
-      new MeshLambertMaterial(),
-    ]);
+    this.batch = context.batches.of(
+      edge ? "puck" : "start and end",
+      () => [
+        (edge
+          ? new CylinderGeometry(RADIUS, RADIUS, THICK, context.quality === "low" ? 12 : 24)
+          : new CylinderGeometry(BORDER, BORDER, 0.014, 6)
+        ).rotateX(Math.PI / 2),
+        new MeshLambertMaterial(),
+      ],
+      edge ? RADIUS : 0,
+      edge ? THICK / 2 / RADIUS : 0,
+    );
     this.instance = { id: item.id, frame: this.root, offset: new Matrix4(), color: context.palette.point };
     this.batch.add(this.instance);
     this.above = { id: item.id, frame: this.root, offset: new Matrix4(), color: context.palette.point };
