@@ -127,7 +127,8 @@ class Generic(abc.ABC):
 
         Names that the editor draws: `width` of a gripper, m; `gripped`, 1 for a closed gripper; `velocity` of a belt,
         m/s; `door`, 1 when open, 0 when closed, 0.5 in between; `red`, `amber`, `green`, `blue` and `white`, 1 for a
-        lit lamp. Round them, because every change is sent to all clients.
+        lit lamp; the digital inputs of an I/O block by their names, 1 when on, which may be sensors that detect parts.
+        Round them, because every change is sent to all clients.
         """
         return {}
 

@@ -7,7 +7,7 @@ from arcor2_hw.data.device import Quality, Reading
 from arcor2_hw.exceptions import DeviceFault
 from arcor2_hw.objects import IOBlock
 from arcor2_hw.objects.point_actions import MARGIN, PointActions
-from arcor2_hw.objects.small import PointKind
+from arcor2_hw.objects.small import PointDirection, PointKind
 
 from .block import Block
 from .points import parse_points
@@ -27,6 +27,16 @@ class RemoteIO(PointActions, Block, IOBlock):
         self.use_block(settings, parse_points(settings.points))
         self.io_points = {name: point.io for name, point in self.block_points.items()}
         self.edge_listeners = self.digital_points
+
+    @property
+    def shown_values(self) -> dict[str, float]:
+        """Return for each digital input whether it is on."""
+        states = {
+            name: self.digital_points.value(name)
+            for name in self.digital_points.names
+            if self.io_points[name].direction is PointDirection.INPUT
+        }
+        return {name: float(on) for name, on in states.items() if on is not None}
 
     def point_label(self, name: str) -> str:
         """Return the terminal of a point."""

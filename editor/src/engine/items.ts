@@ -31,6 +31,13 @@ export interface ObjectItem extends Base {
   fault: boolean;
   /** What the device reports of what one can see, by name; undefined while it is unknown. */
   values?: Readonly<Record<string, number>> | undefined;
+  /** Parts that sensors detect on it, in its frame. */
+  parts?: readonly DetectedPart[] | undefined;
+}
+
+export interface DetectedPart {
+  position: Position;
+  size: Position;
 }
 
 /** A part that a robot carries, in the frame of an end effector. */

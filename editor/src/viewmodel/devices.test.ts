@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import type { ObjectTypeMeta, ObjectValuesData, SceneObject } from "../protocol/types";
 import { initialState, type State } from "../store/state";
-import { gripperOf, isPlaceable, placeOf, toolOf } from "./devices";
+import { gripperOf, isPlaceable, partsOn, placeOf, toolOf } from "./devices";
 
 const upright = { x: 0, y: 0, z: 0, w: 1 };
 const pose = { position: { x: 1, y: 0, z: 0 }, orientation: upright };
@@ -58,4 +58,22 @@ test("the fingers follow the reported width, or the part that a gripper on an ou
   expect(toolOf(stateWith([arm], [held]), arm).parts).toEqual([
     { link: "tcp", pose, shape: { kind: "box", size: [0.08, 0.056, 0.001] } },
   ]);
+});
+
+test("parts are drawn where sensors detect them", () => {
+  const [position, size] = [
+    { x: 0.2, y: 0, z: 0.06 },
+    { x: 0.08, y: 0.06, z: 0.002 },
+  ];
+  const detected = (on: number, view: unknown = { on: "obj_belt", position, size }) => {
+    const state = stateWith([], [{ object_id: "obj_io", values: { stop: on }, parts: [] }]);
+    return partsOn({ ...state, view: { ...state.view, scene: { "part/obj_io/stop": view } } }, "obj_belt");
+  };
+  expect(detected(1)).toEqual({ "part/obj_io/stop": { position, size } });
+  expect([detected(0), detected(1, null), detected(1, { on: "obj_belt", size })]).toEqual([
+    undefined,
+    undefined,
+    undefined,
+  ]);
+  expect(detected(1, { on: "obj_other", position, size })).toBeUndefined();
 });

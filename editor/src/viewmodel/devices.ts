@@ -1,7 +1,7 @@
 /** What one can see of devices: their place, reported values, grippers and parts at robots. Pure functions. */
 
-import type { CarriedItem, RobotItem } from "../engine/items";
-import type { Pose, SceneObject } from "../protocol/types";
+import type { CarriedItem, DetectedPart, RobotItem } from "../engine/items";
+import type { Pose, Position, SceneObject } from "../protocol/types";
 import type { State } from "../store/state";
 import { shapeOf } from "./shapes";
 
@@ -25,10 +25,27 @@ export function isPlaceable({ types }: Pick<State, "types">, object: SceneObject
 }
 
 function isPose(value: unknown): value is Pose {
-  const { position, orientation } = (value ?? {}) as Partial<Record<keyof Pose, Record<string, unknown>>>;
-  const finite = (part: Record<string, unknown> | undefined, names: string) =>
-    [...names].every((name) => Number.isFinite(part?.[name]));
+  const { position, orientation } = (value ?? {}) as Partial<Record<keyof Pose, unknown>>;
   return finite(position, "xyz") && finite(orientation, "xyzw");
+}
+
+function finite(value: unknown, names: string): value is Position {
+  return [...names].every((name) => Number.isFinite((value as Record<string, unknown> | undefined)?.[name]));
+}
+
+/** Return the parts that sensors detect on an object, by the sensor; undefined without one. */
+export function partsOn(
+  { view, live }: Pick<State, "view" | "live">,
+  id: string,
+): Record<string, DetectedPart> | undefined {
+  const found: Record<string, DetectedPart> = {};
+  for (const [key, value] of Object.entries(view.scene)) {
+    const [kind, sensor = "", name = ""] = key.split("/");
+    if (kind !== "part" || live.values[sensor]?.values[name] !== 1) continue;
+    const { on, position, size } = (value ?? {}) as Record<string, unknown>;
+    if (on === id && finite(position, "xyz") && finite(size, "xyz")) found[key] = { position, size };
+  }
+  return Object.keys(found).length > 0 ? found : undefined;
 }
 
 /** Return the object of a separate gripper that a robot carries; undefined without one. */

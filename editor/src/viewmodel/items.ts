@@ -8,7 +8,7 @@ import type { LogicItem, Pose, Position, Reach } from "../protocol/types";
 import { isRunning } from "../store/selectors";
 import type { OpenDocument, State } from "../store/state";
 import type { Draft, Ghost } from "../store/ui";
-import { gripperOf, placeOf, toolOf } from "./devices";
+import { gripperOf, partsOn, placeOf, toolOf } from "./devices";
 import { borders, isDim, isOpen } from "./program";
 import { shapeOf } from "./shapes";
 import { faintness } from "./visibility";
@@ -67,7 +67,9 @@ export class ItemMaker {
       const { values } = state.live.values[object.id] ?? {};
       const gripper = robot && gripperOf(state, object);
       const live = [robot ? state.live.values[object.id] : values, gripper, gripper && state.live.values[gripper.id]];
-      const looks = [type, robot, fault, robot && online, model, ghost, robot && axes, ...live];
+      const parts = partsOn(state, object.id);
+      const detected = parts && Object.keys(parts).join();
+      const looks = [type, robot, fault, robot && online, model, ghost, robot && axes, detected, ...live];
       add(object.id, [object, place, preview, ...looks, ...notify(object.id)], () => {
         const pose = {
           position: preview?.position ?? place?.position ?? NO_PLACE,
@@ -85,7 +87,7 @@ export class ItemMaker {
             ...toolOf(state, object),
           };
         const shape = shapeOf(type && model ? { ...type, object_model: model } : type);
-        return { ...base, kind: "object", shape, values };
+        return { ...base, kind: "object", shape, values, parts: parts && Object.values(parts) };
       });
     }
     const size = pointSize(state);

@@ -41,6 +41,16 @@ class Place(Struct, frozen=True, forbid_unknown_fields=True):
     rotation: Vector3 = (0.0, 0.0, 0.0)
 
 
+class PartSensor(Struct, frozen=True, forbid_unknown_fields=True):
+    """A digital input that is on while a part is at a place, where the editor draws it; m, in the frame of `on`."""
+
+    object: str
+    input: str
+    on: str
+    position: Vector3
+    size: Vector3
+
+
 class Obstacle(Struct, frozen=True, forbid_unknown_fields=True):
     """A box-shaped collision object; position and size in m."""
 
@@ -95,6 +105,7 @@ class Workplace(Struct, frozen=True, forbid_unknown_fields=True):
     logic: list[Link]
     constants: dict[str, Scalar]
     places: list[Place] = field(default_factory=list)
+    part_sensors: list[PartSensor] = field(default_factory=list)
 
 
 def load(file: Path | None = None) -> Workplace:
@@ -193,10 +204,16 @@ class Creation:
     async def _place(self, scene: Scene) -> None:
         """Store where the editor draws the devices without a pose."""
         ids = {obj.name: obj.id for obj in scene.objects}
-        values = {
+        values: dict[str, Any] = {
             f"place/{ids[place.object]}": msgspec.to_builtins(_pose(place.position, place.rotation))
             for place in self._workplace.places
         }
+        for sensor in self._workplace.part_sensors:
+            values[f"part/{ids[sensor.object]}/{sensor.input}"] = {
+                "on": ids[sensor.on],
+                "position": dict(zip("xyz", sensor.position, strict=True)),
+                "size": dict(zip("xyz", sensor.size, strict=True)),
+            }
         if values:
             await self._client.call("SetViewState", rpc.SetViewStateArgs(ViewScope.SHARED, values, scene.id))
 

@@ -119,10 +119,11 @@ def test_connecting_observes_and_writes_nothing(fake: FakeProcess, observed: Rem
     assert (identity.vendor, identity.model, identity.firmware) == ("Fake Field Devices", "RIO-16", "2.0")
 
 
-def test_every_kind_of_point_is_read(fake: FakeProcess, observed: RemoteIO) -> None:
+def test_every_kind_of_point_is_read(fake: FakeProcess, observed: RemoteIO, wait_for: Callable[..., Any]) -> None:
     fake.control.do("set_input", number=0, on=True)
     fake.control.do("set_analog", number=0, raw=-250)
     assert observed.read_digital("part") is True
+    wait_for(lambda: observed.shown_values, lambda values: values == {"part": 1.0, "door": 0.0})
     assert observed.read_analog("level") == pytest.approx(-0.25)
     reading = observed.read("level")
     assert reading.quality is Quality.GOOD

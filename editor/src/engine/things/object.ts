@@ -22,6 +22,9 @@ import { setPose } from "../poses";
 import { surface } from "../surface";
 import { type Context, disposeTree, ownedBy, seenThrough, Thing } from "../thing";
 
+/** Colour of detected parts. */
+const PART = 0x2f8f5b;
+
 export class ObjectThing extends Thing<ObjectItem> {
   readonly root = new Group();
   item: ObjectItem;
@@ -35,6 +38,8 @@ export class ObjectThing extends Thing<ObjectItem> {
   private reason = "";
   private model: DeviceModel | null = null;
   private values: ObjectItem["values"];
+  private parts: ObjectItem["parts"];
+  private readonly partMaterial = surface(this.context, { color: PART });
 
   constructor(item: ObjectItem, context: Context) {
     super(context);
@@ -50,6 +55,7 @@ export class ObjectThing extends Thing<ObjectItem> {
       this.build(item.shape);
     }
     if (item.values !== this.values) this.showValues(item);
+    if (item.parts !== this.parts) this.showParts(item);
     const { palette } = this.context;
     const color = item.selected
       ? palette.selected
@@ -90,6 +96,23 @@ export class ObjectThing extends Thing<ObjectItem> {
     super.dispose();
     this.material.dispose();
     this.edges.dispose();
+    this.partMaterial.dispose();
+  }
+
+  /** Show the parts that sensors detect on it. */
+  private showParts({ parts = [] }: ObjectItem): void {
+    this.parts = this.item.parts;
+    for (const child of this.root.children.filter((each) => each.userData.part)) {
+      child.removeFromParent();
+      disposeTree(child);
+    }
+    for (const { position, size } of parts) {
+      const mesh = new Mesh(new BoxGeometry(size.x, size.y, size.z), this.partMaterial);
+      mesh.userData.part = mesh.castShadow = true;
+      mesh.position.set(position.x, position.y, position.z);
+      this.root.add(mesh);
+    }
+    this.context.invalidate();
   }
 
   private build(shape: Shape): void {
