@@ -76,8 +76,11 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
 /** Trends of the device's values, which are read only while they are shown. */
 function Values({ id }: { id: string }) {
   const [shown, setShown] = useState(false);
-  const observable = useEditor((state) => state.types.byName[state.doc?.objects[id]?.type ?? ""]?.observable);
-  if (!observable) return null;
+  const changing = useEditor(({ doc, types }) => {
+    const type = doc?.objects[id]?.type ?? "";
+    return types.byName[type]?.observable === true || types.robots[type] !== undefined;
+  });
+  if (!changing) return null;
   return (
     <>
       <OnOff isSelected={shown} onChange={setShown}>
