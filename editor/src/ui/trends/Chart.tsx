@@ -52,6 +52,7 @@ export function Chart({ times, series }: { times: number[]; series: Series[] }) 
           {
             ...axis,
             size: 56,
+            space: 24,
             values: (_, splits) => splits.map((each) => (binary ? binaryMark(each) : decimal(each, 6))),
           },
         ],
