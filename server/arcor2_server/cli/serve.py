@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import IO, Annotated, Literal
 
 import msgspec
-import structlog
 import uvloop
 from cyclopts import Parameter, validators
 
+import arcor2_server.log  # before all that imports structlog
 from arcor2_hw.calibration.configuration import (
     CalibrationConfiguration,
     configuration_of,
@@ -36,7 +36,7 @@ from arcor2_server.log import setup as server_logging
 from arcor2_server.settings import DEVICE_FILES_NAME, LegacyListener, ServerSettings
 from arcor2_server.websocket.classic_ports import ports_from_environment
 
-log = structlog.get_logger(__name__)
+log = arcor2_server.log.get_logger(__name__)
 
 LegacyRole = Literal["operator", "standard_user", "advanced_user", "technician"]
 """The roles of clients without a token; programmer is not allowed."""
