@@ -13,6 +13,8 @@ from rich.table import Table
 GOALS: Final[dict[str, tuple[str, str]]] = {
     # name: unit, goal
     "cold_start_s": ("s", "<= 1.0"),
+    "start_server_ratio": ("x interpreter", "<= 16"),
+    "start_host_ratio": ("x interpreter", "<= 3"),
     "idle_memory_mib": ("MiB", "<= 150"),
     "rpc_ratio_system_info": ("x echo", "<= 1.3"),
     "rpc_ratio_list_scenes": ("x echo", "<= 1.3"),

@@ -3,14 +3,20 @@
 import asyncio
 import json
 import os
+import resource
 import statistics
+import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
 
+import psutil
+
 from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
 from arcor2_hw.data.geometry import Position
+from arcor2_server.hosts.process import CellHost
 from benchmarks import server_process
 from benchmarks.metrics import Metric, Report, median
 
@@ -108,23 +114,54 @@ async def edits(report: Report, url: str, directory: Path) -> None:
                 report.add(Metric(f"add_action_{size}_ms", beyond * 1e3, len(adds), note))
 
 
-async def start(report: Report, directory: Path) -> None:
-    """Measure the time to the first response with existing data, and the memory of the idle server."""
+def interpreter_start() -> float:
+    """Return the processor time of an interpreter that imports asyncio, s; median of 5."""
     samples = []
+    for _ in range(5):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run([sys.executable, "-c", "import asyncio"], check=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        samples.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return median(samples)
+
+
+async def host_start() -> float:
+    """Return the processor time of a cell host until it is ready, s."""
+    host = await CellHost.start()
+    await host.ready
+    taken = processor_time(psutil.Process(host.pid))
+    await host.close()
+    return taken
+
+
+def processor_time(process: psutil.Process) -> float:
+    """Return the processor time that a process has used, s."""
+    times = process.cpu_times()
+    return float(times.user + times.system)
+
+
+async def start(report: Report, directory: Path) -> None:
+    """Measure the start of server and cell host with existing data, and the memory of the idle server."""
+    samples, servers, cell_hosts = [], [], []
     memory = 0.0
     hosts = 0.0
     for _ in range(6):
+        reference = interpreter_start()
+        cell_hosts.append(await host_start() / reference)
         begin = time.perf_counter()
         async with server_process.server(directory / "data") as (url, process):
             async with server_process.socket(url) as opened:
                 await server_process.answer(opened, '{"id": 1, "request": "SystemInfo"}')
             samples.append(time.perf_counter() - begin)
+            servers.append(processor_time(process) / reference)
             if len(samples) == 6:
                 await _settled(url)
                 memory = process.memory_full_info().pss / 2**20
                 hosts = sum(child.memory_full_info().pss for child in process.children()) / 2**20
     # The first start creates the database and fills the file cache.
     report.add(Metric("cold_start_s", median(samples[1:]), 5, f"first on empty data {samples[0]:.2f} s"))
+    report.add(Metric("start_server_ratio", median(servers[1:]), 5, f"first on empty data {servers[0]:.1f}"))
+    report.add(Metric("start_host_ratio", median(cell_hosts[1:]), 5, f"interpreter {reference * 1e3:.0f} ms"))
     report.add(Metric("idle_memory_mib", memory, 1, f"PSS of the server; the spare cell host uses {hosts:.0f} MiB"))
 
 
