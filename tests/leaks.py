@@ -52,7 +52,7 @@ class Holdings:
     def beyond(self, other: "Holdings") -> list[str]:
         """Name what is here and not in `other`."""
         found = [f"thread {name}" for ident, name in self.threads.items() if ident not in other.threads]
-        started = {pid for pid, _ in other.children}
+        started = {pid for pid, _ in other.children} - forking
         for key, cmd in self.children.items():
             if key not in other.children and not started & _ancestors(key[0]):
                 found.append(f"process {key[0]}: {cmd}")
@@ -74,6 +74,8 @@ def _ancestors(pid: int) -> set[int]:
 
 _before = pytest.StashKey[Holdings]()
 _allowed = Holdings()
+forking: set[int] = set()
+"""Processes that fork programs for tests (`tests.forking`). They may live on, but not what they start."""
 _after: list[Holdings] = []
 """What this process held after the previous test."""
 

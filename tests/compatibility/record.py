@@ -81,7 +81,7 @@ async def record(folder: Path) -> None:
         event = await client.next_event("OpenProject")
         write_json("unsaved_project.json", json.loads(msgspec.json.encode(event.data.project)))
     server.process.kill()
-    await server.process.communicate()
+    await server.ended()
     write_archive(folder / "data", RECORDED / "data-directory.tar.gz")
 
 

@@ -5,18 +5,28 @@ import select
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import msgspec
 import pytest
 
 from arcor2_fakes.control import BlockingControlClient
 from tests import waiting
+from tests.forking import Forked, Forker
 
 READY_WITHIN = 60.0  # s; imports on a busy machine, of OPC UA above all
 ENDS_WITHIN = 30.0  # s
+
+
+_forker = Forker()
+
+
+def start_forked_fake(module: str, arguments: Sequence[str], stderr: IO[Any] | int) -> Forked | subprocess.Popen[bytes]:
+    """Start a fake as `python -m arcor2_fakes.MODULE`, forked from a process that has imported it."""
+    name = f"arcor2_fakes.{module}"
+    return _forker.start(name, arguments, [f"{name}.__main__"], stderr)
 
 
 class FakeProcess:
@@ -25,10 +35,12 @@ class FakeProcess:
     def __init__(self, module: str | Path, *arguments: str) -> None:
         """Start a module of `arcor2_fakes`, or the file of another fake."""
         self.stderr = tempfile.TemporaryFile("w+")  # noqa: SIM115 - closed in `end`
-        started = [str(module)] if isinstance(module, Path) else ["-m", f"arcor2_fakes.{module}"]
-        self.process = subprocess.Popen(
-            [sys.executable, *started, *arguments], stdout=subprocess.PIPE, stderr=self.stderr
-        )
+        self.process: Forked | subprocess.Popen[bytes]
+        if isinstance(module, Path):
+            command = [sys.executable, str(module), *arguments]
+            self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=self.stderr)
+        else:
+            self.process = start_forked_fake(module, arguments, self.stderr)
         self._control: BlockingControlClient | None = None
         line = self._first_line()
         if not line.startswith(b"ready "):

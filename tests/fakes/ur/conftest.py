@@ -9,11 +9,14 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from arcor2_fakes.control import BlockingControlClient
+from tests.fakes.conftest import start_forked_fake
+from tests.forking import Forked
 
 _PRELUDE = """
 import json, os, sys, time
@@ -45,7 +48,7 @@ _hosts = (f"127.{(os.getpid() >> 8) % 200 + 20}.{os.getpid() % 256}.{n % 250 + 1
 class FakeUr:
     """A running fake controller."""
 
-    process: subprocess.Popen[str]
+    process: Forked | subprocess.Popen[bytes]
     ready: dict[str, Any]
     control: BlockingControlClient
 
@@ -90,15 +93,11 @@ def start_ur() -> Iterator[Callable[..., FakeUr]]:
     running: list[FakeUr] = []
 
     def start(*options: str) -> FakeUr:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "arcor2_fakes.ur", "--host", next(_hosts), *options],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
+        with Path(os.devnull).open("wb") as nothing:
+            process = start_forked_fake("ur", ["--host", next(_hosts), *options], nothing)
         assert process.stdout is not None
-        word, _, rest = process.stdout.readline().partition(" ")
-        assert word == "ready", "the fake did not start"
+        word, _, rest = process.stdout.readline().partition(b" ")
+        assert word == b"ready", "the fake did not start"
         ready = json.loads(rest)
         running.append(FakeUr(process, ready, BlockingControlClient(ready["control"])))
         return running[-1]

@@ -5,6 +5,7 @@ import contextlib
 import json
 import os
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import AsyncIterator
@@ -13,62 +14,91 @@ from typing import Any
 
 from websockets.asyncio.client import ClientConnection, connect
 
+from tests.forking import Forked, Forker, ended, readable
+
 COMMAND = [sys.executable, "-m", "arcor2_server.cli.main"]
 READY_WITHIN = 60.0
 WITHIN = 30.0
 """Time in s for which a test waits for what must come; long, as it passes only when a test fails."""
 
 
+_forker = Forker()
+_MAIN = "arcor2_server.cli.main"
+_IMPORTS = (
+    *("arcor2_server.cli.serve", "arcor2_server.app", "arcor2_server.web.http_server"),
+    "sqlalchemy.dialects.sqlite.aiosqlite",
+)
+_analyses: list[bytes] = []
+"""The stored analysis of the installed object types, once a server has made it."""
+
+
 class ServerProcess:
-    """`arcor2-hw serve` as a child."""
+    """`arcor2-hw serve` as a child, forked from a process that has imported it."""
+
+    forked = True
+    """False: the real command is started."""
 
     def __init__(self, data_dir: Path, *arguments: str, **environment: str) -> None:
         self.data_dir = data_dir
         self.url = ""
         self._arguments = arguments
         self._environment = os.environ | environment
-        self._process: asyncio.subprocess.Process | None = None
+        self._process: Forked | subprocess.Popen[bytes] | None = None
         self.log = data_dir.with_suffix(".log")
 
     @property
-    def process(self) -> asyncio.subprocess.Process:
+    def process(self) -> Forked | subprocess.Popen[bytes]:
         assert self._process is not None
         return self._process
 
     async def start(self) -> None:
+        stored = self.data_dir / "analysis.msgpack"
+        fresh = self.forked and not self.data_dir.exists()
+        if fresh and _analyses:  # it takes a third of a start; the server checks that it is valid
+            self.data_dir.mkdir(0o700, parents=True)
+            stored.write_bytes(_analyses[0])
+        serve = ("serve", "--port", "0", "--data-dir", str(self.data_dir), *self._arguments)
         with self.log.open("wb") as log:
-            self._process = await asyncio.create_subprocess_exec(
-                *COMMAND,
-                *("serve", "--port", "0", "--data-dir", str(self.data_dir), *self._arguments),
-                stdout=asyncio.subprocess.PIPE,
-                stderr=log,
-                env=self._environment,
-            )
+            if self.forked:
+                self._process = _forker.start(_MAIN, serve, _IMPORTS, log, self._environment)
+            else:
+                command = [*COMMAND, *serve]
+                self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, env=self._environment)
         try:
             self.url = await self._ready()
         except BaseException:  # nobody will stop what has not started
-            if self._process.returncode is None:
-                self._process.kill()
-            await self._process.communicate()
+            self._process.kill()
+            await self.ended()
             raise
+        if fresh and not _analyses:
+            _analyses.append(stored.read_bytes())
 
     async def _ready(self) -> str:
         assert self.process.stdout is not None
+        line = b""
         try:
             async with asyncio.timeout(READY_WITHIN):
-                line = (await self.process.stdout.readline()).decode()
+                while not line.endswith(b"\n"):
+                    await readable(self.process.stdout.fileno())
+                    if not (part := os.read(self.process.stdout.fileno(), 4096)):
+                        break
+                    line += part
         except TimeoutError:
             raise TimeoutError(f"not ready within {READY_WITHIN:g} s; its log: {self.log.read_text()}") from None
-        assert line.startswith("ready "), self.log.read_text()
-        return line.split()[1]
+        assert line.startswith(b"ready "), self.log.read_text()
+        return line.decode().split()[1]
+
+    async def ended(self) -> int:
+        """Wait until it has ended."""
+        status = await ended(self.process)
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+        return status
 
     async def stop(self) -> int:
-        if self.process.returncode is None:
-            self.process.send_signal(signal.SIGTERM)
+        self.process.send_signal(signal.SIGTERM)
         async with asyncio.timeout(30):
-            await self.process.communicate()
-        assert self.process.returncode is not None
-        return self.process.returncode
+            return await self.ended()
 
 
 @contextlib.asynccontextmanager

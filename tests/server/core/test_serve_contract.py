@@ -7,6 +7,7 @@ import signal
 import socket
 import sys
 import urllib.request
+from collections.abc import Iterator
 from pathlib import Path
 
 import psutil
@@ -15,6 +16,14 @@ import pytest
 from arcor2_server.cli.exit_status import ExitStatus
 from tests.server.core import serving
 from tests.server.core.serving import COMMAND, ServerProcess, running, talking
+
+
+@pytest.fixture(scope="module", autouse=True)
+def real_command() -> Iterator[None]:
+    """Start the real command, not a fork of a process that has imported it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ServerProcess, "forked", False)
+        yield
 
 
 async def run(*arguments: str) -> tuple[int, str, str]:
@@ -124,7 +133,7 @@ async def test_an_invalid_environment_is_reported(tmp_path: Path, monkeypatch: p
 async def test_killed_server_starts_again(tmp_path: Path) -> None:
     async with running(tmp_path / "data") as server:
         server.process.kill()
-        await server.process.communicate()
+        await server.ended()
     async with running(tmp_path / "data") as server, talking(server.url) as talker:
         await talker.granted("ListScenes")
 

@@ -24,8 +24,9 @@ async def services(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Se
     with ThreadPoolExecutor(1) as executor:
         asyncio.get_running_loop().set_default_executor(executor)
         async with running_server(ServerSettings(data_dir=directory)) as parts:
+            before = len(psutil.Process().children())
             parts.hosts.prepare()
-            await until(lambda: psutil.Process().children())
+            await until(lambda: len(psutil.Process().children()) > before)
             await start_workers(parts)
             yield parts
 

@@ -52,8 +52,9 @@ class Loop:
         # schemathesis calls an application in this process "testserver".
         settings = ServerSettings(data_dir=self._directory, allowed_hosts=frozenset({"testserver"}))
         async with running_server(settings) as services:
+            before = len(psutil.Process().children())
             services.hosts.prepare()
-            await until(lambda: psutil.Process().children())
+            await until(lambda: len(psutil.Process().children()) > before)
             await start_workers(services)
             self.app = create_app(services)
             self._up.set()

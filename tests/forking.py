@@ -1,0 +1,136 @@
+"""Starts fakes and servers by forking a process that has already imported them: imports are most of a start.
+
+The program runs as after `python -m`, with its own arguments, environment, directory, output and signals. Tests of the
+command line itself start the real command.
+"""
+
+import asyncio
+import atexit
+import contextlib
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import IO, Any
+
+from tests import forking_process, leaks
+
+BOUND_TO_THE_INTERPRETER = ("PYTHON", "LD_", "MALLOC_", "OPENBLAS_")
+"""Environment variables that take effect only when an interpreter starts begin with these."""
+
+
+class Forked:
+    """A started program: what tests use of `subprocess.Popen`."""
+
+    def __init__(self, pid: int, status: int, stdout: int) -> None:
+        self.pid = pid
+        self.returncode: int | None = None
+        self.stdout: IO[bytes] = os.fdopen(stdout, "rb")
+        self._status = os.fdopen(status, "rb")
+
+    def poll(self) -> int | None:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.wait(0)
+        return self.returncode
+
+    def wait(self, timeout: float | None = None) -> int:
+        if self.returncode is None:
+            if not select.select([self._status], [], [], timeout)[0]:
+                raise subprocess.TimeoutExpired(f"process {self.pid}", timeout or 0)
+            self.returncode = int(self._status.read())
+            self._status.close()
+        return self.returncode
+
+    def send_signal(self, number: int) -> None:
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def terminate(self) -> None:
+        self.send_signal(signal.SIGTERM)
+
+    def kill(self) -> None:
+        self.send_signal(signal.SIGKILL)
+
+
+class Forker:
+    """Forks programs from one process, which starts with the first of them and ends with this one."""
+
+    def __init__(self) -> None:
+        self._connection: socket.socket | None = None
+        self._lock = threading.Lock()
+
+    def start(
+        self,
+        module: str,
+        arguments: Sequence[str],
+        imports: Sequence[str],
+        stderr: IO[Any] | int,
+        environment: Mapping[str, str] | None = None,
+    ) -> "Forked | subprocess.Popen[bytes]":
+        """Start `python -m MODULE ARGUMENTS` from a process that has imported some modules; standard output is a pipe.
+
+        The real command is started if the environment has variables that only a new interpreter reads.
+        """
+        own = os.environ if environment is None else environment
+        if any(own[key] != os.environ.get(key) for key in own if key.startswith(BOUND_TO_THE_INTERPRETER)):
+            command = [sys.executable, "-m", module, *arguments]
+            return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=stderr, env=own)
+        errors = stderr if isinstance(stderr, int) else stderr.fileno()
+        request = json.dumps([module, list(arguments), list(imports), dict(own), str(Path.cwd())])
+        out, theirs = os.pipe()
+        status, reported = os.pipe()
+        try:
+            with self._lock:
+                if self._connection is None:
+                    with leaks.outliving_the_test():
+                        self._connection = self._start()
+                socket.send_fds(self._connection, [request.encode()], [theirs, errors, reported])
+                pid = self._connection.recv(20)
+        finally:
+            os.close(theirs)
+            os.close(reported)
+        assert pid, "the forking process has ended"
+        return Forked(int(pid), status, out)
+
+    def _start(self) -> socket.socket:
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        for end in (ours, theirs):
+            end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, forking_process.LONGEST)
+        with theirs:
+            process = subprocess.Popen(
+                [sys.executable, "-m", forking_process.__name__, str(theirs.fileno())],
+                pass_fds=[theirs.fileno()],
+                stdout=subprocess.DEVNULL,
+                # A pool of threads does not survive the fork.
+                env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+            )
+        leaks.forking.add(process.pid)
+        atexit.register(lambda: (ours.close(), process.wait()))
+        return ours
+
+
+async def ended(process: "Forked | subprocess.Popen[bytes]") -> int:
+    """Wait for the end of a process without blocking the event loop; give its exit status."""
+    with contextlib.suppress(ProcessLookupError):
+        fd = os.pidfd_open(process.pid)
+        try:
+            await readable(fd)
+        finally:
+            os.close(fd)
+    return process.wait()
+
+
+async def readable(fd: int) -> None:
+    """Wait until a file can be read."""
+    loop, arrived = asyncio.get_running_loop(), asyncio.Event()
+    loop.add_reader(fd, arrived.set)
+    try:
+        await arrived.wait()
+    finally:
+        loop.remove_reader(fd)
