@@ -8,6 +8,7 @@ from arcor2_drivers.remote_io.remote_io import RemoteIO
 from arcor2_drivers.remote_io.settings import RemoteIOSettings
 from arcor2_drivers.vacuum_gripper.settings import VacuumGripperSettings
 from arcor2_drivers.vacuum_gripper.suction_gripper import SuctionGripper
+from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import NotFound
 from arcor2_hw.objects import Generic
 from arcor2_hw.testing.bench import Bench, Check
@@ -100,9 +101,10 @@ class SuctionGripperBench(Bench):
         self.fake.control.do("silence")
 
     def heal(self) -> None:
-        """Not before the carrier's watchdog has seen to the blast of air, whose output is declared to go off."""
+        """Reconnect the carrier, but not before its watchdog has ended the blast of air."""
         wait_until(lambda: not self.running(), 3.0, "the watchdog of the carrier")
         self.fake.control.do("heal")
+        wait_until(lambda: self.block.connection is not Connection.LOST, 10.0, "the connection of the carrier")
 
     def observe(self, device: Generic) -> object:
         assert isinstance(device, SuctionGripper)
