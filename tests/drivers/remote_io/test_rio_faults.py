@@ -198,13 +198,13 @@ def test_a_pulse_ends_during_a_connection_loss(
     block = make(fake.ready["modbus"], watchdog_ms=5000)  # the pulse is over long before
     block.connect()
     block.take_control()
-    thread, outcome = in_thread(lambda: block.pulse("valve", 0.3))
+    thread, outcome = in_thread(lambda: block.pulse("valve", 2.0))
     wait_for(lambda: fake.truth()["outputs"][5])
     fake.control.do("reset")
     thread.join(30.0)
     assert isinstance(outcome[0], ConnectionLost)
     history = wait_for(lambda: fake.truth()["history"], lambda history: len(history) == 2)
-    assert history[1]["time"] - history[0]["time"] == pytest.approx(0.3, abs=0.001)
+    assert history[1]["time"] - history[0]["time"] == pytest.approx(2.0, abs=0.001)
 
 
 def test_a_late_answer_to_a_reading(relay: Relay, make: Callable[..., RemoteIO]) -> None:
