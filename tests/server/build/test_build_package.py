@@ -362,7 +362,7 @@ async def test_the_request_builds_under_the_lock_of_the_project() -> None:
     class Tasks:
         @contextlib.contextmanager
         def running(self, kind: TaskKind, title: str, user: str) -> Iterator[None]:
-            seen.append(f"{kind.value} {title!r} of {user}")
+            seen.append(f"{kind.value} '{title}' of {user}")
             yield
             seen.append("finished")
 
