@@ -79,6 +79,7 @@ from arcor2_hw.data.rpc.operation import JogFrame, JogRobotData, StopAllData
 from arcor2_hw.data.rpc.projects import ListProjectsData
 from arcor2_hw.data.rpc.robots import RobotEventKind, StepAxis, StepMode, StepWhat
 from arcor2_hw.data.rpc.scenes import CheckConnectionData, FoundDevice, ListScenesData, Pivot
+from arcor2_hw.data.rpc.scripts import CheckScriptData, ImportScriptData, ProjectScriptData
 from arcor2_hw.data.scene import BareScene, Scene, SceneObject
 from arcor2_hw.messages import Message
 
@@ -280,6 +281,9 @@ class Requests(ABC):
         Needs the role technician.
         """
 
+    async def check_script(self, *, script: str, revision: int, timeout: float | None = None) -> CheckScriptData:
+        """CheckScript: an edited script, and the revision of the script before. Needs the role standard user."""
+
     async def close_project(self, *, force: bool = False, dry_run: bool = False, timeout: float | None = None) -> None:
         """CloseProject. Needs the role standard user."""
 
@@ -430,6 +434,11 @@ class Requests(ABC):
         timeout: float | None = None,
     ) -> None:
         """HoldHandTeaching. Needs the role standard user."""
+
+    async def import_script(
+        self, *, script: str, revision: int, dry_run: bool = False, timeout: float | None = None
+    ) -> ImportScriptData:
+        """ImportScript: an edited script, and the revision of the script before. Needs the role standard user."""
 
     async def inverse_kinematics(
         self,
@@ -634,6 +643,9 @@ class Requests(ABC):
         timeout: float | None = None,
     ) -> None:
         """PreviewMove. Needs the role standard user."""
+
+    async def project_script(self, *, timeout: float | None = None) -> ProjectScriptData:
+        """ProjectScript. Needs the role operator."""
 
     async def projects_with_scene(self, id: str, *, timeout: float | None = None) -> set[str]:
         """ProjectsWithScene. Needs the role operator."""

@@ -412,20 +412,71 @@ async def test_start_is_dragged_for_all_users(work: Work) -> None:
     assert math.dist(kept.values["place/START"].values(), after.values()) < 1e-6
 
 
-async def test_code_view_shows_the_saved_program_and_selects_actions(work: Work) -> None:
-    """A note says that the code is older than the unsaved program."""
-    page = work.screen.page
-    await work.add("newer", "flow/wait", "bad")
-    await work.screen.close_panels()
+async def test_code_is_edited_and_imported(work: Work) -> None:
+    """Errors are shown at their line; the changes are reviewed, and imported as one step of undo."""
+    page, screen = work.screen.page, work.screen
+    await screen.close_panels()
     await work.mode("Code")
     code = page.get_by_role("region", name="Python program")
-    await code.get_by_text("This is the last saved program.").wait_for()
     await code.get_by_text("def main(res: Resources)").wait_for()
-    line = code.locator("li", has_text="reader.scan(")
+    assert await code.get_by_text("obj_").count() == 0, "ids are shown as names"
+    line = code.locator(".cm-line", has_text="reader.scan(")
     await line.click()
     await work.panel.get_by_role("heading", name="scan", exact=True).wait_for()
     await expect(line).to_have_attribute("data-selected", "true")
-    await work.screen.picture("program code")
+    await screen.close_panels()
+    # A breakpoint at the line.
+    box = await line.bounding_box()
+    gutter = await code.locator(".cm-breakpoints").bounding_box()
+    assert box
+    assert gutter
+    await page.mouse.click(gutter["x"] + gutter["width"] / 2, box["y"] + box["height"] / 2)
+    await expect(code.locator(".breakpoint-dot[data-on=true]")).to_have_count(1)
+    shared = await work.client.call("GetBreakpoints")
+    assert shared.ids == {work.action("scan").id}  # type: ignore[attr-defined]
+    await screen.picture("program code")
+    # An error at its line.
+    await line.click(position={"x": 60, "y": 5})
+    await screen.close_panels()
+    await line.click(position={"x": 60, "y": 5})
+    await page.keyboard.press("End")
+    await page.keyboard.type("\nreader.dance()")
+    await code.get_by_role("alert").get_by_text(re.compile("has no action dance")).wait_for()
+    await code.locator(".cm-lintRange-error").wait_for()
+    for name in ("tablet", "phone"):
+        await page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
+        await screen.settle()
+        assert await screen.faults() == []
+        await screen.picture(f"program code error {name}")
+    await page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
+    # The draft survives another view; what is typed instead can be imported.
+    await work.mode("3D")
+    await work.mode("Code")
+    wrong = code.locator(".cm-line", has_text="reader.dance()")
+    await wrong.click()
+    await page.keyboard.press("End")
+    for _ in "reader.dance()":
+        await page.keyboard.press("Backspace")
+    await page.keyboard.type('flow.wait(0.5, an="rest")')
+    await code.get_by_text(re.compile("changes to import")).wait_for()
+    await code.get_by_role("button", name="Review and import").click()
+    await code.get_by_role("heading", name="Changes in the project").wait_for()
+    assert await code.locator("li", has_text="rest").count() >= 1
+    for name in ("tablet", "phone"):
+        await page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
+        await screen.settle()
+        assert await screen.faults() == []
+        await screen.picture(f"program code review {name}")
+    await page.emulate_media(color_scheme="dark")
+    await screen.picture("program code review dark")
+    await page.emulate_media(color_scheme="light")
+    await page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
+    await code.get_by_role("button", name="Import", exact=True).click()
+    added = await work.told("ActionChanged", lambda event: event.change_type is ChangeType.ADD)
+    assert added.data.name == "rest"
+    await screen.sees("Imported. Undo reverts it in one step.")
+    await page.get_by_role("button", name="Undo").first.click()
+    await work.told("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
     await work.mode("3D")
 
 

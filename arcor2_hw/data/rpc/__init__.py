@@ -15,6 +15,7 @@ from arcor2_hw.data.rpc.operation import *
 from arcor2_hw.data.rpc.projects import *
 from arcor2_hw.data.rpc.robots import *
 from arcor2_hw.data.rpc.scenes import *
+from arcor2_hw.data.rpc.scripts import *
 
 _ALL: Final = (
     *ACTION_POINT_RPCS,
@@ -29,6 +30,7 @@ _ALL: Final = (
     *PROJECT_RPCS,
     *ROBOT_RPCS,
     *SCENE_RPCS,
+    *SCRIPT_RPCS,
 )
 RPCS: Final = {rpc.name: rpc for rpc in sorted(_ALL, key=lambda rpc: rpc.name)}
 """Every request by name."""

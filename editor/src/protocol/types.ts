@@ -393,6 +393,13 @@ export interface CheckConnectionData {
   seconds: number;
 }
 
+/** Answer to CheckScript: the first problem, or the items that the import would change. */
+export interface CheckScriptData {
+  revision: number;
+  problems: ScriptProblem[];
+  changes: HistoryItem[];
+}
+
 /** Arguments of CloseProject. */
 export interface CloseProjectArgs {
   force?: boolean;
@@ -705,6 +712,12 @@ export interface Identity {
   model: string;
   serial: string;
   firmware: string;
+}
+
+/** Answer to ImportScript: the new revision, and the changed items. */
+export interface ImportScriptData {
+  revision: number;
+  changes: HistoryItem[];
 }
 
 /** Arguments of InverseKinematics. */
@@ -1308,6 +1321,17 @@ export interface ProjectRobotJoints {
   id: string;
 }
 
+/**
+ * Answer to ProjectScript: the script, and the revision of the project from which it was generated.
+ *
+ * `editable` is whether an edited script can be imported: if the project has logic.
+ */
+export interface ProjectScriptData {
+  revision: number;
+  script: string;
+  editable: boolean;
+}
+
 /** Reliability of a reading (good, uncertain, bad, as in OPC UA). */
 export type Quality = "good" | "uncertain" | "bad";
 
@@ -1702,6 +1726,21 @@ export interface SceneStateData {
 
 /** Values of StateEnum in SceneState. */
 export type SceneStateEnum = "stopped" | "starting" | "started" | "stopping";
+
+/** Arguments of CheckScript and ImportScript: an edited script, and the revision of the script before. */
+export interface ScriptArgs {
+  script: string;
+  revision: number;
+}
+
+/** Why a script cannot be imported. `line` and `column` count from 1; without them it concerns the whole script. */
+export interface ScriptProblem {
+  message: string;
+  line?: number;
+  column?: number;
+  key?: string;
+  values?: Record<string, string | Message>;
+}
 
 /** Arguments of SetBreakpoints: ids of action points and actions, and the project, by default the open one. */
 export interface SetBreakpointsArgs {
@@ -2107,6 +2146,7 @@ export interface Requests {
   CancelAction: { args: undefined; data: undefined };
   CheckCalibration: { args: CheckCalibrationArgs; data: CalibrationCheck };
   CheckConnection: { args: CheckConnectionArgs; data: CheckConnectionData };
+  CheckScript: { args: ScriptArgs; data: CheckScriptData };
   CloseProject: { args: CloseProjectArgs | undefined; data: undefined };
   CloseScene: { args: CloseSceneArgs | undefined; data: undefined };
   CopyActionPoint: { args: CopyActionPointArgs; data: undefined };
@@ -2138,6 +2178,7 @@ export interface Requests {
   HandTeachingMode: { args: HandTeachingModeArgs; data: undefined };
   History: { args: HistoryArgs | undefined; data: HistoryData };
   HoldHandTeaching: { args: HoldHandTeachingArgs; data: undefined };
+  ImportScript: { args: ScriptArgs; data: ImportScriptData };
   InverseKinematics: { args: InverseKinematicsArgs; data: Joint[] };
   JogRobot: { args: JogRobotArgs; data: JogRobotData };
   ListCalibrations: { args: ListCalibrationsArgs | undefined; data: ListCalibrationsData };
@@ -2162,6 +2203,7 @@ export interface Requests {
   OpenScene: { args: IdArgs; data: undefined };
   PausePackage: { args: undefined; data: undefined };
   PreviewMove: { args: MovePreview; data: undefined };
+  ProjectScript: { args: undefined; data: ProjectScriptData };
   ProjectsWithScene: { args: IdArgs; data: string[] };
   Reachability: { args: ReachabilityArgs | undefined; data: ReachabilityData[] };
   ReadLock: { args: ReadLockArgs; data: undefined };
@@ -2340,6 +2382,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   CancelAction: 1,
   CheckCalibration: 1,
   CheckConnection: 4,
+  CheckScript: 2,
   CloseProject: 2,
   CloseScene: 2,
   CopyActionPoint: 2,
@@ -2371,6 +2414,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   HandTeachingMode: 2,
   History: 1,
   HoldHandTeaching: 2,
+  ImportScript: 2,
   InverseKinematics: 2,
   JogRobot: 2,
   ListCalibrations: 1,
@@ -2395,6 +2439,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   OpenScene: 2,
   PausePackage: 1,
   PreviewMove: 2,
+  ProjectScript: 1,
   ProjectsWithScene: 1,
   Reachability: 1,
   ReadLock: 1,

@@ -101,6 +101,15 @@ export interface FormDraft {
   values: Record<string, string>;
 }
 
+/** An edited script that is not imported. */
+export interface ScriptDraft {
+  projectId: string;
+  /** The script before, and the revision of the project from which it was generated. */
+  script: string;
+  revision: number;
+  text: string;
+}
+
 export interface Ui {
   selection: Selection | null;
   /** The item at the crosshair. */
@@ -124,6 +133,7 @@ export interface Ui {
   overlay: "" | "search" | "about" | "messages";
   /** Settings as typed, by the id of the object or, for a new device, by the name of its type. */
   forms: Record<string, FormDraft>;
+  scriptDraft?: ScriptDraft | undefined;
   /** Tabs that were open last. */
   robotTab: "tool" | "joints" | "hand" | "go";
   programTab: "add" | "steps" | "problems" | "parameters";

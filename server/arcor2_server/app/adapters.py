@@ -51,6 +51,7 @@ from arcor2_server.rpc.robot_motion import RobotMotionRequests
 from arcor2_server.rpc.runs import RunRequests
 from arcor2_server.rpc.scene import SceneRequests
 from arcor2_server.rpc.scene_objects import SceneObjectRequests
+from arcor2_server.rpc.scripts import ScriptRequests
 
 
 def request_handlers(s: Server) -> Handlers:
@@ -102,6 +103,7 @@ def request_handlers(s: Server) -> Handlers:
         RobotRequests(s.locks, s.types, s.session, s.online, s.robots, s.kinematics, s.motion),
         RobotMotionRequests(s.locks, s.types, s.session, s.online, s.robots, s.motion),
         RunRequests(s.runs),
+        ScriptRequests(s.session, s.undo, s.script_editing, editing),
         scenes,
         objects,
     )

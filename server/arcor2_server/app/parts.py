@@ -7,6 +7,7 @@ from typing import Protocol, TypeVar
 from arcor2_hw.data.events import Event
 from arcor2_server.access.admission import Access
 from arcor2_server.build.importing import PackageImport
+from arcor2_server.build.script_editing import ScriptEditing
 from arcor2_server.build.service import BuildService
 from arcor2_server.collaboration.lock_takeover import LockTakeover
 from arcor2_server.collaboration.locks import Locks
@@ -163,6 +164,7 @@ class Server:
             motion, cameras,
         )  # fmt: skip
         build = self.build = BuildService(settings, storage, types)
+        self.script_editing = ScriptEditing(storage, types, session)
         self.package_import = PackageImport(storage, assets, types, session, type_notifications)
         runs = self.runs = Runs(hub)
         await runs.open(shared)

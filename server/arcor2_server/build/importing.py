@@ -12,7 +12,7 @@ from msgspec import UNSET
 from arcor2_hw.analysis import SourceFile
 from arcor2_hw.data.base import Data, Unset
 from arcor2_hw.data.object_type import Mesh, Models, ObjectTypeSource
-from arcor2_hw.data.project import END, START, Action, Project
+from arcor2_hw.data.project import END, START, Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Conflict, InvalidPackage, InvalidProject, NotFound
 from arcor2_hw.messages import Message
@@ -20,7 +20,6 @@ from arcor2_server.build import script
 from arcor2_server.build.combined_types import CombinedTypes
 from arcor2_server.build.imported import Imported, read, with_helper_names
 from arcor2_server.documents import Session
-from arcor2_server.documents.checks.actions import complete_parameters
 from arcor2_server.documents.checks.project import project_problems
 from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.object_types.notifications import TypeNotifications
@@ -92,27 +91,14 @@ def _checked(package: Imported, known: Sequence[SourceFile], options: ImportOpti
 
 def _from_script(package: Imported, types: CombinedTypes) -> Project:
     """Return the project updated from the script, with default values added, as editors do."""
-    from arcor2_server.build.reading import from_script  # not needed for the start of the server
+    from arcor2_server.build.reading import completed_from_script  # not needed for the start of the server
 
     if package.needs_source:
         raise InvalidProject(
             "The project {name} has no logic, so its script cannot be converted to logic.", name=package.project.name
         )
-    facts = types.facts(package.scene)
-    project = from_script(
-        package.script, package.scene, with_present_names(package.scene, package.project, types), facts
-    )
-    type_of = {obj.id: obj.type for obj in package.scene.objects}
-
-    def completed(action: Action) -> Action:
-        object_id, method = action.parse_type()
-        return complete_parameters(action, facts[type_of[object_id]].actions[method])
-
-    points = [
-        msgspec.structs.replace(point, actions=[completed(action) for action in point.actions])
-        for point in project.action_points
-    ]
-    return msgspec.structs.replace(project, action_points=points)
+    project = with_present_names(package.scene, package.project, types)
+    return completed_from_script(package.script, package.scene, project, types.facts(package.scene))
 
 
 class _Saved(Data, frozen=True):

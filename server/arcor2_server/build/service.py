@@ -40,11 +40,23 @@ class BuildInput(Data, frozen=True):
     """The stored script of a project without logic, if there is one."""
 
 
-def _facts(types: ObjectTypes, scene: Scene, project: Project, code: Iterable[PackageType]) -> dict[str, TypeFacts]:
-    """Return what the script needs to know about the types of a scene, with the actions that the project uses."""
+def type_facts(
+    types: ObjectTypes, scene: Scene, project: Project, code: Iterable[PackageType], *, all_actions: bool = False
+) -> dict[str, TypeFacts]:
+    """Return what the script needs to know about the types of a scene, with the actions that the project uses, or all.
+
+    Args:
+        types: the object types.
+        scene: the scene of the project.
+        project: the project.
+        code: the code of the types in a package; a script imports the other types from the library.
+        all_actions: whether to include the actions that the project does not use.
+    """
     packaged = {packaged_type.name: packaged_type for packaged_type in code}
     type_of = {obj.id: obj.type for obj in scene.objects}
-    actions: dict[str, dict[str, ObjectAction]] = {name: {} for name in type_of.values()}
+    actions: dict[str, dict[str, ObjectAction]] = {
+        name: {each.name: each for each in types.actions(name)} if all_actions else {} for name in type_of.values()
+    }
     for point in project.action_points:
         for action in point.actions:
             object_id, _, method = action.type.partition("/")
@@ -65,6 +77,14 @@ def _facts(types: ObjectTypes, scene: Scene, project: Project, code: Iterable[Pa
             kinds = {key: msgspec.structs.replace(kind, module=module) for key, kind in kinds.items()}
         facts[name] = TypeFacts(module, types.meta(name).shown_name, used, kinds, types.keyword_only(name))
     return facts
+
+
+def package_code(types: ObjectTypes, names: Iterable[str], extra: Iterable[str] = ()) -> list[PackageType]:
+    """Return the code of types for a package, with their bases: an uploaded type may derive from an installed one.
+
+    `extra` are further uploaded sources, which may be helpers or mixins.
+    """
+    return types.sources_for([*(each for name in names for each in (*reversed(types.bases(name)), name)), *extra])
 
 
 @contextlib.contextmanager
@@ -138,8 +158,7 @@ class BuildService:
                     "object type {name} cannot be used: {problem}", name=meta.shown_name, problem=meta.why_disabled
                 )
         extra = [] if isinstance(project.project_objects_ids, Unset) else project.project_objects_ids
-        # With the bases, since an uploaded type may derive from an installed one.
-        code = types.sources_for([*(each for name in used for each in (*reversed(types.bases(name)), name)), *extra])
+        code = package_code(types, used, extra)
         modules = {packaged_type.name: packaged_type.module for packaged_type in code}
         models = {
             modules[name]: model
@@ -155,7 +174,7 @@ class BuildService:
             scene,
             project,
             code,
-            _facts(types, scene, project, code),
+            type_facts(types, scene, project, code),
             models,
             now(),
             {name: list(types.enumerations(name).values()) for name in used},

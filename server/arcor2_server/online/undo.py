@@ -70,7 +70,8 @@ class Undo:
     ) -> int:
         """Apply the changes that revert edits after the edit number `after`; return the new revision.
 
-        In a dry run only check them, and return the present revision. Call this inside `locked`.
+        Changes of the kind EDIT were prepared in the state after the edit number `after`. In a dry run only check them,
+        and return the present revision. Call this inside `locked`.
 
         Raises:
             RequestRefused: the changes conflict with later edits, or with the state of scene and projects.
@@ -91,7 +92,7 @@ class Undo:
         if dry_run:
             return session.revision
         revision = session.revision + 1
-        await session.commit(user, changes, request, kind, after)
+        await session.commit(user, changes, request, kind, 0 if kind is EditKind.EDIT else after)
         for change in changes:
             if change.kind is Kind.OBJECT and change.after is None:
                 session.removed_types.add(change.before.type)

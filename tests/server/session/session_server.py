@@ -8,7 +8,7 @@ import asyncio
 import contextlib
 import functools
 import json
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -24,6 +24,7 @@ from arcor2_server.access.admission import Access
 from arcor2_server.app import Server
 from arcor2_server.app.application import endpoints
 from arcor2_server.app.parts import connect_edits, is_stored
+from arcor2_server.build.script_editing import ScriptEditing
 from arcor2_server.collaboration.lock_takeover import LockTakeover
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.collaboration.presence import PresenceBoard
@@ -37,6 +38,7 @@ from arcor2_server.documents.edit_notifications import EditNotifications
 from arcor2_server.documents.saved_problems import SavedProblems
 from arcor2_server.errors import RequestRefused
 from arcor2_server.execution.breakpoints import SharedBreakpoints
+from arcor2_server.object_types.catalog import PackageType
 from arcor2_server.object_types.changes import Changes
 from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.online.undo import Undo
@@ -107,6 +109,21 @@ class RecordedTypes:
             if action.name == name:
                 return action
         raise NotFound(f"{type_name} has no action {name!r}.")
+
+    def actions(self, name: str) -> list[ObjectAction]:
+        return self._actions.get(name, [])
+
+    def enumerations(self, name: str) -> dict[Any, Any]:
+        return {}
+
+    def keyword_only(self, name: str) -> frozenset[Any]:
+        return frozenset()
+
+    def bases(self, name: str) -> list[str]:
+        return []
+
+    def sources_for(self, names: Iterable[str]) -> list[PackageType]:
+        return [PackageType(name, name.lower(), source="...") for name in names]
 
     def robot_meta(self, name: str) -> RobotMeta:
         if not self.derives_from(name, "Robot"):
@@ -326,6 +343,7 @@ async def open_server(directory: Path, **settings: Any) -> AsyncIterator[Session
                 ),
                 type_notifications=TypeNotifications(known, hub),
                 dependents=(dependents := Dependents(storage, known, session)),
+                script_editing=ScriptEditing(storage, known, session),
                 undo=Undo(locks, storage, known, session, online, dependents),
                 saved_problems=SavedProblems(storage, known, chosen.problems_file),
                 edit_notifications=EditNotifications(hub, session),

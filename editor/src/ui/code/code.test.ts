@@ -1,9 +1,9 @@
-/** The code view: a script read from a package, split into pieces for highlighting. */
+/** The code view: a script read from a package, its actions and folded parts. */
 
 import { deflateRawSync } from "node:zlib";
 import { expect, test } from "vitest";
 import { textOfZip } from "./package";
-import { pieces } from "./python";
+import { actionsOf, boilerplate, idsOf } from "./script";
 
 test("a file is read from a zip archive, compressed or stored", async () => {
   const files: [string, string, boolean][] = [
@@ -40,12 +40,50 @@ test("a file is read from a zip archive, compressed or stored", async () => {
   await expect(textOfZip(new ArrayBuffer(40), "a.txt")).rejects.toThrow("cannot be downloaded");
 });
 
-test("tokens contain every character, and strings can span lines", () => {
-  const source = 'def f(x):  # why\n    """One\n    two."""\n    return x_1 + 2.5e-3';
-  const lines = pieces(source);
-  expect(lines.map((line) => line.map((each) => each.text).join("")).join("\n")).toBe(source);
-  expect(lines[0]?.[0]).toEqual({ text: "def", kind: "word" });
-  expect(lines[0]?.at(-1)).toEqual({ text: "# why", kind: "comment" });
-  expect(lines[2]?.[0]?.kind).toBe("text");
-  expect(lines[3]?.at(-1)).toEqual({ text: "2.5e-3", kind: "number" });
+const SCRIPT = `"""Main script of the project Sort."""
+
+from action_points import ActionPoints
+from arcor2_hw.runtime.resources import Resources
+from object_types.arm import Arm
+
+
+def main(res: Resources) -> None:
+    aps = ActionPoints(res)
+
+    # Objects of the scene
+    robot: Arm = res.objects["obj_0123456789abcdef0123456789abcdef"]
+    table: tableType = res.objects["obj_2"]
+
+    # Project parameters
+    boards = 2
+
+    while True:
+        robot.pick(aps.feeder.poses.default, an="pick")
+        robot.move_joints(
+            aps.feeder.joints.above,
+            an="say \\"above\\"",
+        )
+
+
+if __name__ == "__main__":
+    main(Resources())
+`;
+
+test("the actions of a script are found by their names, also in calls of several lines", () => {
+  const line = (at: number) => SCRIPT.slice(0, at).split("\n").length;
+  expect(actionsOf(SCRIPT).map(({ name, from, to }) => [name, line(from), line(to)])).toEqual([
+    ["pick", 19, 19],
+    ['say "above"', 20, 22],
+  ]);
+});
+
+test("imports, objects and entry point are folded, and ids are found", () => {
+  const folded = boilerplate(SCRIPT).map(({ from, to }) => SCRIPT.slice(from, to).trim().split("\n"));
+  expect(folded.map((lines) => [lines[0]?.trim(), lines.at(-1)?.trim()])).toEqual([
+    ["from arcor2_hw.runtime.resources import Resources", "from object_types.arm import Arm"],
+    ['robot: Arm = res.objects["obj_0123456789abcdef0123456789abcdef"]', 'table: tableType = res.objects["obj_2"]'],
+    ["main(Resources())", "main(Resources())"],
+  ]);
+  expect(boilerplate("print(1)\n")).toEqual([]);
+  expect(idsOf(SCRIPT).map(({ id }) => id)).toEqual(["obj_0123456789abcdef0123456789abcdef"]);
 });

@@ -7,14 +7,14 @@ from arcor2_hw.messages import Message
 
 
 class NotUnderstood(InvalidProject):
-    """A line of a script cannot be converted to actions and logic. `line` counts from 1."""
+    """A line of a script cannot be converted to actions and logic. `line` counts from 1, `problem` does not name it."""
 
     code = "script_not_understood"
 
     def __init__(self, line: int, message: str, detail: str = "", **values: object) -> None:
         problem = Message.of(message, **values)
         super().__init__("script.py, line {line}: {problem}", detail, line=line, problem=problem)
-        self.line = line
+        self.line, self.problem = line, problem
 
 
 def excerpt(node: ast.AST) -> str:

@@ -1,0 +1,26 @@
+"""Converts a script to a project whose actions have all parameters."""
+
+from collections.abc import Mapping
+
+from msgspec.structs import replace
+
+from arcor2_hw.data.project import Action, Project
+from arcor2_hw.data.scene import Scene
+from arcor2_server.build.frame import TypeFacts
+from arcor2_server.build.reading.project import from_script
+from arcor2_server.documents.checks.actions import complete_parameters
+
+
+def completed_from_script(source: str, scene: Scene, project: Project, facts: Mapping[str, TypeFacts]) -> Project:
+    """Return the project updated from its script (see `from_script`), with default values added, as editors do."""
+    project = from_script(source, scene, project, facts)
+    type_of = {obj.id: obj.type for obj in scene.objects}
+
+    def completed(action: Action) -> Action:
+        object_id, method = action.parse_type()
+        return complete_parameters(action, facts[type_of[object_id]].actions[method])
+
+    points = [
+        replace(point, actions=[completed(action) for action in point.actions]) for point in project.action_points
+    ]
+    return replace(project, action_points=points)
