@@ -1,6 +1,7 @@
 /** Fields of the settings of an object: required ones first and marked, groups and advanced ones below. */
 
 import { t } from "@lingui/core/macro";
+import { Fragment } from "react";
 import { words } from "../../program/naming";
 import { grouped, type Values } from "../../program/settings";
 import { extraOf, nameWithoutUnit } from "../../program/values";
@@ -54,10 +55,10 @@ export function SettingsFields({ type: owner, values, why, autoFocus = false, on
     );
     if (!each.found_by || why) return control;
     return (
-      <div key={name} className="found-setting">
+      <Fragment key={name}>
         {control}
         <FindDevices type={owner} setting={each} values={values} onFound={(json) => set(name, json, default_value)} />
-      </div>
+      </Fragment>
     );
   };
   return (
