@@ -1,6 +1,8 @@
 """All errors: each has a stable code, a message for the operator and a detail for the technician."""
 
-from typing import ClassVar, Self
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import ClassVar, Final, Self
 
 from arcor2_hw.messages import Message
 
@@ -141,6 +143,29 @@ class KinematicsError(DeviceError):
     """No joint values reach the pose, or a value is invalid for the robot."""
 
     code = "kinematics"
+
+
+ERROR_KINDS: Final[Mapping[str, type[Arcor2Error]]] = MappingProxyType(
+    {
+        kind.code: kind
+        for kind in (
+            DeviceTimeout,
+            Refused,
+            OutOfRange,
+            Stale,
+            NoDepth,
+            Overexposed,
+            DeviceFault,
+            PathBlocked,
+            KinematicsError,
+            Arcor2Error,
+        )
+    }
+)
+"""The kinds of errors that an error exit of an action can name, in the order in which exits apply; `error` is any."""
+
+ENDS_PROGRAM: Final = (NotConnected, ConnectionLost, NotInControl, SafetyStop, Cancelled)
+"""Errors that no error exit of an action catches: they end the program."""
 
 
 # ------------------------------------------------------------------------------------------------ programs and data

@@ -111,6 +111,7 @@ class Requests(ABC):
         type: str,
         parameters: Sequence[ActionParameter] = (),
         flows: Sequence[Flow] = (),
+        error_output: str | Unset = UNSET,
         dry_run: bool = False,
         timeout: float | None = None,
     ) -> None:
@@ -180,6 +181,7 @@ class Requests(ABC):
         start: str,
         end: str,
         condition: ProjectLogicIf | Unset = UNSET,
+        error_kinds: list[str] | Unset = UNSET,
         dry_run: bool = False,
         timeout: float | None = None,
     ) -> None:
@@ -910,6 +912,7 @@ class Requests(ABC):
         *,
         parameters: list[ActionParameter] | Unset = UNSET,
         flows: list[Flow] | Unset = UNSET,
+        error_output: str | Unset = UNSET,
         dry_run: bool = False,
         timeout: float | None = None,
     ) -> None:
@@ -960,6 +963,7 @@ class Requests(ABC):
         start: str,
         end: str,
         condition: ProjectLogicIf | Unset = UNSET,
+        error_kinds: list[str] | Unset = UNSET,
         dry_run: bool = False,
         timeout: float | None = None,
     ) -> None:

@@ -206,8 +206,8 @@ class Rest:
         return await self.request("GET", f"/projects/{_part(key)}", Project)
 
     async def put_project(self, project: Project) -> None:
-        """Save a new or changed project. Its scene has to be saved before."""
-        await self.request("PUT", "/projects", body=project)
+        """Save a new or changed project exactly as it is. Its scene has to be saved before."""
+        await self.request("PUT", "/projects", body=project, params={"exact": "true"})
 
     async def delete_project(self, key: str) -> None:
         """Delete a saved project and its script."""

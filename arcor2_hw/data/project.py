@@ -1,6 +1,7 @@
 """A project: action points with orientations, joints and actions, the logic between actions, parameters."""
 
 import enum
+from typing import Final
 
 from msgspec import field
 
@@ -12,6 +13,10 @@ from arcor2_hw.data.scene import SceneObjectOverride
 
 START = "START"
 END = "END"
+ERROR_FLOW: Final = "error"
+"""The flow in a link to the error of an action: `<action id>/error/<index of the part>`."""
+ERROR_PARTS: Final = ("device", "kind", "text")
+"""The parts of an error, in the order of their indexes. All are strings."""
 
 
 class FlowTypes(enum.StrEnum):
@@ -54,10 +59,14 @@ class BareAction(Data, frozen=True):
 
 
 class Action(BareAction, frozen=True):
-    """An action on an action point."""
+    """An action on an action point.
+
+    `error_output` names the error for the actions after an error exit; without it, the error is not stored.
+    """
 
     parameters: list[ActionParameter] = field(default_factory=list)
     flows: list[Flow] = field(default_factory=list)
+    error_output: str | Unset = UNSET
 
     def parse_type(self) -> tuple[str, str]:
         """Return the object id and the name of the method. Raises ValueError when `type` is not of that form."""
@@ -69,6 +78,10 @@ class Action(BareAction, frozen=True):
     def outputs(self) -> list[str]:
         """Return the names of the results in the default flow, empty when they are not stored."""
         return next((flow.outputs for flow in self.flows if flow.type is FlowTypes.DEFAULT), [])
+
+    def names(self) -> list[str]:
+        """Return the names of the results and of the error: the variables of the program."""
+        return [*self.outputs(), self.error_output] if self.error_output else self.outputs()
 
 
 class NamedOrientation(Data, frozen=True):
@@ -130,12 +143,21 @@ def parse_link(link: str) -> tuple[str, str, int]:
 
 
 class LogicItem(Data, frozen=True):
-    """A step from one action to the next, taken when its condition holds."""
+    """A step from one action to the next, taken when its condition holds.
+
+    With `error_kinds` it is an error exit: it is taken when the action fails with an error of one of these kinds.
+    """
 
     start: str
     end: str
     condition: ProjectLogicIf | Unset = UNSET
     id: str = ""
+    error_kinds: list[str] | Unset = UNSET
+
+    @property
+    def is_error_exit(self) -> bool:
+        """Whether the step is taken when the action fails. Without kinds it is an ordinary step."""
+        return bool(self.error_kinds)
 
 
 class ProjectParameter(Parameter, frozen=True):

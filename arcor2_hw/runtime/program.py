@@ -6,7 +6,7 @@ import time
 import traceback
 from collections.abc import Mapping, Sequence, Set
 from types import MappingProxyType
-from typing import Any, Final, Protocol
+from typing import Any, Final, NamedTuple, Protocol
 
 import msgspec
 
@@ -21,7 +21,15 @@ from arcor2_hw.data.events import (
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.project import Project, ProjectRobotJoints
 from arcor2_hw.data.secret import ObjectSecrets
-from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, InvalidData, NotFound, ProgramStopped, message_of
+from arcor2_hw.exceptions import (
+    ENDS_PROGRAM,
+    Arcor2Error,
+    ConnectionLost,
+    InvalidData,
+    NotFound,
+    ProgramStopped,
+    message_of,
+)
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
@@ -72,6 +80,17 @@ class Action:
         self.id = action_id
         self.began = 0.0
         self.waited = 0.0
+
+
+class ActionError(NamedTuple):
+    """The error of an action that the program handles."""
+
+    device: str
+    """Name of the device; empty if no device raised the error."""
+    kind: str
+    """Code of the error, such as `device_timeout`."""
+    text: str
+    """Message for the operator."""
 
 
 class Program:
@@ -224,6 +243,19 @@ class Program:
     def record_error_source(self, device: Device, error: BaseException) -> None:
         """Record the device that raised an error, so that the report of the error names it."""
         self._error_source = error, device
+
+    def caught(self, error: Arcor2Error) -> ActionError:
+        """Return what happened, for the error exit of an action.
+
+        Raises:
+            Arcor2Error: The same error, if it always ends the program: a lost device, lost control, a safety stop or a
+                cancelled action.
+        """
+        if isinstance(error, ENDS_PROGRAM):
+            raise error
+        source = self._error_source
+        device = source[1].name if source is not None and source[0] is error else ""
+        return ActionError(device, error.code, str(error))
 
     # -------------------------------------------------------------------------------- stop and end
     def stop(self) -> None:

@@ -13,7 +13,7 @@ from arcor2_hw.exceptions import Arcor2Error, ProgramFinished, ProgramStopped
 from arcor2_hw.runtime.cell import SceneFault, recipes
 from arcor2_hw.runtime.creation import find_type, prepare_for_sources
 from arcor2_hw.runtime.package import PackageData, WorldPoints, package_name, put_on_path
-from arcor2_hw.runtime.program import Program, current
+from arcor2_hw.runtime.program import ActionError, Program, current
 from arcor2_hw.runtime.proxy import proxy
 from arcor2_hw.runtime.standalone import Standalone
 
@@ -80,6 +80,10 @@ class Resources:
     def parameter(self, parameter_id: str) -> Any:
         """Return the value of a project parameter. Raises NotFound."""
         return self._points.parameter(parameter_id)
+
+    def caught(self, error: Arcor2Error) -> ActionError:
+        """Return device, kind and text of the error of an action. Raises errors that always end the program."""
+        return self._program.caught(error)
 
     # -------------------------------------------------------------------------------- life
     def __enter__(self) -> "Resources":

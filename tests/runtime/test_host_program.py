@@ -86,7 +86,7 @@ class Arm(Robot):
 
     @action
     def fail(self, kind: str, *, an: str | None = None) -> None:
-        raise {"lost": ConnectionLost("cable cut"), "odd": ValueError("odd")}[kind]
+        raise {"lost": ConnectionLost("cable cut"), "odd": ValueError("odd"), "full": Refused("the box is full")}[kind]
 
     @action
     def finish(self, *, an: str | None = None) -> None:
@@ -175,6 +175,31 @@ class Run:
 @pytest.fixture
 def run(host: HostProcess, package: Package, tmp_path: Path) -> Run:
     return Run(host, package, tmp_path)
+
+
+def test_an_error_exit_is_taken(run: Run) -> None:
+    run.start(
+        """
+        from arcor2_hw.exceptions import Arcor2Error, Refused
+        try:
+            arm.fail("full", an="a1")
+        except Refused as error:
+            problem = res.caught(error)
+        assert problem == ("arm", "refused", "the box is full"), problem
+        arm.go(res.pose("ori_top"), an="a2")
+        try:
+            arm.fail("lost", an="a3")
+        except Arcor2Error as error:
+            res.caught(error)
+        arm.go(res.pose("ori_top"), an="a4")
+        """
+    )
+    ended = run.host.expect_state("stopped")
+    assert ended.finished is False
+    assert run.host.gone() == 0
+    assert [event["action_id"] for event in run.data_of("ActionStateBefore")] == ["act_a1", "act_a2", "act_a3"]
+    [raised] = run.data_of("ProjectException")
+    assert (raised["type"], raised["action_id"]) == ("ConnectionLost", "act_a3")
 
 
 def test_events_of_a_complete_run(run: Run) -> None:

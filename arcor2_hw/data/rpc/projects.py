@@ -13,21 +13,23 @@ from arcor2_hw.messages import Message
 
 
 class AddActionArgs(Data, frozen=True):
-    """Arguments of AddAction."""
+    """Arguments of AddAction; `error_output` names its error."""
 
     action_point_id: str
     name: str
     type: str
     parameters: list[ActionParameter] = field(default_factory=list)
     flows: list[Flow] = field(default_factory=list)
+    error_output: str | Unset = UNSET
 
 
 class AddLogicItemArgs(Data, frozen=True):
-    """Arguments of AddLogicItem."""
+    """Arguments of AddLogicItem; `error_kinds` make the item an error exit."""
 
     start: str
     end: str
     condition: ProjectLogicIf | Unset = UNSET
+    error_kinds: list[str] | Unset = UNSET
 
 
 class AddProjectParameterArgs(Data, frozen=True):
@@ -106,15 +108,17 @@ class UpdateActionArgs(Data, frozen=True):
     action_id: str
     parameters: list[ActionParameter] | Unset = UNSET
     flows: list[Flow] | Unset = UNSET
+    error_output: str | Unset = UNSET
 
 
 class UpdateLogicItemArgs(Data, frozen=True):
-    """Arguments of UpdateLogicItem."""
+    """Arguments of UpdateLogicItem; without `error_kinds` these stay as they are, and an empty list removes them."""
 
     logic_item_id: str
     start: str
     end: str
     condition: ProjectLogicIf | Unset = UNSET
+    error_kinds: list[str] | Unset = UNSET
 
 
 class UpdateProjectDescriptionArgs(Data, frozen=True):

@@ -10,13 +10,18 @@ export interface AcknowledgeStopArgs {
   code?: string;
 }
 
-/** An action on an action point. */
+/**
+ * An action on an action point.
+ *
+ * `error_output` names the error for the actions after an error exit; without it, the error is not stored.
+ */
 export interface Action {
   name: string;
   type: string;
   id: string;
   parameters: ActionParameter[];
   flows: Flow[];
+  error_output?: string;
 }
 
 /** Data of the event ActionExecution. */
@@ -92,13 +97,14 @@ export interface ActionStateBeforeData {
   thread_id?: number;
 }
 
-/** Arguments of AddAction. */
+/** Arguments of AddAction; `error_output` names its error. */
 export interface AddActionArgs {
   action_point_id: string;
   name: string;
   type: string;
   parameters?: ActionParameter[];
   flows?: Flow[];
+  error_output?: string;
 }
 
 /** Arguments of AddActionPoint. */
@@ -139,11 +145,12 @@ export interface AddApUsingRobotArgs {
   arm_id?: string;
 }
 
-/** Arguments of AddLogicItem. */
+/** Arguments of AddLogicItem; `error_kinds` make the item an error exit. */
 export interface AddLogicItemArgs {
   start: string;
   end: string;
   condition?: ProjectLogicIf;
+  error_kinds?: string[];
 }
 
 /** Arguments of AddObjectToScene. */
@@ -833,12 +840,17 @@ export interface LockHolder {
 /** Kinds of write lock. */
 export type LockType = "TREE" | "OBJECT";
 
-/** A step from one action to the next, taken when its condition holds. */
+/**
+ * A step from one action to the next, taken when its condition holds.
+ *
+ * With `error_kinds` it is an error exit: it is taken when the action fails with an error of one of these kinds.
+ */
 export interface LogicItem {
   start: string;
   end: string;
   condition?: ProjectLogicIf;
   id: string;
+  error_kinds?: string[];
 }
 
 /** Values of WhatEnum in ShowMainScreen. */
@@ -1965,6 +1977,7 @@ export interface UpdateActionArgs {
   action_id: string;
   parameters?: ActionParameter[];
   flows?: Flow[];
+  error_output?: string;
 }
 
 /** Arguments of UpdateActionPointJoints. */
@@ -2014,12 +2027,13 @@ export interface UpdateLockArgs {
   new_type: LockType;
 }
 
-/** Arguments of UpdateLogicItem. */
+/** Arguments of UpdateLogicItem; without `error_kinds` these stay as they are, and an empty list removes them. */
 export interface UpdateLogicItemArgs {
   logic_item_id: string;
   start: string;
   end: string;
   condition?: ProjectLogicIf;
+  error_kinds?: string[];
 }
 
 /** Arguments of UpdateObjectModel. */

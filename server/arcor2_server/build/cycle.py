@@ -1,16 +1,28 @@
 """Converts the logic of a project to the statements of the script's loop."""
 
 import ast
+from typing import Final
 
 from arcor2_hw.actions.parameter_types import PARAMETER_TYPES, read_reference
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ParameterMeta
-from arcor2_hw.data.project import ActionParameter, ActionParameterType, parse_link
-from arcor2_hw.exceptions import Arcor2Error, InvalidData, InvalidProject
+from arcor2_hw.data.project import (
+    ERROR_FLOW,
+    ERROR_PARTS,
+    ActionParameter,
+    ActionParameterType,
+    FlowTypes,
+    parse_link,
+)
+from arcor2_hw.exceptions import ERROR_KINDS, Arcor2Error, InvalidData, InvalidProject
 from arcor2_server.build import expressions
-from arcor2_server.build.frame import NEXT_ACTION, REFERENCES, Frame, References
+from arcor2_server.build.error_exits import nodes_of
+from arcor2_server.build.frame import ERROR, NEXT_ACTION, REFERENCES, Frame, References
 from arcor2_server.build.layout import arrange
 from arcor2_server.documents.logic_graph import BRANCHABLE, END_NODE, Condition, Flow
+
+CAUGHT: Final = expressions.dotted("res", ("caught",))
+"""The method that returns what happened, for an error exit."""
 
 Block = list[ast.stmt]
 Stack = list[tuple[int, Block]]
@@ -21,7 +33,8 @@ class Cycle:
 
     def __init__(self, frame: Frame, flow: Flow) -> None:
         self.frame, self.flow = frame, flow
-        self.layout, self.natural = arrange(flow.edges)
+        self.nodes = nodes_of(flow.edges, flow.exits)
+        self.layout, self.natural = arrange(self.nodes.edges)
         self.numbers = {action.id: number for number, action in enumerate(flow.actions)}
         names: set[str] = set()
         for action in flow.actions:
@@ -31,6 +44,8 @@ class Cycle:
         self.calls = [frame.resolve(action) for action in flow.actions]
         self.results = [self._name_results(number) for number in range(len(flow.actions))]
         """The variables for the results of each action."""
+        self.errors = [frame.names.claim(action.error_output) if action.error_output else "" for action in flow.actions]
+        """The variable for the error of each action; empty if it is not stored."""
 
     def _name_results(self, number: int) -> list[str]:
         action, returns = self.flow.actions[number], self.calls[number].meta.returns
@@ -47,26 +62,42 @@ class Cycle:
         return [self.frame.names.claim(output) for output in outputs]
 
     # ------------------------------------------------------------------------------------------------ blocks
+    def _name(self, node: int) -> str:
+        """Return the name of a node in the variable with the next action."""
+        return self.flow.actions[self.nodes.actions[node]].name + self.nodes.names[node]
+
     def statements(self) -> Block:
         """Return the body of the loop."""
         body: Block = []
+        guards: list[ast.If] = []
         stack: Stack = [(0, body)]
+        nodes = self.nodes
         while stack:
             node, block = stack.pop()
             placed = self.layout.placed[node]
             if placed.guarded:
-                guard = ast.If(expressions.equals(NEXT_ACTION, self.flow.actions[node].name), [], [])
+                guard = ast.If(expressions.equals(NEXT_ACTION, self._name(node)), [], [])
+                guards.append(guard)
                 block.append(guard)
                 block = guard.body
-            block.append(self._call(node))
+            action = nodes.actions[node]
+            attempt: ast.Try | None = None
+            if node == nodes.call[action]:
+                call = self._call(action)
+                if nodes.exits[action]:
+                    attempt = ast.Try([call], [], [], [])
+                block.append(attempt or call)
             stack.extend((join, block) for join in reversed(placed.joins))
             if placed.last != END_NODE:
                 stack.append((placed.last, block))
-            edges = self.flow.edges[node]
-            if len(edges) == 1:
+            if attempt is not None:
+                self._catch(node, attempt, stack)
+            elif len(edges := nodes.edges[node]) == 1:
                 self._continue_at(node, edges[0].target, block, stack, placed.follow)
             else:
                 self._branch(node, block, stack)
+        for guard in guards:
+            guard.body = guard.body or [ast.Pass()]
         return body
 
     def _continue_at(self, node: int, target: int, block: Block, stack: Stack, follow: int) -> None:
@@ -77,18 +108,39 @@ class Cycle:
         elif not self.layout.is_join[target]:
             stack.append((target, block))
         elif self.layout.sets_next_action(node, target):
-            block.append(expressions.assign(NEXT_ACTION, ast.Constant(self.flow.actions[target].name)))
+            block.append(expressions.assign(NEXT_ACTION, ast.Constant(self._name(target))))
+
+    def _catch(self, node: int, attempt: ast.Try, stack: Stack) -> None:
+        """Write the error exits of an action as `except` blocks, and its success as `else` block."""
+        placed = self.layout.placed[node]
+        action = self.nodes.actions[node]
+        follow = placed.follow if placed.last == END_NODE else placed.last
+        for target, leaving in zip(self.nodes.exits[action], self.flow.exits[action], strict=True):
+            kinds: list[ast.expr] = [
+                expressions.name(self.frame.imported(ERROR_KINDS[kind].__module__, ERROR_KINDS[kind].__name__))
+                for kind in leaving.kinds
+            ]
+            caught = ast.Call(CAUGHT, [expressions.name(ERROR)], [])
+            variable = self.errors[action]
+            inside: Block = [expressions.assign(variable, caught) if variable else ast.Expr(caught)]
+            kind = kinds[0] if len(kinds) == 1 else ast.Tuple(kinds, ast.Load())
+            attempt.handlers.append(ast.ExceptHandler(kind, ERROR, inside))
+            if target != placed.last:
+                self._continue_at(node, target, inside, stack, follow)
+        if self.nodes.success[action] != placed.last:
+            self._continue_at(node, self.nodes.success[action], attempt.orelse, stack, follow)
 
     def _branch(self, node: int, block: Block, stack: Stack) -> None:
         """Write the edges of an action as branches of an `if` statement."""
         placed = self.layout.placed[node]
-        targets = {edge.target for edge in self.flow.edges[node]}
+        edges = self.nodes.edges[node]
+        targets = {edge.target for edge in edges}
         if len(targets) == 1:
             self._continue_at(node, targets.pop(), block, stack, placed.follow)
             return
         follow = placed.follow if placed.last == END_NODE else placed.last
         branches: list[tuple[Condition | None, Block, bool]] = []
-        for edge in self.flow.edges[node]:
+        for edge in edges:
             inside: Block = []
             waiting = len(stack)
             if edge.target == END_NODE or edge.target != placed.last:
@@ -98,7 +150,7 @@ class Cycle:
             branches.pop()  # an empty last branch continues with the next statement anyway
         if not branches:
             return
-        if len(self.flow.edges[node]) == 2 and not branches[0][2]:
+        if len(edges) == 2 and not branches[0][2]:
             (first, _, _), (condition, inside, _) = branches
             # An edge without a condition is followed if the condition of the other edge does not hold.
             test = self._test(node, condition) if condition else self._test(node, first, negated=True)
@@ -108,7 +160,7 @@ class Cycle:
         for number, (condition, inside, filled) in enumerate(branches):
             if not filled:
                 inside.append(ast.Pass())
-            if above is not None and number == len(self.flow.edges[node]) - 1:
+            if above is not None and number == len(edges) - 1:
                 above.orelse = inside
                 break
             step = ast.If(self._test(node, condition), inside, [])
@@ -119,9 +171,9 @@ class Cycle:
             above = step
 
     # ------------------------------------------------------------------------------------------------ expressions
-    def _result(self, node: int, source: int, output: int, kind: str) -> str:
-        """Return the variable with a result of action number `source` that action number `node` uses."""
-        consumer, producer = self.flow.actions[node], self.flow.actions[source]
+    def _result(self, user: int, source: int, output: int, kind: str) -> str:
+        """Return the variable with a result of action number `source` that action number `user` uses."""
+        consumer, producer = self.flow.actions[user], self.flow.actions[source]
         names, returns = self.results[source], self.calls[source].meta.returns
         if output >= len(names):
             raise InvalidProject(
@@ -143,10 +195,10 @@ class Cycle:
 
     def _test(self, node: int, condition: Condition | None, *, negated: bool = False) -> ast.expr:
         assert condition is not None, "only the last of several edges has no condition"
-        source = condition.action
-        if not self.natural.always_before(source, node):
-            raise self._too_early(node, source)
-        user, returns = self.flow.actions[node].name, self.calls[source].meta.returns
+        source, number = condition.action, self.nodes.actions[node]
+        if not self.nodes.has_results(self.natural, source, node):
+            raise self._too_early(number, source)
+        user, returns = self.flow.actions[number].name, self.calls[source].meta.returns
         kind = returns[condition.output] if condition.output < len(returns) else ""
         if kind not in BRANCHABLE:
             name = self.flow.actions[source].outputs()[condition.output]
@@ -156,7 +208,7 @@ class Cycle:
                 name=name,
                 type=kind or "nothing",
             )
-        variable = self._result(node, source, condition.output, kind)
+        variable = self._result(number, source, condition.output, kind)
         if type(condition.value) is not BRANCHABLE[kind]:
             allowed = "true and false" if kind == "boolean" else "strings" if kind == "string_enum" else "integers"
             raise InvalidProject(
@@ -169,27 +221,47 @@ class Cycle:
             )
         return (expressions.differs if negated else expressions.equals)(variable, condition.value)
 
-    def _too_early(self, node: int, source: int) -> InvalidProject:
-        consumer, producer = self.flow.actions[node].name, self.flow.actions[source].name
+    def _too_early(self, user: int, source: int) -> InvalidProject:
+        consumer, producer = self.flow.actions[user].name, self.flow.actions[source].name
         return InvalidProject(
             "action {consumer!r} uses a result of {producer!r}, which does not run before it on all paths",
             consumer=consumer,
             producer=producer,
         )
 
-    def _linked(self, node: int, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:
+    def _linked(self, user: int, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:
         action_id, flow, output = parse_link(read_reference(parameter))
         source = self.numbers.get(action_id)
-        if source is None or flow != "default":
+        if source is None or flow not in (FlowTypes.DEFAULT, ERROR_FLOW):
             _, producer = self.frame.index.action(action_id)
             raise InvalidData(
                 "parameter {name}: {producer_name!r} never runs and has no result",
                 name=parameter.name,
                 producer_name=producer.name,
             )
-        if source == node or not self.natural.always_before(source, node):
-            raise self._too_early(node, source)
-        return expressions.name(self._result(node, source, output, meta.type))
+        node = self.nodes.call[user]
+        if flow == ERROR_FLOW:
+            return self._part_of_error(user, source, output, meta)
+        if source == user or not self.nodes.has_results(self.natural, source, node):
+            raise self._too_early(user, source)
+        return expressions.name(self._result(user, source, output, meta.type))
+
+    def _part_of_error(self, user: int, source: int, part: int, meta: ParameterMeta) -> ast.expr:
+        consumer, producer = self.flow.actions[user].name, self.flow.actions[source].name
+        if not self.errors[source] or part >= len(ERROR_PARTS) or meta.type != "string":
+            raise InvalidProject(
+                "action {name!r}: {parameter} cannot be the error of {producer_name!r}",
+                name=consumer,
+                parameter=meta.name,
+                producer_name=producer,
+            )
+        if not self.nodes.has_error(self.natural, source, self.nodes.call[user]):
+            raise InvalidProject(
+                "action {consumer!r} uses the error of {producer!r}, which has not failed on all paths to it",
+                consumer=consumer,
+                producer=producer,
+            )
+        return expressions.dotted(self.errors[source], (ERROR_PARTS[part],))
 
     def _constant(self, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:
         constant = self.frame.index.parameter(read_reference(parameter))
@@ -203,8 +275,8 @@ class Cycle:
             )
         return expressions.name(self.frame.parameters[constant.id])
 
-    def _literal(self, node: int, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:
-        object_id, type_name, method, _ = self.calls[node]
+    def _literal(self, user: int, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:
+        object_id, type_name, method, _ = self.calls[user]
         kind = PARAMETER_TYPES.get(meta.type)
         if kind is None or parameter.type != meta.type:
             raise InvalidData(
@@ -218,9 +290,9 @@ class Cycle:
         enumerations = self.frame.types[type_name].enumerations
         return kind.expression(parameter, References(self.frame, object_id, enumerations, method))
 
-    def _arguments(self, node: int) -> tuple[list[ast.expr], list[ast.keyword]]:
+    def _arguments(self, user: int) -> tuple[list[ast.expr], list[ast.keyword]]:
         """Return positional arguments, and keyword arguments if required or after a default value."""
-        action, (_, type_name, method, declared) = self.flow.actions[node], self.calls[node]
+        action, (_, type_name, method, declared) = self.flow.actions[user], self.calls[user]
         keyword_only = self.frame.types[type_name].keyword_only
         given = {parameter.name: parameter for parameter in action.parameters}
         positional: list[ast.expr] = []
@@ -237,11 +309,11 @@ class Cycle:
                 continue
             match parameter.type:
                 case ActionParameterType.LINK:
-                    value = self._linked(node, parameter, meta)
+                    value = self._linked(user, parameter, meta)
                 case ActionParameterType.PROJECT_PARAMETER:
                     value = self._constant(parameter, meta)
                 case _:
-                    value = self._literal(node, parameter, meta)
+                    value = self._literal(user, parameter, meta)
             if gap or (method, meta.name) in keyword_only:
                 keywords.append(ast.keyword(meta.name, value))
             else:
@@ -255,19 +327,19 @@ class Cycle:
             )
         return positional, keywords
 
-    def _call(self, node: int) -> ast.stmt:
+    def _call(self, number: int) -> ast.stmt:
         """Return the statement that runs an action and stores its results."""
-        action = self.flow.actions[node]
-        object_id, _, method, _ = self.calls[node]
+        action = self.flow.actions[number]
+        object_id, _, method, _ = self.calls[number]
         try:
-            positional, keywords = self._arguments(node)
+            positional, keywords = self._arguments(number)
         except InvalidProject:
             raise
         except (Arcor2Error, ValueError) as error:
             raise InvalidProject("action {name!r}: {reason}", name=action.name, reason=error) from error
         keywords.append(ast.keyword("an", ast.Constant(action.name)))
         call = ast.Call(expressions.dotted(self.frame.objects[object_id], (method,)), positional, keywords)
-        match self.results[node]:
+        match self.results[number]:
             case []:
                 return ast.Expr(call)
             case [name]:

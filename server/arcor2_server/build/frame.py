@@ -22,9 +22,11 @@ from arcor2_server.build.style import Writer
 
 NEXT_ACTION: Final = "next_action"
 """Variable with the name of the action that runs next, if that is not the next one in the text (see layout.py)."""
+ERROR: Final = "error"
+"""Variable with the caught error in an `except` block."""
 REFERENCES: Final = frozenset({"pose", "position", "joints"})
 """Parameter types whose value is an id in the project."""
-_RESERVED: Final = ("ActionPoints", "Resources", "aps", "error", "main", "print_exception", "res", NEXT_ACTION)
+_RESERVED: Final = ("ActionPoints", "Resources", "aps", ERROR, "main", "print_exception", "res", NEXT_ACTION)
 _FRAME: Final = """
 def main(res: Resources) -> None:
     aps = ActionPoints(res)

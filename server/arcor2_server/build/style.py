@@ -176,6 +176,9 @@ class Writer:
                     kind = f" {_unparse(handler.type)}" if handler.type else ""
                     self._lines.append(f"{indent}except{kind}{f' as {handler.name}' if handler.name else ''}:")
                     self._block(handler.body, deeper)
+                if node.orelse:
+                    self._lines.append(f"{indent}else:")
+                    self._block(node.orelse, deeper)
             case ast.FunctionDef():
                 returns = f" -> {_unparse(node.returns)}" if node.returns else ""
                 self._lines.append(f"{indent}def {node.name}({_unparse(node.args)}){returns}:")

@@ -76,7 +76,7 @@ def _check_name(document: Document, change: Change) -> None:
     parent = change.parent if change.kind in _NAMED_IN_POINT else ""
     names: list[tuple[str, str]] = [(change.kind, change.after.name)]
     if change.kind is Kind.ACTION:
-        names += [("output", output) for output in change.after.outputs()]
+        names += [("output", output) for output in change.after.names()]
     for kind, name in names:
         other = document.named(kind, name, parent)
         if other is not None and other != change.id:

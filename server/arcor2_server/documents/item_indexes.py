@@ -1,11 +1,12 @@
 """Indexes of the items of a document: by name, by action point, and by the items that they refer to."""
 
+import contextlib
 from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
 import msgspec
 
-from arcor2_hw.data.project import ActionParameterType, parse_link
+from arcor2_hw.data.project import Action, ActionParameterType, parse_link
 from arcor2_server.documents.changes import Item, Kind
 
 OWNED: Final = (Kind.ORIENTATION, Kind.JOINTS, Kind.ACTION)
@@ -29,6 +30,14 @@ def reference(kind: str, value: str) -> str | None:
         return parse_link(target)[0] if kind == ActionParameterType.LINK else target
     except (msgspec.DecodeError, ValueError):
         return None
+
+
+def links(action: Action) -> Iterator[tuple[str, str, int]]:
+    """Return action id, flow and output index of each link among the parameters of an action."""
+    for parameter in action.parameters:
+        if parameter.type == ActionParameterType.LINK:
+            with contextlib.suppress(msgspec.DecodeError, ValueError):
+                yield parse_link(msgspec.json.decode(parameter.value, type=str))
 
 
 class ItemIndexes:
@@ -89,7 +98,7 @@ class ItemIndexes:
                 yield self.names, (item.parent + item.kind, value.name)
             case Kind.ACTION:
                 yield self.names, (item.kind, value.name)
-                for output in set(value.outputs()):
+                for output in set(value.names()):
                     yield self.names, ("output", output)
                 targets = {reference(parameter.type, parameter.value) for parameter in value.parameters}
                 for target in targets - {None}:

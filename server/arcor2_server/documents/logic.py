@@ -10,7 +10,7 @@ from arcor2_hw.data.project import END, START, Action, LogicItem, ProjectLogicIf
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.item_indexes import action_of
-from arcor2_server.documents.logic_graph import BRANCHABLE
+from arcor2_server.documents.logic_graph import BRANCHABLE, error_kinds_problem
 
 
 def check_logic_item(
@@ -38,11 +38,14 @@ def check_logic_item(
     siblings = [other for other in document.outgoing(start) if other.id != item.id]
     if start == START and siblings:
         raise InvalidData("START leads to {name} already.", name=_name(document, action_of(siblings[0].end)))
-    if any(action_of(other.end) == end for other in siblings):
+    if any(action_of(other.end) == end and other.is_error_exit == item.is_error_exit for other in siblings):
         raise InvalidData(
             "{name} leads to {other_name} already.", name=_name(document, start), other_name=_name(document, end)
         )
-    _check_otherwise(document, start, [item, *siblings])
+    if item.is_error_exit:
+        _check_error_exit(document, start, item, siblings)
+    else:
+        _check_otherwise(document, start, [item, *(other for other in siblings if not other.is_error_exit)])
     if not isinstance(item.condition, Unset):
         if start == START:
             raise InvalidData("The step from START cannot have a condition, because no action has a result yet.")
@@ -55,6 +58,21 @@ def check_logic_item(
             name=_name(document, start),
             other_name=_name(document, end),
         )
+
+
+def _check_error_exit(document: Document, start: str, item: LogicItem, siblings: list[LogicItem]) -> None:
+    if start == START:
+        raise InvalidData("The step from START cannot be an error exit, because START is not an action.")
+    if not isinstance(item.condition, Unset):
+        raise InvalidData("An error exit of {name} cannot have a condition.", name=_name(document, start))
+    kinds = item.error_kinds or []
+    if (problem := error_kinds_problem(kinds)) is not None:
+        raise InvalidData(problem)
+    for other in siblings:
+        if shared := set(kinds).intersection(other.error_kinds or ()):
+            raise InvalidData(
+                "{name} has another error exit for {kind}.", name=_name(document, start), kind=min(shared)
+            )
 
 
 def _check_otherwise(document: Document, start: str, items: list[LogicItem]) -> None:

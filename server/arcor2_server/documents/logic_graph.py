@@ -1,13 +1,14 @@
 """The logic of a project as a graph: the successors of each action and their conditions."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple, TypeGuard
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.project import END, START, Action, LogicItem, Project, ProjectLogicIf, parse_link
-from arcor2_hw.exceptions import InvalidProject
+from arcor2_hw.exceptions import ERROR_KINDS, Arcor2Error, InvalidProject
+from arcor2_hw.messages import Message
 
 END_NODE: Final = -1
 """The number of END, next to the numbers of actions."""
@@ -31,15 +32,24 @@ class Edge(NamedTuple):
     condition: Condition | None
 
 
+class ErrorExit(NamedTuple):
+    """A connection to action number `target` (or END_NODE) for errors of some kinds."""
+
+    target: int
+    kinds: tuple[str, ...]
+
+
 @dataclass(frozen=True, slots=True)
 class Flow:
     """The reachable actions in topological order: every edge leads to a higher number, 0 is the first.
 
     `edges[n]` is one unconditional edge, or several that are tested in order. The last one applies if no other does.
+    `exits[n]` are the error exits in the order in which they apply.
     """
 
     actions: list[Action]
     edges: list[tuple[Edge, ...]]
+    exits: list[tuple[ErrorExit, ...]]
 
 
 def _node(reference: str, item: LogicItem, known: dict[str, int]) -> int:
@@ -122,6 +132,44 @@ def _ordered(edges: list[Edge], source: Action, actions: Sequence[Action]) -> tu
     return (*conditional, *unconditional)
 
 
+def error_kinds_problem(kinds: Sequence[str]) -> Message | None:
+    """Return the problem of the kinds of an error exit, None if they are valid."""
+    if unknown := [kind for kind in kinds if kind not in ERROR_KINDS]:
+        known = ", ".join(ERROR_KINDS)
+        return Message.of("{kind!r} is not a kind of error. Known kinds: {known}.", kind=unknown[0], known=known)
+    if len(set(kinds)) != len(kinds):
+        return Message.of("A kind of error is given twice.")
+    if Arcor2Error.code in kinds and len(kinds) > 1:
+        return Message.of("The kind {kind!r} contains all others: remove them.", kind=Arcor2Error.code)
+    return None
+
+
+def in_order_of_kinds(kinds: Iterable[str]) -> list[str]:
+    """Return kinds of errors in the order in which error exits apply."""
+    wanted = set(kinds)
+    return [kind for kind in ERROR_KINDS if kind in wanted]
+
+
+def _exits(failing: list[tuple[int, LogicItem]], source: Action) -> tuple[ErrorExit, ...]:
+    """Check the error exits of an action, and sort them. The one for errors of any kind comes last."""
+    found: list[ErrorExit] = []
+    seen: set[str] = set()
+    for target, item in failing:
+        kinds = [] if isinstance(item.error_kinds, Unset) else item.error_kinds
+        if (problem := error_kinds_problem(kinds)) is not None:
+            raise InvalidProject("action {name!r}: {reason}", name=source.name, reason=problem)
+        if not isinstance(item.condition, Unset):
+            raise InvalidProject("action {name!r}: an error exit has a condition", name=source.name)
+        if shared := seen.intersection(kinds):
+            raise InvalidProject(
+                "action {name!r}: two error exits have the kind {kind}", name=source.name, kind=min(shared)
+            )
+        seen.update(kinds)
+        found.append(ErrorExit(target, tuple(in_order_of_kinds(kinds))))
+    order = list(ERROR_KINDS)
+    return tuple(sorted(found, key=lambda one: order.index(one.kinds[0])))
+
+
 def _is_boolean(condition: Condition | None) -> TypeGuard[Condition]:
     return condition is not None and isinstance(condition.value, bool)
 
@@ -179,14 +227,19 @@ def read(project: Project) -> Flow:
     new_numbers = {old: number for number, old in enumerate(order)}
     reached = [actions[number] for number in order]
     reached_ids = {action.id: number for number, action in enumerate(reached)}
+    new_numbers[END_NODE] = END_NODE
     edges: list[tuple[Edge, ...]] = []
+    exits: list[tuple[ErrorExit, ...]] = []
     for old, source in zip(order, reached, strict=True):
         outgoing = [
             Edge(
-                END_NODE if target == END_NODE else new_numbers[target],
+                new_numbers[target],
                 None if isinstance(item.condition, Unset) else _condition(item.condition, source, reached, reached_ids),
             )
             for target, item in items[old]
+            if not item.is_error_exit
         ]
         edges.append(_ordered(outgoing, source, reached))
-    return Flow(reached, edges)
+        failing = [(new_numbers[target], item) for target, item in items[old] if item.is_error_exit]
+        exits.append(_exits(failing, source) if failing else ())
+    return Flow(reached, edges, exits)

@@ -3,13 +3,13 @@
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.project import Action, BareActionPoint, LogicItem
+from arcor2_hw.data.project import ERROR_FLOW, Action, BareActionPoint, FlowTypes, LogicItem
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.checks.actions import action_meta
 from arcor2_server.documents.checks.object_types import Types
 from arcor2_server.documents.document import Document
-from arcor2_server.documents.item_indexes import OWNED, action_of
+from arcor2_server.documents.item_indexes import OWNED, action_of, links
 from arcor2_server.documents.logic import check_logic_item
 from arcor2_server.errors import RequestRefused
 
@@ -44,8 +44,19 @@ def require_point_unused(document: Document, point: BareActionPoint) -> None:
 
 def require_results_unused(document: Document, before: Action, after: Action) -> None:
     """Raise RequestRefused if `after` lacks the results of `before`, and a link or a condition uses one of them."""
-    if before.outputs() and not after.outputs() and (users := document.users_of(before.id)):
-        user = users[0]
+    for user in document.users_of(before.id):
+        if isinstance(user, Action):
+            flows = {link[1] for link in links(user) if link[0] == before.id}
+        else:
+            flows = {str(FlowTypes.DEFAULT)}
+        if ERROR_FLOW in flows and before.error_output and not after.error_output:
+            raise RequestRefused(
+                "The action {user} uses the error of {name}, so its error must keep a name.",
+                user=user.name if isinstance(user, Action) else "",
+                name=before.name,
+            )
+        if FlowTypes.DEFAULT not in flows or not before.outputs() or after.outputs():
+            continue
         using = f"The action {user.name}" if isinstance(user, Action) else "A condition of the logic"
         raise RequestRefused(
             "{user} uses a result of {name}, so its results must keep their names.", user=using, name=before.name
@@ -61,11 +72,11 @@ def neighbours(document: Document, action_id: str) -> set[str]:
 def bypass(document: Document, types: Types, action: Action) -> list[Change]:
     """Return the changes that remove an action from the logic.
 
-    If exactly one unconditional logic item leaves the action, the incoming logic items are redirected to its end where
-    the result is valid. All other logic items of the action are removed.
+    If exactly one unconditional logic item leaves the action, apart from error exits, the incoming logic items are
+    redirected to its end where the result is valid. All other logic items of the action are removed.
     """
-    outgoing = document.outgoing(action.id)
-    changes = [document.remove(Kind.LOGIC, item.id) for item in outgoing]
+    changes = [document.remove(Kind.LOGIC, item.id) for item in document.outgoing(action.id)]
+    outgoing = [item for item in document.outgoing(action.id) if not item.is_error_exit]
     end = outgoing[0].end if len(outgoing) == 1 and isinstance(outgoing[0].condition, Unset) else None
     for item in document.incoming(action.id):
         redirected = None if end is None else replace(item, end=end)

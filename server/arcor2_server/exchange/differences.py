@@ -93,6 +93,8 @@ def _names(archive: Archive) -> dict[str, str]:
                 names[one.id] = one.name  # type: ignore[attr-defined]
         for item in project.logic:
             branch = "" if isinstance(item.condition, Unset) else f" if {item.condition.value}"
+            if item.error_kinds:
+                branch = f" on {', '.join(item.error_kinds)}"
             start, end = (names.get(key.partition("/")[0], key) for key in (item.start, item.end))
             names[item.id] = f"{start} → {end}{branch}"
     return names

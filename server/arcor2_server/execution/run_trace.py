@@ -70,7 +70,8 @@ class RunTraceCollector:
         if self._began is None:
             self._began = start
         branch = self._branches.get((self._last.get(data.thread_id, ""), action_id), UNSET)
-        self._last[data.thread_id] = action_id
+        # An action after an error exit did not follow a condition.
+        self._last[data.thread_id] = action_id if isinstance(error, Unset) else ""
         self._ended += 1
         self._spans.append(
             Span(

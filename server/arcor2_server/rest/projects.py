@@ -11,6 +11,7 @@ from arcor2_hw.data.project import Project, ProjectParameter
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.scene import SceneObjectOverride
 from arcor2_hw.exceptions import Conflict, InvalidData, NotFound
+from arcor2_server.documents.extensions import keep_extensions
 from arcor2_server.rest.operations import operation
 from arcor2_server.rest.scenes import STORAGE, IdDesc, check_id
 from arcor2_server.storage import Storage
@@ -33,6 +34,12 @@ class CloneQuery(Data, frozen=True):
     new_description: str | Unset = UNSET
 
 
+class PutProjectQuery(Data, frozen=True):
+    """`exact`: store the project exactly as it is in the body."""
+
+    exact: bool = False
+
+
 @dataclass(frozen=True, slots=True)
 class ProjectOperations:
     """Projects, their sources and parameters over REST (protocol, section 13)."""
@@ -53,9 +60,15 @@ class ProjectOperations:
         return await self._storage.project(project_id)
 
     @operation("PUT", "/projects", STORAGE, Role.ADVANCED_USER)
-    async def put_project(self, body: Project) -> Timestamp:
-        """Save a new or changed project; return the time. Its scene must be saved before."""
+    async def put_project(self, query: PutProjectQuery, body: Project) -> Timestamp:
+        """Save a new or changed project; return the time. Its scene must be saved before.
+
+        Error exits and names of errors that the body lacks are kept by the ids of their items, unless `exact`.
+        """
         check_id(body.id, "project")
+        if not query.exact:
+            with contextlib.suppress(NotFound):
+                body = keep_extensions(body, await self._storage.project(body.id))
         return str((await self._storage.put_project(body)).modified)
 
     @operation("DELETE", "/projects/{project_id}", STORAGE, Role.ADVANCED_USER)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace
 
-from arcor2_hw.data.base import Unset, new_id
+from arcor2_hw.data.base import UNSET, Unset, new_id
 from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.project import Action, BareAction, LogicItem
 from arcor2_hw.data.rpc import AddActionArgs, RemoveActionArgs, RenameActionArgs, UpdateActionArgs
@@ -48,6 +48,7 @@ class ActionRequests:
             document.action_point(args.action_point_id)
             self._check_name(args.name)
             action = Action(args.name, args.type, new_id("act"), list(args.parameters), list(args.flows))
+            action = replace(action, error_output=args.error_output or UNSET)
             meta = action_meta(action, document, self._types)
             check_flows(action, meta)
             check_outputs_unique(document, action)
@@ -57,13 +58,16 @@ class ActionRequests:
 
     @rpc("UpdateAction")
     async def update_action(self, context: Context, args: UpdateActionArgs) -> None:
-        """Replace the parameters or the flows of an action, or both."""
+        """Replace the parameters, the flows or the name of the error of an action."""
         document = self._session.require_project_open()
         _, action = document.action(args.action_id)
         meta = action_meta(action, document, self._types)
         updated = action
         if not isinstance(args.flows, Unset):
             updated = replace(updated, flows=list(args.flows))
+        if not isinstance(args.error_output, Unset):
+            updated = replace(updated, error_output=args.error_output or UNSET)
+        if updated is not action:
             check_flows(updated, meta)
             check_outputs_unique(document, updated)
             require_results_unused(document, action, updated)

@@ -68,7 +68,8 @@ def _copied_action(
 ) -> Action:
     flows = [replace(flow, outputs=[free_output(output) for output in flow.outputs]) for flow in action.flows]
     parameters = [_redirected(parameter, new_ids) for parameter in action.parameters]
-    return replace(action, name=free_name(action.name), flows=flows, parameters=parameters)
+    error = free_output(action.error_output) if action.error_output else action.error_output
+    return replace(action, name=free_name(action.name), flows=flows, parameters=parameters, error_output=error)
 
 
 def _redirected(parameter: ActionParameter, new_ids: dict[str, str]) -> ActionParameter:

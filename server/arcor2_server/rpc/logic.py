@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace
 
-from arcor2_hw.data.base import new_id
+from arcor2_hw.data.base import UNSET, Unset, new_id
 from arcor2_hw.data.events import LockData
 from arcor2_hw.data.project import LogicItem
 from arcor2_hw.data.rpc import AddLogicItemArgs, RemoveLogicItemArgs, UpdateLogicItemArgs
@@ -53,7 +53,7 @@ class LogicRequests:
         document = self._require_logic()
         places = tuple(dict.fromkeys((action_of(args.start), action_of(args.end))))
         async with self._locks.auto_skip_held(context.user, *places):
-            item = LogicItem(args.start, args.end, args.condition, new_id("lit"))
+            item = LogicItem(args.start, args.end, args.condition, new_id("lit"), args.error_kinds or UNSET)
             self._check(document, item)
             if not await self._editing.commit_one(context, document.add(Kind.LOGIC, item.id, item)):
                 return
@@ -64,7 +64,8 @@ class LogicRequests:
         """Change a connection of the logic."""
         document = self._require_logic()
         item = document.logic_item(args.logic_item_id)
-        changed = replace(item, start=args.start, end=args.end, condition=args.condition)
+        kinds = item.error_kinds if isinstance(args.error_kinds, Unset) else args.error_kinds or UNSET
+        changed = replace(item, start=args.start, end=args.end, condition=args.condition, error_kinds=kinds)
         self._check(document, changed)
         await self._editing.commit_one(context, document.update(Kind.LOGIC, item.id, changed))
 

@@ -1,6 +1,7 @@
 """Projects made for the tests of Build, and a direct walk through a project's logic to compare programs with."""
 
 import builtins
+import copy
 import itertools
 import json
 import random
@@ -25,6 +26,8 @@ from arcor2_hw.data.project import (
     parse_link,
 )
 from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_hw.exceptions import ERROR_KINDS, Arcor2Error, InvalidProject
+from arcor2_hw.runtime.program import ActionError
 from arcor2_server.build.frame import TypeFacts
 from arcor2_server.build.script import from_logic
 
@@ -39,6 +42,7 @@ DECLARED = {
     "count": ObjectAction("count", returns=["integer"]),
     "sort": ObjectAction("sort", returns=["string_enum"]),
     "ask2": ObjectAction("ask2", returns=["boolean", "boolean"]),
+    "tell": ObjectAction("tell", parameters=[ParameterMeta("text", "string")]),
     "use": ObjectAction("use", parameters=[ParameterMeta("flag", "boolean"), ParameterMeta("x", "double")]),
 }
 TYPES = {"Thing": TypeFacts("object_types.thing", "Thing", DECLARED)}
@@ -53,6 +57,9 @@ class Draft:
     ways: list[tuple[str, str, Way]] = field(default_factory=list)
     links: dict[str, tuple[str, int]] = field(default_factory=dict)
     methods: dict[str, str] = field(default_factory=dict)
+    exits: list[tuple[str, str, list[str]]] = field(default_factory=list)
+    errors: dict[str, str] = field(default_factory=dict)
+    told: dict[str, tuple[str, int]] = field(default_factory=dict)
 
     def action(self, name: str, *results: str) -> "Draft":
         self.actions[name] = list(results)
@@ -75,6 +82,10 @@ class Draft:
         result = self.actions[name][0]
         return self.way(name, yes, (name, result, True)).way(name, no, (name, result, False))
 
+    def exit(self, start: str, end: str, *kinds: str) -> "Draft":
+        self.exits.append((start, end, list(kinds)))
+        return self
+
     def _action(self, name: str) -> Action:
         results = self.actions[name]
         method = self.methods.get(name) or ("do", "ask", "ask2")[len(results)]
@@ -84,7 +95,11 @@ class Draft:
             method = "use"
             link = ActionParameter("flag", "link", json.dumps(f"id_{source}/default/{output}"))
             parameters = [link, ActionParameter("x", "double", "0.5")]
-        return Action(name, f"{OBJECT}/{method}", f"id_{name}", parameters, [Flow(outputs=results)])
+        if name in self.told:
+            source, part = self.told[name]
+            method, parameters = "tell", [ActionParameter("text", "link", json.dumps(f"id_{source}/error/{part}"))]
+        flows = [Flow(outputs=results)]
+        return Action(name, f"{OBJECT}/{method}", f"id_{name}", parameters, flows, self.errors.get(name, UNSET))
 
     def project(self) -> Project:
         logic = []
@@ -95,6 +110,9 @@ class Draft:
                 when = ProjectLogicIf(f"id_{asked}/default/{self.actions[asked].index(result)}", json.dumps(value))
             begin = START if start == START else f"id_{start}"
             logic.append(LogicItem(begin, END if end == END else f"id_{end}", when, f"lit_{number}"))
+        for number, (start, end, kinds) in enumerate(self.exits):
+            target = END if end == END else f"id_{end}"
+            logic.append(LogicItem(f"id_{start}", target, id=f"exit_{number}", error_kinds=kinds))
         point = ActionPoint("ap", Position(), id="acp_1", actions=[self._action(name) for name in self.actions])
         return Project("project", "scn_1", id="pro_1", action_points=[point], logic=logic)
 
@@ -104,6 +122,28 @@ class Draft:
 
 class Enough(Exception):
     """The run has shown what it was to show."""
+
+
+Exits = dict[str, list[list[str]]]
+"""The kinds of the error exits of actions, by name."""
+
+
+def exits_of(project: Project) -> Exits:
+    names = {action.id: action.name for point in project.action_points for action in point.actions}
+    found: Exits = {}
+    for item in project.logic:
+        if item.error_kinds:
+            found.setdefault(names[item.start], []).append(item.error_kinds)
+    return found
+
+
+def failure(exits: Exits, name: str, number: int, drawn: tuple[bool, ...]) -> Arcor2Error | None:
+    """Give the error of the n-th action that runs, for what an oracle draws."""
+    rng = random.Random(f"{name} {number} {drawn}")
+    kinds = sorted(kind for exit_ in exits.get(name, ()) for kind in exit_)
+    if not kinds or rng.random() < 0.5:
+        return None
+    return ERROR_KINDS[rng.choice(kinds)](f"{name} failed")
 
 
 Oracle = Callable[[str, int], tuple[bool, ...]]
@@ -123,9 +163,10 @@ def given(method: str, drawn: tuple[bool, ...]) -> tuple[Any, ...]:
 def walk(project: Project, oracle: Oracle, count: int) -> list[tuple[str, tuple[Any, ...]]]:
     """Follow the logic item by item, without any notion of blocks; gives what runs with which linked values."""
     actions = {action.id: action for point in project.action_points for action in point.actions}
+    exits = exits_of(project)
     done: list[tuple[str, tuple[Any, ...]]] = []
     while True:
-        results: dict[str, tuple[Any, ...]] = {}
+        results: dict[tuple[str, str], tuple[Any, ...]] = {}
         at = next(item.end for item in project.logic if item.start == START)
         while at != END:
             if len(done) == count:
@@ -134,18 +175,27 @@ def walk(project: Project, oracle: Oracle, count: int) -> list[tuple[str, tuple[
             values = []
             for parameter in action.parameters:
                 if parameter.type == "link":
-                    source, _, output = parse_link(json.loads(parameter.value))
-                    values.append(results[source][output])
+                    source, flow, output = parse_link(json.loads(parameter.value))
+                    values.append(results[source, flow][output])
                 else:
                     values.append(json.loads(parameter.value))
-            results[at] = given(action.parse_type()[1], oracle(action.name, len(done)))
+            drawn = oracle(action.name, len(done))
+            error = failure(exits, action.name, len(done), drawn)
             done.append((action.name, tuple(values)))
-            ways = [item for item in project.logic if item.start == at]
+            if error is not None:
+                results[at, "error"] = ("thing", error.code, str(error))
+                at = next(i.end for i in project.logic if i.start == at and error.code in (i.error_kinds or ()))
+                continue
+            results[at, "default"] = given(action.parse_type()[1], drawn)
+            ways = [item for item in project.logic if item.start == at and not item.error_kinds]
             # The one without a condition is for when none holds, wherever it stands.
-            for item in sorted(ways, key=lambda way: not isinstance(way.condition, ProjectLogicIf)):
-                if isinstance(item.condition, ProjectLogicIf):
+            ways.sort(key=lambda way: not isinstance(way.condition, ProjectLogicIf))
+            while len(ways) > 1 and ways[-2].end == ways[-1].end:
+                ways.pop(-2)
+            for item in ways:
+                if isinstance(item.condition, ProjectLogicIf) and item is not ways[-1]:
                     source, _, output = parse_link(item.condition.what)
-                    if results[source][output] != json.loads(item.condition.value):
+                    if results[source, "default"][output] != json.loads(item.condition.value):
                         continue
                 at = item.end
                 break
@@ -154,34 +204,40 @@ def walk(project: Project, oracle: Oracle, count: int) -> list[tuple[str, tuple[
 
 
 class _Thing:
-    def __init__(self, oracle: Oracle, count: int) -> None:
+    def __init__(self, oracle: Oracle, count: int, exits: Exits) -> None:
         self.done: list[tuple[str, tuple[Any, ...]]] = []
-        self._oracle, self._count = oracle, count
+        self._oracle, self._count, self._exits = oracle, count, exits
 
     def __getattr__(self, method: str) -> Callable[..., Any]:
         def call(*arguments: Any, an: str) -> Any:
             if len(self.done) == self._count:
                 raise Enough
-            results = given(method, self._oracle(an, len(self.done)))
+            drawn = self._oracle(an, len(self.done))
+            error = failure(self._exits, an, len(self.done), drawn)
             self.done.append((an, arguments))
+            if error is not None:
+                raise error
+            results = given(method, drawn)
             return None if not results else results[0] if len(results) == 1 else results
 
         return call
 
 
-def run(source: str, oracle: Oracle, count: int) -> list[tuple[str, tuple[Any, ...]]]:
+def run(source: str, oracle: Oracle, count: int, exits: Exits | None = None) -> list[tuple[str, tuple[Any, ...]]]:
     """Run a generated script with a recording object in place of the device, for `count` actions."""
-    thing = _Thing(oracle, count)
+    thing = _Thing(oracle, count, exits or {})
     stub = types.SimpleNamespace(
         ActionPoints=lambda res: None, Resources=None, print_exception=None, Thing=_Thing, thing=None
     )
+    vars(stub).update({kind.__name__: kind for kind in ERROR_KINDS.values()})
     names: dict[str, Any] = {
         "__builtins__": {**vars(builtins), "__import__": lambda *_, **__: stub},
         "__name__": "script",
     }
     exec(compile(source, "script.py", "exec"), names)
     try:
-        names["main"](types.SimpleNamespace(objects={OBJECT: thing}))
+        caught = lambda error: ActionError("thing", error.code, str(error))  # noqa: E731
+        names["main"](types.SimpleNamespace(objects={OBJECT: thing}, caught=caught))
     except Enough:
         return thing.done
     raise AssertionError("a generated program must not end by itself")
@@ -191,7 +247,7 @@ def same_runs(draft: Draft, oracle: Oracle, count: int) -> None:
     """Compare the program with the logic."""
     project = draft.project()
     source = from_logic(SCENE, project, TYPES)
-    assert run(source, oracle, count) == walk(project, oracle, count), source
+    assert run(source, oracle, count, exits_of(project)) == walk(project, oracle, count), source
 
 
 def random_draft(rng: random.Random, size: int, joining: float, ending: float, window: int) -> Draft:
@@ -270,4 +326,38 @@ def with_choices(draft: Draft, rng: random.Random) -> Draft:
     if rng.random() < 0.5:
         # Where the way without a condition stands among the others makes no difference.
         draft.ways.sort(key=lambda way: way[2] is not None)
+    return draft
+
+
+def with_exits(draft: Draft, rng: random.Random) -> Draft:
+    """Add error exits, and actions that use the error, where the results that actions use stay set on all paths."""
+    names = [name for name in draft.actions if name != START]
+    order = {name: number for number, name in enumerate(names)}
+    kinds = list(ERROR_KINDS)
+    for name in names:
+        free = rng.sample(kinds[:-1], 3) + kinds[-1:]
+        for number in range(rng.choice((0, 0, 1, 1, 2))):
+            added = copy.deepcopy(draft)
+            chosen = [free.pop()] if rng.random() < 0.3 else [free.pop(0)]
+            if chosen[0] != "error" and len(free) > 1 and rng.random() < 0.4:
+                chosen.append(free.pop(0))
+            chosen.sort(key=kinds.index)
+            later = [one for one in names if order[one] > order[name]]
+            end = rng.choice([END, *later[:3]])
+            if rng.random() < 0.6:
+                handler = f"h{number}_{name}"
+                added.action(handler)
+                added.exit(name, handler, *chosen).way(handler, end)
+                if rng.random() < 0.7:
+                    added.errors[name] = f"e_{name}"
+                    added.told[handler] = (name, rng.randrange(3))
+            else:
+                added.exit(name, end, *chosen)
+            exits = [(start, target) for start, target, _ in added.exits]
+            try:
+                if len(exits) == len(set(exits)):
+                    added.script()
+                    draft = added
+            except InvalidProject:
+                pass
     return draft

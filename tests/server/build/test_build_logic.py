@@ -15,7 +15,17 @@ from arcor2_hw.exceptions import InvalidProject
 from arcor2_server.build.frame import TypeFacts
 from arcor2_server.build.layout import MAX_NESTING, Tree
 from arcor2_server.build.script import from_logic
-from tests.server.build.projects import DECLARED, SCENE, TYPES, Draft, random_draft, run, same_runs, with_choices
+from tests.server.build.projects import (
+    DECLARED,
+    SCENE,
+    TYPES,
+    Draft,
+    random_draft,
+    run,
+    same_runs,
+    with_choices,
+    with_exits,
+)
 
 
 @settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -26,13 +36,16 @@ from tests.server.build.projects import DECLARED, SCENE, TYPES, Draft, random_dr
     st.sampled_from([0.0, 0.1, 0.3]),
     st.sampled_from([1, 2, 3, 20]),
     st.booleans(),
+    st.booleans(),
 )
 def test_a_program_does_what_its_logic_defines(
-    seed: int, size: int, joining: float, ending: float, window: int, choices: bool
+    seed: int, size: int, joining: float, ending: float, window: int, choices: bool, exits: bool
 ) -> None:
     draft = random_draft(random.Random(seed), size, joining, ending, window)
     if choices:
         draft = with_choices(draft, random.Random(seed))
+    if exits:
+        draft = with_exits(draft, random.Random(seed))
     for draw in range(4):
         same_runs(draft, _oracle(seed + draw), 4 * size)
 

@@ -19,7 +19,7 @@ from arcor2_server.build.frame import TypeFacts
 from arcor2_server.build.reading import NotUnderstood, from_script
 from arcor2_server.build.script import from_logic
 from tests.server.build import workplace
-from tests.server.build.projects import SCENE, TYPES, random_draft, walk, with_choices
+from tests.server.build.projects import SCENE, TYPES, random_draft, walk, with_choices, with_exits
 
 
 def _oracle(seed: int) -> Any:
@@ -38,17 +38,20 @@ def _oracle(seed: int) -> Any:
     st.sampled_from([0.0, 0.1, 0.3]),
     st.sampled_from([1, 2, 3, 20]),
     st.booleans(),
+    st.booleans(),
 )
 def test_a_script_round_trips_to_the_same_project(
-    seed: int, size: int, joining: float, ending: float, window: int, choices: bool
+    seed: int, size: int, joining: float, ending: float, window: int, choices: bool, exits: bool
 ) -> None:
     draft = random_draft(random.Random(seed), size, joining, ending, window)
     if choices:
         draft = with_choices(draft, random.Random(seed))
+    if exits:
+        draft = with_exits(draft, random.Random(seed))
     project = draft.project()
     source = from_logic(SCENE, project, TYPES)
     back = from_script(source, SCENE, project, TYPES)
-    steps = [(item.start, item.end) for item in project.logic]
+    steps = [(item.start, item.end, item.is_error_exit) for item in project.logic]
     if len(steps) == len(set(steps)):
         assert back == project, source
     # Two steps from one action to the same one, which no editor makes, may become one.

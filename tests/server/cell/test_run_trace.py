@@ -66,6 +66,16 @@ def test_spans_name_device_and_branch_and_exclude_pauses() -> None:
     assert (found.run, found.started) == (3, "1970-01-01T00:16:40.000000+00:00")
 
 
+def test_an_action_after_an_error_exit_followed_no_condition() -> None:
+    trace = RunTraceCollector(3)
+    trace.describe(INFO)
+    begin(trace, 1, "act_a", "obj_lamp", 1000.0)
+    trace.ended(1, 0.5, 0.0, "It jams.")
+    begin(trace, 2, "act_b", "obj_belt", 1000.5)
+    trace.ended(2, 0.25, 0.0)
+    assert trace.trace().spans[1] == Span(2, "act_b", "b", "obj_belt", 0.5, 0.25)
+
+
 def test_the_oldest_actions_of_a_long_run_are_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run_trace, "MAX_SPANS", 2)
     trace = RunTraceCollector(1)

@@ -124,6 +124,31 @@ async def test_unknown_routes_are_refused(http: httpx.AsyncClient) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ projects
+async def test_error_exits_survive_a_client_that_does_not_know_them(http: httpx.AsyncClient) -> None:
+    granted(await http.put("/scenes", json=scene("scn_e", "FlowActions")))
+    action = {"id": "act_1", "name": "end", "type": "obj_0/end"}
+    known = {"id": "lit_1", "start": "act_1", "end": "END"}
+    point = {"id": "acp_1", "name": "point", "position": POSE["position"]}
+    sent = project("pro_e", "scn_e") | {"actionPoints": [point | {"actions": [action]}], "logic": [known]}
+    ours = sent | {
+        "actionPoints": [point | {"actions": [action | {"errorOutput": "problem"}]}],
+        "logic": [known, known | {"id": "lit_2", "errorKinds": ["refused"]}],
+    }
+    granted(await http.put("/projects", json=ours))
+    stored = granted(await http.get("/projects/pro_e"))
+    assert [item.get("errorKinds") for item in stored["logic"]] == [None, ["refused"]]
+    without = sent | {"logic": [known, known | {"id": "lit_2"}], "description": "theirs"}
+    granted(await http.put("/projects", json=without))
+    again = granted(await http.get("/projects/pro_e"))
+    assert again == stored | {"description": "theirs", "modified": again["modified"]}
+    granted(await http.put("/projects", json=sent))  # it removed the item
+    assert [item["id"] for item in granted(await http.get("/projects/pro_e"))["logic"]] == ["lit_1"]
+    granted(await http.put("/projects?exact=true", json=sent))
+    [stored_point] = granted(await http.get("/projects/pro_e"))["actionPoints"]
+    assert "errorOutput" not in stored_point["actions"][0]
+    granted(await http.delete("/projects/pro_e"))
+
+
 async def test_a_project_is_stored_and_deleted_with_its_parts(http: httpx.AsyncClient) -> None:
     granted(await http.put("/scenes", json=scene("scn_p")))
     refused(await http.put("/projects", json=project("pro_a", "scn_nowhere")), 404, "NotFound", "scn_nowhere")

@@ -3,6 +3,7 @@
 import asyncio
 from typing import Any
 
+import msgspec
 import pytest
 
 from arcor2_hw.data.events import SceneStateEnum
@@ -43,6 +44,31 @@ async def test_order_of_events_when_documents_open_and_close(server: SessionServ
     assert alice.names() == ["OpenScene", "SceneState"]
     await alice.ask("CloseScene")
     assert alice.names() == ["SceneClosed", "ShowMainScreen"]
+
+
+async def test_an_error_exit_survives_a_client_that_does_not_know_it(work: Work, alice: Person) -> None:
+    await work.project("p")
+    one = await work.add_action(work.point("p"), "one", error_output="problem")
+    two = await work.add_action(work.point("p"), "two")
+    await alice.ask("AddLogicItem", start=one, end="END")
+    alice.take()
+    await alice.ask("AddLogicItem", start=one, end=two, error_kinds=["refused"])
+    [_, changed, *_] = alice.take()
+    item = changed["data"]
+    assert item["error_kinds"] == ["refused"]
+    await alice.ask("UpdateLogicItem", logic_item_id=item["id"], start=one, end="END")
+    assert work.session.document.logic_item(item["id"]).error_kinds == ["refused"]
+    await alice.lock(one)
+    await alice.ask("UpdateAction", action_id=one, flows=[{"type": "default", "outputs": []}])
+    assert work.action("one").error_output == "problem"
+    with pytest.raises(Refused, match="one names a result problem already"):
+        await work.add_action(work.point("p"), "three", error_output="problem")
+    with pytest.raises(Refused, match="cannot name an error"):
+        await alice.ask("UpdateAction", action_id=one, error_output="no name")
+    await alice.ask("UpdateAction", action_id=one, error_output="")
+    assert "error_output" not in msgspec.to_builtins(work.action("one"))
+    with pytest.raises(Refused, match="one leads to END already"):
+        await alice.ask("UpdateLogicItem", logic_item_id=item["id"], start=one, end="END", error_kinds=[])
 
 
 async def test_logic_items_always_announce_unlocking(work: Work, alice: Person, bob: Person) -> None:

@@ -140,6 +140,35 @@ def test_numbers_and_texts_may_have_a_default_branch() -> None:
         check_logic_item(document, meta_of, step("a", "d", key="a>d"))
 
 
+def error_exit(start: str, end: str, *kinds: str, condition: str = "") -> LogicItem:
+    return replace(step(start, end, condition, key=f"{start}!{end}"), error_kinds=list(kinds))
+
+
+def test_error_exits_are_next_to_ordinary_steps() -> None:
+    document = branching("a", "b", "c", "d")
+    add(document, step("START", "a"))
+    add(document, step("a", "b"))
+    add(document, error_exit("a", "b", "device_timeout"))  # continue as after a success
+    add(document, error_exit("a", "c", "refused", "kinematics"))
+    add(document, error_exit("a", "END", "error"))
+    for item, reason in (
+        (replace(error_exit("START", "c", "refused"), id="START>a"), "START is not an action"),
+        (error_exit("a", "d", "stale", condition="a/default/0"), "cannot have a condition"),
+        (error_exit("a", "d", "connection_lost"), "connection_lost.*is not a kind"),
+        (error_exit("a", "d", "stale", "stale"), "given twice"),
+        (error_exit("a", "d", "stale", "error"), "contains all others"),
+        (error_exit("a", "d", "kinematics"), "another error exit for kinematics"),
+        (replace(error_exit("a", "c", "stale"), id="new"), "a leads to c already"),
+        (error_exit("b", "a", "stale"), "loop"),
+        (step("a", "d"), "needs a condition"),
+    ):
+        with pytest.raises(InvalidData, match=reason):
+            check_logic_item(document, meta_of, item)
+    # A branch needs conditions only on the ordinary steps.
+    document.apply([document.update(Kind.LOGIC, "a>b", step("a", "b", "a/default/0"))])
+    check_logic_item(document, meta_of, step("a", "d", "a/default/0", "false"))
+
+
 def test_booleans_have_no_default_branch() -> None:
     document = branching("a", "b", "c")
     add(document, step("a", "b"))

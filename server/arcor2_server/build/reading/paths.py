@@ -2,7 +2,8 @@
 
 The reader follows the code in the order of execution, on all paths to a line at the same time. A path starts after a
 call and ends at the next call or at the end of the cycle. It has at most one condition that is true, or several that
-are false, and may set the variable `next_action` (see layout.py).
+are false, and may set the variable `next_action` (see layout.py). A path through an `except` block starts at the error
+exit of the call in the `try` block.
 """
 
 import ast
@@ -10,12 +11,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
-from arcor2_hw.data.object_type import ObjectAction, find_action
+from arcor2_hw.data.object_type import ObjectAction, ParameterMeta, find_action
+from arcor2_hw.data.project import ERROR_FLOW, ERROR_PARTS, FlowTypes
 from arcor2_server.build.frame import NEXT_ACTION, Frame
 from arcor2_server.build.reading.errors import NotUnderstood, excerpt
 from arcor2_server.build.reading.module import Script
 from arcor2_server.build.reading.values import Values
-from arcor2_server.documents.logic_graph import BRANCHABLE, END_NODE, Condition
+from arcor2_server.documents.logic_graph import (
+    BRANCHABLE,
+    END_NODE,
+    Condition,
+    ErrorExit,
+    error_kinds_problem,
+    in_order_of_kinds,
+)
 
 START_NODE: Final = -2
 
@@ -41,8 +50,10 @@ class Call:
     declared: ObjectAction
     arguments: dict[str, ast.expr]
     outputs: list[str]
-    results: dict[str, tuple[int, int]] = field(default_factory=dict)
-    """The results that its arguments use, by parameter: number of the call and of its result."""
+    results: dict[str, tuple[int, str, int]] = field(default_factory=dict)
+    """What its arguments use of other calls, by parameter: number of the call, flow and number of the result."""
+    error: str = ""
+    """The variable for its error; empty if it is not stored."""
 
 
 class LogicPath(NamedTuple):
@@ -60,15 +71,19 @@ class _OpenPath(NamedTuple):
     tried: tuple[Condition, ...] = ()
     taken: Condition | None = None
     next_action: str | None = None
+    kinds: tuple[str, ...] = ()
+    """The kinds of errors, if the path starts at an error exit of the call."""
 
 
 class Use(NamedTuple):
-    """A use of a result of call `source`, at or after call `node`."""
+    """A use of a result or the error of call `source`: by call `user`, or by a condition after it."""
 
-    node: int
+    user: int
     source: int
     line: int
     name: str
+    in_condition: bool = False
+    of_error: bool = False
 
 
 class LoopReader:
@@ -77,9 +92,12 @@ class LoopReader:
     def __init__(self, frame: Frame, script: Script, values: Values) -> None:
         self.calls: list[Call] = []
         self.paths: dict[int, list[LogicPath]] = {START_NODE: []}
+        self.exits: dict[int, list[ErrorExit]] = {}
+        """The error exits by the number of the call."""
         self.uses: list[Use] = []
         self._frame, self._script, self._values = frame, script, values
         self._results: dict[str, tuple[int, int]] = {}
+        self._errors: dict[str, int] = {}
         self._lines: dict[str, int] = {}
         open_paths = self._block(script.loop, [_OpenPath(START_NODE)])
         self._end(open_paths, script.loop[-1].lineno)
@@ -94,12 +112,12 @@ class LoopReader:
             match node:
                 case ast.Assign([ast.Name(name)], ast.Constant(str(next_action))) if name == NEXT_ACTION:
                     open_paths = [path._replace(next_action=next_action) for path in open_paths]
-                case ast.Expr(ast.Call() as call):
-                    open_paths = self._call(node, call, [], open_paths)
-                case ast.Assign([target], ast.Call() as call) | ast.AnnAssign(target, _, ast.Call() as call):
-                    open_paths = self._call(node, call, self._targets(target), open_paths)
+                case ast.Expr(ast.Call()) | ast.Assign([_], ast.Call()) | ast.AnnAssign(_, _, ast.Call()):
+                    open_paths = self._step(node, open_paths)
                 case ast.If():
                     open_paths = self._if(node, open_paths)
+                case ast.Try():
+                    open_paths = self._try(node, open_paths)
                 case ast.Continue():
                     self._end(open_paths, node.lineno)
                     open_paths = []
@@ -108,7 +126,7 @@ class LoopReader:
                 case _:
                     raise NotUnderstood(
                         node.lineno,
-                        "the loop contains only calls of actions, conditions and `continue`, but this is {node}",
+                        "the loop contains only calls of actions, conditions, `try` and `continue`, but this is {node}",
                         node=excerpt(node),
                     )
         return open_paths
@@ -120,7 +138,75 @@ class LoopReader:
             self._arrive(path, END_NODE)
 
     def _arrive(self, path: _OpenPath, target: int) -> None:
-        self.paths[path.source].append(LogicPath(target, path.tried, path.taken))
+        if not path.kinds:
+            self.paths[path.source].append(LogicPath(target, path.tried, path.taken))
+            return
+        exits = self.exits.setdefault(path.source, [])
+        for place, one in enumerate(exits):
+            if one.target == target:
+                exits[place] = one._replace(kinds=tuple(in_order_of_kinds((*one.kinds, *path.kinds))))
+                return
+        exits.append(ErrorExit(target, path.kinds))
+
+    # ------------------------------------------------------------------------------------------------ error exits
+    def _try(self, node: ast.Try, open_paths: list[_OpenPath]) -> list[_OpenPath]:
+        match node.body:
+            case [ast.Expr() | ast.Assign() | ast.AnnAssign() as step] if not node.finalbody and node.handlers:
+                after = self._step(step, open_paths)
+            case _:
+                raise NotUnderstood(node.lineno, "a `try` block contains one call of an action, and has no `finally`")
+        number = len(self.calls) - 1
+        if node.orelse:
+            after = self._block(node.orelse, after)
+        seen: set[str] = set()
+        for handler in node.handlers:
+            kinds = self._kinds(handler)
+            if (problem := error_kinds_problem(kinds)) is not None:
+                raise NotUnderstood(handler.lineno, "{problem}", problem=problem)
+            if shared := seen.intersection(kinds):
+                raise NotUnderstood(handler.lineno, "{kind} is handled twice", kind=min(shared))
+            seen.update(kinds)
+            variable = self._caught(handler)
+            if variable and variable != self.calls[number].error:
+                if self.calls[number].error:
+                    raise NotUnderstood(
+                        handler.lineno, "the error of an action has one name, not also {name}", name=variable
+                    )
+                self._script.claim(variable, handler.lineno)
+                self._errors[variable] = number
+                self.calls[number].error = variable
+            after = after + self._block(handler.body[1:], [_OpenPath(number, kinds=tuple(in_order_of_kinds(kinds)))])
+        return after
+
+    def _kinds(self, handler: ast.ExceptHandler) -> list[str]:
+        classes = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type]
+        found = [self._script.errors.get(one.id) if isinstance(one, ast.Name) else None for one in classes]
+        if not found or None in found:
+            raise NotUnderstood(
+                handler.lineno, "`except` needs kinds of errors that are imported from arcor2_hw.exceptions"
+            )
+        return [kind for kind in found if kind is not None]
+
+    def _caught(self, handler: ast.ExceptHandler) -> str:
+        """Return the variable for the error of an `except` block, empty if it is not stored."""
+        call: ast.expr | None = None
+        variable = ""
+        match handler.body[0]:
+            case ast.Expr(call):
+                pass
+            case ast.Assign([ast.Name(variable)], call) | ast.AnnAssign(ast.Name(variable), _, ast.expr() as call):
+                pass
+        match call:
+            case ast.Call(ast.Attribute(ast.Name(resources), "caught"), [ast.Name(error)], []) if (
+                resources == self._script.resources and error == handler.name
+            ):
+                return variable
+        raise NotUnderstood(
+            handler.lineno,
+            "an `except` block starts with `[name =] {resources}.caught({error})`",
+            resources=self._script.resources,
+            error=handler.name or "error",
+        )
 
     # ------------------------------------------------------------------------------------------------ calls
     @staticmethod
@@ -133,6 +219,15 @@ class LoopReader:
         raise NotUnderstood(
             target.lineno, "results must be assigned to variables, not to {target}", target=excerpt(target)
         )
+
+    def _step(self, node: ast.stmt, open_paths: list[_OpenPath]) -> list[_OpenPath]:
+        """Read a statement that calls an action."""
+        match node:
+            case ast.Expr(ast.Call() as call):
+                return self._call(node, call, [], open_paths)
+            case ast.Assign([target], ast.Call() as call) | ast.AnnAssign(target, _, ast.Call() as call):
+                return self._call(node, call, self._targets(target), open_paths)
+        raise NotUnderstood(node.lineno, "{node} is not a call of an action", node=excerpt(node))
 
     def _call(self, node: ast.stmt, call: ast.Call, outputs: list[str], open_paths: list[_OpenPath]) -> list[_OpenPath]:
         match call.func:
@@ -194,13 +289,20 @@ class LoopReader:
         self._lines[name] = call.lineno
         return name
 
-    def _links(self, number: int, arguments: dict[str, ast.expr], declared: ObjectAction) -> dict[str, tuple[int, int]]:
-        links: dict[str, tuple[int, int]] = {}
+    def _links(
+        self, number: int, arguments: dict[str, ast.expr], declared: ObjectAction
+    ) -> dict[str, tuple[int, str, int]]:
+        links: dict[str, tuple[int, str, int]] = {}
         for meta in declared.parameters:
             node = arguments.get(meta.name)
+            match node:
+                case ast.Attribute(ast.Name(variable), part) if variable in self._errors:
+                    links[meta.name] = self._part_of_error(number, node, variable, part, meta)
+                    continue
             if not isinstance(node, ast.Name) or node.id not in self._results:
                 continue
-            source, output = links[meta.name] = self._results[node.id]
+            source, output = self._results[node.id]
+            links[meta.name] = source, FlowTypes.DEFAULT, output
             kind = self.calls[source].declared.returns[output]
             if kind != meta.type:
                 raise NotUnderstood(
@@ -213,6 +315,22 @@ class LoopReader:
                 )
             self.uses.append(Use(number, source, node.lineno, node.id))
         return links
+
+    def _part_of_error(
+        self, number: int, node: ast.Attribute, variable: str, part: str, meta: ParameterMeta
+    ) -> tuple[int, str, int]:
+        if part not in ERROR_PARTS:
+            known = ", ".join(ERROR_PARTS)
+            raise NotUnderstood(
+                node.lineno, "{name} has no {part}; it has {known}", name=variable, part=part, known=known
+            )
+        if meta.type != "string":
+            raise NotUnderstood(
+                node.lineno, "{name} is {type}, but {part} is string", name=meta.name, type=meta.type, part=part
+            )
+        source = self._errors[variable]
+        self.uses.append(Use(number, source, node.lineno, variable, of_error=True))
+        return source, ERROR_FLOW, ERROR_PARTS.index(part)
 
     # ------------------------------------------------------------------------------------------------ conditions
     def _if(self, node: ast.If, open_paths: list[_OpenPath]) -> list[_OpenPath]:
@@ -247,7 +365,9 @@ class LoopReader:
         for path in open_paths:
             if path.source == START_NODE:
                 raise NotUnderstood(test.lineno, "a condition needs the result of an action before it")
-            self.uses.append(Use(path.source, condition.action, test.lineno, variable))
+            if path.kinds:
+                raise NotUnderstood(test.lineno, "an action is required between an error and a condition")
+            self.uses.append(Use(path.source, condition.action, test.lineno, variable, in_condition=True))
             if path.taken is not None:
                 if path.taken[:2] != condition[:2]:
                     raise NotUnderstood(test.lineno, "an action is required between two conditions")

@@ -24,6 +24,7 @@ from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidProject
 from arcor2_server.build import layout
 from arcor2_server.build.cycle import Cycle
+from arcor2_server.build.error_exits import nodes_of
 from arcor2_server.build.frame import Frame, TypeFacts
 from arcor2_server.build.reading import module
 from arcor2_server.build.reading.errors import NotUnderstood
@@ -31,7 +32,7 @@ from arcor2_server.build.reading.module import Script
 from arcor2_server.build.reading.paths import START_NODE, Call, LogicPath, LoopReader
 from arcor2_server.build.reading.values import PLAIN, Values, json_as_before, json_of, of_type, plain
 from arcor2_server.documents import logic_graph
-from arcor2_server.documents.logic_graph import END_NODE, Condition, Edge
+from arcor2_server.documents.logic_graph import END_NODE, Condition, Edge, ErrorExit
 
 _ConditionKey = tuple[str, object] | None
 """A condition in comparable form: the result and its value."""
@@ -75,24 +76,36 @@ class _Reading:
         loop = LoopReader(frame, self._script, self._values)
         self._calls = loop.calls
         self._paths = {number: _merged(found) for number, found in loop.paths.items()}
+        self._exits = loop.exits
         self._check_uses(loop)
 
         points = [(point, action) for point in project.action_points for action in point.actions]
         self._before: dict[str, tuple[ActionPoint, Action]] = {}
         for point, action in points:
             self._before.setdefault(action.name, (point, action))
-        self._variables = _variables(frame, project)
+        self._variables, self._error_variables = _variables(frame, project)
         self._ids = [
             self._before[call.name][1].id if call.name in self._before else new_id("act") for call in self._calls
         ]
 
     def _check_uses(self, loop: LoopReader) -> None:
         """Raise NotUnderstood for uses of results that are not set on all paths."""
-        edges = [tuple(Edge(path.target, None) for path in loop.paths[number]) for number in range(len(self._calls))]
-        _, natural = layout.arrange(edges)
+        count = range(len(self._calls))
+        edges = [tuple(Edge(path.target, None) for path in loop.paths[number]) for number in count]
+        nodes = nodes_of(edges, [loop.exits.get(number, ()) for number in count])
+        _, natural = layout.arrange(nodes.edges)
         for use in loop.uses:
-            if not natural.always_before(use.source, use.node):
-                producer = self._calls[use.source].name
+            producer = self._calls[use.source].name
+            node = (nodes.success if use.in_condition else nodes.call)[use.user]
+            if use.of_error:
+                if not nodes.has_error(natural, use.source, node):
+                    raise NotUnderstood(
+                        use.line,
+                        "{name} is not always set: {producer!r} has not failed on all paths to this line",
+                        name=use.name,
+                        producer=producer,
+                    )
+            elif not nodes.has_results(natural, use.source, node):
                 raise NotUnderstood(
                     use.line,
                     "{name} is not always set: {producer!r} does not run on all paths to this line",
@@ -143,7 +156,7 @@ class _Reading:
                 elif old.id not in reached and number is None:
                     actions[point.id].append(old)
                     unreachable.add(old.id)
-                    named |= dict.fromkeys(old.outputs(), old.name)
+                    named |= dict.fromkeys(old.names(), old.name)
         place: str | None = None
         for number, call in enumerate(self._calls):
             if call.name in self._before:
@@ -152,7 +165,7 @@ class _Reading:
             place = self._place(call, place)
             actions[place].append(self._action(number, None))
         for action in (action for of in actions.values() for action in of if action.id not in unreachable):
-            for output in action.outputs():
+            for output in action.names():
                 if output in named:
                     line = self._calls[number_of[action.name]].line
                     raise NotUnderstood(
@@ -185,8 +198,8 @@ class _Reading:
             if (node := call.arguments.get(meta.name)) is None:
                 continue
             if meta.name in call.results:
-                source, output = call.results[meta.name]
-                link = f"{self._ids[source]}/default/{output}"
+                source, flow, output = call.results[meta.name]
+                link = f"{self._ids[source]}/{flow}/{output}"
                 found[meta.name] = ActionParameter(meta.name, ActionParameterType.LINK, json_of(link))
             else:
                 found[meta.name] = self._values.constant(
@@ -199,7 +212,17 @@ class _Reading:
             self._ids[number],
             [found[name] for name in order],
             self._flows(call, old),
+            self._error_output(call, old),
         )
+
+    def _error_output(self, call: Call, old: Action | None) -> str | Unset:
+        if not call.error:
+            return UNSET
+        if old is not None and self._error_variables.get(old.id) == call.error:
+            return old.error_output
+        if not is_valid_name(call.error):
+            raise NotUnderstood(call.line, "{variable} is not a valid name of an error", variable=call.error)
+        return call.error
 
     def _flows(self, call: Call, old: Action | None) -> list[Flow]:
         before = [] if old is None else self._variables.get(old.id, [])
@@ -226,37 +249,45 @@ class _Reading:
             start = START if number == START_NODE else self._ids[number]
             old = old_items.get(start, [])
             wanted = self._steps(paths, old)
+            wanted += [self._exit(one) for one in self._exits.get(number, ())]
             same = {_key(item): item for item in old}
-            keys = [(end, _condition_key(condition)) for end, condition in wanted]
+            keys = [_key(item) for item in wanted]
             # The order of conditions matters; the edge without a condition is always the last.
-            ordered = len(wanted) <= 2 or [key for key in same if key[1]] == [key for key in keys if key[1]]
+            ordered = len(paths) <= 2 or [key for key in same if key[1]] == [key for key in keys if key[1]]
             if len(same) == len(old) == len(keys) and set(same) == set(keys) and ordered:
                 unchanged |= {id(item): item for item in old}
                 continue
-            spare = {item.end.partition("/")[0]: item for item in old}
-            for end, condition in wanted:
-                key = spare.pop(end).id if end in spare else new_id("lit")
-                changed.append(LogicItem(start, end, condition, key))
+            spare = {(item.end.partition("/")[0], item.is_error_exit): item for item in old}
+            for item in wanted:
+                former = spare.pop((item.end, item.is_error_exit), None)
+                changed.append(replace(item, start=start, id=former.id if former else new_id("lit")))
         known = {*self._ids, *unreachable, END}
         for item in self._old.logic:
             if item.start.partition("/")[0] in unreachable and item.end.partition("/")[0] in known:
                 unchanged[id(item)] = item
         return [*(item for item in self._old.logic if id(item) in unchanged), *changed]
 
-    def _steps(self, paths: list[LogicPath], old: list[LogicItem]) -> list[tuple[str, ProjectLogicIf | Unset]]:
-        steps: list[tuple[str, ProjectLogicIf | Unset]] = []
+    def _end(self, target: int) -> str:
+        return END if target == END_NODE else self._ids[target]
+
+    def _exit(self, found: ErrorExit) -> LogicItem:
+        return LogicItem("", self._end(found.target), error_kinds=list(found.kinds))
+
+    def _steps(self, paths: list[LogicPath], old: list[LogicItem]) -> list[LogicItem]:
+        """Return the ordinary steps of an action, without start and id."""
+        before = {_key(item) for item in old}
+        steps: list[LogicItem] = []
         for path in paths:
-            end = END if path.target == END_NODE else self._ids[path.target]
+            end = self._end(path.target)
             if path.taken is not None:
-                steps.append((end, self._logic_if(path.taken)))
+                steps.append(LogicItem("", end, self._logic_if(path.taken)))
                 continue
             opposites = [
                 self._logic_if(one._replace(value=not one.value)) for one in path.tried if isinstance(one.value, bool)
             ]
-            before = {_key(item) for item in old}
-            known = [one for one in opposites if (end, _condition_key(one)) in before]
+            known = [one for one in opposites if _key(LogicItem("", end, one)) in before]
             chosen = [*known, *reversed(opposites)]
-            steps.append((end, chosen[0] if chosen else UNSET))
+            steps.append(LogicItem("", end, chosen[0] if chosen else UNSET))
         return steps
 
     def _logic_if(self, condition: Condition) -> ProjectLogicIf:
@@ -281,17 +312,19 @@ def _condition_key(condition: ProjectLogicIf | Unset) -> _ConditionKey:
     return condition.what, (type(value).__name__, value)
 
 
-def _key(item: LogicItem) -> tuple[str, _ConditionKey]:
-    return item.end.partition("/")[0], _condition_key(item.condition)
+def _key(item: LogicItem) -> tuple[str, _ConditionKey, frozenset[str]]:
+    kinds = frozenset(item.error_kinds or ())
+    return item.end.partition("/")[0], _condition_key(item.condition), kinds
 
 
-def _variables(frame: Frame, project: Project) -> dict[str, list[str]]:
-    """Return the variables for the results of actions in the script of the old project, by id of the action."""
+def _variables(frame: Frame, project: Project) -> tuple[dict[str, list[str]], dict[str, str]]:
+    """Return the variables for results and errors in the script of the old project, by id of the action."""
     try:
         cycle = Cycle(frame, logic_graph.read(project))
     except InvalidProject:
-        return {}
-    return {action.id: cycle.results[number] for number, action in enumerate(cycle.flow.actions)}
+        return {}, {}
+    ids = [action.id for action in cycle.flow.actions]
+    return dict(zip(ids, cycle.results, strict=True)), dict(zip(ids, cycle.errors, strict=True))
 
 
 def _reached(project: Project) -> set[str]:

@@ -9,6 +9,8 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction, ParameterMeta
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import (
+    ERROR_FLOW,
+    ERROR_PARTS,
     Action,
     ActionParameter,
     ActionParameterType,
@@ -83,6 +85,10 @@ def check_flows(action: Action, meta: ObjectAction) -> None:
     outputs = flows[0].outputs
     for output in outputs:
         check_name(output, "result")
+    if not isinstance(action.error_output, Unset):
+        check_name(action.error_output, "error")
+        if action.error_output in outputs:
+            raise InvalidData("{name}: its error and a result have the same name.", name=action.name)
     if outputs and len(outputs) != len(meta.returns):
         raise InvalidData(
             "{name}: {meta_name} returns {count} values, {other_count} names are given.",
@@ -95,7 +101,7 @@ def check_flows(action: Action, meta: ObjectAction) -> None:
 
 def check_outputs_unique(document: Document, action: Action) -> None:
     """Raise InvalidData for a result name that another action uses, since results become variables of one program."""
-    for output in action.outputs():
+    for output in action.names():
         other = document.named("output", output)
         if other is not None and other != action.id:
             raise InvalidData(
@@ -189,6 +195,9 @@ def _check_link(
         raise InvalidData("parameter {name} cannot be linked to a result of the same action.", name=wanted.name)
     _, source = lookup.action(source_id)
     returns, outputs = action_meta(source, lookup, types).returns, source.outputs()
+    if flow == ERROR_FLOW:
+        _check_link_to_error(wanted, source, index)
+        return
     if flow != FlowTypes.DEFAULT or len(outputs) != len(returns) or index >= len(returns):
         raise InvalidData(
             "parameter {name}: {source_name} has no named result number {index}. Name its results.",
@@ -203,4 +212,18 @@ def _check_link(
             type=wanted.type,
             output=outputs[index],
             return_value=returns[index],
+        )
+
+
+def _check_link_to_error(wanted: ParameterMeta, source: Action, index: int) -> None:
+    if not source.error_output or index >= len(ERROR_PARTS):
+        raise InvalidData(
+            "parameter {name}: the error of {source_name} has no name, or no part number {index}.",
+            name=wanted.name,
+            source_name=source.name,
+            index=index,
+        )
+    if wanted.type != "string":
+        raise InvalidData(
+            "parameter {name} is {type}, the parts of an error are string.", name=wanted.name, type=wanted.type
         )
