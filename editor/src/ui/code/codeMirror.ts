@@ -165,13 +165,7 @@ const folding = foldService.of((state, from, to) => {
 
 /** Return the extensions that let the user edit, or only read. */
 const editing = (allowed: boolean): Extension =>
-  allowed
-    ? []
-    : [
-        EditorState.readOnly.of(true),
-        EditorView.editable.of(false),
-        EditorView.contentAttributes.of({ tabindex: "0" }),
-      ];
+  allowed ? [] : [EditorState.readOnly.of(true), EditorView.editable.of(false)];
 
 /** Return the extensions of every view of a script, also of the comparison. */
 export const appearance = (): Extension => [
@@ -239,7 +233,7 @@ export class CodeMirror {
         linter((view) => handlers.check(view.state.doc.toString()), { delay: 600 }),
         keymap.of([...searchKeymap, ...foldKeymap, ...historyKeymap, ...defaultKeymap]),
         this.editable.of(editing(false)),
-        EditorView.contentAttributes.of({ "aria-label": t`Python program` }),
+        EditorView.contentAttributes.of({ "aria-label": t`Python program`, tabindex: "0" }),
         EditorView.updateListener.of((update) => {
           if (update.docChanged && !this.loading) handlers.onEdit(update.state.doc.toString());
         }),
