@@ -183,6 +183,7 @@ async def test_branch_takes_four_taps_and_step_two(work: Work) -> None:
     # Redirecting a step keeps its id.
     await graph.locator(f"[data-id='{joined.id}'] .react-flow__edge-interaction").click(force=True)
     await work.tap_button("Change target", work.panel)
+    await page.get_by_role("status").filter(has_text="Tap the step that follows on_yes").wait_for()
     await graph.locator('.react-flow__node[data-id="END"] .flow-name').click()
     moved = await work.told("LogicItemChanged")
     assert (moved.change_type, moved.data.id, moved.data.end) == (ChangeType.UPDATE, joined.id, "END")

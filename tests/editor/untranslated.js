@@ -10,7 +10,7 @@
   const named = new RegExp(`(?<![\\p{L}\\d_])(${escaped.join("|")})(?![\\p{L}_])`, "gu");
   const plain = (text) => /[A-Za-z]{2,}/.test(text.replace(named, " ").replace(exempt, " "));
   const shown = (element) => element.checkVisibility({ visibilityProperty: true });
-  const inCode = (element) => element.closest("pre, code, kbd, script, style, textarea, .view-label, [data-name]");
+  const inCode = (element) => element.closest("pre, code, kbd, script, style, textarea, .cm-content, .view-label, [data-name]");
   const found = new Set();
   const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   for (let node = walker.nextNode(); node; node = walker.nextNode()) {
