@@ -13,7 +13,13 @@ from tests.protocol import PROTOCOL
 
 TRANSLATION = {"key", "values"}
 ADDED = {
+    "Action": {"error_output"},
     "ActionMetadata": {"verdict"},
+    "AddAction.Request.Args": {"error_output"},
+    "AddLogicItem.Request.Args": {"error_kinds"},
+    "LogicItem": {"error_kinds"},
+    "UpdateAction.Request.Args": {"error_output"},
+    "UpdateLogicItem.Request.Args": {"error_kinds"},
     "ObjectTypeMeta": {"category", "display_name", "icon", "observable", "shadows"} | TRANSLATION,
     "ParameterMeta": {"address", "for_control", "former_names", "found_by", "secret"},
     "ObjectAction": {"category", "former_names", "icon"} | TRANSLATION,
