@@ -187,7 +187,7 @@ def test_sr_sends_after_a_change_of_the_weight(fake: FakeProcess, line: Line) ->
     put(fake, 0.2)
     dynamic = line.read()
     assert dynamic.startswith("S D ")
-    assert 115.0 <= float(dynamic.split()[2]) < 200.0
+    assert 110.0 <= float(dynamic.split()[2]) < 200.0
     assert line.read() == "S S     200.00 g"
     assert line.ask("SR") == "S S     200.00 g"  # without a preset: 12.5 %
     put(fake, 0.22)
