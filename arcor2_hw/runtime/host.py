@@ -298,7 +298,7 @@ class Host:
         self.link.post(m.ProgramChanged(state))
 
     def action_over(self, number: int, duration: float, error: Message | None, waited: float) -> None:
-        """Report the end of an action for which there is no event."""
+        """Report the end of an action that sends no event at its end."""
         self.link.post(m.ActionFailed(number, duration, error, waited))
 
     # -------------------------------------------------------------------------------- reader thread

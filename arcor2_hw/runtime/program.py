@@ -64,7 +64,7 @@ class Channel(Protocol):
         """Report that the program is running or paused."""
 
     def action_over(self, number: int, duration: float, error: Message | None, waited: float) -> None:
-        """Report the end of an action for which there is no event: it failed, or the project declares no actions.
+        """Report the end of an action that sends no event at its end: it failed, or the project declares no actions.
 
         See ActionFailed.
         """

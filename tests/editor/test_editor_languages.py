@@ -202,6 +202,6 @@ async def test_running_program(visitors: list[Visitor], client: Client) -> None:
     while (await client.next_event("PackageState")).data.state is not PackageStateEnum.PAUSED:
         pass
     await visit(visitors, lambda each: each.tour.running())
-    # There is no board, so the reader finds no code, and the run fails.
+    # Without a board, the reader finds no code, and the run fails.
     await client.call("ResumePackage")
     await visit(visitors, lambda each: each.tour.failed())

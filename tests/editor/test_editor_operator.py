@@ -70,7 +70,7 @@ async def test_built_package_appears_runs_and_its_error_is_shown(
         await page.get_by_role("radio", name=project.name).wait_for()
         await screen.press("Start")
         await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=BEGUN)
-        # There is no board, so the reader finds no code.
+        # Without a board, the reader finds no code.
         state = page.get_by_role("status", name="State")
         await expect(state).to_contain_text("Run failed in scan")
         await expect(state).to_contain_text("no code was read")

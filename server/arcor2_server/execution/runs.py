@@ -238,7 +238,7 @@ class Runs:
         """Return the trace of a run, during the run that of the actions that have ended.
 
         Raises:
-            NotFound: there is no such run, or an older server did not store its trace.
+            NotFound: the number is unknown, or an older server stored no trace of the run.
             StorageError: the trace cannot be read.
         """
         if number == self._spans.run:
@@ -247,7 +247,7 @@ class Runs:
         if stored is None and self._data is not None:
             stored = await self._data.run_trace(number)
         if number not in self._runs or stored is None:
-            raise NotFound("There is no trace of run {number}.", number=number)
+            raise NotFound("Run {number} has no trace.", number=number)
         return stored
 
     # -------------------------------------------------------------------------------- storage

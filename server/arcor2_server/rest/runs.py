@@ -45,5 +45,5 @@ class RunOperations:
 def _number(text: str) -> int:
     """Return the number of a run. Raise NotFound if the text is not a number."""
     if not (text.isascii() and text.isdecimal() and len(text) < 10):
-        raise NotFound("There is no trace of run {number}.", number=text[:20])
+        raise NotFound("Run {number} has no trace.", number=text[:20])
     return int(text)

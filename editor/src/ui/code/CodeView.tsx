@@ -262,7 +262,7 @@ function Script({ text, whyReadOnly, hidden, onEdit, check, onReady }: ScriptPro
         else notify("info", t`Import the program first: ${name} is new.`);
       },
       check: async () => {
-        const result = await handlers.current.check().catch(() => null); // without a connection there is no check
+        const result = await handlers.current.check().catch(() => null); // shows no problems while disconnected
         return (result?.problems ?? []).flatMap((each) => diagnosticOf(made, each));
       },
     });

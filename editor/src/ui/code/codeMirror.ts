@@ -198,7 +198,7 @@ export const appearance = (): Extension => [
 /** The text editor in a page. */
 export class CodeMirror {
   readonly view: EditorView;
-  /** Whether the text is being replaced by `load`, which is no edit of the user. */
+  /** Whether `load` is replacing the text. Such a change is not reported as an edit of the user. */
   private loading = false;
   private readonly editable = new Compartment();
 
