@@ -60,7 +60,7 @@ class SavedProblems:
         self._file = file
         self._stored: Stored | None = None
         self._changing = asyncio.Lock()
-        self._writing: asyncio.Future[None] | None = None
+        self._writing: asyncio.Task[None] | None = None
 
     async def close(self) -> None:
         """Wait until the last results are stored."""
@@ -117,7 +117,15 @@ class SavedProblems:
     def _store(self, known: Stored) -> None:
         if known != self._stored:
             self._stored = known
-            self._writing = asyncio.get_running_loop().run_in_executor(None, self._write, known)
+            if self._writing is None or self._writing.done():
+                self._writing = asyncio.create_task(self._write_newest())
+
+    async def _write_newest(self) -> None:
+        """Write the results until the newest ones are in the file, one write at a time."""
+        written: Stored | None = None
+        while self._stored is not None and self._stored is not written:
+            written = self._stored
+            await asyncio.to_thread(self._write, written)
 
     def _write(self, known: Stored) -> None:
         try:

@@ -4,6 +4,7 @@ import ast
 import json
 import subprocess
 import sys
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,6 +13,8 @@ import pytest
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_server.app import running_server
+from arcor2_server.documents import saved_problems
+from arcor2_server.files import write_private
 from arcor2_server.settings import ServerSettings
 
 MODULES = 1150
@@ -74,6 +77,28 @@ async def test_a_damaged_analysis_is_repeated(tmp_path: Path) -> None:
     async with running_server(settings) as second:
         assert second.types.metas() == known
     assert settings.analysis_file.read_bytes() == intact
+
+
+async def test_the_newest_problems_are_stored_after_a_slow_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = ServerSettings(data_dir=tmp_path)
+    overtaken = threading.Event()
+    sizes: list[int] = []
+
+    def write(path: Path, content: bytes) -> None:
+        sizes.append(len(content))
+        if len(sizes) == 1:
+            overtaken.wait(0.5)
+        write_private(path, content)
+        overtaken.set()
+
+    async with running_server(settings) as server:
+        monkeypatch.setattr(saved_problems, "write_private", write)
+        for number in range(2):
+            await server.storage.put_scene(Scene(f"scene {number}", id=f"scn_{number}"))
+            await server.saved_problems.of_scenes(await server.storage.scenes())
+    assert settings.problems_file.stat().st_size == max(sizes)
 
 
 async def test_a_second_start_checks_no_saved_document(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
