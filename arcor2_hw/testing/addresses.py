@@ -86,7 +86,7 @@ class Place(Data, frozen=True):
 
 
 def own_loopback() -> str:
-    """Return an address of this machine that no other process uses."""
+    """Return an address of this machine that no other process of a test run uses."""
     number = next(_numbers)
     return f"127.{64 + os.getpid() % 32}.{os.getpid() // 32 % 250}.{number % 250 + 1}"
 

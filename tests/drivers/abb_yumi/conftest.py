@@ -1,7 +1,5 @@
 """A fake controller per module, on its own address, and a driver per test."""
 
-import itertools
-import os
 from collections.abc import Iterator
 from typing import Any
 
@@ -10,18 +8,18 @@ import pytest
 from arcor2_drivers.abb_yumi.settings import YumiSettings
 from arcor2_drivers.abb_yumi.yumi import YuMi
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.testing.addresses import own_loopback
 from tests.drivers.background_call import BackgroundCall as BackgroundCall
 from tests.fakes.conftest import FakeProcess
 
 RWS_PORT = 8080
-_numbers = itertools.count(1)
 
 
 class FakeYumi(FakeProcess):
     """A running fake controller and its control channel."""
 
     def __init__(self, *arguments: str) -> None:
-        self.host = f"127.{20 + os.getpid() % 60}.{os.getpid() // 60 % 250}.{next(_numbers)}"
+        self.host = own_loopback()
         super().__init__("abb_yumi", "--host", self.host, *arguments)
         self.truth()  # opens the control channel, which lives as long
 

@@ -1,8 +1,6 @@
 """A fake controller per module, on its own address, and a driver per test."""
 
 import contextlib
-import itertools
-import os
 import subprocess
 import sys
 import textwrap
@@ -14,19 +12,19 @@ import pytest
 from arcor2_drivers.universal_robots.settings import UrSettings
 from arcor2_drivers.universal_robots.ur5e import UR5e
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.testing.addresses import own_loopback
 from tests.drivers.background_call import BackgroundCall as BackgroundCall
 from tests.fakes.conftest import FakeProcess
 from tests.waiting import wait_for
 
 HOME = [0.0, -1.5707963267948966, 1.5707963267948966, -1.5707963267948966, -1.5707963267948966, 0.0]
-_numbers = itertools.count(1)
 
 
 class FakeUr(FakeProcess):
     """A running fake controller and its control channel."""
 
     def __init__(self, *arguments: str) -> None:
-        self.host = f"127.{100 + os.getpid() % 100}.{os.getpid() // 100 % 250}.{next(_numbers)}"
+        self.host = own_loopback()
         super().__init__("ur", "--host", self.host, "--control", "127.0.0.1:0", *arguments)
         self.truth()  # opens the control channel, which lives as long
 

@@ -1,22 +1,17 @@
 """Fixtures: the fake controller in a process, and ur_rtde in another one with a time limit."""
 
-import itertools
+import contextlib
 import json
-import os
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from arcor2_fakes.control import BlockingControlClient
-from tests.fakes.conftest import start_forked_fake
-from tests.forking import Forked
+from arcor2_hw.testing.addresses import own_loopback
+from tests.fakes.conftest import FakeProcess
 
 _PRELUDE = """
 import json, os, sys, time
@@ -41,20 +36,17 @@ def until(holds, within=20.0):
         time.sleep(0.002)
 """
 
-_hosts = (f"127.{(os.getpid() >> 8) % 200 + 20}.{os.getpid() % 256}.{n % 250 + 1}" for n in itertools.count())
 
+class FakeUr(FakeProcess):
+    """A running fake controller on an address of its own."""
 
-@dataclass
-class FakeUr:
-    """A running fake controller."""
-
-    process: Forked | subprocess.Popen[bytes]
-    ready: dict[str, Any]
-    control: BlockingControlClient
+    def __init__(self, *options: str) -> None:
+        super().__init__("ur", "--host", own_loopback(), *options)
 
     @property
     def host(self) -> str:
-        return self.ready["host"]
+        host: str = self.ready["host"]
+        return host
 
     def do(self, command: str, **arguments: Any) -> Any:
         return self.control.do(command, **arguments)
@@ -69,7 +61,8 @@ class FakeUr:
         )
         for line in run.stdout.splitlines():
             if "RESULT " in line:  # the library writes to the same stream without line ends
-                return json.loads(line.partition("RESULT ")[2])
+                reported: dict[str, Any] = json.loads(line.partition("RESULT ")[2])
+                return reported
         raise AssertionError(f"status {run.returncode}\n{run.stdout[-3000:]}\n{run.stderr[-3000:]}")
 
     @contextmanager
@@ -89,33 +82,15 @@ class FakeUr:
 
 @pytest.fixture
 def start_ur() -> Iterator[Callable[..., FakeUr]]:
-    """``start_ur("--time-scale", "0.1")`` starts a fake controller on an address of its own."""
-    running: list[FakeUr] = []
+    """Start fake controllers: ``start_ur("--time-scale", "0.1")``. They end after the test."""
+    with contextlib.ExitStack() as stack:
 
-    def start(*options: str) -> FakeUr:
-        with Path(os.devnull).open("wb") as nothing:
-            process = start_forked_fake("ur", ["--host", next(_hosts), *options], nothing)
-        assert process.stdout is not None
-        word, _, rest = process.stdout.readline().partition(b" ")
-        assert word == b"ready", "the fake did not start"
-        ready = json.loads(rest)
-        running.append(FakeUr(process, ready, BlockingControlClient(ready["control"])))
-        return running[-1]
+        def start(*options: str) -> FakeUr:
+            fake = FakeUr(*options)
+            stack.callback(fake.end)
+            return fake
 
-    yield start
-    for fake in running:
-        fake.control.close()
-        if fake.process.poll() is None:
-            fake.process.send_signal(signal.SIGTERM)
-        try:
-            fake.process.wait(30.0)
-        except subprocess.TimeoutExpired:
-            fake.process.kill()
-            fake.process.wait()
-            raise
-        finally:
-            assert fake.process.stdout is not None
-            fake.process.stdout.close()
+        yield start
 
 
 @pytest.fixture
