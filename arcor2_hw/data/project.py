@@ -1,6 +1,7 @@
 """A project: action points with orientations, joints and actions, the logic between actions, parameters."""
 
 import enum
+from collections.abc import Iterator
 from typing import Final
 
 from msgspec import field
@@ -17,6 +18,9 @@ ERROR_FLOW: Final = "error"
 """The flow in a link to the error of an action: `<action id>/error/<index of the part>`."""
 ERROR_PARTS: Final = ("device", "kind", "text")
 """The parts of an error, in the order of their indexes. All are strings."""
+
+CALL: Final = "call"
+"""The action of a function in the type of an action that calls it: `<function id>/call`."""
 
 
 class FlowTypes(enum.StrEnum):
@@ -44,14 +48,16 @@ class ActionParameterType(enum.StrEnum):
 
     PROJECT_PARAMETER = "project_parameter"
     LINK = "link"
+    FUNCTION_PARAMETER = "function_parameter"
+    """The name of a parameter of the function that contains the action; not in ARCOR2."""
 
 
 class ActionParameter(Parameter, frozen=True):
-    """A literal, a project parameter or a link to a result, depending on `type`."""
+    """A literal, a project parameter, a parameter of the function, or a link to a result, depending on `type`."""
 
 
 class BareAction(Data, frozen=True):
-    """An action without parameters and flows; `type` is `<object id>/<action name>`."""
+    """An action without parameters and flows; `type` is `<object id>/<action name>`, or `<function id>/call`."""
 
     name: str
     type: str
@@ -59,7 +65,7 @@ class BareAction(Data, frozen=True):
 
 
 class Action(BareAction, frozen=True):
-    """An action on an action point.
+    """An action on an action point, or of a function.
 
     `error_output` names the error for the actions after an error exit; without it, the error is not stored.
     """
@@ -170,14 +176,17 @@ class ProjectParameter(Parameter, frozen=True):
 
 
 class FunctionReturns(Data, frozen=True):
-    """A result of a project function."""
+    """A result of a function: its type, and the result `<action id>/default/<output index>` of one of its actions."""
 
     type: str
     link: str
 
 
 class ProjectFunction(Data, frozen=True):
-    """A named group of actions with logic of its own."""
+    """A named group of actions with logic of its own, which actions of type `<function id>/call` call.
+
+    `type` of a parameter is the name of a parameter type. Its `value` has no meaning, and is empty.
+    """
 
     name: str
     actions: list[Action] = field(default_factory=list)
@@ -209,3 +218,10 @@ class Project(BareProject, frozen=True):
     logic: list[LogicItem] = field(default_factory=list)
     object_overrides: list[SceneObjectOverride] = field(default_factory=list)
     project_objects_ids: list[str] | Unset = UNSET
+
+    def all_actions(self) -> Iterator[Action]:
+        """Return the actions on all action points, then those of all functions."""
+        for point in self.action_points:
+            yield from point.actions
+        for function in self.functions:
+            yield from function.actions
