@@ -54,6 +54,7 @@ from arcor2_hw.data.object_type import ObjectAction, ObjectModel, ObjectTypeMeta
 from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHoldData
 from arcor2_hw.data.package import PackageSummary
 from arcor2_hw.data.parameter import IdValue, Parameter
+from arcor2_hw.data.position import ProgramPosition, ProgramStep
 from arcor2_hw.data.project import (
     ActionParameter,
     BareAction,
@@ -63,6 +64,7 @@ from arcor2_hw.data.project import (
     LogicItem,
     NamedOrientation,
     Project,
+    ProjectFunction,
     ProjectLogicIf,
     ProjectParameter,
     ProjectRobotJoints,
@@ -71,6 +73,13 @@ from arcor2_hw.data.robot import Joint, RobotArg, RobotMeta
 from arcor2_hw.data.rpc.calibrations import ListCalibrationsData
 from arcor2_hw.data.rpc.editor import GetExecutionTraceData, ListRunsData, SetViewStateData
 from arcor2_hw.data.rpc.execution import BuildProjectData
+from arcor2_hw.data.rpc.functions import (
+    AddFunctionData,
+    DissolveCallData,
+    FunctionExport,
+    ImportFunctionData,
+    MakeFunctionData,
+)
 from arcor2_hw.data.rpc.general import AuthenticateData, SystemInfoData
 from arcor2_hw.data.rpc.history import HistoryData, RestoreRevisionData, UndoData
 from arcor2_hw.data.rpc.locks import LockHolder, LockType, TakeOverLocksData
@@ -174,6 +183,26 @@ class Requests(ABC):
         timeout: float | None = None,
     ) -> None:
         """AddApUsingRobot. Needs the role standard user."""
+
+    async def add_function(self, name: str, *, dry_run: bool = False, timeout: float | None = None) -> AddFunctionData:
+        """AddFunction. Needs the role standard user."""
+
+    async def add_function_parameter(
+        self,
+        *,
+        function_id: str,
+        name: str,
+        type: str,
+        value: Parameter | Unset = UNSET,
+        dry_run: bool = False,
+        timeout: float | None = None,
+    ) -> None:
+        """AddFunctionParameter. Needs the role standard user."""
+
+    async def add_function_result(
+        self, *, function_id: str, link: str, dry_run: bool = False, timeout: float | None = None
+    ) -> None:
+        """AddFunctionResult. Needs the role standard user."""
 
     async def add_logic_item(
         self,
@@ -324,8 +353,19 @@ class Requests(ABC):
     async def delete_scene(self, id: str, *, dry_run: bool = False, timeout: float | None = None) -> set[str]:
         """DeleteScene. Needs the role technician."""
 
+    async def dissolve_call(
+        self, action_id: str, *, remove_function: bool = False, dry_run: bool = False, timeout: float | None = None
+    ) -> DissolveCallData:
+        """DissolveCall: an action that calls a function, and whether to remove the function.
+
+        Needs the role standard user.
+        """
+
     async def execute_action(self, action_id: str, *, dry_run: bool = False, timeout: float | None = None) -> None:
         """ExecuteAction. Needs the role standard user."""
+
+    async def export_function(self, id: str, *, timeout: float | None = None) -> FunctionExport:
+        """ExportFunction. Needs the role operator."""
 
     async def find_devices(
         self, *, type: str, setting: str, parameters: Sequence[Parameter] = (), timeout: float | None = None
@@ -382,6 +422,9 @@ class Requests(ABC):
     async def get_object_types(self, *, timeout: float | None = None) -> list[ObjectTypeMeta]:
         """GetObjectTypes. Needs the role operator."""
 
+    async def get_program_position(self, *, timeout: float | None = None) -> ProgramPosition:
+        """GetProgramPosition. Needs the role operator."""
+
     async def get_project(self, id: str, *, timeout: float | None = None) -> Project:
         """GetProject. Needs the role operator."""
 
@@ -436,6 +479,16 @@ class Requests(ABC):
         timeout: float | None = None,
     ) -> None:
         """HoldHandTeaching. Needs the role standard user."""
+
+    async def import_function(
+        self,
+        function: FunctionExport,
+        *,
+        points: dict[str, str] | Unset = UNSET,
+        dry_run: bool = False,
+        timeout: float | None = None,
+    ) -> ImportFunctionData:
+        """ImportFunction. Needs the role standard user."""
 
     async def import_script(
         self, *, script: str, revision: int, dry_run: bool = False, timeout: float | None = None
@@ -513,6 +566,20 @@ class Requests(ABC):
 
     async def list_scenes(self, *, timeout: float | None = None) -> list[ListScenesData]:
         """ListScenes. Needs the role operator."""
+
+    async def make_function(
+        self,
+        *,
+        name: str,
+        action_ids: list[str],
+        call_name: str | Unset = UNSET,
+        dry_run: bool = False,
+        timeout: float | None = None,
+    ) -> MakeFunctionData:
+        """MakeFunction: the name of the function, its actions, and the name of the action that calls it.
+
+        Needs the role standard user.
+        """
 
     async def markers_corners(
         self, *, camera_parameters: CameraParameters, image: str, timeout: float | None = None
@@ -703,6 +770,19 @@ class Requests(ABC):
     ) -> None:
         """RemoveFromScene. Needs the role technician."""
 
+    async def remove_function(self, id: str, *, dry_run: bool = False, timeout: float | None = None) -> None:
+        """RemoveFunction. Needs the role standard user."""
+
+    async def remove_function_parameter(
+        self, *, function_id: str, name: str, dry_run: bool = False, timeout: float | None = None
+    ) -> None:
+        """RemoveFunctionParameter. Needs the role standard user."""
+
+    async def remove_function_result(
+        self, *, function_id: str, index: int, dry_run: bool = False, timeout: float | None = None
+    ) -> None:
+        """RemoveFunctionResult. Needs the role standard user."""
+
     async def remove_logic_item(self, logic_item_id: str, *, timeout: float | None = None) -> None:
         """RemoveLogicItem. Needs the role standard user."""
 
@@ -728,6 +808,11 @@ class Requests(ABC):
         self, *, orientation_id: str, new_name: str, dry_run: bool = False, timeout: float | None = None
     ) -> None:
         """RenameActionPointOrientation. Needs the role standard user."""
+
+    async def rename_function(
+        self, *, function_id: str, new_name: str, dry_run: bool = False, timeout: float | None = None
+    ) -> None:
+        """RenameFunction. Needs the role standard user."""
 
     async def rename_object(
         self, *, id: str, new_name: str, dry_run: bool = False, timeout: float | None = None
@@ -819,7 +904,7 @@ class Requests(ABC):
     async def start_scene_keep_going(self, *, dry_run: bool = False, timeout: float | None = None) -> None:
         """StartSceneKeepGoing. Needs the role standard user."""
 
-    async def step_action(self, *, timeout: float | None = None) -> None:
+    async def step_action(self, *, mode: ProgramStep = ProgramStep.OVER, timeout: float | None = None) -> None:
         """StepAction. Needs the role operator."""
 
     async def step_robot_eef(
@@ -952,6 +1037,24 @@ class Requests(ABC):
         self, *, action_point_id: str, robot: RobotArg, timeout: float | None = None
     ) -> None:
         """UpdateActionPointUsingRobot. Needs the role standard user."""
+
+    async def update_function_parameter(
+        self,
+        *,
+        function_id: str,
+        name: str,
+        new_name: str | Unset = UNSET,
+        type: str | Unset = UNSET,
+        value: Parameter | Unset = UNSET,
+        dry_run: bool = False,
+        timeout: float | None = None,
+    ) -> None:
+        """UpdateFunctionParameter. Needs the role standard user."""
+
+    async def update_function_result(
+        self, *, function_id: str, index: int, link: str, dry_run: bool = False, timeout: float | None = None
+    ) -> None:
+        """UpdateFunctionResult. Needs the role standard user."""
 
     async def update_lock(self, *, object_id: str, new_type: LockType, timeout: float | None = None) -> None:
         """UpdateLock. Needs the role standard user."""
@@ -1097,6 +1200,10 @@ class Requests(ABC):
     ) -> EventStream[TypedEvent[TraceEntry]]: ...
     @overload
     def follow(
+        self, name: Literal["FunctionChanged"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[ProjectFunction]]: ...
+    @overload
+    def follow(
         self, name: Literal["HandTeachingMode"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[HandTeachingModeData]]: ...
     @overload
@@ -1173,6 +1280,10 @@ class Requests(ABC):
     def follow(
         self, name: Literal["ProcessState"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[ProcessStateData]]: ...
+    @overload
+    def follow(
+        self, name: Literal["ProgramPosition"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[ProgramPosition]]: ...
     @overload
     def follow(
         self, name: Literal["ProjectChanged"], /, *, limit: int = LIMIT

@@ -235,7 +235,7 @@ class TraceEntry(TranslatableData, frozen=True):
     number: number of the action in the run from 1, in the order of their start. started: time of the start. duration:
     s, without a pause before it; omitted while it runs. parameters, results: as in ActionStateBefore and
     ActionStateAfter. error: why it failed, with `key` and `values`. thread_id: omitted in the main thread of the
-    script.
+    script. call: number of the call of the function that contains the action; omitted in the program itself.
     """
 
     run: int
@@ -248,6 +248,7 @@ class TraceEntry(TranslatableData, frozen=True):
     results: list[str] | Unset = UNSET
     error: str | Unset = UNSET
     thread_id: int | Unset = UNSET
+    call: int | Unset = UNSET
 
 
 # ---------------------------------------------------------------------------------------------- reachability

@@ -24,6 +24,7 @@ from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHoldData
 from arcor2_hw.data.package import CollisionModels, PackageStateEnum, PackageSummary
 from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.position import ProgramPosition
 from arcor2_hw.data.project import (
     BareAction,
     BareActionPoint,
@@ -31,6 +32,7 @@ from arcor2_hw.data.project import (
     LogicItem,
     NamedOrientation,
     Project,
+    ProjectFunction,
     ProjectParameter,
     ProjectRobotJoints,
 )
@@ -362,8 +364,10 @@ EVENTS: Final = {
         EventType("RobotHold", RobotHoldData, Role.OPERATOR, additional=True),
         EventType("BreakpointsChanged", ProjectBreakpoints, Role.OPERATOR, additional=True),
         EventType("ExecutionTrace", TraceEntry, Role.OPERATOR, additional=True),
+        EventType("FunctionChanged", ProjectFunction, Role.OPERATOR, additional=True),
         EventType("HistoryChanged", HistoryChangedData, Role.OPERATOR, additional=True),
         EventType("MovePreview", MovePreviewData, Role.OPERATOR, additional=True),
+        EventType("ProgramPosition", ProgramPosition, Role.OPERATOR, additional=True),
         EventType("ReachabilityChanged", ReachabilityData, Role.OPERATOR, additional=True),
         EventType("RunChanged", Run, Role.OPERATOR, additional=True),
         EventType("RunStatistics", RunStatisticsData, Role.OPERATOR, additional=True),

@@ -1,5 +1,6 @@
 """The position of a running program: the call stack of each branch."""
 
+import enum
 from typing import Final
 
 from msgspec import field
@@ -8,6 +9,14 @@ from arcor2_hw.data.base import UNSET, Data, Unset
 
 MAIN_BRANCH: Final = "main"
 """Id of the branch of the program itself."""
+
+
+class ProgramStep(enum.StrEnum):
+    """Where a step ends: before the next action of the same function or a caller, of any function, or of a caller."""
+
+    OVER = "over"
+    INTO = "into"
+    OUT = "out"
 
 
 class Frame(Data, frozen=True):

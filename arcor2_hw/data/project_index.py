@@ -11,6 +11,7 @@ from arcor2_hw.data.project import (
     BareActionPoint,
     NamedOrientation,
     Project,
+    ProjectFunction,
     ProjectParameter,
     ProjectRobotJoints,
 )
@@ -33,11 +34,17 @@ class ProjectLookup(Protocol):
     def joints(self, joints_id: str) -> tuple[BareActionPoint, ProjectRobotJoints]:
         """Return joints with their action point."""
 
-    def action(self, action_id: str) -> tuple[BareActionPoint, Action]:
-        """Return an action with its action point."""
+    def action(self, action_id: str) -> Action:
+        """Return an action."""
 
     def parameter(self, parameter_id: str) -> ProjectParameter:
         """Return a project parameter."""
+
+    def find_function(self, function_id: str) -> ProjectFunction | None:
+        """Return a function, None if there is none."""
+
+    def function_of(self, action_id: str) -> str:
+        """Return the id of the function that contains an action; empty for an action of the program."""
 
 
 def _chain(lookup: ProjectLookup, point: BareActionPoint) -> Iterable[Pose]:
@@ -87,7 +94,9 @@ class ProjectIndex:
         self._points = {point.id: point for point in project.action_points}
         self._orientations = {o.id: (p, o) for p in project.action_points for o in p.orientations}
         self._joints = {j.id: (p, j) for p in project.action_points for j in p.robot_joints}
-        self._actions = {a.id: (p, a) for p in project.action_points for a in p.actions}
+        self._actions = {action.id: action for action in project.all_actions()}
+        self._functions = {function.id: function for function in project.functions}
+        self._function_of = {action.id: function.id for function in project.functions for action in function.actions}
         self._parameters = {parameter.id: parameter for parameter in project.parameters}
 
     def scene_object(self, object_id: str) -> SceneObject:
@@ -120,8 +129,8 @@ class ProjectIndex:
         except KeyError:
             raise NotFound("the project has no joints {joints_id}", joints_id=joints_id) from None
 
-    def action(self, action_id: str) -> tuple[BareActionPoint, Action]:
-        """Return an action with its action point."""
+    def action(self, action_id: str) -> Action:
+        """Return an action."""
         try:
             return self._actions[action_id]
         except KeyError:
@@ -133,3 +142,11 @@ class ProjectIndex:
             return self._parameters[parameter_id]
         except KeyError:
             raise NotFound("the project has no parameter {parameter_id}", parameter_id=parameter_id) from None
+
+    def find_function(self, function_id: str) -> ProjectFunction | None:
+        """Return a function, None if there is none."""
+        return self._functions.get(function_id)
+
+    def function_of(self, action_id: str) -> str:
+        """Return the id of the function that contains an action; empty for an action of the program."""
+        return self._function_of.get(action_id, "")

@@ -14,7 +14,8 @@ class Span(Data, frozen=True):
     number: number of the action in the run from 1, in the order of their start. device: id of the object. start: since
     the first action of the run, s. duration: s. branch: value of the condition after which the action followed the one
     before it, as JSON; omitted without a condition. error: why the action failed. thread_id: omitted in the main thread
-    of the script.
+    of the script. call: number of the call of the function that contains the action; omitted in the program itself. The
+    span of a call has no device.
     """
 
     number: int
@@ -26,6 +27,7 @@ class Span(Data, frozen=True):
     branch: str | Unset = UNSET
     error: str | Unset = UNSET
     thread_id: int | Unset = UNSET
+    call: int | Unset = UNSET
 
 
 class TracedDevice(Data, frozen=True):

@@ -25,6 +25,7 @@ import msgspec
 from msgspec.structs import replace
 
 from arcor2_hw.data.device import Connection
+from arcor2_hw.data.position import MAIN_BRANCH, Frame
 from arcor2_hw.exceptions import Arcor2Error, ProgramFinished, ProgramStopped, Refused
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
@@ -288,10 +289,13 @@ class Host:
         time: float = 0.0,
         device: str = "",
         waited: float = 0.0,
+        call: int = 0,
+        frames: Sequence[Frame] = (),
+        branch: str = MAIN_BRANCH,
     ) -> None:
         """Send an encoded event of the program. Wait up to EVENT_WAIT for a server that does not keep up."""
         self.link.wait_for_room(EVENT_WAIT)
-        self.link.post(m.ProgramEvent(name, encoded, number, action, time, device, waited))
+        self.link.post(m.ProgramEvent(name, encoded, number, action, time, device, waited, call, list(frames), branch))
 
     def changed(self, state: str) -> None:
         """Report that the program is running or paused."""
@@ -346,9 +350,11 @@ class Host:
                 self._subscribed[message.object_id] = message
             case m.StopProgram():
                 self._stop_program()
-            case m.Pause() | m.Resume() | m.Step() if self.program is not None:
+            case m.Pause() | m.Resume() if self.program is not None:
                 gate = self.program.gate
-                {m.Pause: gate.pause, m.Resume: gate.resume, m.Step: gate.step}[type(message)]()
+                {m.Pause: gate.pause, m.Resume: gate.resume}[type(message)]()
+            case m.Step() if self.program is not None:
+                self.program.gate.step(message.mode)
             case m.SetBreakpoints() if self.program is not None:
                 self.program.set_shared_breakpoints(frozenset(message.shared_breakpoints))
 

@@ -13,6 +13,7 @@ from arcor2_hw.data.cell import Cell
 from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.operation import HoldKind
+from arcor2_hw.data.position import MAIN_BRANCH, Frame, ProgramStep
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
@@ -209,7 +210,9 @@ class Resume(ToHost, frozen=True):
 
 
 class Step(ToHost, frozen=True):
-    """Continue the program for one action."""
+    """Continue the program for one action, over or into functions, or until the present function is left."""
+
+    mode: ProgramStep = ProgramStep.OVER
 
 
 class SetBreakpoints(ToHost, frozen=True):
@@ -299,7 +302,8 @@ class ProgramEvent(ToServer, frozen=True):
     number: counts the calls of actions from 1. name: of the action, or device and method if it has no name. time: start
     of the action, s since the epoch (ActionStateBefore); its duration, s (ActionStateAfter). device: id of the object
     (ActionStateBefore). waited: time between ActionStateBefore and the start of the action, s, for which the program
-    was paused (ActionStateAfter).
+    was paused (ActionStateAfter). call: number of the call of the function that contains the action, 0 for the program
+    itself. frames: the position of the program (ActionStateBefore). branch: the branch, or thread, of the script.
     """
 
     event: str
@@ -309,6 +313,9 @@ class ProgramEvent(ToServer, frozen=True):
     time: float = 0.0
     device: str = ""
     waited: float = 0.0
+    call: int = 0
+    frames: list[Frame] = []
+    branch: str = MAIN_BRANCH
 
 
 class ActionFailed(ToServer, frozen=True):

@@ -1,9 +1,11 @@
 """The gate that every action of a program passes: pause, resume, step, breakpoints, stop."""
 
 import enum
+import sys
 import threading
 from collections.abc import Callable, Set
 
+from arcor2_hw.data.position import ProgramStep
 from arcor2_hw.exceptions import ProgramStopped
 
 
@@ -36,6 +38,9 @@ class Gate:
         self._breakpoints = breakpoints
         self._mode = _Mode.RUN
         self._steps = 0
+        self._step = ProgramStep.OVER
+        self._deepest = sys.maxsize
+        """After a step: the largest number of calls around an action before which the program pauses."""
         if start_paused:  # the same state as after a single step
             self._mode = _Mode.STEP
         self._reported = False
@@ -54,9 +59,11 @@ class Gate:
         """Continue the program."""
         self._continue(_Mode.RUN)
 
-    def step(self) -> None:
-        """Continue for one action."""
-        self._continue(_Mode.STEP)
+    def step(self, mode: ProgramStep = ProgramStep.OVER) -> None:
+        """Continue for one action. `mode`: whether the actions inside a function that it calls count."""
+        with self._changed:
+            self._step = mode
+            self._continue(_Mode.STEP)
 
     def stop(self) -> None:
         """Raise ProgramStopped in all threads that wait at the gate or arrive later."""
@@ -78,18 +85,25 @@ class Gate:
         with self._changed:
             self._breakpoints = breakpoints
 
-    def before(self, ids: Set[str] = frozenset()) -> None:
+    def before(self, ids: Set[str] = frozenset(), depth: int = 0, *, is_call: bool = False) -> None:
         """Wait until an action may start. Raises ProgramStopped.
 
-        ids: of the action and its action points, compared with the breakpoints.
+        Args:
+            ids: of the action and its action points, compared with the breakpoints.
+            depth: number of calls of functions around the action.
+            is_call: whether it calls a function, so that other actions pass the gate before it ends.
         """
         with self._changed:
-            if (self._mode is _Mode.STEP and not self._steps) or not self._breakpoints.isdisjoint(ids):
+            stepped = self._mode is _Mode.STEP and not self._steps and depth <= self._deepest
+            if stepped or not self._breakpoints.isdisjoint(ids):
                 self._mode = _Mode.PAUSE
             self._wait()
-            if self._mode is _Mode.STEP:
+            if self._mode is _Mode.STEP and self._steps:
                 self._steps = 0
-            self._running += 1
+                limits = {ProgramStep.OVER: depth, ProgramStep.INTO: sys.maxsize, ProgramStep.OUT: depth - 1}
+                self._deepest = limits[self._step]
+            if not is_call:
+                self._running += 1
 
     def after(self) -> None:
         """Record the end of an action, then wait while the program is paused. Raises ProgramStopped."""

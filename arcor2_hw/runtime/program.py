@@ -19,7 +19,8 @@ from arcor2_hw.data.events import (
     ProjectExceptionData,
 )
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.data.project import Project, ProjectRobotJoints
+from arcor2_hw.data.position import MAIN_BRANCH, Frame
+from arcor2_hw.data.project import CALL, Project, ProjectRobotJoints
 from arcor2_hw.data.secret import ObjectSecrets
 from arcor2_hw.exceptions import (
     ENDS_PROGRAM,
@@ -57,6 +58,9 @@ class Channel(Protocol):
         time: float = 0.0,
         device: str = "",
         waited: float = 0.0,
+        call: int = 0,
+        frames: Sequence[Frame] = (),
+        branch: str = MAIN_BRANCH,
     ) -> None:
         """Send an encoded event. The other arguments describe the call of an action, see ProgramEvent."""
 
@@ -71,13 +75,18 @@ class Channel(Protocol):
 
 
 class Action:
-    """One call of an action. `id` is None in a project that declares no actions."""
+    """One call of an action. `id` is None in a project that declares no actions.
 
-    __slots__ = ("began", "id", "number", "waited")
+    number: Counts the calls of a run from 1. call: The number of the call of the function around it, 0 for none.
+    """
 
-    def __init__(self, number: int, action_id: str | None) -> None:
+    __slots__ = ("began", "call", "frame", "id", "number", "waited")
+
+    def __init__(self, number: int, action_id: str | None, call: int, frame: Frame) -> None:
         self.number = number
         self.id = action_id
+        self.call = call
+        self.frame = frame
         self.began = 0.0
         self.waited = 0.0
 
@@ -135,7 +144,11 @@ class Program:
         self._stops: list[SentStop] = []
         self._stop_sent = threading.Event()
         self._action_ids: dict[str, str] = {}
+        self._functions: dict[str, str] = {}
+        """The called functions by the ids of the actions that call them."""
         self._joints_points: dict[str, str] = {}
+        self._calls: dict[int, list[Action]] = {}
+        """The calls of functions around the present action of each thread, outermost first."""
         self._numbers = itertools.count(1)
 
     # -------------------------------------------------------------------------------- the project
@@ -145,7 +158,9 @@ class Program:
         Raises:
             NotFound: A breakpoint is not at an action or action point of the project.
         """
-        self._action_ids = {a.name: a.id for point in project.action_points for a in point.actions}
+        self._action_ids = {action.name: action.id for action in project.all_actions()}
+        types = {action.id: action.type.partition("/") for action in project.all_actions()}
+        self._functions = {key: called for key, (called, _, method) in types.items() if method == CALL}
         self._joints_points = {j.id: point.id for point in project.action_points for j in point.robot_joints}
         if unknown := self.breakpoints.difference((p.id for p in project.action_points), self._action_ids.values()):
             raise NotFound(
@@ -197,6 +212,13 @@ class Program:
             InvalidData: The project has no such action.
             ProgramStopped: The program was stopped.
         """
+        return self._begin(device, what, name, arguments, is_call=False)
+
+    def function_begins(self, what: str, name: str | None, arguments: Sequence[Any]) -> Action:
+        """Report that a function is called, as an action without a device. `action_begins` states the arguments."""
+        return self._begin("", what, name, arguments, is_call=True)
+
+    def _begin(self, device: str, what: str, name: str | None, arguments: Sequence[Any], *, is_call: bool) -> Action:
         self.check()
         action_id: str | None = None
         if self._action_ids:
@@ -207,31 +229,67 @@ class Program:
                 raise InvalidData("{what}: the project has no action named {name!r}", what=what, name=name)
         points = self.points_of(arguments)
         thread = None if self.in_main_thread else threading.get_ident()
+        calls = self._calls.setdefault(threading.get_ident(), [])
+        frame = Frame(action_id or "")
+        if calls:
+            caller = calls[-1].id or ""
+            frame = Frame(frame.action_id, self._functions.get(caller, ""), caller)
         data = ActionStateBeforeData(
             msgspec.UNSET if action_id is None else action_id,
             [encode_shown(argument) for argument in arguments] if arguments else msgspec.UNSET,
             points or msgspec.UNSET,
             msgspec.UNSET if thread is None else thread,
         )
-        action = Action(next(self._numbers), action_id)
+        action = Action(next(self._numbers), action_id, calls[-1].number if calls else 0, frame)
         encoded = _encode(Event("ActionStateBefore", data=data))
-        self.channel.event("ActionStateBefore", encoded, action.number, name or what, time.time(), device)
+        self.channel.event(
+            "ActionStateBefore",
+            encoded,
+            action.number,
+            name or what,
+            time.time(),
+            device,
+            call=action.call,
+            frames=[*(call.frame for call in calls), frame],
+            branch=MAIN_BRANCH if thread is None else f"thread {thread}",
+        )
         announced = time.monotonic()
-        self.gate.before(points if action_id is None else points | {action_id})
+        # The action that uses a pose pauses at its action point, not the call that passes it on.
+        ids = set() if is_call else points
+        self.gate.before(ids if action_id is None else ids | {action_id}, len(calls), is_call=is_call)
         action.began = time.monotonic()
         action.waited = action.began - announced
+        if is_call:
+            calls.append(action)
         return action
 
     def action_ended(self, action: Action, value: Any) -> None:
         """Report the result of an action, then wait while the program is paused. Raises ProgramStopped."""
+        self._report_end(action, value)
+        self.gate.after()
+
+    def function_ended(self, call: Action, value: Any) -> None:
+        """Report the result of a function."""
+        self._calls[threading.get_ident()].pop()
+        self._report_end(call, value)
+
+    def function_failed(self, call: Action, error: BaseException) -> None:
+        """Report that a function has failed. The failed action inside remains the cause of the error."""
+        self._calls[threading.get_ident()].pop()
+        if self._failed is None or self._failed[0] is not error:
+            self._failed = error, call
+        self.channel.action_over(call.number, time.monotonic() - call.began, message_of(error), call.waited)
+
+    def _report_end(self, action: Action, value: Any) -> None:
         duration = time.monotonic() - action.began
         if action.id is None:
             self.channel.action_over(action.number, duration, None, action.waited)
         else:
             data = ActionStateAfterData(action.id, results(value) or msgspec.UNSET)
             encoded = _encode(Event("ActionStateAfter", data=data))
-            self.channel.event("ActionStateAfter", encoded, action.number, time=duration, waited=action.waited)
-        self.gate.after()
+            self.channel.event(
+                "ActionStateAfter", encoded, action.number, time=duration, waited=action.waited, call=action.call
+            )
 
     def action_failed(self, action: Action, error: BaseException) -> None:
         """Report that an action has failed, then wait while the program is paused. Raises ProgramStopped."""

@@ -12,6 +12,7 @@ from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, ProgramFinished, ProgramStopped
 from arcor2_hw.runtime.cell import SceneFault, recipes
 from arcor2_hw.runtime.creation import find_type, prepare_for_sources
+from arcor2_hw.runtime.functions import F, function_of
 from arcor2_hw.runtime.package import PackageData, WorldPoints, package_name, put_on_path
 from arcor2_hw.runtime.program import ActionError, Program, current
 from arcor2_hw.runtime.proxy import proxy
@@ -84,6 +85,10 @@ class Resources:
     def caught(self, error: Arcor2Error) -> ActionError:
         """Return device, kind and text of the error of an action. Raises errors that always end the program."""
         return self._program.caught(error)
+
+    def function(self, body: F) -> F:
+        """Let calls of a function of the script be announced, stepped into and traced: the decorator of functions."""
+        return function_of(self._program, body)
 
     # -------------------------------------------------------------------------------- life
     def __enter__(self) -> "Resources":

@@ -6,13 +6,14 @@ import signal
 import sys
 import threading
 import types
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import msgspec
 
 from arcor2_hw.data.events import Event, PackageStateData
 from arcor2_hw.data.package import PackageStateEnum
+from arcor2_hw.data.position import ProgramStep
 from arcor2_hw.exceptions import ProgramStopped
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime.program import Program
@@ -82,7 +83,9 @@ class Standalone:
             raise ProgramStopped
 
     def _read_commands(self) -> None:
-        commands = {"p": self.program.gate.pause, "r": self.program.gate.resume, "s": self.program.gate.step}
+        gate = self.program.gate
+        commands: dict[str, Callable[[], None]] = {"p": gate.pause, "r": gate.resume, "s": gate.step}
+        commands |= {"i": lambda: gate.step(ProgramStep.INTO), "o": lambda: gate.step(ProgramStep.OUT)}
         for line in sys.stdin:
             if (command := commands.get(line.strip())) is not None:
                 command()

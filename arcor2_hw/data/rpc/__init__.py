@@ -7,6 +7,7 @@ from arcor2_hw.data.rpc.calibrations import *
 from arcor2_hw.data.rpc.editor import *
 from arcor2_hw.data.rpc.envelope import *
 from arcor2_hw.data.rpc.execution import *
+from arcor2_hw.data.rpc.functions import *
 from arcor2_hw.data.rpc.general import *
 from arcor2_hw.data.rpc.history import *
 from arcor2_hw.data.rpc.locks import *
@@ -22,6 +23,7 @@ _ALL: Final = (
     *CALIBRATION_RPCS,
     *EDITOR_RPCS,
     *EXECUTION_RPCS,
+    *FUNCTION_RPCS,
     *GENERAL_RPCS,
     *HISTORY_RPCS,
     *LOCK_RPCS,

@@ -4,6 +4,7 @@ from typing import Final
 
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.package import PackageSummary
+from arcor2_hw.data.position import ProgramPosition, ProgramStep
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc.envelope import Rpc
 from arcor2_hw.data.rpc.general import IdArgs
@@ -57,6 +58,12 @@ class TemporaryPackageArgs(Data, frozen=True):
     shared_breakpoints: bool | Unset = UNSET
 
 
+class StepActionArgs(Data, frozen=True):
+    """Arguments of StepAction."""
+
+    mode: ProgramStep = ProgramStep.OVER
+
+
 class UploadPackageArgs(Data, frozen=True):
     """Arguments of UploadPackage."""
 
@@ -69,12 +76,13 @@ EXECUTION_RPCS: Final = (
     Rpc("CancelAction", None, None, Role.OPERATOR),
     Rpc("DeletePackage", IdArgs, None, Role.ADVANCED_USER),
     Rpc("ExecuteAction", ExecuteActionArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("GetProgramPosition", None, ProgramPosition, Role.OPERATOR, additional=True),
     Rpc("ListPackages", None, list[PackageSummary], Role.OPERATOR),
     Rpc("PausePackage", None, None, Role.OPERATOR),
     Rpc("RenamePackage", RenamePackageArgs, None, Role.ADVANCED_USER),
     Rpc("ResumePackage", None, None, Role.OPERATOR),
     Rpc("RunPackage", RunPackageArgs, None, Role.OPERATOR),
-    Rpc("StepAction", None, None, Role.OPERATOR),
+    Rpc("StepAction", StepActionArgs, None, Role.OPERATOR, args_optional=True),
     Rpc("StopPackage", None, None, Role.OPERATOR),
     Rpc("TemporaryPackage", TemporaryPackageArgs, None, Role.STANDARD_USER, args_optional=True),
     Rpc("UploadPackage", UploadPackageArgs, None, Role.PROGRAMMER),

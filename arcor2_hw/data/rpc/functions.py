@@ -119,9 +119,10 @@ class RemoveFunctionResultArgs(Data, frozen=True):
 
 
 class DissolveCallArgs(Data, frozen=True):
-    """Arguments of DissolveCall: an action that calls a function."""
+    """Arguments of DissolveCall: an action that calls a function, and whether to remove the function."""
 
     action_id: str
+    remove_function: bool = False
 
 
 class DissolveCallData(Data, frozen=True):
@@ -165,7 +166,7 @@ class ImportFunctionArgs(Data, frozen=True):
     """
 
     function: FunctionExport
-    points: dict[str, str] = field(default_factory=dict)
+    points: dict[str, str] | Unset = UNSET
 
 
 class ImportFunctionData(Data, frozen=True):

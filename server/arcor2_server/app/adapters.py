@@ -32,6 +32,7 @@ from arcor2_server.rpc.copying import CopyRequests
 from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.editor import SharedStateRequests
 from arcor2_server.rpc.execution import ExecutionRequests
+from arcor2_server.rpc.functions import FunctionRequests
 from arcor2_server.rpc.general import GeneralRequests
 from arcor2_server.rpc.history import HistoryRequests
 from arcor2_server.rpc.joints import JointsRequests
@@ -74,6 +75,7 @@ def request_handlers(s: Server) -> Handlers:
         ExecutionRequests(
             s.locks, s.types, s.session, s.online, s.execution, s.tasks, s.package_runs, s.temporary_runs
         ),
+        FunctionRequests(s.types, s.session, s.undo, editing),
         GeneralRequests(
             s.access,
             s.hub,

@@ -206,7 +206,7 @@ async def _run(server: Server, wanted: str, paused: bool) -> ExitStatus:
         async for event in client.events():
             match event.event:
                 case "PackageInfo":
-                    actions = {a.id: a.name for point in event.data.project.action_points for a in point.actions}
+                    actions = {a.id: a.name for a in event.data.project.all_actions()}
                 case "ActionStateBefore" if not isinstance(event.data.action_id, Unset):
                     out.print(actions.get(event.data.action_id, event.data.action_id))
                 case "ActionStateAfter" if not isinstance(event.data.results, Unset):

@@ -207,7 +207,7 @@ class Demo:
                 )
 
     async def _follow(self, client: Client, project: Project, outcome: Outcome) -> None:
-        actions = {action.id: action for point in project.action_points for action in point.actions}
+        actions = {action.id: action for action in project.all_actions()}
         problem = ""
         while True:
             try:

@@ -13,6 +13,7 @@ from arcor2_hw.data.project import (
     LogicItem,
     NamedOrientation,
     Project,
+    ProjectFunction,
     ProjectParameter,
     ProjectRobotJoints,
 )
@@ -20,7 +21,7 @@ from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 
 
 class Kind(enum.StrEnum):
-    """Kinds of item. SCENE and PROJECT carry the document's own fields, their lists stay empty."""
+    """Kinds of item. SCENE, PROJECT and FUNCTION carry their own fields, their lists of other items stay empty."""
 
     SCENE = "scene"
     OBJECT = "object"
@@ -30,6 +31,7 @@ class Kind(enum.StrEnum):
     JOINTS = "joints"
     ACTION = "action"
     PARAMETER = "parameter"
+    FUNCTION = "function"
     LOGIC = "logic"
     OVERRIDE = "override"
 
@@ -43,6 +45,7 @@ VALUE_TYPES: Final[dict[Kind, type]] = {
     Kind.JOINTS: ProjectRobotJoints,
     Kind.ACTION: Action,
     Kind.PARAMETER: ProjectParameter,
+    Kind.FUNCTION: ProjectFunction,
     Kind.LOGIC: LogicItem,
     Kind.OVERRIDE: SceneObjectOverride,
 }
@@ -57,7 +60,8 @@ class Item(Struct, frozen=True, array_like=True):
     Attributes:
         kind: The kind of the item.
         id: Its id, unique within the kind.
-        parent: The action point of an orientation, joints or action, else empty.
+        parent: The action point of an orientation, joints or action, or the function of an action or logic item, else
+            empty.
         rank: Orders the items of one kind, so that a restored item returns to its old position.
         value: Never modified in place.
     """

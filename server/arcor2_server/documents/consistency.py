@@ -4,20 +4,21 @@ from collections.abc import Callable, Iterable, Sequence
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction
-from arcor2_hw.data.project import END, START, Action, LogicItem
+from arcor2_hw.data.project import END, START, Action, LogicItem, ProjectFunction
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_hw.messages import Message
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.checks.actions import action_meta, check_action
+from arcor2_server.documents.checks.functions import check_function
 from arcor2_server.documents.checks.object_types import Types
 from arcor2_server.documents.checks.scene import object_problems
-from arcor2_server.documents.document import Document
-from arcor2_server.documents.item_indexes import OWNED, action_of, reference
-from arcor2_server.documents.logic import check_logic_item, check_no_loops
+from arcor2_server.documents.document import OUTPUT, Document
+from arcor2_server.documents.item_indexes import OWNED, action_of, link_of, reference
+from arcor2_server.documents.logic import check_logic_item, check_no_loops, scope_of
 from arcor2_server.documents.reparenting import check_no_loop, check_parent
 
 _NAMED_IN_POINT = (Kind.ORIENTATION, Kind.JOINTS)
-_NAMED = (Kind.OBJECT, Kind.POINT, Kind.ACTION, Kind.PARAMETER, *_NAMED_IN_POINT)
+_NAMED = (Kind.OBJECT, Kind.POINT, Kind.ACTION, Kind.PARAMETER, Kind.FUNCTION, *_NAMED_IN_POINT)
 
 
 class Inconsistent(InvalidData):
@@ -64,6 +65,8 @@ def _check_unused(document: Document, change: Change) -> None:
     if change.kind is Kind.POINT:
         users += [point.id for point in document.points_of(key)]
         users += [item.id for kind in OWNED for item in document.owned(key, kind)]
+    if change.kind is Kind.FUNCTION:
+        users += [item.id for kind in (Kind.ACTION, Kind.LOGIC) for item in document.owned(key, kind)]
     if change.kind is Kind.ACTION:
         users += [item.id for item in (*document.outgoing(key), *document.incoming(key))]
     if users:
@@ -73,11 +76,10 @@ def _check_unused(document: Document, change: Change) -> None:
 def _check_name(document: Document, change: Change) -> None:
     if change.kind not in _NAMED:
         return
-    parent = change.parent if change.kind in _NAMED_IN_POINT else ""
-    names: list[tuple[str, str]] = [(change.kind, change.after.name)]
+    names = [(change.kind, change.after.name, change.parent if change.kind in _NAMED_IN_POINT else "")]
     if change.kind is Kind.ACTION:
-        names += [("output", output) for output in change.after.names()]
-    for kind, name in names:
+        names += [(OUTPUT, output, document.function_of(change.id)) for output in change.after.names()]
+    for kind, name, parent in names:
         other = document.named(kind, name, parent)
         if other is not None and other != change.id:
             raise Inconsistent("The name {name} is taken.", [other], name=name)
@@ -101,33 +103,61 @@ def _point(document: Document, change: Change, types: Types) -> None:  # noqa: A
 
 
 def _owned(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001
-    if document.find(Kind.POINT, change.parent) is None:
+    kinds = (Kind.POINT, Kind.FUNCTION) if change.kind is Kind.ACTION else (Kind.POINT,)
+    if all(document.find(kind, change.parent) is None for kind in kinds):
         raise Inconsistent(
-            "The action point of {change} does not exist any more.", [change.parent], change=title(change)
+            "The action point or function of {change} does not exist any more.", [change.parent], change=title(change)
         )
 
 
 def _action(document: Document, change: Change, types: Types) -> None:
     _owned(document, change, types)
     _check_action(document, change.after, types)
-    for user in document.users_of(change.id):
-        if isinstance(user, Action):
-            _check_action(document, user, types, blamed=user.id)
-        else:
-            _check_step(document, user, types)
+    _check_users(document, change.id, types)
+
+
+def _check_users(document: Document, key: str, types: Types) -> None:
+    for user in document.users_of(key):
+        match user:
+            case Action():
+                _check_action(document, user, types, blamed=user.id)
+            case LogicItem():
+                _check_step(document, user, types)
+            case ProjectFunction():
+                _check_function(document, user.id, types)
 
 
 def _check_action(document: Document, action: Action, types: Types, blamed: str = "") -> None:
+    function_id = document.function_of(action.id)
     try:
-        check_action(action, document, types)
+        check_action(action, document, types, document.find_function(function_id))
     except Arcor2Error as error:
         targets = {reference(parameter.type, parameter.value) for parameter in action.parameters}
+        targets |= {action.type.partition("/")[0], function_id}
         raise Inconsistent(error.message, [blamed] if blamed else [target for target in targets if target]) from None
+
+
+def _function(document: Document, change: Change, types: Types) -> None:
+    _check_function(document, change.id, types)
+    for item in document.owned(change.id, Kind.ACTION):
+        _check_action(document, item.value, types, blamed=item.id)
+    _check_users(document, change.id, types)
+
+
+def _check_function(document: Document, key: str, types: Types) -> None:
+    function = document.function(key)
+    try:
+        check_function(function, document, types)
+    except Arcor2Error as error:
+        sources = {link[0] for link in map(link_of, function.returns) if link is not None}
+        raise Inconsistent(error.message, {key, *sources}) from None
 
 
 def _logic(document: Document, change: Change, types: Types) -> None:
     project = next((item for item in document.of_kind(Kind.PROJECT)), None)
-    if project is not None and not project.value.has_logic:
+    if change.parent and document.find(Kind.FUNCTION, change.parent) is None:
+        raise Inconsistent("The function of {change} does not exist any more.", [change.parent], change=title(change))
+    if project is not None and not project.value.has_logic and not change.parent:
         raise Inconsistent("The project {name} has no logic any more.", [project.id], name=project.value.name)
     _check_step(document, change.after, types)
 
@@ -138,7 +168,9 @@ def _check_step(document: Document, item: LogicItem, types: Types) -> None:
         check_logic_item(document, meta_of, item, loops=False)
     except Arcor2Error as error:
         places = {action_of(item.start), action_of(item.end)} - {START, END}
-        siblings = {other.id for other in document.outgoing(action_of(item.start))} - {item.id}
+        siblings = {other.id for other in document.outgoing(action_of(item.start), scope_of(document, item))} - {
+            item.id
+        }
         if not isinstance(item.condition, Unset):
             places.add(action_of(item.condition.what))
         raise Inconsistent(error.message, places | siblings) from None
@@ -154,10 +186,8 @@ def _check_loops(document: Document, steps: list[LogicItem]) -> None:
 
 
 def _project(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001
-    if not change.after.has_logic and document.count(Kind.LOGIC):
-        raise Inconsistent(
-            "{name} has steps of its logic.", [item.id for item in document.of_kind(Kind.LOGIC)], name=change.after.name
-        )
+    if not change.after.has_logic and (steps := document.program_logic()):
+        raise Inconsistent("{name} has steps of its logic.", [item.id for item in steps], name=change.after.name)
 
 
 _CHECKS: dict[Kind, Callable[[Document, Change, Types], None]] = {
@@ -167,5 +197,6 @@ _CHECKS: dict[Kind, Callable[[Document, Change, Types], None]] = {
     Kind.ORIENTATION: _owned,
     Kind.JOINTS: _owned,
     Kind.ACTION: _action,
+    Kind.FUNCTION: _function,
     Kind.LOGIC: _logic,
 }

@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable, Iterable, Sequence
 from msgspec.structs import replace
 
 from arcor2_hw.data.object_type import ObjectTypeMeta
-from arcor2_hw.data.project import Action, Project
+from arcor2_hw.data.project import Action, LogicItem, Project, ProjectFunction
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import NotFound
 from arcor2_server.documents import Session
@@ -65,14 +65,23 @@ def project_after(scene: Scene, project: Project, removed: Iterable[str], moved:
 
 def _without_action(document: Document, action: Action) -> list[Change]:
     steps = {item.id: item for item in (*document.outgoing(action.id), *document.incoming(action.id))}
-    steps |= {user.id: user for user in document.users_of(action.id) if not isinstance(user, Action)}
-    return [*(document.remove(Kind.LOGIC, i) for i in steps), document.remove(Kind.ACTION, action.id)]
+    users = document.users_of(action.id)
+    steps |= {user.id: user for user in users if isinstance(user, LogicItem)}
+    returning = [
+        replace(user, returns=[each for each in user.returns if each.link.partition("/")[0] != action.id])
+        for user in users
+        if isinstance(user, ProjectFunction)
+    ]
+    return [
+        *(document.remove(Kind.LOGIC, i) for i in steps),
+        *(document.update(Kind.FUNCTION, function.id, function) for function in returning),
+        document.remove(Kind.ACTION, action.id),
+    ]
 
 
 def _uses(project: Project, object_id: str) -> bool:
-    return any(
-        point.parent == object_id or any(action.type.partition("/")[0] == object_id for action in point.actions)
-        for point in project.action_points
+    return any(point.parent == object_id for point in project.action_points) or any(
+        action.type.partition("/")[0] == object_id for action in project.all_actions()
     )
 
 

@@ -16,15 +16,16 @@ from arcor2_hw.data.project import (
     LogicItem,
     NamedOrientation,
     Project,
+    ProjectFunction,
     ProjectParameter,
     ProjectRobotJoints,
 )
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.documents.changes import OF_SCENE, Change, Item, Kind
-from arcor2_server.documents.item_indexes import OWNED, ItemIndexes, action_of
+from arcor2_server.documents.item_indexes import OWNED, ItemIndexes, action_of, place_of
 
-ROOTS: Final = (Kind.OBJECT, Kind.PARAMETER, Kind.SCENE, Kind.PROJECT)
+ROOTS: Final = (Kind.OBJECT, Kind.PARAMETER, Kind.FUNCTION, Kind.SCENE, Kind.PROJECT)
 """Kinds of items that are roots of lock trees, in addition to action points without a parent."""
 
 _TITLES: Final = {
@@ -34,6 +35,9 @@ _TITLES: Final = {
     Kind.OVERRIDE: "override of the object",
 }
 """Kinds as users know them, where their name differs."""
+
+OUTPUT: Final = "output"
+"""Scope of the names of results and errors in `Document.named`."""
 
 UNTIMED: Final = {"created": UNSET, "modified": UNSET, "int_modified": UNSET}
 """Resets the times of a scene or project, since an undo must not change them."""
@@ -57,6 +61,8 @@ class Document:
         self._indexes = ItemIndexes()
         self._scene: Scene | None = None
         self._project: Project | None = None
+        self._functions: dict[str, ProjectFunction] = {}
+        """Functions with their actions and logic, as far as they were requested since the last change."""
         for item in items:
             self._put(item)
 
@@ -74,7 +80,7 @@ class Document:
         changes += [add(Kind.OBJECT, obj.id, obj) for obj in scene.objects]
         if project is None:
             return changes
-        bare = replace(project, action_points=[], parameters=[], logic=[], object_overrides=[], **UNTIMED)
+        bare = replace(project, action_points=[], parameters=[], functions=[], logic=[], object_overrides=[], **UNTIMED)
         changes.append(add(Kind.PROJECT, project.id, bare))
         for point in project.action_points:
             changes.append(add(Kind.POINT, point.id, reduce_to(BareActionPoint, point)))
@@ -82,9 +88,19 @@ class Document:
             changes += [add(Kind.JOINTS, j.id, j, point.id) for j in point.robot_joints]
             changes += [add(Kind.ACTION, a.id, a, point.id) for a in point.actions]
         changes += [add(Kind.PARAMETER, p.id, p) for p in project.parameters]
+        for function in project.functions:
+            changes += self.changes_to_add(function)
         changes += [add(Kind.LOGIC, i.id, i) for i in project.logic]
         changes += [add(Kind.OVERRIDE, o.id, o) for o in project.object_overrides]
         return changes
+
+    def changes_to_add(self, function: ProjectFunction) -> list[Change]:
+        """Return the changes that add a function with its actions and logic."""
+        return [
+            self.add(Kind.FUNCTION, function.id, replace(function, actions=[], logic=[])),
+            *(self.add(Kind.ACTION, action.id, action, function.id) for action in function.actions),
+            *(self.add(Kind.LOGIC, item.id, item, function.id) for item in function.logic),
+        ]
 
     # ------------------------------------------------------------------------------------------ changes
     def add(self, kind: Kind, item_id: str, value: Any, parent: str = "") -> Change:
@@ -132,6 +148,7 @@ class Document:
                 self._scene = None
             else:
                 self._project = None
+                self._functions.clear()
 
     def _put(self, item: Item) -> None:
         of_kind = self._items[item.kind]
@@ -169,13 +186,13 @@ class Document:
     def project(self) -> Project | None:
         """The project, None if the document has none."""
         if self._project is None and (base := self._bare(Kind.PROJECT)) is not None:
-            values = {kind: [item.value for item in self.of_kind(kind)] for kind in Kind if kind not in OWNED}
             self._project = replace(
                 base,
-                action_points=[self.full_point(point.id) for point in values[Kind.POINT]],
-                parameters=values[Kind.PARAMETER],
-                logic=values[Kind.LOGIC],
-                object_overrides=values[Kind.OVERRIDE],
+                action_points=[self.full_point(item.id) for item in self.of_kind(Kind.POINT)],
+                parameters=[item.value for item in self.of_kind(Kind.PARAMETER)],
+                functions=[self.function(item.id) for item in self.of_kind(Kind.FUNCTION)],
+                logic=[item.value for item in self.program_logic()],
+                object_overrides=[item.value for item in self.of_kind(Kind.OVERRIDE)],
             )
         return self._project
 
@@ -224,10 +241,29 @@ class Document:
         item = self._get(Kind.JOINTS, joints_id)
         return self.action_point(item.parent), item.value
 
-    def action(self, action_id: str) -> tuple[BareActionPoint, Action]:
-        """Return an action with its action point."""
-        item = self._get(Kind.ACTION, action_id)
-        return self.action_point(item.parent), item.value
+    def action(self, action_id: str) -> Action:
+        """Return an action."""
+        value: Action = self._get(Kind.ACTION, action_id).value
+        return value
+
+    def function(self, function_id: str) -> ProjectFunction:
+        """Return a function with its actions and logic."""
+        if (function := self._functions.get(function_id)) is None:
+            bare: ProjectFunction = self._get(Kind.FUNCTION, function_id).value
+            actions, logic = (
+                [item.value for item in self.owned(function_id, kind)] for kind in (Kind.ACTION, Kind.LOGIC)
+            )
+            function = self._functions[function_id] = replace(bare, actions=actions, logic=logic)
+        return function
+
+    def find_function(self, function_id: str) -> ProjectFunction | None:
+        """Return a function with its actions and logic, None if there is none."""
+        return self.function(function_id) if function_id in self._items[Kind.FUNCTION] else None
+
+    def function_of(self, action_id: str) -> str:
+        """Return the id of the function that contains an action; empty for an action of the program."""
+        item = self._items[Kind.ACTION].get(action_id)
+        return item.parent if item is not None and item.parent in self._items[Kind.FUNCTION] else ""
 
     def parameter(self, parameter_id: str) -> ProjectParameter:
         """Return a project parameter."""
@@ -246,7 +282,7 @@ class Document:
 
     # ------------------------------------------------------------------------------------------ relations
     def owned(self, point_id: str, kind: Kind) -> list[Item]:
-        """Return the items of a kind that belong to an action point, in their order."""
+        """Return the items of a kind that belong to an action point or function, in their order."""
         return sorted((self._items[kind][i] for i in self._indexes.owned_by(point_id, kind)), key=_by_rank)
 
     def points_of(self, parent_id: str) -> list[BareActionPoint]:
@@ -268,14 +304,21 @@ class Document:
         """Return the id of the item with a name, None if the name is free.
 
         Names are unique per kind, those of orientations and joints within their action point. For the kind "output"
-        the item is the action whose result has the name.
+        the item is the action whose result has the name, and the parent is its function.
         """
+        if kind == OUTPUT:
+            found = self._indexes.names.get((kind, name), ())
+            return next((action_id for action_id in found if self.function_of(action_id) == parent), None)
         scope = parent + kind if parent else kind
         return next(iter(self._indexes.names.get((scope, name), ())), None)
 
-    def outgoing(self, start: str) -> list[LogicItem]:
-        """Return the logic items that leave START or an action."""
-        return [self._items[Kind.LOGIC][i].value for i in self._indexes.leaving.get(start, ())]
+    def program_logic(self) -> list[Item]:
+        """Return the logic items of the program, without those of functions, in their order."""
+        return [item for item in self.of_kind(Kind.LOGIC) if not item.parent]
+
+    def outgoing(self, start: str, function: str = "") -> list[LogicItem]:
+        """Return the logic items that leave an action, or START of the program or of a function."""
+        return [self._items[Kind.LOGIC][i].value for i in self._indexes.leaving.get(place_of(start, function), ())]
 
     def incoming(self, end: str) -> list[LogicItem]:
         """Return the logic items that arrive at END or an action."""
@@ -308,10 +351,17 @@ class Document:
             forward = not forward
         return False
 
-    def users_of(self, target_id: str) -> list[Action | LogicItem]:
-        """Return the actions with a parameter that refers to this id, and the logic items with a condition on it."""
-        actions, logic = self._items[Kind.ACTION], self._items[Kind.LOGIC]
-        return [(actions.get(i) or logic[i]).value for i in self._indexes.users.get(target_id, ())]
+    def users_of(self, target_id: str) -> list[Action | LogicItem | ProjectFunction]:
+        """Return the actions with a parameter that refers to this id, and the logic items with a condition on it.
+
+        The users of an action are also the function that returns a result of it; those of a function are its calls.
+        """
+        actions, logic, functions = (self._items[kind] for kind in (Kind.ACTION, Kind.LOGIC, Kind.FUNCTION))
+        return [(actions.get(i) or logic.get(i) or functions[i]).value for i in self._indexes.users.get(target_id, ())]
+
+    def calls_of(self, function_id: str) -> list[Action]:
+        """Return the actions that call a function."""
+        return [user for user in self.users_of(function_id) if isinstance(user, Action)]
 
     def root_of(self, item: str) -> str:
         """Return the root of the lock tree that an id belongs to (protocol, section 6). Raise NotFound if unknown."""

@@ -92,6 +92,7 @@ _ITEMS: Final = translatable(
         Kind.SCENE: "the scene {name}",
         Kind.OBJECT: "the object {name}",
         Kind.PROJECT: "the project {name}",
+        Kind.FUNCTION: "the function {name}",
         Kind.POINT: "the action point {name}",
         Kind.ACTION: "the action {name}",
         Kind.PARAMETER: "the parameter {name}",

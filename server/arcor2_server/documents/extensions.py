@@ -7,12 +7,15 @@ from arcor2_hw.data.project import Action, LogicItem, Project
 
 
 def keep_extensions(sent: Project, stored: Project) -> Project:
-    """Return a sent project with the names of errors and the error exits that it lacks, by the ids of its items.
+    """Return a sent project with the functions, names of errors and error exits that it lacks, by the ids of its items.
 
-    An empty name or list removes them.
+    An empty name or list removes an error.
     """
-    errors = {a.id: a.error_output for point in stored.action_points for a in point.actions if a.error_output}
-    exits = {item.id: item.error_kinds for item in stored.logic if item.is_error_exit}
+    present = {function.id for function in sent.functions}
+    functions = [*sent.functions, *(function for function in stored.functions if function.id not in present)]
+    logic = [*stored.logic, *(item for function in stored.functions for item in function.logic)]
+    errors = {action.id: action.error_output for action in stored.all_actions() if action.error_output}
+    exits = {item.id: item.error_kinds for item in logic if item.is_error_exit}
 
     def action(one: Action) -> Action:
         missing = isinstance(one.error_output, Unset) and one.id in errors
@@ -24,5 +27,9 @@ def keep_extensions(sent: Project, stored: Project) -> Project:
 
     if errors:
         points = [replace(point, actions=[action(one) for one in point.actions]) for point in sent.action_points]
+        functions = [replace(one, actions=[action(each) for each in one.actions]) for one in functions]
         sent = replace(sent, action_points=points)
-    return replace(sent, logic=[item(one) for one in sent.logic]) if exits else sent
+    if exits:
+        functions = [replace(one, logic=[item(each) for each in one.logic]) for one in functions]
+        sent = replace(sent, logic=[item(one) for one in sent.logic])
+    return replace(sent, functions=functions)

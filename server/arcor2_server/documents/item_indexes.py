@@ -6,13 +6,15 @@ from typing import Any, Final
 
 import msgspec
 
-from arcor2_hw.data.project import Action, ActionParameterType, parse_link
+from arcor2_hw.data.project import CALL, START, Action, ActionParameterType, FunctionReturns, parse_link
 from arcor2_server.documents.changes import Item, Kind
 
 OWNED: Final = (Kind.ORIENTATION, Kind.JOINTS, Kind.ACTION)
-"""Kinds that belong to an action point."""
+"""Kinds that belong to an action point; actions may belong to a function instead."""
 
-REFERRING: Final = frozenset({"pose", "position", "joints", *ActionParameterType})
+REFERRING: Final = frozenset(
+    {"pose", "position", "joints", ActionParameterType.LINK, ActionParameterType.PROJECT_PARAMETER}
+)
 """Types of action parameter whose value is the id of an item of the project."""
 
 
@@ -40,15 +42,28 @@ def links(action: Action) -> Iterator[tuple[str, str, int]]:
                 yield parse_link(msgspec.json.decode(parameter.value, type=str))
 
 
+def link_of(result: FunctionReturns) -> tuple[str, str, int] | None:
+    """Return action id, flow and output index of a result of a function, None if it is malformed."""
+    with contextlib.suppress(ValueError):
+        return parse_link(result.link)
+    return None
+
+
+def place_of(end: str, function: str) -> str:
+    """Return the key of one side of a logic item: the action id, END, or START of the program or of a function."""
+    place = action_of(end)
+    return f"{START}/{function}" if function and place == START else place
+
+
 class ItemIndexes:
     """The ids of items by key, in the order in which they were added.
 
     Attributes:
-        owned: Orientations, joints and actions, by action point and kind.
+        owned: Orientations, joints, actions and logic items, by action point or function, and kind.
         points: Action points by parent.
         names: Items by scope and name; the scope is a kind, for orientations and joints with their action point.
-        users: Actions and logic items by the item that they refer to.
-        leaving: Logic items by their start.
+        users: Actions, logic items and functions by the item that they refer to; calls also by their function.
+        leaving: Logic items by their start (`place_of`).
         arriving: Logic items by their end.
     """
 
@@ -64,8 +79,8 @@ class ItemIndexes:
         """Add an item."""
         for index, key in self._keys(item):
             index.setdefault(key, {})[item.id] = None
-        if item.kind in OWNED:
-            self.owned.setdefault(item.parent, {kind: {} for kind in OWNED})[item.kind][item.id] = None
+        if item.parent:
+            self.owned.setdefault(item.parent, {}).setdefault(item.kind, {})[item.id] = None
 
     def remove(self, item: Item) -> None:
         """Remove an item."""
@@ -74,14 +89,14 @@ class ItemIndexes:
             ids.pop(item.id, None)
             if not ids:
                 del index[key]
-        if item.kind in OWNED:
+        if item.parent:
             owned = self.owned[item.parent]
             del owned[item.kind][item.id]
             if not any(owned.values()):
                 del self.owned[item.parent]
 
     def owned_by(self, point_id: str, kind: Kind) -> Iterable[str]:
-        """Return the ids of the items of a kind that belong to an action point."""
+        """Return the ids of the items of a kind that belong to an action point or function."""
         return self.owned.get(point_id, {}).get(kind, ())
 
     def _keys(self, item: Item) -> Iterator[tuple[dict[Any, dict[str, None]], Any]]:
@@ -101,10 +116,17 @@ class ItemIndexes:
                 for output in set(value.names()):
                     yield self.names, ("output", output)
                 targets = {reference(parameter.type, parameter.value) for parameter in value.parameters}
+                called, _, method = value.type.partition("/")
+                if method == CALL:
+                    targets.add(called)
                 for target in targets - {None}:
                     yield self.users, target
+            case Kind.FUNCTION:
+                yield self.names, (item.kind, value.name)
+                for target in {link[0] for link in map(link_of, value.returns) if link is not None}:
+                    yield self.users, target
             case Kind.LOGIC:
-                yield self.leaving, action_of(value.start)
+                yield self.leaving, place_of(value.start, item.parent)
                 yield self.arriving, action_of(value.end)
                 if value.condition:
                     yield self.users, action_of(value.condition.what)

@@ -35,7 +35,14 @@ def check_logic_item(
         raise InvalidData("{name} cannot lead to itself.", name=_name(document, start))
     for place in {start, end} - {START, END}:
         document.action(place)
-    siblings = [other for other in document.outgoing(start) if other.id != item.id]
+    function = scope_of(document, item)
+    if end != END and document.function_of(end) != function:
+        raise InvalidData(
+            "{name} and {other_name} are not actions of the same function.",
+            name=_name(document, start),
+            other_name=_name(document, end),
+        )
+    siblings = [other for other in document.outgoing(start, function) if other.id != item.id]
     if start == START and siblings:
         raise InvalidData("START leads to {name} already.", name=_name(document, action_of(siblings[0].end)))
     if any(action_of(other.end) == end and other.is_error_exit == item.is_error_exit for other in siblings):
@@ -49,7 +56,7 @@ def check_logic_item(
     if not isinstance(item.condition, Unset):
         if start == START:
             raise InvalidData("The step from START cannot have a condition, because no action has a result yet.")
-        _check_condition(document, meta_of, item.condition)
+        _check_condition(document, meta_of, item.condition, function)
         if any(_same(item.condition, other.condition) for other in siblings):
             raise InvalidData("Another step from {name} has the same condition.", name=_name(document, start))
     if loops and start != START and end != END and document.leads_to(end, start, item.id):
@@ -58,6 +65,12 @@ def check_logic_item(
             name=_name(document, start),
             other_name=_name(document, end),
         )
+
+
+def scope_of(document: Document, item: LogicItem) -> str:
+    """Return the id of the function to which a logic item belongs by its actions; empty for the program."""
+    start = action_of(item.start)
+    return document.function_of(action_of(item.end) if start == START else start)
 
 
 def _check_error_exit(document: Document, start: str, item: LogicItem, siblings: list[LogicItem]) -> None:
@@ -130,7 +143,7 @@ def _place(text: str, border: str) -> str:
 
 
 def _name(document: Document, place: str) -> str:
-    return place if place in (START, END) else document.action(place)[1].name
+    return place if place in (START, END) else document.action(place).name
 
 
 def _same(one: ProjectLogicIf, other: ProjectLogicIf | Unset) -> bool:
@@ -139,12 +152,18 @@ def _same(one: ProjectLogicIf, other: ProjectLogicIf | Unset) -> bool:
     return one.what == other.what and msgspec.json.decode(one.value) == msgspec.json.decode(other.value)
 
 
-def _check_condition(document: Document, meta_of: Callable[[Action], ObjectAction], condition: ProjectLogicIf) -> None:
+def _check_condition(
+    document: Document, meta_of: Callable[[Action], ObjectAction], condition: ProjectLogicIf, function: str
+) -> None:
     try:
         action_id, flow, index = condition.parse_what()
     except ValueError as error:
         raise InvalidData("The condition is malformed: {reason}.", reason=error) from None
-    _, action = document.action(action_id)
+    action = document.action(action_id)
+    if document.function_of(action_id) != function:
+        raise InvalidData(
+            "The condition uses a result of {name}, an action of another function or of the program.", name=action.name
+        )
     outputs, returns = action.outputs(), meta_of(action).returns
     if flow != "default" or index >= len(outputs) or index >= len(returns):
         raise InvalidData(

@@ -6,7 +6,16 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple, TypeGuard
 
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.project import END, START, Action, LogicItem, Project, ProjectLogicIf, parse_link
+from arcor2_hw.data.project import (
+    END,
+    START,
+    Action,
+    LogicItem,
+    Project,
+    ProjectFunction,
+    ProjectLogicIf,
+    parse_link,
+)
 from arcor2_hw.exceptions import ERROR_KINDS, Arcor2Error, InvalidProject
 from arcor2_hw.messages import Message
 
@@ -203,13 +212,20 @@ def _number(first: int, edges: list[list[int]], actions: Sequence[Action]) -> li
     return done
 
 
-def read(project: Project) -> Flow:
-    """Return the graph of a project's logic. Raise InvalidProject naming the action where it is invalid."""
-    actions = [action for point in project.action_points for action in point.actions]
+def read(logic_of: Project | ProjectFunction) -> Flow:
+    """Return the graph of the logic of a project or function.
+
+    Raises:
+        InvalidProject: the logic is invalid; the message names the action.
+    """
+    if isinstance(logic_of, Project):
+        actions = [action for point in logic_of.action_points for action in point.actions]
+    else:
+        actions = logic_of.actions
     known = {action.id: number for number, action in enumerate(actions)}
     starts: list[int] = []
     items: list[list[tuple[int, LogicItem]]] = [[] for _ in actions]
-    for item in project.logic:
+    for item in logic_of.logic:
         target = END_NODE if item.end == END else _node(item.end, item, known)
         if item.start == START:
             if target == END_NODE:

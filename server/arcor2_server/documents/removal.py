@@ -3,7 +3,7 @@
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.project import ERROR_FLOW, Action, BareActionPoint, FlowTypes, LogicItem
+from arcor2_hw.data.project import ERROR_FLOW, Action, BareActionPoint, FlowTypes, LogicItem, ProjectFunction
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.checks.actions import action_meta
@@ -27,12 +27,12 @@ def require_point_unused(document: Document, point: BareActionPoint) -> None:
         if document.outgoing(action_id) or document.incoming(action_id):
             raise RequestRefused(
                 "The action {name} on {point_name} is used in the logic.",
-                name=document.action(action_id)[1].name,
+                name=document.action(action_id).name,
                 point_name=point.name,
             )
     for needed in (point.id, *(item.id for kind in OWNED for item in document.owned(point.id, kind))):
         for user in document.users_of(needed):
-            if not isinstance(user, Action):
+            if isinstance(user, LogicItem):
                 raise RequestRefused("A condition of the logic uses a result of an action on {name}.", name=point.name)
             if user.id not in own:
                 raise RequestRefused(
@@ -40,6 +40,17 @@ def require_point_unused(document: Document, point: BareActionPoint) -> None:
                     name=user.name,
                     point_name=point.name,
                 )
+
+
+def title_of(user: Action | LogicItem | ProjectFunction) -> str:
+    """Return the user of a result, at the start of a sentence."""
+    match user:
+        case Action():
+            return f"The action {user.name}"
+        case ProjectFunction():
+            return f"The function {user.name}"
+        case _:
+            return "A condition of the logic"
 
 
 def require_results_unused(document: Document, before: Action, after: Action) -> None:
@@ -57,9 +68,10 @@ def require_results_unused(document: Document, before: Action, after: Action) ->
             )
         if FlowTypes.DEFAULT not in flows or not before.outputs() or after.outputs():
             continue
-        using = f"The action {user.name}" if isinstance(user, Action) else "A condition of the logic"
         raise RequestRefused(
-            "{user} uses a result of {name}, so its results must keep their names.", user=using, name=before.name
+            "{user} uses a result of {name}, so its results must keep their names.",
+            user=title_of(user),
+            name=before.name,
         )
 
 

@@ -37,5 +37,10 @@ def with_present_names(scene: Scene, project: Project, types: Types) -> Project:
         except NotFound:
             return action
 
-    points = [replace(point, actions=[renamed(action) for action in point.actions]) for point in project.action_points]
-    return project if points == project.action_points else replace(project, action_points=points)
+    points, functions = (
+        [replace(each, actions=[renamed(action) for action in each.actions]) for each in lists]
+        for lists in (project.action_points, project.functions)
+    )
+    if points == project.action_points and functions == project.functions:
+        return project
+    return replace(project, action_points=points, functions=functions)

@@ -93,7 +93,7 @@ def _locked_ids(change: Change) -> list[str]:
     match change.kind:
         case Kind.OBJECT:
             return [change.id if change.before is not None else SCENE]
-        case Kind.PARAMETER:
+        case Kind.PARAMETER | Kind.FUNCTION:
             return [change.id if change.before is not None else PROJECT]
         case Kind.POINT:
             parents = {value.parent for value in values if not isinstance(value.parent, Unset)}

@@ -91,7 +91,10 @@ def _names(archive: Archive) -> dict[str, str]:
             names[point.id] = point.name
             for one in (*point.orientations, *point.robot_joints, *point.actions):
                 names[one.id] = one.name  # type: ignore[attr-defined]
-        for item in project.logic:
+        for function in project.functions:
+            names[function.id] = function.name
+            names |= {action.id: action.name for action in function.actions}
+        for item in (*project.logic, *(item for function in project.functions for item in function.logic)):
             branch = "" if isinstance(item.condition, Unset) else f" if {item.condition.value}"
             if item.error_kinds:
                 branch = f" on {', '.join(item.error_kinds)}"

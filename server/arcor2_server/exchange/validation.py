@@ -124,7 +124,9 @@ def _document_findings(archive: Archive, types: Known) -> Iterator[tuple[str, st
         ids = [project.id, *(one.id for one in project.parameters), *(item.id for item in project.logic)]
         for point in project.action_points:
             ids += [point.id, *(one.id for one in point.orientations), *(one.id for one in point.robot_joints)]
-            ids += [action.id for action in point.actions]
+        ids += [action.id for action in project.all_actions()]
+        for function in project.functions:
+            ids += [function.id, *(item.id for item in function.logic)]
         yield from _duplicate_ids(PROJECT, ids)
 
 
@@ -135,6 +137,10 @@ def _project_names(project: Project) -> dict[str, str]:
         names[at] = point.name
         names |= {f"{at}.actions[{number}]": one.name for number, one in enumerate(point.actions)}
         names |= {f"{at}.robot_joints[{number}]": one.name for number, one in enumerate(point.robot_joints)}
+    for index, function in enumerate(project.functions):
+        at = f"functions[{index}]"
+        names[at] = function.name
+        names |= {f"{at}.actions[{number}]": one.name for number, one in enumerate(function.actions)}
     return names
 
 
@@ -152,10 +158,17 @@ def _duplicate_ids(path: str, ids: list[str]) -> Iterator[tuple[str, str]]:
 
 
 def _logic(project: Project) -> Iterator[tuple[str, str]]:
-    known = {action.id for point in project.action_points for action in point.actions}
-    for index, item in enumerate(project.logic):
-        for place in {item.start.partition("/")[0], item.end.partition("/")[0]} - {START, END} - known:
-            yield f"{PROJECT}: logic[{index}]", f"The connection leads from or to action {place}, which does not exist."
+    of_program = [action for point in project.action_points for action in point.actions]
+    parts = [("logic", of_program, project.logic)]
+    parts += [(f"functions[{index}].logic", one.actions, one.logic) for index, one in enumerate(project.functions)]
+    for at, actions, logic in parts:
+        known = {START, END, *(action.id for action in actions)}
+        for index, item in enumerate(logic):
+            for place in {item.start.partition("/")[0], item.end.partition("/")[0]} - known:
+                yield (
+                    f"{PROJECT}: {at}[{index}]",
+                    f"The connection leads from or to action {place}, which does not exist.",
+                )
 
 
 def _program(archive: Archive, scene: Scene, project: Project, types: Known, errors: bool) -> Iterator[Finding]:

@@ -105,8 +105,8 @@ class SharedBreakpoints:
         """Return the ids of the action points and actions of a project. Raise NotFound if there is no such project."""
         if any(item.id == project_id for item in self._session.document.of_kind(Kind.PROJECT)):
             return self._items_of_open_project()
-        points = (await self._storage.project(project_id)).action_points
-        return {point.id for point in points} | {action.id for point in points for action in point.actions}
+        project = await self._storage.project(project_id)
+        return {point.id for point in project.action_points} | {action.id for action in project.all_actions()}
 
     def _items_of_open_project(self) -> set[str]:
         document = self._session.document

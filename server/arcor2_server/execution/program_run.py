@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import RunEnd
 from arcor2_hw.data.events import PackageInfoData, ProjectExceptionData
+from arcor2_hw.data.position import Branch, Frame, ProgramPosition
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
@@ -43,10 +44,14 @@ class ProgramRun:
         self.error: m.ErrorData | None = None
         """The error that ended the program, None if it finished or was stopped."""
         self.action: bytes | None = None
-        """The encoded ActionStateBefore of the running action, or of the action before which the program is paused."""
+        """The encoded ActionStateBefore of the running action, or of the action before which the program is paused.
+
+        Of the actions of a function it is that of the outermost call.
+        """
         self._runs = runs
         self._statistics: RunStatisticsCollector | None = None
         self._exception: ProjectExceptionData | None = None
+        self._frames: dict[str, list[Frame]] = {}
         self._number = 0
 
     def begin(self, how: How, *, temporary: bool) -> None:
@@ -82,17 +87,26 @@ class ProgramRun:
         if self._statistics is not None:
             self._statistics.handle_paused()
 
+    @property
+    def position(self) -> ProgramPosition:
+        """The present position of the program."""
+        return ProgramPosition(self._number, [Branch(key, frames) for key, frames in self._frames.items()])
+
     def handle_event(self, message: m.ProgramEvent) -> None:
         """Store an event of the program."""
         if message.number:
             self._runs.announced(message)
+        if message.frames:
+            self._frames[message.branch] = message.frames
         statistics, changed = self._statistics, False
         match message.event:
             case "ActionStateBefore":
-                self.action = message.encoded
+                if not message.call:
+                    self.action = message.encoded
                 changed = statistics is not None and statistics.handle_start(message.encoded)
             case "ActionStateAfter":
-                self.action = None
+                if not message.call:
+                    self.action = None
                 changed = statistics is not None and statistics.handle_result(message.encoded)
             case "ProjectException":
                 self._exception = msgspec.json.decode(message.encoded, type=_ExceptionEvent).data
@@ -109,6 +123,7 @@ class ProgramRun:
     def end(self, *, lost: bool) -> None:
         """Store the end of the run."""
         error = self.error
+        self._frames.clear()
         end = RunEnd.FINISHED if error is None else RunEnd.LOST if lost else RunEnd.FAILED
         if self.stopped_by is not None:
             end = RunEnd.STOPPED

@@ -56,11 +56,7 @@ class RunStatisticsCollector:
         self._clock = clock
         self._first = next((item.end for item in info.project.logic if item.start == _START), "")
         self._counters = {each.id: each for each in info.scene.objects if each.type == COUNTER}
-        self._methods = {
-            action.id: tuple(action.type.partition("/")[::2])
-            for point in info.project.action_points
-            for action in point.actions
-        }
+        self._methods = {action.id: tuple(action.type.partition("/")[::2]) for action in info.project.all_actions()}
         self._cycles = 0
         self._began: float | None = None
         self._paused = False

@@ -44,7 +44,7 @@ class RunTraceCollector:
         self._names = {each.id: each.name for each in info.scene.objects}
         self._branches = {
             (item.start, item.end): item.condition.value
-            for item in info.project.logic
+            for item in (*info.project.logic, *(item for each in info.project.functions for item in each.logic))
             if not isinstance(item.condition, Unset)
         }
 
@@ -84,6 +84,7 @@ class RunTraceCollector:
                 branch,
                 error,
                 data.thread_id,
+                before.call or UNSET,
             )
         )
 
@@ -94,6 +95,8 @@ class RunTraceCollector:
         busy: dict[str, float] = {}
         spans = sorted(self._spans, key=lambda span: span.number)
         for span in spans:
+            if not span.device:  # the call of a function
+                continue
             busy[span.device] = busy.get(span.device, 0.0) + span.duration
         return RunTrace(
             self.run,

@@ -64,6 +64,7 @@ class _Call:
             announced.name,
             parameters=before.parameters,
             thread_id=before.thread_id,
+            call=announced.call or UNSET,
         )
         match end:
             case m.ProgramEvent():

@@ -12,12 +12,13 @@ from arcor2_hw.data import events as e
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.events import Event, MainScreen, ProjectExceptionData
 from arcor2_hw.data.package import PackageStateEnum
+from arcor2_hw.data.position import ProgramStep
 from arcor2_hw.exceptions import Arcor2Error, NotFound
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.background import BackgroundTasks
 from arcor2_server.errors import RequestRefused
-from arcor2_server.events import EventHub, make_event
+from arcor2_server.events import EventHub, encode, make_event
 from arcor2_server.execution.breakpoints import SharedBreakpoints
 from arcor2_server.execution.packages import PackageLibrary
 from arcor2_server.execution.program_run import ProgramRun
@@ -40,6 +41,8 @@ STOP_WITHIN: Final = 5.0
 """Time limit for a stopped program to end before its host is killed, s."""
 SPARE_AFTER: Final = 1.0
 """Time from PackageInfo to the start of the next spare host, s, so that it does not delay the starting program."""
+POSITION: Final = "ProgramPosition"
+"""The additional event with the position of the program."""
 RUN_STATES: Final = frozenset({S.RUNNING, S.PAUSING, S.PAUSED, S.RESUMING})
 _IDLE: Final = frozenset({S.UNDEFINED, S.STOPPED})
 
@@ -267,11 +270,11 @@ class Execution(PackageLibrary):
         self._enter(S.RESUMING)
         host.send(m.Resume())
 
-    def step(self) -> None:
-        """Let a paused program execute one action."""
+    def step(self, mode: ProgramStep = ProgramStep.OVER) -> None:
+        """Let a paused program execute one action. `mode`: whether actions inside of functions count."""
         host = self._require({S.PAUSED}, "stepped")
         self._enter(S.RESUMING)
-        host.send(m.Step())
+        host.send(m.Step(mode))
 
     def _breakpoints_changed(self, project_id: str, ids: set[str]) -> None:
         if self.program.shared_of == project_id and self.state not in _IDLE:
@@ -307,13 +310,24 @@ class Execution(PackageLibrary):
                 self.program.handle_event(message)
                 if message.event == "PackageInfo":
                     self._show_devices(message.encoded)
-                self._hub.broadcast_encoded(message.event, message.encoded)
+                if message.frames:
+                    self._publish_position()
+                if message.call:  # other clients do not know the actions of functions
+                    for client in self._hub.subscribers(POSITION):
+                        client.put(message.encoded)
+                else:
+                    self._hub.broadcast_encoded(message.event, message.encoded)
             case m.ActionFailed():
                 self._runs.ended(message)
             case m.ProgramChanged():
                 self._program_changed(host, message)
             case _:
                 pass
+
+    def _publish_position(self) -> None:
+        if self._hub.subscribers(POSITION):
+            event = make_event(POSITION, self.program.position)
+            self._hub.stream_to_subscribers(POSITION, "program", encode(event))
 
     def _show_devices(self, package_info: bytes) -> None:
         self._host.package_info = package_info
@@ -327,7 +341,7 @@ class Execution(PackageLibrary):
         """Return the ids of the actions whose result says that a part is good."""
         types = {each.id: each.type for each in info.scene.objects}
         found = set()
-        for action in (action for point in info.project.action_points for action in point.actions):
+        for action in info.project.all_actions():
             object_id, _, method = action.type.partition("/")
             with contextlib.suppress(Arcor2Error):  # the type may be only in the package
                 if self._types.action(types.get(object_id, ""), method).meta.verdict is True:
@@ -360,6 +374,7 @@ class Execution(PackageLibrary):
     def _ended(self, *, lost: bool = False) -> None:
         self._host.host = None
         self.program.end(lost=lost)
+        self._publish_position()
         self.streams.clear()
         error = self.program.error
         self.board.clear(None if error is None else error.message)

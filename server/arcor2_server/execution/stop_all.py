@@ -96,6 +96,6 @@ class StopAll:
 
     def _name(self, action_id: str) -> str:
         try:
-            return self._session.document.action(action_id)[1].name
+            return self._session.document.action(action_id).name
         except NotFound:  # deleted while it ran
             return action_id

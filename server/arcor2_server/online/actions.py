@@ -78,7 +78,7 @@ def argument(parameter: ActionParameter, lookup: ProjectLookup, results: dict[st
             raise InvalidData("parameter {name}: {reason}", name=parameter.name, reason=error) from error
         stored = results.get(action_id)
         if stored is None or index >= len(stored):
-            name = lookup.action(action_id)[1].name
+            name = lookup.action(action_id).name
             raise RequestRefused(
                 "Parameter {name} needs a result of the action {other_name}: execute that action first.",
                 name=parameter.name,
@@ -87,6 +87,10 @@ def argument(parameter: ActionParameter, lookup: ProjectLookup, results: dict[st
         return msgspec.Raw(stored[index].encode())
     if parameter.type == ActionParameterType.PROJECT_PARAMETER:
         return msgspec.Raw(lookup.parameter(read_reference(parameter)).value.encode())
+    if parameter.type == ActionParameterType.FUNCTION_PARAMETER:
+        raise RequestRefused(
+            "Parameter {name} is a parameter of the function. Run the project to execute it.", name=parameter.name
+        )
     return parameter_type(parameter.type).value(parameter, lookup)
 
 

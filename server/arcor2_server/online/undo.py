@@ -66,12 +66,20 @@ class Undo:
             yield
 
     async def apply(
-        self, user: str, changes: Sequence[Change], after: int, request: str, kind: EditKind, *, dry_run: bool
+        self,
+        user: str,
+        changes: Sequence[Change],
+        after: int,
+        request: str,
+        kind: EditKind,
+        *,
+        dry_run: bool,
+        step: str = "",
     ) -> int:
         """Apply the changes that revert edits after the edit number `after`; return the new revision.
 
-        Changes of the kind EDIT were prepared in the state after the edit number `after`. In a dry run only check them,
-        and return the present revision. Call this inside `locked`.
+        Changes of the kind EDIT were prepared in the state after the edit number `after`, and belong to the `step` of
+        undo. In a dry run only check them, and return the present revision. Call this inside `locked`.
 
         Raises:
             RequestRefused: the changes conflict with later edits, or with the state of scene and projects.
@@ -92,7 +100,7 @@ class Undo:
         if dry_run:
             return session.revision
         revision = session.revision + 1
-        await session.commit(user, changes, request, kind, 0 if kind is EditKind.EDIT else after)
+        await session.commit(user, changes, request, kind, 0 if kind is EditKind.EDIT else after, step)
         for change in changes:
             if change.kind is Kind.OBJECT and change.after is None:
                 session.removed_types.add(change.before.type)

@@ -17,11 +17,13 @@ from arcor2_server.documents.checks.actions import (
     check_flows,
     check_outputs_unique,
     check_parameters,
+    check_recursion,
     complete_parameters,
 )
-from arcor2_server.documents.removal import bypass, neighbours, require_results_unused
+from arcor2_server.documents.removal import bypass, neighbours, require_results_unused, title_of
 from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.rpc.change_events import emit_functions
 from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.registry import Context, rpc
 
@@ -42,25 +44,30 @@ class ActionRequests:
 
     @rpc("AddAction")
     async def add_action(self, context: Context, args: AddActionArgs) -> None:
-        """Add an action to an action point. Parameters with a default value may be omitted."""
+        """Add an action to an action point or a function. Parameters with a default value may be omitted."""
         document = self._session.require_project_open()
         async with self._locks.auto_skip_held(context.user, args.action_point_id):
-            document.action_point(args.action_point_id)
+            function = document.find_function(args.action_point_id)
+            if function is None:
+                document.action_point(args.action_point_id)
             self._check_name(args.name)
             action = Action(args.name, args.type, new_id("act"), list(args.parameters), list(args.flows))
             action = replace(action, error_output=args.error_output or UNSET)
             meta = action_meta(action, document, self._types)
             check_flows(action, meta)
-            check_outputs_unique(document, action)
+            check_outputs_unique(document, action, "" if function is None else function.id)
             action = complete_parameters(action, meta)
-            check_parameters(action, meta, document, self._types)
+            check_parameters(action, meta, document, self._types, function)
+            if function is not None:
+                check_recursion(action, function, document)
             await self._editing.commit_one(context, document.add(Kind.ACTION, action.id, action, args.action_point_id))
 
     @rpc("UpdateAction")
     async def update_action(self, context: Context, args: UpdateActionArgs) -> None:
         """Replace the parameters, the flows or the name of the error of an action."""
         document = self._session.require_project_open()
-        _, action = document.action(args.action_id)
+        action = document.action(args.action_id)
+        function = document.find_function(document.function_of(action.id))
         meta = action_meta(action, document, self._types)
         updated = action
         if not isinstance(args.flows, Unset):
@@ -69,11 +76,11 @@ class ActionRequests:
             updated = replace(updated, error_output=args.error_output or UNSET)
         if updated is not action:
             check_flows(updated, meta)
-            check_outputs_unique(document, updated)
+            check_outputs_unique(document, updated, "" if function is None else function.id)
             require_results_unused(document, action, updated)
         if not isinstance(args.parameters, Unset):
             updated = complete_parameters(replace(updated, parameters=list(args.parameters)), meta)
-            check_parameters(updated, meta, document, self._types)
+            check_parameters(updated, meta, document, self._types, function)
         self._editing.require_locked(context, action.id)
         await self._editing.commit_one(context, document.update(Kind.ACTION, action.id, updated))
 
@@ -82,12 +89,14 @@ class ActionRequests:
         """Rename an action."""
         document = self._session.require_project_open()
         self._check_name(args.new_name)
-        _, action = document.action(args.action_id)
+        action = document.action(args.action_id)
         self._editing.require_locked(context, action.id)
         renamed = replace(action, name=args.new_name)
-        if await self._editing.commit(context, [document.update(Kind.ACTION, action.id, renamed)]):
+        change = document.update(Kind.ACTION, action.id, renamed)
+        if await self._editing.commit(context, [change]):
             self._editing.unlock(context, action.id)
-            context.emit("ActionChanged", renamed, ChangeType.UPDATE_BASE)
+            if emit_functions(context, self._session, [change]):
+                context.emit("ActionChanged", renamed, ChangeType.UPDATE_BASE)
 
     @rpc("RemoveAction")
     async def remove_action(self, context: Context, args: RemoveActionArgs) -> None:
@@ -96,7 +105,7 @@ class ActionRequests:
         document.action(args.id)
         places = neighbours(document, args.id) if args.with_steps else ()
         async with self._locks.auto_skip_held(context.user, args.id, *places):
-            _, action = document.action(args.id)
+            action = document.action(args.id)
             if not args.with_steps and (document.outgoing(action.id) or document.incoming(action.id)):
                 raise RequestRefused("{name} is part of the logic: remove its steps first.", name=action.name)
             logic_changes = bypass(document, self._types, action) if args.with_steps else []
@@ -104,16 +113,20 @@ class ActionRequests:
             for user in document.users_of(action.id):
                 if isinstance(user, LogicItem) and user.id in removed:
                     continue
-                using = f"the action {user.name}" if isinstance(user, Action) else "a condition of the logic"
+                using = title_of(user)
                 raise RequestRefused(
-                    "A result of {name} is used by {user}. Change that first.", name=action.name, user=using
+                    "A result of {name} is used by {user}. Change that first.",
+                    name=action.name,
+                    user=using[0].lower() + using[1:],
                 )
             # The action comes first, since the history names an edit by its first change.
-            if await self._editing.commit(context, [document.remove(Kind.ACTION, action.id), *logic_changes]):
-                for change in logic_changes:
-                    if change.after is None:
-                        context.emit("LogicItemChanged", change.before, ChangeType.REMOVE)
-                    else:
-                        context.emit("LogicItemChanged", change.after, ChangeType.UPDATE)
-                context.emit("ActionChanged", BareAction(action.name, action.type, action.id), ChangeType.REMOVE)
+            removal = document.remove(Kind.ACTION, action.id)
+            if await self._editing.commit(context, [removal, *logic_changes]):
+                if emit_functions(context, self._session, [removal, *logic_changes]):
+                    for change in logic_changes:
+                        if change.after is None:
+                            context.emit("LogicItemChanged", change.before, ChangeType.REMOVE)
+                        else:
+                            context.emit("LogicItemChanged", change.after, ChangeType.UPDATE)
+                    context.emit("ActionChanged", BareAction(action.name, action.type, action.id), ChangeType.REMOVE)
                 self._editing.drop_locks(context, action.id)

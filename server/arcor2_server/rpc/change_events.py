@@ -22,6 +22,7 @@ EVENTS: Final = {
     Kind.JOINTS: "JointsChanged",
     Kind.ACTION: "ActionChanged",
     Kind.PARAMETER: "ProjectParameterChanged",
+    Kind.FUNCTION: "FunctionChanged",
     Kind.LOGIC: "LogicItemChanged",
 }
 """The event that publishes a change, by kind of item."""
@@ -99,13 +100,40 @@ def _by_name(override: Any) -> dict[str, Parameter]:
     return {} if override is None else {parameter.name: parameter for parameter in override.parameters}
 
 
+def emit_functions(context: Context, session: Session, changes: Sequence[Change]) -> list[Change]:
+    """Send FunctionChanged for each changed function after the response; return the changes outside of functions.
+
+    The event contains the actions and logic of the function, so their own events are not sent.
+    """
+    document = session.document
+    own = {change.id: change for change in changes if change.kind is Kind.FUNCTION}
+    changed: dict[str, None] = {}
+    others: list[Change] = []
+    for change in changes:
+        key = change.id if change.kind is Kind.FUNCTION else change.parent
+        if key in own or (key and document.find(Kind.FUNCTION, key) is not None):
+            changed[key] = None
+        else:
+            others.append(change)
+    for key in changed:
+        function = document.find_function(key)
+        if function is None:
+            context.emit("FunctionChanged", own[key].before, ChangeType.REMOVE)
+        else:
+            added = key in own and own[key].before is None
+            context.emit("FunctionChanged", function, ChangeType.ADD if added else ChangeType.UPDATE)
+    return others
+
+
 def emit_all(context: Context, session: Session, changes: Sequence[Change]) -> None:
     """Send one event for each changed item after the response.
 
     Removed logic items come first, since an action has only one next step. Then come added and changed items, an
-    action point before its children, and at last the other removed items, children before their action point.
+    action point before its children, and at last the other removed items, children before their action point. Changed
+    functions come before all others, so that a client knows a function before its first call.
     """
     document = session.document
+    changes = emit_functions(context, session, changes)
     present = sorted(
         (change for change in changes if change.after is not None),
         key=lambda change: (_ORDER.index(change.kind), _depth(document, change), change.rank),

@@ -15,7 +15,7 @@ from arcor2_hw.data.rpc import CopyActionPointArgs
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, Kind
-from arcor2_server.documents.document import Document
+from arcor2_server.documents.document import OUTPUT, Document
 from arcor2_server.documents.item_indexes import OWNED, reference
 from arcor2_server.rpc.change_events import EVENTS
 from arcor2_server.rpc.editing import Editing
@@ -31,7 +31,7 @@ def _copy(document: Document, args: CopyActionPointArgs) -> list[Change]:
     owned = {point.id: [item for kind in OWNED for item in document.owned(point.id, kind)] for point in points}
     new_ids = {point.id: new_id("acp") for point in points}
     new_ids |= {item.id: new_id(_PREFIXES[item.kind]) for items in owned.values() for item in items}
-    free_point, free_action, free_output = (_free_names(document, kind) for kind in (Kind.POINT, Kind.ACTION, "output"))
+    free_point, free_action, free_output = (_free_names(document, kind) for kind in (Kind.POINT, Kind.ACTION, OUTPUT))
     points_with_poses: list[Change] = []
     actions: list[Change] = []
     for point in points:

@@ -12,7 +12,7 @@ from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.errors import RequestRefused
 from arcor2_server.execution.service import Execution
-from arcor2_server.rpc.change_events import EVENTS
+from arcor2_server.rpc.change_events import EVENTS, emit_functions
 from arcor2_server.rpc.registry import Context
 from arcor2_server.storage import Storage
 from arcor2_server.storage.setting_secrets import SettingSecrets
@@ -45,6 +45,8 @@ class Editing:
         """
         if not await self.commit(context, [change]):
             return False
+        if not emit_functions(context, self._session, [change]):
+            return True
         if change.after is None:
             context.emit(EVENTS[change.kind], change.before, ChangeType.REMOVE)
         elif change.before is None:

@@ -6,11 +6,13 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.events import ActionExecutionData, ChangeType
 from arcor2_hw.data.package import PackageSummary
+from arcor2_hw.data.position import ProgramPosition, ProgramStep
 from arcor2_hw.data.rpc import (
     ExecuteActionArgs,
     IdArgs,
     RenamePackageArgs,
     RunPackageArgs,
+    StepActionArgs,
     TemporaryPackageArgs,
     UploadPackageArgs,
 )
@@ -70,12 +72,14 @@ class ExecutionRequests:
         session, cell = self._session, self._online
         session.require_project_open()
         async with self._locks.auto(context.user, ACTION):
-            action = session.document.action(args.action_id)[1]
+            action = session.document.action(args.action_id)
             cell.require_online()
             if cell.running_action is not None:
-                name = session.document.action(cell.running_action.action_id)[1].name
+                name = session.document.action(cell.running_action.action_id).name
                 raise RequestRefused("The action {name} is running.", name=name)
             object_id, _, method = action.type.partition("/")
+            if session.document.find_function(object_id) is not None:
+                raise RequestRefused("{name} calls a function. Run the project to execute it.", name=action.name)
             obj = session.document.scene_object(object_id)
             cell.board.require_not_failed(object_id)
             if object_id in cell.moving:
@@ -160,6 +164,11 @@ class ExecutionRequests:
         self._execution.resume()
 
     @rpc("StepAction")
-    async def step_action(self, context: Context, args: None) -> None:
-        """Resume the paused program for one action."""
-        self._execution.step()
+    async def step_action(self, context: Context, args: StepActionArgs | None) -> None:
+        """Resume the paused program for one action, over or into functions, or until the present function is left."""
+        self._execution.step(ProgramStep.OVER if args is None else args.mode)
+
+    @rpc("GetProgramPosition")
+    async def get_program_position(self, context: Context, args: None) -> ProgramPosition:
+        """Return the position of the running program."""
+        return self._execution.program.position

@@ -15,7 +15,7 @@ from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.checks.actions import action_meta
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.item_indexes import action_of
-from arcor2_server.documents.logic import check_logic_item
+from arcor2_server.documents.logic import check_logic_item, scope_of
 from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.rpc.editing import Editing
@@ -55,7 +55,8 @@ class LogicRequests:
         async with self._locks.auto_skip_held(context.user, *places):
             item = LogicItem(args.start, args.end, args.condition, new_id("lit"), args.error_kinds or UNSET)
             self._check(document, item)
-            if not await self._editing.commit_one(context, document.add(Kind.LOGIC, item.id, item)):
+            change = document.add(Kind.LOGIC, item.id, item, scope_of(document, item))
+            if not await self._editing.commit_one(context, change):
                 return
         self._unlock(context, places)
 
@@ -67,6 +68,8 @@ class LogicRequests:
         kinds = item.error_kinds if isinstance(args.error_kinds, Unset) else args.error_kinds or UNSET
         changed = replace(item, start=args.start, end=args.end, condition=args.condition, error_kinds=kinds)
         self._check(document, changed)
+        if scope_of(document, changed) != scope_of(document, item):
+            raise RequestRefused("A step cannot be moved into a function or out of it.")
         await self._editing.commit_one(context, document.update(Kind.LOGIC, item.id, changed))
 
     @rpc("RemoveLogicItem")

@@ -193,7 +193,7 @@ class ProjectRequests:
         if (item := document.find(Kind.PROJECT, project_id)) is not None:
             changes = [document.update(Kind.PROJECT, project_id, replace(item.value, **fields))]
             if without_logic:
-                changes += [document.remove(Kind.LOGIC, step.id) for step in document.of_kind(Kind.LOGIC)]
+                changes += [document.remove(Kind.LOGIC, step.id) for step in document.program_logic()]
             if await self._editing.commit(context, changes):
                 context.emit_first("ProjectChanged", session.bare_project(), ChangeType.UPDATE_BASE)
             return

@@ -6,12 +6,13 @@ from typing import Any
 import msgspec
 
 from arcor2_hw.data.base import Unset, is_valid_name
-from arcor2_hw.data.project import Action, Project, ProjectParameter, ProjectRobotJoints
+from arcor2_hw.data.project import Action, Project, ProjectFunction, ProjectParameter, ProjectRobotJoints
 from arcor2_hw.data.project_index import ProjectLookup
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
 from arcor2_hw.messages import Message
 from arcor2_server.documents.checks.actions import check_action
+from arcor2_server.documents.checks.functions import check_function
 from arcor2_server.documents.checks.names import check_name, duplicate_names
 from arcor2_server.documents.checks.object_types import Types
 from arcor2_server.documents.checks.scene import scene_findings
@@ -77,8 +78,21 @@ def project_findings(scene: Scene, project: Project, types: Types) -> Iterator[t
                 yield f"{at}.actions[{number}]", problem
     for problem in duplicate_names((point.name for point in project.action_points), "action point"):
         yield "project.action_points", problem
-    for problem in duplicate_names((a.name for point in project.action_points for a in point.actions), "action"):
+    yield from _function_findings(document, project, types)
+    for problem in duplicate_names((action.name for action in project.all_actions()), "action"):
         yield "project.action_points", problem
+
+
+def _function_findings(document: Document, project: Project, types: Types) -> Iterator[tuple[str, Message]]:
+    for index, function in enumerate(project.functions):
+        at = f"project.functions[{index}]"
+        for problem in _problem(check_function, function, document, types):
+            yield at, problem
+        for number, action in enumerate(function.actions):
+            for problem in _problem(check_action, action, document, types, function):
+                yield f"{at}.actions[{number}]", problem
+    for problem in duplicate_names((function.name for function in project.functions), "function"):
+        yield "project.functions", problem
 
 
 def _problem(check: Callable[..., None], *args: Any) -> list[Message]:
@@ -86,7 +100,7 @@ def _problem(check: Callable[..., None], *args: Any) -> list[Message]:
         check(*args)
     except Arcor2Error as error:
         # The error of a failed look-up does not name the item that refers to the missing one.
-        name = next((arg.name for arg in args if isinstance(arg, Action | ProjectParameter)), "")
+        name = next((arg.name for arg in args if isinstance(arg, Action | ProjectParameter | ProjectFunction)), "")
         named = not name or str(error).startswith(name)
         return [error.message if named else Message.of("{name}: {reason}", name=name, reason=error)]
     return []
