@@ -7,6 +7,7 @@ from arcor2_hw.actions.parameter_types import PARAMETER_TYPES, read_reference
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ParameterMeta
 from arcor2_hw.data.project import (
+    CALL,
     ERROR_FLOW,
     ERROR_PARTS,
     ActionParameter,
@@ -19,6 +20,7 @@ from arcor2_server.build import expressions
 from arcor2_server.build.error_exits import nodes_of
 from arcor2_server.build.frame import ERROR, NEXT_ACTION, REFERENCES, Frame, References
 from arcor2_server.build.layout import arrange
+from arcor2_server.build.naming import Names
 from arcor2_server.documents.logic_graph import BRANCHABLE, END_NODE, Condition, Flow
 
 CAUGHT: Final = expressions.dotted("res", ("caught",))
@@ -29,23 +31,27 @@ Stack = list[tuple[int, Block]]
 
 
 class Cycle:
-    """One cycle of the logic, which the script repeats. Actions are numbered in the order of `flow`."""
+    """One cycle of the logic, which the script repeats, or the body of a function.
+
+    Actions are numbered in the order of `flow`.
+    """
 
     def __init__(self, frame: Frame, flow: Flow) -> None:
         self.frame, self.flow = frame, flow
+        self.names = Names(outer=frame.names)
+        """The variables of the cycle or function."""
+        self._claim_parameters()
         self.nodes = nodes_of(flow.edges, flow.exits)
         self.layout, self.natural = arrange(self.nodes.edges)
         self.numbers = {action.id: number for number, action in enumerate(flow.actions)}
-        names: set[str] = set()
-        for action in flow.actions:
-            if action.name in names:
-                raise InvalidProject("two actions have the name {name!r}; rename one of them", name=action.name)
-            names.add(action.name)
         self.calls = [frame.resolve(action) for action in flow.actions]
         self.results = [self._name_results(number) for number in range(len(flow.actions))]
         """The variables for the results of each action."""
-        self.errors = [frame.names.claim(action.error_output) if action.error_output else "" for action in flow.actions]
+        self.errors = [self.names.claim(action.error_output) if action.error_output else "" for action in flow.actions]
         """The variable for the error of each action; empty if it is not stored."""
+
+    def _claim_parameters(self) -> None:
+        """Reserve names that precede those of results."""
 
     def _name_results(self, number: int) -> list[str]:
         action, returns = self.flow.actions[number], self.calls[number].meta.returns
@@ -59,7 +65,7 @@ class Cycle:
                 method=method,
                 other_count=len(returns),
             )
-        return [self.frame.names.claim(output) for output in outputs]
+        return [self.names.claim(output) for output in outputs]
 
     # ------------------------------------------------------------------------------------------------ blocks
     def _name(self, node: int) -> str:
@@ -104,11 +110,15 @@ class Cycle:
         """Let the program continue at `target` after a block, if `follow` is the next action in the text."""
         if target == END_NODE:
             if follow != END_NODE:
-                block.append(ast.Continue())
+                block.append(self._leaving())
         elif not self.layout.is_join[target]:
             stack.append((target, block))
         elif self.layout.sets_next_action(node, target):
             block.append(expressions.assign(NEXT_ACTION, ast.Constant(self._name(target))))
+
+    def _leaving(self) -> ast.stmt:
+        """Return the statement that ends the cycle early."""
+        return ast.Continue()
 
     def _catch(self, node: int, attempt: ast.Try, stack: Stack) -> None:
         """Write the error exits of an action as `except` blocks, and its success as `else` block."""
@@ -233,7 +243,7 @@ class Cycle:
         action_id, flow, output = parse_link(read_reference(parameter))
         source = self.numbers.get(action_id)
         if source is None or flow not in (FlowTypes.DEFAULT, ERROR_FLOW):
-            _, producer = self.frame.index.action(action_id)
+            producer = self.frame.index.action(action_id)
             raise InvalidData(
                 "parameter {name}: {producer_name!r} never runs and has no result",
                 name=parameter.name,
@@ -275,6 +285,10 @@ class Cycle:
             )
         return expressions.name(self.frame.parameters[constant.id])
 
+    def _parameter(self, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:  # noqa: ARG002 - see functions
+        """Return the variable of a parameter of the function that contains the action."""
+        raise InvalidData("parameter {name}: only actions of a function have its parameters", name=parameter.name)
+
     def _literal(self, user: int, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:
         object_id, type_name, method, _ = self.calls[user]
         kind = PARAMETER_TYPES.get(meta.type)
@@ -287,13 +301,13 @@ class Cycle:
             )
         if meta.type not in REFERENCES:  # `expression` looks up references
             kind.check(parameter, meta)
-        enumerations = self.frame.types[type_name].enumerations
+        enumerations = self.frame.types_of(type_name).enumerations
         return kind.expression(parameter, References(self.frame, object_id, enumerations, method))
 
     def _arguments(self, user: int) -> tuple[list[ast.expr], list[ast.keyword]]:
         """Return positional arguments, and keyword arguments if required or after a default value."""
         action, (_, type_name, method, declared) = self.flow.actions[user], self.calls[user]
-        keyword_only = self.frame.types[type_name].keyword_only
+        keyword_only = self.frame.types_of(type_name).keyword_only
         given = {parameter.name: parameter for parameter in action.parameters}
         positional: list[ast.expr] = []
         keywords: list[ast.keyword] = []
@@ -312,6 +326,8 @@ class Cycle:
                     value = self._linked(user, parameter, meta)
                 case ActionParameterType.PROJECT_PARAMETER:
                     value = self._constant(parameter, meta)
+                case ActionParameterType.FUNCTION_PARAMETER:
+                    value = self._parameter(parameter, meta)
                 case _:
                     value = self._literal(user, parameter, meta)
             if gap or (method, meta.name) in keyword_only:
@@ -338,7 +354,11 @@ class Cycle:
         except (Arcor2Error, ValueError) as error:
             raise InvalidProject("action {name!r}: {reason}", name=action.name, reason=error) from error
         keywords.append(ast.keyword("an", ast.Constant(action.name)))
-        call = ast.Call(expressions.dotted(self.frame.objects[object_id], (method,)), positional, keywords)
+        if method == CALL and object_id in self.frame.functions:
+            called = expressions.name(self.frame.functions[object_id])
+        else:
+            called = expressions.dotted(self.frame.objects[object_id], (method,))
+        call = ast.Call(called, positional, keywords)
         match self.results[number]:
             case []:
                 return ast.Expr(call)

@@ -6,11 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
+from msgspec import UNSET
+from msgspec.structs import replace
+
 from arcor2_hw.actions.parameter_types import PARAMETER_TYPES
 from arcor2_hw.analysis import Enumeration
-from arcor2_hw.data.object_type import ObjectAction
+from arcor2_hw.data.object_type import ObjectAction, ParameterMeta
 from arcor2_hw.data.parameter import Parameter
-from arcor2_hw.data.project import Action, Project
+from arcor2_hw.data.project import CALL, Action, Project, ProjectFunction
 from arcor2_hw.data.project_index import ProjectIndex
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidData, InvalidProject, NotFound
@@ -19,6 +22,7 @@ from arcor2_server.build import expressions
 from arcor2_server.build.naming import Names
 from arcor2_server.build.points import PointNames, names_of
 from arcor2_server.build.style import Writer
+from arcor2_server.documents.checks.actions import uses_of_parameter
 
 NEXT_ACTION: Final = "next_action"
 """Variable with the name of the action that runs next, if that is not the next one in the text (see layout.py)."""
@@ -60,12 +64,19 @@ class TypeFacts:
 
 
 class ActionCall(NamedTuple):
-    """The method call of an action."""
+    """The call of a method, or of a function, whose id is then that of the object and of the type."""
 
     object_id: str
     type_name: str
     method: str
     meta: ObjectAction
+
+
+class ParameterUse(NamedTuple):
+    """The method that uses a parameter of a function first, and its own parameter."""
+
+    call: ActionCall
+    meta: ParameterMeta
 
 
 class Frame:
@@ -80,6 +91,9 @@ class Frame:
         self.imports: dict[tuple[str, str], str] = {}
         self.classes = {obj.id: self.imported(self._facts(obj.type).module, obj.type) for obj in scene.objects}
         self.parameters = {parameter.id: self.names.claim(parameter.name) for parameter in project.parameters}
+        self.functions = {function.id: self.names.claim(function.name) for function in project.functions}
+        self.function_facts: dict[str, TypeFacts] = {}
+        """The functions as types with one action, as far as they are called."""
         self.comments: dict[ast.stmt, str] = {}
 
     def _facts(self, type_name: str) -> TypeFacts:
@@ -96,8 +110,8 @@ class Frame:
         return self.imports[key]
 
     # ------------------------------------------------------------------------------------------------ module
-    def module(self, loop: list[ast.stmt]) -> str:
-        """Return the source code of the script, with `loop` after the objects and project parameters."""
+    def module(self, loop: list[ast.stmt], functions: list[ast.stmt] | None = None) -> str:
+        """Return the source code of the script, with functions and `loop` after the objects and project parameters."""
         main, entry = parse(_FRAME).body
         assert isinstance(main, ast.FunctionDef)
         objects = [
@@ -109,7 +123,8 @@ class Frame:
             expressions.assign(self.parameters[parameter.id], self._constant(parameter))
             for parameter in self.project.parameters
         ]
-        for part, title in ((objects, "Objects of the scene"), (constants, "Project parameters")):
+        parts = ((objects, "Objects of the scene"), (constants, "Project parameters"), (functions or [], "Functions"))
+        for part, title in parts:
             if part:
                 self.comments[part[0]] = title
                 main.body += part
@@ -151,6 +166,8 @@ class Frame:
         """
         try:
             object_id, method = action.parse_type()
+            if method == CALL and (function := self.index.find_function(object_id)) is not None:
+                return ActionCall(object_id, object_id, CALL, self.facts_of(function).actions[CALL])
             obj = self.index.scene_object(object_id)
         except (ValueError, NotFound) as error:
             raise InvalidProject("action {name!r}: {reason}", name=action.name, reason=error) from error
@@ -172,6 +189,56 @@ class Frame:
                 reason=found.why_disabled,
             )
         return ActionCall(object_id, obj.type, method, found)
+
+    # ------------------------------------------------------------------------------------------------ functions
+    def facts_of(self, function: ProjectFunction) -> TypeFacts:
+        """Return the metadata of the calls of a function. Its parameters have the values of their first use."""
+        if (facts := self.function_facts.get(function.id)) is not None:
+            return facts
+        # Known before its actions are read, so that a function that calls itself ends the search.
+        meta = ObjectAction(CALL, returns=[result.type for result in function.returns])
+        self.function_facts[function.id] = TypeFacts("", function.name, {CALL: meta})
+        parameters: list[ParameterMeta] = []
+        enumerations: dict[tuple[str, str], Enumeration] = {}
+        for parameter in function.parameters:
+            use = self.use_of(function, parameter.name)
+            extra = UNSET if use is None else use.meta.extra
+            parameters.append(ParameterMeta(parameter.name, parameter.type, extra=extra))
+            if use is not None:
+                kinds = self.types_of(use.call.type_name).enumerations
+                if (kind := kinds.get((use.call.method, use.meta.name))) is not None:
+                    enumerations[CALL, parameter.name] = kind
+        facts = TypeFacts("", function.name, {CALL: replace(meta, parameters=parameters)}, enumerations)
+        self.function_facts[function.id] = facts
+        return facts
+
+    def use_of(
+        self, function: ProjectFunction, name: str, callers: frozenset[str] = frozenset()
+    ) -> ParameterUse | None:
+        """Return the first use of a parameter of a function, None if no action uses it.
+
+        callers: ids of functions around this one, which ends the search in functions that call themselves.
+        """
+        if function.id in callers:
+            return None
+        for action, parameter in uses_of_parameter(function, name):
+            try:
+                call = self.resolve(action)
+            except InvalidProject:
+                continue
+            inner = self.index.find_function(call.object_id) if call.method == CALL else None
+            if inner is not None:
+                if (use := self.use_of(inner, parameter.name, callers | {function.id})) is not None:
+                    return use
+                continue
+            meta = next((each for each in call.meta.parameters if each.name == parameter.name), None)
+            if meta is not None:
+                return ParameterUse(call, meta)
+        return None
+
+    def types_of(self, type_name: str) -> TypeFacts:
+        """Return the facts of an object type, or of a function by its id."""
+        return self.function_facts.get(type_name) or self._facts(type_name)
 
 
 class References:
@@ -202,7 +269,7 @@ class References:
     def joints(self, joints_id: str) -> ast.expr:
         """Return the expression for joints of an action point."""
         _, joints = self._frame.index.joints(joints_id)
-        if joints.robot_id != self._object_id:
+        if joints.robot_id != self._object_id and self._object_id not in self._frame.functions:
             raise InvalidData("the joints {name} belong to another robot", name=joints.name)
         return self._point_attribute("joints", self._frame.points.joints, joints_id)
 

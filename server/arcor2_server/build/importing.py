@@ -71,12 +71,14 @@ def _check(package: Imported, types: CombinedTypes) -> None:
 
 def _check_logic(project: Project) -> None:
     """Raise InvalidPackage for logic items of missing actions. Build checks whether the logic is complete."""
-    known = {action.id for point in project.action_points for action in point.actions}
-    for item in project.logic:
-        for place in {item.start.partition("/")[0], item.end.partition("/")[0]} - {START, END}:
-            if place not in known:
+    of_program = [action for point in project.action_points for action in point.actions]
+    parts = [(of_program, project.logic), *((function.actions, function.logic) for function in project.functions)]
+    for actions, logic in parts:
+        known = {START, END, *(action.id for action in actions)}
+        for item in logic:
+            if missing := {item.start.partition("/")[0], item.end.partition("/")[0]} - known:
                 raise InvalidPackage(
-                    "The logic of the package refers to the action {place}, which does not exist.", place=place
+                    "The logic of the package refers to the action {place}, which does not exist.", place=missing.pop()
                 )
 
 

@@ -30,23 +30,40 @@ def class_name(text: str) -> str:
 
 
 class Names:
-    """The names of one scope."""
+    """The names of one scope. Names differ from those of the scopes around and inside it.
 
-    def __init__(self, taken: Iterable[str] = ()) -> None:
+    Args:
+        taken: names that are reserved from the beginning.
+        outer: the scope around this one.
+    """
+
+    def __init__(self, taken: Iterable[str] = (), outer: "Names | None" = None) -> None:
         self._taken = set(taken)
+        self._inside: set[str] = set()
+        """The names of the scopes inside this one."""
+        self._outer = outer
         self._next: dict[str, int] = {}
+
+    def _is_free(self, name: str) -> bool:
+        if name in self._taken or name in self._inside:
+            return False
+        return self._outer is None or name not in self._outer._taken
+
+    def _take(self, name: str) -> str:
+        self._taken.add(name)
+        if self._outer is not None:
+            self._outer._inside.add(name)
+        return name
 
     def claim(self, text: str, *others: str) -> str:
         """Reserve and return a name: `text`, else the first free one of `others`, else `text` with a number."""
         wanted = identifier(text)
         for name in (wanted, *map(identifier, others)):
-            if name not in self._taken:
-                self._taken.add(name)
-                return name
+            if self._is_free(name):
+                return self._take(name)
         stem = wanted if wanted.endswith("_") else f"{wanted}_"
         number = self._next.get(wanted, 2)
-        while f"{stem}{number}" in self._taken:
+        while not self._is_free(f"{stem}{number}"):
             number += 1
         self._next[wanted] = number + 1
-        self._taken.add(name := f"{stem}{number}")
-        return name
+        return self._take(f"{stem}{number}")

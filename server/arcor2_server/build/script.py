@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidProject
-from arcor2_server.build.cycle import Cycle
 from arcor2_server.build.frame import Frame, TypeFacts
-from arcor2_server.documents import logic_graph
+from arcor2_server.build.functions import cycles_of
 
 
 def from_logic(scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> str:
@@ -19,8 +18,9 @@ def from_logic(scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -
         NotFound: `types` does not contain an object type.
     """
     frame = Frame(scene, project, types)
-    body = Cycle(frame, logic_graph.read(project)).statements()
-    return frame.module([ast.While(ast.Constant(True), body, [])])
+    program, functions = cycles_of(frame, project)
+    definitions: list[ast.stmt] = [function.definition() for function in functions]
+    return frame.module([ast.While(ast.Constant(True), program.statements(), [])], definitions)
 
 
 def without_logic(scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> str:

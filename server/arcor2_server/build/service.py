@@ -57,16 +57,15 @@ def type_facts(
     actions: dict[str, dict[str, ObjectAction]] = {
         name: {each.name: each for each in types.actions(name)} if all_actions else {} for name in type_of.values()
     }
-    for point in project.action_points:
-        for action in point.actions:
-            object_id, _, method = action.type.partition("/")
-            name = type_of.get(object_id)
-            if name is None or method in actions[name]:
-                continue
-            try:
-                actions[name][method] = types.action(name, method)
-            except NotFound:
-                continue  # `Frame.resolve` reports it if the logic uses the action
+    for action in project.all_actions():
+        object_id, _, method = action.type.partition("/")
+        name = type_of.get(object_id)
+        if name is None or method in actions[name]:
+            continue
+        try:
+            actions[name][method] = types.action(name, method)
+        except NotFound:
+            continue  # `Frame.resolve` reports it if the logic uses the action
     facts: dict[str, TypeFacts] = {}
     for name, used in actions.items():
         code_of = packaged.get(name)

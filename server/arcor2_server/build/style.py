@@ -99,6 +99,18 @@ def _simple(node: ast.stmt, indent: str) -> list[str]:
     ]
 
 
+def _signature(node: ast.FunctionDef, indent: str) -> list[str]:
+    """Return the first lines of a function. A signature that is too long has one parameter per line."""
+    returns = f" -> {_unparse(node.returns)}" if node.returns else ""
+    text = f"{indent}def {node.name}({_unparse(node.args)}){returns}:"
+    if len(text) <= LINE:
+        return [text]
+    keyword_only = [_unparse(one) for one in node.args.kwonlyargs]
+    parameters = [*map(_unparse, node.args.args), *(["*"] if keyword_only else []), *keyword_only]
+    lines = [f"{indent}{_INDENT}{parameter}," for parameter in parameters]
+    return [f"{indent}def {node.name}(", *lines, f"{indent}){returns}:"]
+
+
 def _reads(test: ast.expr, before: ast.stmt) -> bool:
     """Return whether a condition uses a variable that the statement before it assigns."""
     if not isinstance(before, ast.Assign):
@@ -180,8 +192,8 @@ class Writer:
                     self._lines.append(f"{indent}else:")
                     self._block(node.orelse, deeper)
             case ast.FunctionDef():
-                returns = f" -> {_unparse(node.returns)}" if node.returns else ""
-                self._lines.append(f"{indent}def {node.name}({_unparse(node.args)}){returns}:")
+                self._lines += [f"{indent}@{_unparse(decorator)}" for decorator in node.decorator_list]
+                self._lines += _signature(node, indent)
                 self._block(node.body, deeper)
             case _:
                 self._lines += _simple(node, indent)

@@ -12,7 +12,7 @@ from typing import Any
 
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.geometry import Position
-from arcor2_hw.data.object_type import ObjectAction, ParameterMeta
+from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ParameterMeta
 from arcor2_hw.data.project import (
     END,
     START,
@@ -25,11 +25,16 @@ from arcor2_hw.data.project import (
     ProjectLogicIf,
     parse_link,
 )
+from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.data.scene import Scene, SceneObject
-from arcor2_hw.exceptions import ERROR_KINDS, Arcor2Error, InvalidProject
+from arcor2_hw.exceptions import ERROR_KINDS, Arcor2Error, InvalidProject, NotFound
 from arcor2_hw.runtime.program import ActionError
 from arcor2_server.build.frame import TypeFacts
 from arcor2_server.build.script import from_logic
+from arcor2_server.documents.changes import Kind
+from arcor2_server.documents.consistency import check_consistent
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.functions import NoFunction, make_function
 
 OBJECT = "obj_1"
 Way = tuple[str, str, bool | int | str] | None
@@ -129,9 +134,9 @@ Exits = dict[str, list[list[str]]]
 
 
 def exits_of(project: Project) -> Exits:
-    names = {action.id: action.name for point in project.action_points for action in point.actions}
+    names = {action.id: action.name for action in project.all_actions()}
     found: Exits = {}
-    for item in project.logic:
+    for item in (*project.logic, *(item for function in project.functions for item in function.logic)):
         if item.error_kinds:
             found.setdefault(names[item.start], []).append(item.error_kinds)
     return found
@@ -237,7 +242,7 @@ def run(source: str, oracle: Oracle, count: int, exits: Exits | None = None) -> 
     exec(compile(source, "script.py", "exec"), names)
     try:
         caught = lambda error: ActionError("thing", error.code, str(error))  # noqa: E731
-        names["main"](types.SimpleNamespace(objects={OBJECT: thing}, caught=caught))
+        names["main"](types.SimpleNamespace(objects={OBJECT: thing}, caught=caught, function=lambda body: body))
     except Enough:
         return thing.done
     raise AssertionError("a generated program must not end by itself")
@@ -303,6 +308,21 @@ def random_draft(rng: random.Random, size: int, joining: float, ending: float, w
     return draft
 
 
+def without_doubles(draft: Draft) -> Draft:
+    """Make one way of all the ways from one action to the same one, which no editor makes."""
+    ends: dict[str, set[str]] = {}
+    for start, end, _ in draft.ways:
+        ends.setdefault(start, set()).add(end)
+    ways: list[tuple[str, str, Way]] = []
+    for start, end, condition in draft.ways:
+        if len(ends[start]) > 1:
+            ways.append((start, end, condition))
+        elif (start, end, None) not in ways:
+            ways.append((start, end, None))
+    draft.ways = ways
+    return draft
+
+
 def with_choices(draft: Draft, rng: random.Random) -> Draft:
     """Turn branchings on truth values into branchings on numbers and texts with an else, wherever that can be."""
     linked = {source for source, _ in draft.links.values()}
@@ -361,3 +381,47 @@ def with_exits(draft: Draft, rng: random.Random) -> Draft:
             except InvalidProject:
                 pass
     return draft
+
+
+# ------------------------------------------------------------------------------------------------ functions
+class TypesOfTests:
+    """The object types of the drafts, as the checks of documents see them."""
+
+    def meta(self, name: str) -> ObjectTypeMeta:
+        return ObjectTypeMeta(name)
+
+    def action(self, type_name: str, name: str) -> ObjectAction:
+        return TYPES[type_name].actions[name]
+
+    def robot_meta(self, name: str) -> RobotMeta:
+        raise NotFound(f"{name} is no robot")
+
+
+def with_functions(project: Project, rng: random.Random, count: int) -> Project:
+    """Make functions of random actions that follow each other, of the program or of a function, where that is possible.
+
+    The program does the same afterwards, but for an error that no exit handles.
+    """
+    document = Document.of(SCENE, project)
+    for number in range(count):
+        scope = rng.choice(["", *(item.id for item in document.of_kind(Kind.FUNCTION))])
+        items = document.owned(scope, Kind.LOGIC) if scope else document.program_logic()
+        following: dict[str, list[str]] = {}
+        for item in items:
+            following.setdefault(item.value.start, []).append(item.value.end)
+        places = [place for place in following if place != START]
+        selected = [rng.choice(places)]
+        for _ in range(rng.randrange(8)):
+            near = [end for place in selected for end in following.get(place, ()) if end not in (END, *selected)]
+            if not near:
+                break
+            selected.append(rng.choice(near))
+        try:
+            changes, _, _ = make_function(document, TypesOfTests(), f"f{number}", selected)
+        except NoFunction:
+            continue
+        check_consistent(document, changes, TypesOfTests())
+        document.apply(changes)
+    changed = document.project
+    assert changed is not None
+    return changed

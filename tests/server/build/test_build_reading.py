@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
@@ -18,8 +18,25 @@ from arcor2_hw.data.scene import SceneObject
 from arcor2_server.build.frame import TypeFacts
 from arcor2_server.build.reading import NotUnderstood, from_script
 from arcor2_server.build.script import from_logic
+from arcor2_server.documents.changes import Kind
+from arcor2_server.documents.consistency import check_consistent
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.functions import dissolve_call
+from arcor2_server.errors import RequestRefused
 from tests.server.build import workplace
-from tests.server.build.projects import SCENE, TYPES, random_draft, walk, with_choices, with_exits
+from tests.server.build.projects import (
+    SCENE,
+    TYPES,
+    TypesOfTests,
+    exits_of,
+    random_draft,
+    run,
+    walk,
+    with_choices,
+    with_exits,
+    with_functions,
+    without_doubles,
+)
 
 
 def _oracle(seed: int) -> Any:
@@ -62,6 +79,54 @@ def test_a_script_round_trips_to_the_same_project(
         expected = walk(project, _oracle(seed + draw), 3 * size)
         assert walk(back, _oracle(seed + draw), 3 * size) == expected, source
         assert walk(fresh, _oracle(seed + draw), 3 * size) == expected, source
+
+
+@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    st.integers(0, 2**32),
+    st.integers(2, 30),
+    st.sampled_from([0.0, 0.2, 0.5, 0.9]),
+    st.sampled_from([0.0, 0.1]),
+    st.integers(1, 6),
+    st.booleans(),
+)
+def test_functions_round_trip_and_do_what_their_actions_did(
+    seed: int, size: int, joining: float, ending: float, count: int, choices: bool
+) -> None:
+    rng = random.Random(seed)
+    draft = without_doubles(random_draft(rng, size, joining, ending, 3))
+    if choices:
+        draft = with_choices(draft, rng)
+    flat = with_exits(draft, rng).project()
+    steps = [(item.start, item.end, item.is_error_exit) for item in flat.logic]
+    assume(len(steps) == len(set(steps)))  # no editor makes two steps from one action to the same one
+    project = with_functions(flat, rng, count)
+    source = from_logic(SCENE, project, TYPES)
+    assert from_script(source, SCENE, project, TYPES) == project, source
+    for draw in range(3):
+        oracle = _oracle(seed + draw)
+        ran = run(source, oracle, 3 * size, exits_of(project))
+        assert ran == walk(flat, oracle, 3 * size), source
+
+    [point] = project.action_points
+    bare = replace(project, action_points=[replace(point, actions=[])], logic=[], functions=[])
+    fresh = from_script(source, SCENE, bare, TYPES)
+    assert run(from_logic(SCENE, fresh, TYPES), oracle, 3 * size, exits_of(fresh)) == ran, source
+
+    document = Document.of(SCENE, project)
+    for function in document.of_kind(Kind.FUNCTION):
+        [call] = document.calls_of(function.id)
+        if any(item.is_error_exit for item in document.outgoing(call.id)):
+            continue
+        try:
+            changes, _ = dissolve_call(document, call.id, remove_function=True)
+        except RequestRefused:  # the function ends in a branch, and a branch follows the call
+            continue
+        check_consistent(document, changes, TypesOfTests())
+        document.apply(changes)
+    dissolved = document.project
+    assert dissolved is not None
+    assert run(from_logic(SCENE, dissolved, TYPES), oracle, 3 * size, exits_of(dissolved)) == ran, source
 
 
 # ------------------------------------------------------------------------------------------------ edits by hand

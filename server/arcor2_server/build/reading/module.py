@@ -27,6 +27,7 @@ class Script:
         objects: ids of scene objects, by variable.
         constants: values of project parameters, by variable.
         imports: the imported names, by their names in the script.
+        functions: the functions, in their order.
         errors: the kinds of errors, by the names of their classes in the script.
         lines: the line that defines a name.
     """
@@ -36,6 +37,7 @@ class Script:
     resources: str = ""
     objects: dict[str, str] = field(default_factory=dict)
     constants: dict[str, ast.expr] = field(default_factory=dict)
+    functions: list[ast.FunctionDef] = field(default_factory=list)
     imports: dict[str, str] = field(default_factory=dict)
     errors: dict[str, str] = field(default_factory=dict)
     lines: dict[str, int] = field(default_factory=dict)
@@ -128,14 +130,47 @@ def _main(script: Script, main: ast.FunctionDef) -> None:
             case ast.Assign([ast.Name(name)], value) | ast.AnnAssign(ast.Name(name), _, ast.expr() as value):
                 script.claim(name, node.lineno)
                 _set_up(script, name, value)
+            case ast.FunctionDef():
+                _check_function(script, node)
+                script.claim(node.name, node.lineno)
+                script.functions.append(node)
             case _:
                 raise NotUnderstood(
                     node.lineno,
-                    "only action points, objects and project parameters are allowed before the loop, not {node}",
+                    "only action points, objects, project parameters and functions are allowed before the loop, "
+                    "not {node}",
                     node=excerpt(node),
                 )
     if not found:
         raise NotUnderstood(main.lineno, "main has no loop (`while True:`)")
+
+
+def _check_function(script: Script, node: ast.FunctionDef) -> None:
+    """Raise NotUnderstood unless a function has the decorator and the form of parameters of generated functions."""
+    match node.decorator_list:
+        case [ast.Attribute(ast.Name(resources), "function")] if resources == script.resources:
+            pass
+        case _:
+            raise NotUnderstood(
+                node.lineno,
+                "the function {name} needs the decorator @{resources}.function",
+                name=node.name,
+                resources=script.resources,
+            )
+    given = node.args
+    if (
+        given.posonlyargs
+        or given.vararg
+        or given.kwarg
+        or given.defaults
+        or [each.arg for each in given.kwonlyargs] != ["an"]
+    ):
+        raise NotUnderstood(
+            node.lineno,
+            "the parameters of the function {name} must be plain parameters without default values, "
+            "and at last `*, an: str`",
+            name=node.name,
+        )
 
 
 def _set_up(script: Script, name: str, value: ast.expr) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from arcor2_hw.data.object_type import ObjectAction, ParameterMeta, find_action
-from arcor2_hw.data.project import ERROR_FLOW, ERROR_PARTS, FlowTypes
+from arcor2_hw.data.project import CALL, ERROR_FLOW, ERROR_PARTS, FlowTypes
 from arcor2_server.build.frame import NEXT_ACTION, Frame
 from arcor2_server.build.reading.errors import NotUnderstood, excerpt
 from arcor2_server.build.reading.module import Script
@@ -52,6 +52,8 @@ class Call:
     outputs: list[str]
     results: dict[str, tuple[int, str, int]] = field(default_factory=dict)
     """What its arguments use of other calls, by parameter: number of the call, flow and number of the result."""
+    passed: dict[str, str] = field(default_factory=dict)
+    """The parameters of the function around the call that its arguments pass on, by parameter."""
     error: str = ""
     """The variable for its error; empty if it is not stored."""
 
@@ -86,10 +88,25 @@ class Use(NamedTuple):
     of_error: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class ScriptCalls:
+    """What the loop and the functions of a script share.
+
+    Args:
+        functions: ids of the functions that are already read, by name.
+        lines: lines of the calls, by name of the action.
+    """
+
+    functions: dict[str, str] = field(default_factory=dict)
+    lines: dict[str, int] = field(default_factory=dict)
+
+
 class LoopReader:
     """The calls of a loop in the order of the code, and the paths by the number of the call where they start."""
 
-    def __init__(self, frame: Frame, script: Script, values: Values) -> None:
+    def __init__(
+        self, frame: Frame, script: Script, values: Values, shared: ScriptCalls, body: Sequence[ast.stmt]
+    ) -> None:
         self.calls: list[Call] = []
         self.paths: dict[int, list[LogicPath]] = {START_NODE: []}
         self.exits: dict[int, list[ErrorExit]] = {}
@@ -98,9 +115,11 @@ class LoopReader:
         self._frame, self._script, self._values = frame, script, values
         self._results: dict[str, tuple[int, int]] = {}
         self._errors: dict[str, int] = {}
-        self._lines: dict[str, int] = {}
-        open_paths = self._block(script.loop, [_OpenPath(START_NODE)])
-        self._end(open_paths, script.loop[-1].lineno)
+        self._shared = shared
+        self._own_lines: dict[str, int] = {}
+        """The lines that define variables of the loop."""
+        open_paths = self._block(body, [_OpenPath(START_NODE)])
+        self._end(open_paths, body[-1].lineno)
         for paths in self.paths.values():
             paths.sort(key=lambda path: (len(path.tried), path.taken is None))
 
@@ -118,18 +137,35 @@ class LoopReader:
                     open_paths = self._if(node, open_paths)
                 case ast.Try():
                     open_paths = self._try(node, open_paths)
-                case ast.Continue():
-                    self._end(open_paths, node.lineno)
+                case ast.Continue() | ast.Return():
+                    self._leave(node, open_paths)
                     open_paths = []
                 case ast.Pass():
                     continue
                 case _:
-                    raise NotUnderstood(
-                        node.lineno,
-                        "the loop contains only calls of actions, conditions, `try` and `continue`, but this is {node}",
-                        node=excerpt(node),
-                    )
+                    raise self._refusal(node)
         return open_paths
+
+    def _refusal(self, node: ast.stmt) -> NotUnderstood:
+        """Return the error for a statement that cannot be converted."""
+        return NotUnderstood(
+            node.lineno,
+            "the loop contains only calls of actions, conditions, `try` and `continue`, but this is {node}",
+            node=excerpt(node),
+        )
+
+    def _leave(self, node: ast.Continue | ast.Return, open_paths: list[_OpenPath]) -> None:
+        """Read a statement that ends the cycle."""
+        if isinstance(node, ast.Return):
+            raise self._refusal(node)
+        self._end(open_paths, node.lineno)
+
+    def _claim(self, name: str, line: int) -> None:
+        """Store the line that defines a variable. Raise NotUnderstood if its name is already defined."""
+        for lines in (self._script.lines, self._own_lines):
+            if name in lines:
+                raise NotUnderstood(line, "{name} is already defined in line {row}", name=name, row=lines[name])
+        self._own_lines[name] = line
 
     def _end(self, open_paths: list[_OpenPath], line: int) -> None:
         for path in open_paths:
@@ -172,7 +208,7 @@ class LoopReader:
                     raise NotUnderstood(
                         handler.lineno, "the error of an action has one name, not also {name}", name=variable
                     )
-                self._script.claim(variable, handler.lineno)
+                self._claim(variable, handler.lineno)
                 self._errors[variable] = number
                 self.calls[number].error = variable
             after = after + self._block(handler.body[1:], [_OpenPath(number, kinds=tuple(in_order_of_kinds(kinds)))])
@@ -233,12 +269,17 @@ class LoopReader:
         match call.func:
             case ast.Attribute(ast.Name(variable), method) if variable in self._script.objects:
                 object_id = self._script.objects[variable]
+                type_name = self._frame.index.scene_object(object_id).type
+            case ast.Name(variable) if variable in self._shared.functions:
+                object_id = type_name = self._shared.functions[variable]
+                method = CALL
+            case ast.Name(variable) if any(variable == function.name for function in self._script.functions):
+                raise NotUnderstood(call.lineno, "the function {name} must be defined above its calls", name=variable)
             case _:
                 raise NotUnderstood(
                     call.lineno, "{func} is not an action of an object in the scene", func=excerpt(call.func)
                 )
-        obj = self._frame.index.scene_object(object_id)
-        facts = self._frame.types[obj.type]
+        facts = self._values.types_of(type_name)
         declared = find_action(facts.actions.values(), method)
         if declared is None:
             raise NotUnderstood(call.lineno, "{type} has no action {method}", type=facts.shown_name, method=method)
@@ -259,12 +300,13 @@ class LoopReader:
                 count=len(declared.returns),
                 other_count=len(outputs),
             )
-        arguments = self._values.arguments(call, declared, obj.type)
+        arguments = self._values.arguments(call, declared, type_name)
         number = len(self.calls)
         links = self._links(number, arguments, declared)
-        self.calls.append(Call(call.lineno, name, object_id, obj.type, declared, arguments, outputs, links))
+        passed = self._passed(arguments, declared)
+        self.calls.append(Call(call.lineno, name, object_id, type_name, declared, arguments, outputs, links, passed))
         for place, output in enumerate(outputs):
-            self._script.claim(output, node.lineno)
+            self._claim(output, node.lineno)
             self._results[output] = (number, place)
         self.paths[number] = []
         for path in open_paths:
@@ -282,12 +324,15 @@ class LoopReader:
                 )
         else:
             raise NotUnderstood(call.lineno, '{call} has no name: add an="..."', call=excerpt(call))
-        if name in self._lines:
-            raise NotUnderstood(
-                call.lineno, "line {row} already has an action {name!r}", name=name, row=self._lines[name]
-            )
-        self._lines[name] = call.lineno
+        lines = self._shared.lines
+        if name in lines:
+            raise NotUnderstood(call.lineno, "line {row} already has an action {name!r}", name=name, row=lines[name])
+        lines[name] = call.lineno
         return name
+
+    def _passed(self, arguments: dict[str, ast.expr], declared: ObjectAction) -> dict[str, str]:  # noqa: ARG002
+        """Return the parameters of the function that the arguments of a call pass on, by parameter."""
+        return {}
 
     def _links(
         self, number: int, arguments: dict[str, ast.expr], declared: ObjectAction

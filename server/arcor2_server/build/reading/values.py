@@ -7,6 +7,7 @@ from typing import Any, Final
 import msgspec
 
 from arcor2_hw.actions.parameter_types import PARAMETER_TYPES
+from arcor2_hw.analysis import Enumeration
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction, ParameterMeta
 from arcor2_hw.data.parameter import Parameter
@@ -68,6 +69,8 @@ class Values:
         self._script = script
         self.parameters: dict[str, tuple[str, str]] = {}
         """Ids and types of project parameters, by their names in the script."""
+        self._functions: dict[str, TypeFacts] = {}
+        """The functions of the script by id, as types with one action."""
         self._poses = {path: key for key, path in frame.points.poses.items()}
         self._joints = {path: key for key, path in frame.points.joints.items()}
         self._positions = {path: key for key, path in frame.points.positions.items()}
@@ -81,12 +84,32 @@ class Values:
             for value, member in kind.members.items()
         }
 
+    def define(self, function_id: str, facts: TypeFacts) -> None:
+        """Add a function, which can be called from here on."""
+        self._functions[function_id] = facts
+
+    def types_of(self, type_name: str) -> TypeFacts:
+        """Return the facts of an object type, or of a function by its id."""
+        return self._functions.get(type_name) or self._frame.types[type_name]
+
+    def enumeration_of(self, hint: ast.expr) -> Enumeration | None:
+        """Return the enumeration that a type hint names, None for other hints."""
+        match hint:
+            case ast.Name(name) if name in self._script.imports:
+                wanted = self._script.imports[name]
+            case ast.Attribute(ast.Name(name), inner) if name in self._script.imports:
+                wanted = f"{self._script.imports[name]}.{inner}"
+            case _:
+                return None
+        kinds = (kind for facts in self._frame.types.values() for kind in facts.enumerations.values())
+        return next((kind for kind in kinds if kind.name == wanted), None)
+
     # ------------------------------------------------------------------------------------------------ calls
     def arguments(self, call: ast.Call, declared: ObjectAction, type_name: str) -> dict[str, ast.expr]:
         """Return the arguments by parameter, without `an`. Raise NotUnderstood if they do not fit the parameters."""
         given: dict[str, ast.expr] = {}
         names = [meta.name for meta in declared.parameters]
-        by_name = self._frame.types[type_name].keyword_only
+        by_name = self.types_of(type_name).keyword_only
         by_place = [name for name in names if (declared.name, name) not in by_name]
         for name, node in zip(by_place, call.args, strict=False):
             if isinstance(node, ast.Starred):
@@ -199,7 +222,8 @@ class Values:
                 other_type=kind,
             )
         key = tables[kind][path]
-        if kind == "joints" and self._frame.index.joints(key)[1].robot_id != object_id:
+        of_robot = kind == "joints" and object_id not in self._functions
+        if of_robot and self._frame.index.joints(key)[1].robot_id != object_id:
             raise NotUnderstood(node.lineno, "{node} belong to another robot", node=excerpt(node))
         return ActionParameter(meta.name, kind, json_of(key))
 
@@ -214,7 +238,7 @@ class Values:
         return None
 
     def _member(self, node: ast.expr, meta: ParameterMeta, type_name: str, method: str) -> str | int:
-        facts: TypeFacts = self._frame.types[type_name]
+        facts = self.types_of(type_name)
         kind = facts.enumerations.get((method, meta.name))
         named = self._named_member(node)
         if kind is None or named is None or named[0] != kind.name:

@@ -1,0 +1,203 @@
+"""Converts the functions of a project to functions of the script, nested in `main`."""
+
+import ast
+from collections.abc import Iterable, Iterator
+from typing import Final
+
+from arcor2_hw.data.object_type import ParameterMeta
+from arcor2_hw.data.project import CALL, ActionParameter, Project, ProjectFunction, parse_link
+from arcor2_hw.exceptions import InvalidData, InvalidProject
+from arcor2_server.build import expressions
+from arcor2_server.build.cycle import Block, Cycle
+from arcor2_server.build.frame import Frame
+from arcor2_server.documents import logic_graph
+from arcor2_server.documents.checks.actions import text_of
+from arcor2_server.documents.logic_graph import END_NODE, Flow
+
+NAME: Final = "an"
+"""The parameter of functions, as of actions, with the name of the action that calls."""
+HINTS: Final = {
+    "boolean": ("builtins", "bool"),
+    "integer": ("builtins", "int"),
+    "double": ("builtins", "float"),
+    "string": ("builtins", "str"),
+    "pose": ("arcor2_hw.data.geometry", "Pose"),
+    "position": ("arcor2_hw.data.geometry", "Position"),
+    "joints": ("arcor2_hw.data.project", "ProjectRobotJoints"),
+    "string_enum": ("builtins", "str"),
+    "integer_enum": ("builtins", "int"),
+}
+"""Module and name of the type hint of each type; for parameters that are enumerations it is their own class."""
+_DECORATOR: Final = expressions.dotted("res", ("function",))
+
+
+class FunctionCycle(Cycle):
+    """The body of a function."""
+
+    def __init__(self, frame: Frame, flow: Flow, function: ProjectFunction) -> None:
+        self.function = function
+        self.parameters: dict[str, str] = {}
+        """The variables of the parameters by name."""
+        super().__init__(frame, flow)
+        self._returned = [self._result_variable(result.link, result.type) for result in function.returns]
+
+    def _claim_parameters(self) -> None:
+        self.names.claim(NAME)
+        self.parameters = {each.name: self.names.claim(each.name) for each in self.function.parameters}
+
+    def _result_variable(self, link: str, kind: str) -> str:
+        """Return the variable of a result of the function. Raise InvalidProject unless it is set on all paths."""
+        name = self.function.name
+        try:
+            action_id, _, output = parse_link(link)
+        except ValueError as error:
+            raise InvalidProject("function {name!r}: {reason}", name=name, reason=error) from None
+        source = self.numbers.get(action_id)
+        if source is None or output >= len(self.results[source]):
+            raise InvalidProject("function {name!r}: its result {link} does not exist", name=name, link=link)
+        action, returns = self.flow.actions[source], self.calls[source].meta.returns
+        if returns[output] != kind:
+            raise InvalidProject(
+                "function {name!r}: its result {link} is {type}, not {other}",
+                name=name,
+                link=action.outputs()[output],
+                type=returns[output],
+                other=kind,
+            )
+        for node, edges in enumerate(self.nodes.edges):
+            ends = any(edge.target == END_NODE for edge in edges)
+            if ends and not self.nodes.has_results(self.natural, source, node):
+                raise InvalidProject(
+                    "function {name!r} returns a result of {action!r}, which does not run on all paths to its end",
+                    name=name,
+                    action=action.name,
+                )
+        return self.results[source][output]
+
+    def _parameter(self, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:
+        name = text_of(parameter)
+        source = next((each for each in self.function.parameters if each.name == name), None)
+        if source is None or source.type != meta.type:
+            raise InvalidData(
+                "parameter {name} must be {type}; {source} is not such a parameter of the function {function}",
+                name=parameter.name,
+                type=meta.type,
+                source=name,
+                function=self.function.name,
+            )
+        return expressions.name(self.parameters[name])
+
+    def _leaving(self) -> ast.stmt:
+        match [expressions.name(variable) for variable in self._returned]:
+            case []:
+                return ast.Return()
+            case [name]:
+                return ast.Return(name)
+            case names:
+                return ast.Return(ast.Tuple(names, ast.Load()))
+
+    def definition(self) -> ast.FunctionDef:
+        """Return the function."""
+        body: Block = self.statements()
+        if self._returned:
+            body.append(self._leaving())
+        parameters = [
+            ast.arg(self.parameters[each.name], self._hint(each.name, each.type)) for each in self.function.parameters
+        ]
+        arguments = ast.arguments([], parameters, None, [ast.arg(NAME, expressions.name("str"))], [None], None, [])
+        definition = ast.FunctionDef(
+            self.frame.functions[self.function.id], arguments, body, [_DECORATOR], self._returns(), lineno=0
+        )
+        definition.type_params = []
+        return definition
+
+    def _hint(self, name: str, kind: str) -> ast.expr:
+        """Return the type hint of a parameter."""
+        enumeration = self.frame.facts_of(self.function).enumerations.get((CALL, name))
+        if enumeration is not None:
+            first, *inner = enumeration.name.split(".")
+            return expressions.dotted(self.frame.imported(enumeration.module, first), tuple(inner))
+        if kind not in HINTS:
+            raise InvalidProject(
+                "function {name!r}: {type} cannot be the type of the parameter {parameter}",
+                name=self.function.name,
+                type=kind,
+                parameter=name,
+            )
+        return self._class(kind)
+
+    def _class(self, kind: str) -> ast.expr:
+        module, name = HINTS.get(kind, ("builtins", "object"))
+        return expressions.name(name if module == "builtins" else self.frame.imported(module, name))
+
+    def _returns(self) -> ast.expr:
+        match [self._class(result.type) for result in self.function.returns]:
+            case []:
+                return ast.Constant(None)
+            case [hint]:
+                return hint
+            case hints:
+                return ast.Subscript(expressions.name("tuple"), ast.Tuple(hints, ast.Load()), ast.Load())
+
+
+def called_functions(project: Project, program: Flow) -> list[tuple[ProjectFunction, Flow]]:
+    """Return the functions that a program calls, also through functions, each before its callers.
+
+    Raises:
+        InvalidProject: a function is invalid, or calls itself.
+    """
+    known = {function.id: function for function in project.functions}
+
+    def callees(flow: Flow) -> Iterator[ProjectFunction]:
+        for action in flow.actions:
+            key, _, method = action.type.partition("/")
+            if method == CALL and key in known:
+                yield known[key]
+
+    found: dict[str, tuple[ProjectFunction, Flow]] = {}
+    open_: dict[str, tuple[ProjectFunction, Flow]] = {}
+    stack = [callees(program)]
+    while stack:
+        function = next(stack[-1], None)
+        if function is None:
+            stack.pop()
+            if open_:
+                key, value = open_.popitem()
+                found[key] = value
+        elif function.id in open_:
+            raise InvalidProject("function {name!r} calls itself", name=function.name)
+        elif function.id not in found:
+            open_[function.id] = (function, flow_of(function))
+            stack.append(callees(open_[function.id][1]))
+    _check_names([program, *(flow for _, flow in found.values())])
+    return list(found.values())
+
+
+def flow_of(function: ProjectFunction) -> Flow:
+    """Return the logic of a function. Raise InvalidProject if it is invalid."""
+    try:
+        return logic_graph.read(function)
+    except InvalidProject as error:
+        raise InvalidProject("function {name!r}: {reason}", name=function.name, reason=error) from error
+
+
+def _check_names(flows: Iterable[Flow]) -> None:
+    names: set[str] = set()
+    for action in (action for flow in flows for action in flow.actions):
+        if action.name in names:
+            raise InvalidProject("two actions have the name {name!r}; rename one of them", name=action.name)
+        names.add(action.name)
+
+
+def cycles_of(frame: Frame, project: Project) -> tuple[Cycle, list[FunctionCycle]]:
+    """Return the cycle of a program, and the functions that it calls, each before its callers.
+
+    All names of variables are chosen here, so that they do not depend on what the statements import.
+
+    Raises:
+        InvalidProject: an action or the logic is invalid.
+        NotFound: an object type is unknown.
+    """
+    program = logic_graph.read(project)
+    functions = called_functions(project, program)
+    return Cycle(frame, program), [FunctionCycle(frame, flow, function) for function, flow in functions]
