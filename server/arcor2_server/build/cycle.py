@@ -355,7 +355,7 @@ class Cycle:
             raise InvalidProject("action {name!r}: {reason}", name=action.name, reason=error) from error
         keywords.append(ast.keyword("an", ast.Constant(action.name)))
         if method == CALL and object_id in self.frame.functions:
-            called = expressions.name(self.frame.functions[object_id])
+            called: ast.expr = expressions.name(self.frame.functions[object_id])
         else:
             called = expressions.dotted(self.frame.objects[object_id], (method,))
         call = ast.Call(called, positional, keywords)

@@ -88,7 +88,8 @@ class FunctionCycle(Cycle):
         return expressions.name(self.parameters[name])
 
     def _leaving(self) -> ast.stmt:
-        match [expressions.name(variable) for variable in self._returned]:
+        returned: list[ast.expr] = [expressions.name(variable) for variable in self._returned]
+        match returned:
             case []:
                 return ast.Return()
             case [name]:
@@ -105,11 +106,8 @@ class FunctionCycle(Cycle):
             ast.arg(self.parameters[each.name], self._hint(each.name, each.type)) for each in self.function.parameters
         ]
         arguments = ast.arguments([], parameters, None, [ast.arg(NAME, expressions.name("str"))], [None], None, [])
-        definition = ast.FunctionDef(
-            self.frame.functions[self.function.id], arguments, body, [_DECORATOR], self._returns(), lineno=0
-        )
-        definition.type_params = []
-        return definition
+        name = self.frame.functions[self.function.id]
+        return ast.FunctionDef(name, arguments, body, [_DECORATOR], self._returns(), lineno=0)
 
     def _hint(self, name: str, kind: str) -> ast.expr:
         """Return the type hint of a parameter."""

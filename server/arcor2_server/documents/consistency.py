@@ -76,7 +76,9 @@ def _check_unused(document: Document, change: Change) -> None:
 def _check_name(document: Document, change: Change) -> None:
     if change.kind not in _NAMED:
         return
-    names = [(change.kind, change.after.name, change.parent if change.kind in _NAMED_IN_POINT else "")]
+    names: list[tuple[str, str, str]] = [
+        (change.kind, change.after.name, change.parent if change.kind in _NAMED_IN_POINT else "")
+    ]
     if change.kind is Kind.ACTION:
         names += [(OUTPUT, output, document.function_of(change.id)) for output in change.after.names()]
     for kind, name, parent in names:

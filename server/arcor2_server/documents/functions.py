@@ -451,13 +451,13 @@ class _Copies:
         removed = frozenset({call.id, *(ids if remove_function else ())})
         names = Names(document, document.function_of(call.id))
         returned = {
-            parse_link(result.link)[::2]: name
+            _source(result): name
             for result, name in reversed(list(zip(function.returns, call.outputs(), strict=False)))
         }
         self.actions = [self._copy(action, names, removed, returned) for action in function.actions]
 
     def _copy(
-        self, action: Action, names: Names, removed: frozenset[str], returned: dict[tuple[str | int, ...], str]
+        self, action: Action, names: Names, removed: frozenset[str], returned: dict[tuple[str, int], str]
     ) -> Action:
         flows = [
             replace(
@@ -514,6 +514,12 @@ class _Copies:
                 condition = each.condition if branches else step.condition
                 steps.append(replace(step, end=each.end, condition=condition, id=new_id("lit")))
         return steps
+
+
+def _source(result: FunctionReturns) -> tuple[str, int]:
+    """Return the action of a result of a function, and the index of its own result."""
+    action_id, _, index = parse_link(result.link)
+    return action_id, index
 
 
 def _point_of(document: Document, action: Action) -> str | None:
