@@ -11,9 +11,19 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 
 from arcor2_hw.data.geometry import Orientation, Pose, Position
-from arcor2_hw.data.project import Action, ActionPoint, NamedOrientation, Project, ProjectParameter, ProjectRobotJoints
+from arcor2_hw.data.position import Frame, ProgramStep
+from arcor2_hw.data.project import (
+    Action,
+    ActionPoint,
+    NamedOrientation,
+    Project,
+    ProjectFunction,
+    ProjectParameter,
+    ProjectRobotJoints,
+)
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.runtime import messages as m
@@ -243,6 +253,104 @@ def test_events_of_a_complete_run(run: Run) -> None:
     assert (info["package_id"], info["package_name"]) == ("pkg_1", "demo")
     assert info["scene"]["objects"][0]["id"] == OBJ
     assert run.notes() == ["control", "go 12", "go 11", "go 11", "go 99", "disconnected"]
+
+
+# ------------------------------------------------------------------------------------------------ functions
+INNER = [Action(name, f"{OBJ}/go", f"act_{name}") for name in ("i1", "i2")]
+WITH_FUNCTION = replace(
+    PROJECT,
+    functions=[ProjectFunction("there_and_back", INNER, id="pfu_1")],
+    action_points=[
+        replace(
+            PROJECT.action_points[0],
+            actions=[_action("a1"), Action("c1", "pfu_1/call", "act_c1"), Action("c2", "pfu_1/call", "act_c2")],
+        ),
+        PROJECT.action_points[1],
+    ],
+)
+CALLS = """
+    from arcor2_hw.data.geometry import Pose
+
+    @res.function
+    def there_and_back(where: Pose, *, an: str) -> bool:
+        arm.go(where, an="i1")
+        arm.go(res.pose("ori_child"), an="i2")
+        return True
+
+    arm.go(res.pose("ori_top"), an="a1")
+    assert there_and_back(res.pose("ori_top"), an="c1") is True
+    there_and_back(res.pose("ori_top"), an="c2")
+    """
+
+
+def paused_at(run: Run) -> list[str]:
+    """Wait until the program pauses; return the actions of its frames."""
+    run.host.expect_state("paused")
+    announced = [e for e in run.host.seen if isinstance(e, m.ProgramEvent) and e.event == "ActionStateBefore"]
+    return [frame.action_id for frame in announced[-1].frames]
+
+
+def test_steps_go_over_into_and_out_of_functions(run: Run) -> None:
+    run.start(CALLS, project=WITH_FUNCTION, start_paused=True)
+    assert paused_at(run) == ["act_a1"]
+    for mode, expected in (
+        (ProgramStep.OVER, ["act_c1"]),
+        (ProgramStep.INTO, ["act_c1", "act_i1"]),
+        (ProgramStep.OVER, ["act_c1", "act_i2"]),
+        (ProgramStep.OVER, ["act_c2"]),
+        (ProgramStep.INTO, ["act_c2", "act_i1"]),
+    ):
+        run.host.send(m.Step(mode))
+        assert paused_at(run) == expected
+    last = [e for e in run.host.seen if isinstance(e, m.ProgramEvent) and e.event == "ActionStateBefore"][-1]
+    assert last.frames[1] == Frame("act_i1", "pfu_1", "act_c2")
+    run.host.send(m.Step(ProgramStep.OUT))
+    assert run.host.expect_state("stopped").error is None
+    announced = [e for e in run.host.seen if isinstance(e, m.ProgramEvent) and e.number]
+    calls = [(e.number, e.call, e.device) for e in announced if e.event == "ActionStateBefore"]
+    assert calls == [(1, 0, OBJ), (2, 0, ""), (3, 2, OBJ), (4, 2, OBJ), (5, 0, ""), (6, 5, OBJ), (7, 5, OBJ)]
+    assert [e.call for e in announced if e.event == "ActionStateAfter"] == [0, 2, 2, 0, 5, 5, 0]
+    assert run.data_of("ActionStateAfter")[3] == {"action_id": "act_c1", "results": ["true"]}
+
+
+def test_breakpoints_in_a_function_pause_in_every_call(run: Run) -> None:
+    # The action point of the pose pauses at the action that uses it, not at the call that passes it on.
+    run.start(CALLS, project=WITH_FUNCTION, breakpoints=("act_i2", "acp_top"))
+    for expected in (
+        ["act_a1"],
+        ["act_c1", "act_i1"],
+        ["act_c1", "act_i2"],
+        ["act_c2", "act_i1"],
+        ["act_c2", "act_i2"],
+    ):
+        assert paused_at(run) == expected
+        run.host.send(m.Resume())
+    assert run.host.expect_state("stopped").error is None
+
+
+def test_an_error_leaves_a_function_by_the_exit_of_its_call(run: Run) -> None:
+    run.start(
+        """
+        from arcor2_hw.exceptions import Refused
+
+        @res.function
+        def there_and_back(*, an: str) -> None:
+            arm.fail("full", an="i1")
+
+        try:
+            there_and_back(an="c1")
+        except Refused as error:
+            problem = res.caught(error)
+        assert problem == ("arm", "refused", "the box is full"), problem
+        there_and_back(an="c2")
+        """,
+        project=WITH_FUNCTION,
+    )
+    run.host.expect_state("stopped")
+    failed = [e for e in run.host.seen if isinstance(e, m.ActionFailed)]
+    assert [(e.number, str(e.error)) for e in failed] == [(number, "the box is full") for number in (2, 1, 4, 3)]
+    [raised] = run.data_of("ProjectException")
+    assert raised["action_id"] == "act_i1", "the action that failed, not the call"
 
 
 def test_robots_are_streamed_while_an_action_runs(run: Run) -> None:
