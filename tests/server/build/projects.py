@@ -6,7 +6,7 @@ import itertools
 import json
 import random
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -385,13 +385,16 @@ def with_exits(draft: Draft, rng: random.Random) -> Draft:
 
 # ------------------------------------------------------------------------------------------------ functions
 class TypesOfTests:
-    """The object types of the drafts, as the checks of documents see them."""
+    """The object types of the drafts, or others, as the checks of documents see them."""
+
+    def __init__(self, facts: Mapping[str, TypeFacts] = TYPES) -> None:
+        self._facts = facts
 
     def meta(self, name: str) -> ObjectTypeMeta:
         return ObjectTypeMeta(name)
 
     def action(self, type_name: str, name: str) -> ObjectAction:
-        return TYPES[type_name].actions[name]
+        return self._facts[type_name].actions[name]
 
     def robot_meta(self, name: str) -> RobotMeta:
         raise NotFound(f"{name} is no robot")

@@ -9,7 +9,9 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
+from msgspec import UNSET
 from msgspec.structs import replace
 
 from arcor2_hw.data.geometry import Orientation, Position
@@ -17,9 +19,12 @@ from arcor2_hw.data.project import END, START, ActionPoint, NamedOrientation, Pr
 from arcor2_hw.exceptions import InvalidProject
 from arcor2_server.build import package
 from arcor2_server.build.service import files_of
+from arcor2_server.documents.document import Document
+from arcor2_server.documents.functions import make_function
 from tests.server.build import hub, workplace
 from tests.server.build.conftest import make_code
-from tests.server.cell.conftest import Server, serving
+from tests.server.build.projects import TypesOfTests
+from tests.server.cell.conftest import Recorder, Server, serving
 
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs" / "reference" / "scripts.md").read_text()
@@ -96,6 +101,69 @@ async def test_a_thousand_distinct_actions_run(server: Server) -> None:
     # Each had the parameters of its own point, none those of another one.
     assert [data.get("action_point_ids") for data in before[:-1:2]] == [[f"acp_{n}"] for n in range(0, COUNT, 2)]
     assert before[1]["parameters"][1] == "0.2"
+
+
+def project_with_function() -> tuple[Project, dict[str, str]]:
+    """Give the workplace's project with a function that handles a board, and the ids of its actions by name."""
+    document = Document.of(workplace.scene(), workplace.project())
+    ids = {action.name: action.id for action in workplace.project().all_actions()}
+    names = ("above feeder", "pick", "known?", "into good box", "throw away", "back")
+    changes, _, _ = make_function(
+        document, TypesOfTests(workplace.FACTS), "handle_board", [ids[name] for name in names]
+    )
+    document.apply(changes)
+    project = document.project
+    assert project is not None
+    return project, {action.name: action.id for action in project.all_actions()}
+
+
+@serving()
+async def test_a_function_is_stepped_into_and_traced(server: Server) -> None:
+    project, ids = project_with_function()
+    await upload(server, await build(server.services.settings.data_dir, project))
+    client, older = server.client, Recorder(None)
+    server.services.hub.add(older)  # type: ignore[arg-type]
+    server.services.hub.subscribe(client, {"ProgramPosition"}, True)  # type: ignore[arg-type]
+    await server.ask("RunPackage", {"id": "pkg_1", "start_paused": True, "breakpoints": [ids["handle_board"]]})
+    await client.state("paused", "PackageState")
+    await server.ask("ResumePackage")
+    await client.event("ActionStateBefore", lambda data: data["action_id"] == ids["handle_board"])
+    await client.state("paused", "PackageState")
+    await server.ask("StepAction", {"mode": "into"})
+    frames = [
+        {"action_id": ids["handle_board"]},
+        {
+            "action_id": ids["above feeder"],
+            "function_id": project.functions[0].id,
+            "call_action_id": ids["handle_board"],
+        },
+    ]
+    position = {"id": "main", "frames": frames}
+    await client.event("ProgramPosition", lambda data: data["branches"] == [position])
+    await client.state("paused", "PackageState")
+    assert msgspec.to_builtins(await server.ask("GetProgramPosition"))["branches"] == [position]
+    [_, running] = server.services.execution.greeting()[1:]
+    assert running.data["action_id"] == ids["handle_board"], "a new client of the original knows only the call"
+    await server.ask("StepAction", {"mode": "out"})
+    while True:  # the loop has one board for each repetition
+        state = await client.event("PackageState", lambda data: data["state"] in ("paused", "stopped"))
+        if state["state"] == "stopped":
+            break
+        await server.ask("ResumePackage")
+    assert server.services.execution.program.error is None
+    assert (await server.ask("GetProgramPosition")).branches == []
+
+    inside = {action.id for action in project.functions[0].actions}
+    announced = [e["data"]["action_id"] for e in older.got if e["event"] == "ActionStateBefore"]
+    assert ids["handle_board"] in announced
+    assert not inside.intersection(announced), "other clients do not know the actions of functions"
+    trace = await server.services.runs.run_trace(1)
+    call = next(span for span in trace.spans if span.action_id == ids["handle_board"])
+    assert (call.device, call.call) == ("", UNSET)
+    assert [span.name for span in trace.spans if span.call == call.number][:2] == ["above feeder", "pick"]
+    assert "" not in {device.id for device in trace.devices}
+    entries = (await server.ask("GetExecutionTrace", {"limit": 100})).entries
+    assert {entry.call for entry in entries if entry.action_id in inside} >= {call.number}
 
 
 @serving()
