@@ -15,11 +15,14 @@ from arcor2_hw.data.project import (
     START,
     Action,
     ActionParameter,
+    ActionParameterType,
     ActionPoint,
     Flow,
+    FunctionReturns,
     LogicItem,
     NamedOrientation,
     Project,
+    ProjectFunction,
     ProjectLogicIf,
 )
 from arcor2_hw.data.scene import Scene, SceneObject
@@ -60,11 +63,11 @@ class Bench(Generic):
 _SCENE: Final = Scene("bench", objects=[SceneObject("bench", "Bench", id="obj_bench")], id="scn_bench")
 
 
-def project(size: int) -> Project:
-    """Return a project of `size` actions in blocks of four: a test, its two branches, and their join."""
-    actions, logic = [], [LogicItem(START, "act_0", id="lit_start")]
-    for n in range(size):
-        group, place = divmod(n, 4)
+def blocks(first: int, last: int, name: str) -> tuple[list[Action], list[LogicItem]]:
+    """Return the actions with these numbers, in blocks of four: a test, its two branches, and their join."""
+    actions, logic = [], [LogicItem(START, f"act_{first}", id=f"lit_start_{name}")]
+    for n in range(first, last):
+        group, place = divmod(n - first, 4)
         if place == 0:
             parameters: list[ActionParameter] = []
         else:
@@ -77,14 +80,41 @@ def project(size: int) -> Project:
         actions.append(Action(f"action {n}", f"obj_bench/{method}", f"act_{n}", parameters, [flow]))
         after = {0: (1, 2), 1: (2,), 2: (1,), 3: (1,)}[place]
         for branch, step in enumerate(after):
-            end = f"act_{n + step}" if n + step < size else END
+            end = f"act_{n + step}" if n + step < last else END
             when: Any = (
                 ProjectLogicIf(f"act_{n}/default/0", "false" if branch else "true") if place == 0 else msgspec.UNSET
             )
             logic.append(LogicItem(f"act_{n}", end, when, f"lit_{n}_{branch}"))
+    return actions, logic
+
+
+def project(size: int) -> Project:
+    """Return a project of `size` actions and calls. Half of the actions are in functions of 100, each called twice."""
+    count = size // 200
+    own = size - 100 * count - 2 * count
+    actions, logic = blocks(0, own, "program")
+    functions = []
+    before = f"act_{own - 1}"
+    logic[:] = [item for item in logic if item.start != before]
+    for number in range(count):
+        begin = own + 100 * number
+        inner, inner_logic = blocks(begin, begin + 100, f"f{number}")
+        parameter = ActionParameter("speed", ActionParameterType.FUNCTION_PARAMETER, '"speed"')
+        inner[1].parameters[1] = parameter
+        declared = [ActionParameter("speed", "double", "")]
+        returns = [FunctionReturns("boolean", f"act_{begin}/default/0")]
+        functions.append(ProjectFunction(f"step_{number}", inner, inner_logic, declared, returns, f"pfu_{number}"))
+        for call in (f"call_{number}_{part}" for part in range(2)):
+            given = [ActionParameter("speed", "double", "0.25")]
+            actions.append(Action(call, f"pfu_{number}/call", f"act_{call}", given, [Flow(outputs=[f"good_{call}"])]))
+            logic.append(LogicItem(before, f"act_{call}", id=f"lit_{call}"))
+            before = f"act_{call}"
+    logic.append(LogicItem(before, END, id="lit_end"))
     orientations = [NamedOrientation("default", Orientation(), "ori_bench")]
     point = ActionPoint("ap", Position(), id="acp_bench", orientations=orientations, actions=actions)
-    return Project(f"bench {size}", _SCENE.id, id=f"pro_{size}", action_points=[point], logic=logic)
+    return Project(
+        f"bench {size}", _SCENE.id, id=f"pro_{size}", action_points=[point], functions=functions, logic=logic
+    )
 
 
 async def build(report: Report) -> None:
