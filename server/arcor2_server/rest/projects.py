@@ -63,7 +63,7 @@ class ProjectOperations:
     async def put_project(self, query: PutProjectQuery, body: Project) -> Timestamp:
         """Save a new or changed project; return the time. Its scene must be saved before.
 
-        Error exits and names of errors that the body lacks are kept by the ids of their items, unless `exact`.
+        Functions, error exits and names of errors that the body lacks are kept by their ids, unless `exact`.
         """
         check_id(body.id, "project")
         if not query.exact:
