@@ -55,6 +55,7 @@ def chrome_trace(name: str, devices: Sequence[TracedDevice], spans: Sequence[Spa
     """Return spans in the Trace Event Format, which chrome://tracing and Perfetto open. Each device is a thread.
 
     Spans of a device that overlap, because a script uses several threads, are shown in further rows of the device.
+    Calls of functions have rows of their own.
 
     Args:
         name: Name of the process in the viewer.
@@ -71,12 +72,13 @@ def chrome_trace(name: str, devices: Sequence[TracedDevice], spans: Sequence[Spa
         row = next((row for row, (_, busy_until) in enumerate(of_device) if busy_until <= span.start + 1e-6), None)
         if row is None:
             row = len(of_device)
-            title = names.get(span.device, span.device)
+            title = names.get(span.device, span.device or "functions")
             titles.append((len(titles) + 1, title if row == 0 else f"{title} ({row + 1})"))
             of_device.append((titles[-1][0], end))
         thread = of_device[row][0]
         of_device[row] = (thread, end)
         details = {"number": span.number, "action_id": span.action_id, "branch": span.branch, "error": span.error}
+        details["call"] = span.call
         events.append(
             {
                 "ph": "X",

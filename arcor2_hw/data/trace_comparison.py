@@ -93,10 +93,10 @@ def summarize(trace: RunTrace) -> TraceSummary:
     by_action: dict[tuple[str, str], list[Span]] = {}
     for span in spans:
         by_action.setdefault(_key(span), []).append(span)
-    names = {span.start: span.name for span in reversed(spans)}
-    waits = [
-        Wait(names[after], before, after - before) for (_, before), (after, _) in itertools.pairwise(covered(spans))
-    ]
+    on_devices = [span for span in spans if span.device]  # without the calls of functions, which cover waits
+    names = {span.start: span.name for span in reversed(on_devices)}
+    times = itertools.pairwise(covered(on_devices))
+    waits = [Wait(names[after], before, after - before) for (_, before), (after, _) in times]
     return TraceSummary(
         whole,
         len(cycles),

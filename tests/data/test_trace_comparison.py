@@ -34,6 +34,17 @@ def test_a_summary_states_cycle_time_bottleneck_and_waits() -> None:
     assert [round(wait.duration, 6) for wait in found.waits] == [1.25, 0.5, 0.05]
 
 
+def test_calls_of_functions_do_not_hide_waits() -> None:
+    found = summarize(
+        trace(
+            Span(1, "act_f", "f", "", 0.0, 3.0),
+            Span(2, "act_a", "a", "arm", 0.0, 1.0, call=1),
+            Span(3, "act_b", "b", "belt", 2.0, 1.0, call=1),
+        )
+    )
+    assert found.waits == [Wait("b", 1.0, 1.0)]
+
+
 def test_actions_that_overlap_count_once() -> None:
     found = summarize(
         trace(

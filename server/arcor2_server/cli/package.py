@@ -118,7 +118,7 @@ def _show_trace(trace: RunTrace) -> None:
     out = console()
     table = Table("start", "duration", "device", "action", "branch", "error", box=None, pad_edge=False)
     for span in trace.spans:
-        texts = (names[span.device], span.name, span.branch or "", span.error or "")
+        texts = (names.get(span.device, ""), span.name, span.branch or "", span.error or "")
         table.add_row(f"{span.start:.3f} s", f"{span.duration:.3f} s", *(escape(printable(text)) for text in texts))
     out.print(table if trace.spans else "The run has executed no actions.")
     out.print(f"cycle: {times.cycle:.3f} s, {times.cycles} complete; all: {times.whole:.3f} s")
@@ -154,7 +154,7 @@ def _show_comparison(first: RunTrace, second: RunTrace) -> None:
     for one in compare(old, new):
         difference = one.difference
         table.add_row(
-            escape(printable(names[one.device])),
+            escape(printable(names.get(one.device, ""))),
             escape(printable(one.name)),
             *("" if isinstance(value, Unset) else f"{value:.3f} s" for value in (one.first, one.second)),
             "" if difference is None else f"{difference:+.3f} s",

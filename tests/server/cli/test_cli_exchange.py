@@ -639,3 +639,46 @@ def test_tokens_and_trusted_certificates_are_used(
         assert (brought.status, "technician" in brought.err or "programmer" in brought.err) == (18, True)
     finally:
         place.loop.run(server.stop())
+
+
+def test_a_function_is_taken_from_one_project_to_another(cli: Any, place: Place) -> None:
+    async def prepare(client: Client) -> str:
+        await client.register_user("author")
+        source = next(one for one in await client.list_projects() if one.name == "open it")
+        await client.copy_project(source_id=source.id, target_name="with function")
+        await client.new_project(scene_id=source.scene_id, name="other")
+        await client.save_project()
+        await client.close_project()
+        copied = next(one for one in await client.list_projects() if one.name == "with function")
+        await client.open_project(copied.id)
+        actions = [action.id for action in (await client.get_project(copied.id)).all_actions()]
+        await client.make_function(name="open_and_wait", action_ids=actions)
+        await client.save_project()
+        await client.close_project()
+        return copied.id
+
+    async def functions(client: Client) -> list[str]:
+        other = next(one for one in await client.list_projects() if one.name == "other")
+        return [function.name for function in (await client.get_project(other.id)).functions]
+
+    async def remove(client: Client) -> None:
+        await client.register_user("author")
+        for one in await client.list_projects():
+            if one.name in ("with function", "other"):
+                await client.delete_project(one.id)
+
+    place.ask(place.first, prepare)
+    exporting = ("project", "export-function", "with function")
+    assert "has no function nothing" in cli(*exporting, "nothing", at=place.first).err
+    assert cli(*exporting, "open_and_wait", at=place.first).out == (
+        "open_and_wait.json: functions open_and_wait; 2 references\n"
+    )
+    assert "already exists" in cli(*exporting, "open_and_wait", at=place.first).err
+    importing = ("project", "import-function", "other", "open_and_wait.json")
+    assert cli(*importing, "--dry-run", at=place.first).out == "other: can import open_and_wait\n"
+    assert place.ask(place.first, functions) == []
+    assert "--point needs OLD=NEW" in cli(*importing, "--point", "lid", at=place.first).err
+    assert cli(*importing, at=place.first).out == "other: imported open_and_wait\n"
+    assert cli(*importing, at=place.first).status == 0
+    assert place.ask(place.first, functions) == ["open_and_wait", "open_and_wait_2"]
+    place.ask(place.first, remove)
