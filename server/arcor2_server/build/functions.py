@@ -5,13 +5,14 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from arcor2_hw.data.object_type import ParameterMeta
-from arcor2_hw.data.project import CALL, ActionParameter, Project, ProjectFunction, parse_link
+from arcor2_hw.data.project import CALL, ActionParameter, ActionParameterType, Project, ProjectFunction, parse_link
 from arcor2_hw.exceptions import InvalidData, InvalidProject
 from arcor2_server.build import expressions
 from arcor2_server.build.cycle import Block, Cycle
 from arcor2_server.build.frame import Frame
 from arcor2_server.documents import logic_graph
 from arcor2_server.documents.checks.actions import text_of
+from arcor2_server.documents.item_indexes import reference
 from arcor2_server.documents.logic_graph import END_NODE, Flow
 
 NAME: Final = "an"
@@ -43,7 +44,17 @@ class FunctionCycle(Cycle):
 
     def _claim_parameters(self) -> None:
         self.names.claim(NAME)
-        self.parameters = {each.name: self.names.claim(each.name) for each in self.function.parameters}
+        # A parameter may have the name of a project parameter, whose value the calls often pass.
+        used = {
+            reference(parameter.type, parameter.value)
+            for action in self.flow.actions
+            for parameter in action.parameters
+            if parameter.type == ActionParameterType.PROJECT_PARAMETER
+        }
+        hidden = {variable for key, variable in self.frame.parameters.items() if key not in used}
+        for each in self.function.parameters:
+            claim = self.names.shadow if each.name in hidden else self.names.claim
+            self.parameters[each.name] = claim(each.name)
 
     def _result_variable(self, link: str, kind: str) -> str:
         """Return the variable of a result of the function. Raise InvalidProject unless it is set on all paths."""

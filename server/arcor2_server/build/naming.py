@@ -55,6 +55,11 @@ class Names:
             self._outer._inside.add(name)
         return name
 
+    def shadow(self, text: str) -> str:
+        """Reserve and return a name, also if the scope around has it, which must not use it inside this scope."""
+        name = identifier(text)
+        return self.claim(text) if name in self._taken else self._take(name)
+
     def claim(self, text: str, *others: str) -> str:
         """Reserve and return a name: `text`, else the first free one of `others`, else `text` with a number."""
         wanted = identifier(text)

@@ -206,6 +206,48 @@ async def test_a_function_moves_to_another_project_of_the_scene(alice: Person, w
     assert answer["function_id"]
 
 
+async def test_a_function_is_changed_in_the_script(alice: Person, work: Work) -> None:
+    await made(work, "try_luck", "draw", "pause", "again")
+    before = project_of(work)
+    [function] = before.functions
+    loaded = await alice.ask("ProjectScript")
+    script: str = loaded["script"]
+    assert "    def try_luck(wait: float, *, an: str) -> None:\n" in script
+    edited = script.replace("def try_luck(", "def play(").replace("        try_luck(", "        play(")
+    edited = edited.replace('0.1, an="again"', '0.2, an="again"')
+    edited = edited.replace(
+        '        time.sleep(wait, an="pause")\n',
+        '        time.sleep(wait, an="pause")\n        time.sleep(1.0, an="more")\n',
+    )
+    given = {"script": edited, "revision": loaded["revision"]}
+    checked = await alice.ask("CheckScript", **given)
+    assert checked["problems"] == []
+    await alice.ask("ImportScript", **given)
+    [changed] = project_of(work).functions
+    assert (changed.id, changed.name) == (function.id, "play")
+    assert [action.name for action in changed.actions] == ["draw", "pause", "again", "more"]
+    assert [action.id for action in changed.actions][:3] == [action.id for action in function.actions]
+    await alice.ask("Undo")
+    assert project_of(work) == before
+
+    moved = script.replace(
+        "    while True:\n", '    while True:\n        try_luck(wait, an="twice")\n        continue\n'
+    )
+    for wrong, reason in (
+        (moved, "never reached"),
+        (script.replace("    @res.function\n", ""), "needs the decorator @res.function"),
+        (script.replace("wait: float", "wait"), "the parameter wait needs a type hint"),
+        (script.replace("wait: float", "wait: list"), "list cannot be the type of the parameter wait"),
+        (
+            script.replace('        time.sleep(wait, an="pause")', '        try_luck(wait, an="pause")'),
+            "must be defined above",
+        ),
+        (script.replace("        draw", "        draw") + "\n\ndef f(): pass\n", "contains only imports, main"),
+    ):
+        problems = (await alice.ask("CheckScript", script=wrong, revision=loaded["revision"]))["problems"]
+        assert [reason in problem["message"] for problem in problems] == [True], (reason, problems)
+
+
 async def test_functions_survive_a_client_that_does_not_know_them(work: Work) -> None:
     await made(work, "try_luck", "draw")
     stored = project_of(work)

@@ -43,6 +43,9 @@ class FunctionReader(LoopReader):
         """Number of the call and of its result for each result of the function; None if no line states it."""
         self._variables: dict[str, ActionParameter] = {}
         for each in node.args.args:
+            if each.arg in script.lines and each.arg not in script.constants:
+                row = script.lines[each.arg]
+                raise NotUnderstood(each.lineno, "{name} is already defined in line {row}", name=each.arg, row=row)
             self._variables[each.arg] = self._parameter(each, old.get(each.arg), values)
         self.parameters = list(self._variables.values())
         body = node.body
