@@ -100,7 +100,7 @@ def request_handlers(s: Server) -> Handlers:
         OperationRequests(s.types, s.session, s.online, s.execution, s.motion, s.stop_all),
         OrientationRequests(s.locks, s.session, s.online, editing),
         ParameterRequests(s.locks, s.types, s.session, editing),
-        ProjectRequests(s.locks, s.storage, s.types, s.session, s.online, s.type_notifications, editing, scenes),
+        ProjectRequests(s.hub, s.locks, s.storage, s.types, s.session, s.online, s.type_notifications, editing, scenes),
         ReachabilityRequests(s.reachability),
         RobotRequests(s.locks, s.types, s.session, s.online, s.robots, s.kinematics, s.motion),
         RobotMotionRequests(s.locks, s.types, s.session, s.online, s.robots, s.motion),

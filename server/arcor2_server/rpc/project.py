@@ -8,7 +8,15 @@ from msgspec import UNSET
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import new_id, now
-from arcor2_hw.data.events import ChangeType, MainScreen, OpenProjectData, SceneStateData, ShowMainScreenData
+from arcor2_hw.data.events import (
+    ChangeType,
+    MainScreen,
+    NotificationData,
+    NotificationLevel,
+    OpenProjectData,
+    SceneStateData,
+    ShowMainScreenData,
+)
 from arcor2_hw.data.project import BareProject, Project, ProjectParameter
 from arcor2_hw.data.rpc import (
     CloseProjectArgs,
@@ -29,6 +37,7 @@ from arcor2_server.documents.checks.project import project_problems
 from arcor2_server.documents.document import reduce_to
 from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.errors import RequestRefused
+from arcor2_server.events import EventHub, make_event
 from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.online_scene import OnlineScene
@@ -46,6 +55,7 @@ def _id_parameter(name: str, value: str) -> ProjectParameter:
 class ProjectRequests:
     """Requests that open, save, close, rename, copy and delete projects (protocol, 7.4)."""
 
+    _hub: EventHub
     _locks: Locks
     _storage: Storage
     _types: ObjectTypes
@@ -133,6 +143,16 @@ class ProjectRequests:
             await self._save_scene_changes(context)
             await session.show(session.scene or scene, with_present_names(scene, project, self._types))
             self._emit_opened(context)
+            if project.functions:
+                self._notify_older_clients()
+
+    def _notify_older_clients(self) -> None:
+        """Tell the users of clients that do not know functions what they cannot edit."""
+        text = Message.of("This project contains functions. Your client shows their calls, but not what is in them.")
+        data = NotificationData(text.text, NotificationLevel.INFO, **text.translation())
+        notice = make_event("Notification", data)
+        for client in self._hub.clients - set(self._hub.subscribers("FunctionChanged")):
+            self._hub.send(client, notice)
 
     @rpc("SaveProject")
     async def save_project(self, context: Context, args: None) -> None:

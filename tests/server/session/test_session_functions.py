@@ -248,6 +248,18 @@ async def test_a_function_is_changed_in_the_script(alice: Person, work: Work) ->
         assert [reason in problem["message"] for problem in problems] == [True], (reason, problems)
 
 
+async def test_clients_that_do_not_know_functions_are_notified(
+    server: SessionServer, alice: Person, work: Work
+) -> None:
+    await made(work, "try_luck", "draw")
+    await alice.ask("SaveProject")
+    await alice.ask("CloseProject")
+    bob = await server.person("bob")
+    await bob.ask("SubscribeEvents", events=["FunctionChanged"])
+    await alice.ask("OpenProject", id=(await alice.ask("ListProjects"))[0]["id"])
+    assert [len([e for e in each.events() if e["event"] == "Notification"]) for each in (alice, bob)] == [1, 0]
+
+
 async def test_functions_survive_a_client_that_does_not_know_them(work: Work) -> None:
     await made(work, "try_luck", "draw")
     stored = project_of(work)
