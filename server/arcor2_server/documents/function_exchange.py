@@ -124,7 +124,9 @@ def import_function(
         raise Missing("The project lacks: {missing}.", missing="; ".join(found.missing))
     try:
         return _Importing(document, export, ids).changes()
-    except (ValueError, KeyError) as error:
+    except KeyError as error:
+        raise InvalidData("The exported function is damaged: {id} is missing.", id=error.args[0]) from error
+    except ValueError as error:
         raise InvalidData("The exported function is damaged: {reason}.", reason=error) from error
 
 
@@ -192,9 +194,13 @@ class _Importing:
         self._document, self._export, self._ids = document, export, ids
         self._names = Names(document)
         self._functions = {function.id: new_id("pfu") for function in export.functions}
-        self._actions = {action.id: new_id("act") for function in export.functions for action in function.actions}
+        actions = [action.id for function in export.functions for action in function.actions]
+        self._actions = {key: new_id("act") for key in actions}
+        if len(self._functions) < len(export.functions) or len(self._actions) < len(actions):
+            raise ValueError("an id is used twice")
 
     def changes(self) -> tuple[list[Change], list[str]]:
+        """Return the changes, and the ids of the functions. Raise KeyError or ValueError if the export is damaged."""
         changes: list[Change] = []
         for function in self._export.functions:
             changes += self._document.changes_to_add(self._function(function))

@@ -1,5 +1,6 @@
 """Makes functions from actions of a program, and dissolves calls into the actions of their function."""
 
+import contextlib
 import itertools
 from collections.abc import Callable, Sequence
 
@@ -25,11 +26,12 @@ from arcor2_hw.data.project import (
     ProjectLogicIf,
     parse_link,
 )
+from arcor2_hw.exceptions import InvalidData
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.checks.actions import action_meta, text_of
 from arcor2_server.documents.checks.object_types import Types
 from arcor2_server.documents.document import OUTPUT, Document
-from arcor2_server.documents.item_indexes import action_of, links, reference
+from arcor2_server.documents.item_indexes import action_of, link_of, links, reference
 from arcor2_server.errors import RequestRefused
 
 FROM_OUTSIDE = frozenset({ActionParameterType.PROJECT_PARAMETER, ActionParameterType.FUNCTION_PARAMETER})
@@ -110,7 +112,10 @@ def with_links(action: Action, changed: Callable[[tuple[str, str, int]], str | N
     def parameter(one: ActionParameter) -> ActionParameter:
         if one.type != ActionParameterType.LINK:
             return one
-        link = changed(parse_link(text_of(one)))
+        try:
+            link = changed(parse_link(text_of(one)))
+        except (InvalidData, ValueError):
+            return one  # the checks report a malformed link
         return one if link is None else replace(one, value=encoded(link))
 
     return replace(action, parameters=[parameter(one) for one in action.parameters])
@@ -118,10 +123,19 @@ def with_links(action: Action, changed: Callable[[tuple[str, str, int]], str | N
 
 def with_condition(item: LogicItem, changed: Callable[[tuple[str, str, int]], str | None]) -> LogicItem:
     """Return a logic item with a condition on another result, if `changed` returns one."""
-    if isinstance(item.condition, Unset):
+    tested = tested_by(item)
+    what = None if tested is None else changed(tested)
+    if what is None or isinstance(item.condition, Unset):
         return item
-    what = changed(item.condition.parse_what())
-    return item if what is None else replace(item, condition=ProjectLogicIf(what, item.condition.value))
+    return replace(item, condition=ProjectLogicIf(what, item.condition.value))
+
+
+def tested_by(item: LogicItem) -> tuple[str, str, int] | None:
+    """Return the result that the condition of a logic item tests, None without a condition or if it is malformed."""
+    if not isinstance(item.condition, Unset):
+        with contextlib.suppress(ValueError):
+            return item.condition.parse_what()
+    return None
 
 
 def used_by(user: Action | LogicItem | ProjectFunction) -> list[tuple[str, str, int]]:
@@ -130,9 +144,9 @@ def used_by(user: Action | LogicItem | ProjectFunction) -> list[tuple[str, str, 
         case Action():
             return list(links(user))
         case LogicItem():
-            return [] if isinstance(user.condition, Unset) else [user.condition.parse_what()]
+            return [] if (tested := tested_by(user)) is None else [tested]
         case ProjectFunction():
-            return [parse_link(each.link) for each in user.returns]
+            return [link for each in user.returns if (link := link_of(each)) is not None]
 
 
 def changes_of_users(
@@ -155,7 +169,9 @@ def changes_of_users(
                 changes.append(document.update(Kind.LOGIC, user.id, with_condition(user, changed)))
             case ProjectFunction():
                 returns = [
-                    each if (link := changed(parse_link(each.link))) is None else replace(each, link=link)
+                    each
+                    if (before := link_of(each)) is None or (link := changed(before)) is None
+                    else replace(each, link=link)
                     for each in user.returns
                 ]
                 changes.append(document.update(Kind.FUNCTION, user.id, replace(user, returns=returns)))
@@ -227,14 +243,12 @@ class _Selection:
 
     def _check_conditions(self) -> None:
         for item in (*self.inside, *self.leaving):
-            if isinstance(item.condition, Unset):
-                continue
-            tested = item.condition.parse_what()[0]
-            if tested not in self.actions:
+            tested = tested_by(item)
+            if tested is not None and tested[0] not in self.actions:
                 raise NoFunction(
                     "A condition of {name} uses a result of {tested}, which is not selected. Select {tested}, too.",
                     name=self._named([action_of(item.start)]),
-                    tested=self._named([tested]),
+                    tested=self._named([tested[0]]),
                 )
 
 
@@ -300,6 +314,11 @@ def _results_used_outside(document: Document, selection: _Selection) -> list[tup
             raise NoFunction(
                 "The error of {name} is used by an action that is not selected. Select it, too.",
                 name=document.action(link[0]).name,
+            )
+        action = selection.actions[link[0]]
+        if link[2] >= len(action.outputs()):
+            raise NoFunction(
+                "{source} has no named result number {index}. Name its results.", source=action.name, index=link[2]
             )
         found[link[0], link[2]] = None
 
