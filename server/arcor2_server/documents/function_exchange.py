@@ -23,7 +23,7 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_server.documents.changes import Change, Item, Kind
 from arcor2_server.documents.checks.actions import text_of
 from arcor2_server.documents.document import Document
-from arcor2_server.documents.functions import Names, encoded, with_condition, with_links
+from arcor2_server.documents.function_links import Names, encoded, with_condition, with_links
 from arcor2_server.documents.item_indexes import action_of
 from arcor2_server.errors import RequestRefused
 
@@ -125,7 +125,8 @@ def import_function(
     try:
         return _Importing(document, export, ids).changes()
     except KeyError as error:
-        raise InvalidData("The exported function is damaged: {id} is missing.", id=error.args[0]) from error
+        key = error.args[0][-1] if isinstance(error.args[0], tuple) else error.args[0]
+        raise InvalidData("The exported function is damaged: {id} is missing.", id=key) from error
     except ValueError as error:
         raise InvalidData("The exported function is damaged: {reason}.", reason=error) from error
 

@@ -19,7 +19,7 @@ from arcor2_server.documents.checks.actions import uses_of_parameter
 from arcor2_server.documents.checks.functions import type_of_result
 from arcor2_server.documents.checks.object_types import Types
 from arcor2_server.documents.document import Document
-from arcor2_server.documents.functions import Names, changes_of_users, encoded, used_by
+from arcor2_server.documents.function_links import Names, changes_of_users, encoded, used_by
 from arcor2_server.errors import RequestRefused
 
 

@@ -28,6 +28,7 @@ from arcor2_hw.data.rpc import (
 )
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, EditKind, Kind
+from arcor2_server.documents.function_calls import changes_to_remove, dissolve_call
 from arcor2_server.documents.function_exchange import export_function, import_function
 from arcor2_server.documents.function_signature import (
     add_parameter,
@@ -37,7 +38,7 @@ from arcor2_server.documents.function_signature import (
     update_parameter,
     update_result,
 )
-from arcor2_server.documents.functions import changes_to_remove, dissolve_call, make_function
+from arcor2_server.documents.functions import make_function
 from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.undo import Undo

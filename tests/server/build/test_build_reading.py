@@ -21,7 +21,7 @@ from arcor2_server.build.script import from_logic
 from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.consistency import check_consistent
 from arcor2_server.documents.document import Document
-from arcor2_server.documents.functions import dissolve_call
+from arcor2_server.documents.function_calls import dissolve_call
 from arcor2_server.errors import RequestRefused
 from tests.server.build import workplace
 from tests.server.build.projects import (

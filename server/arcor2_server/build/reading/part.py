@@ -1,0 +1,271 @@
+"""Converts the calls and paths of the program, or of one function, to actions and logic."""
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+from msgspec import UNSET
+from msgspec.structs import replace
+
+from arcor2_hw.data.base import Unset, is_valid_name, new_id
+from arcor2_hw.data.project import (
+    END,
+    START,
+    Action,
+    ActionParameter,
+    ActionParameterType,
+    Flow,
+    LogicItem,
+    ProjectLogicIf,
+)
+from arcor2_server.build import layout
+from arcor2_server.build.error_exits import nodes_of
+from arcor2_server.build.reading.errors import NotUnderstood
+from arcor2_server.build.reading.paths import START_NODE, Call, LogicPath, LoopReader
+from arcor2_server.build.reading.values import Values, json_of
+from arcor2_server.documents.logic_graph import END_NODE, Condition, Edge, ErrorExit
+
+_ConditionKey = tuple[str, object] | None
+"""A condition in comparable form: the result and its value."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variables:
+    """The variables of results and errors by action, and of parameters by function and name."""
+
+    results: dict[str, list[str]] = field(default_factory=dict)
+    errors: dict[str, str] = field(default_factory=dict)
+    parameters: dict[str, dict[str, str]] = field(default_factory=dict)
+
+
+class Part:
+    """The program or a function, as the script states it and as it was before.
+
+    Args:
+        reader: the calls and paths in the script.
+        values: reads arguments.
+        actions: the actions before.
+        logic: the logic before.
+        variables: the variables in the script of the old project.
+    """
+
+    def __init__(
+        self,
+        reader: LoopReader,
+        values: Values,
+        actions: Sequence[Action],
+        logic: list[LogicItem],
+        variables: Variables,
+    ) -> None:
+        self.calls = reader.calls
+        self.before = {action.name: action for action in reversed(actions)}
+        """The actions before by name."""
+        self.ids = [self.before[call.name].id if call.name in self.before else new_id("act") for call in self.calls]
+        self.unreachable: dict[str, Action] = {}
+        """The actions that no path of the old logic reached and that are not in the script."""
+        self._values = values
+        self._old_logic = logic
+        self._variables = variables
+        self._paths = {number: _merged(found) for number, found in reader.paths.items()}
+        self._exits = reader.exits
+        self._number_of = {call.name: number for number, call in enumerate(self.calls)}
+        self._reached = reached(logic)
+        self._check_uses(reader)
+
+    def _check_uses(self, loop: LoopReader) -> None:
+        """Raise NotUnderstood for uses of results that are not set on all paths."""
+        count = range(len(self.calls))
+        edges = [tuple(Edge(path.target, None) for path in loop.paths[number]) for number in count]
+        nodes = nodes_of(edges, [loop.exits.get(number, ()) for number in count])
+        _, natural = layout.arrange(nodes.edges)
+        for use in loop.uses:
+            producer = self.calls[use.source].name
+            node = (nodes.success if use.in_condition else nodes.call)[use.user]
+            if use.of_error:
+                if not nodes.has_error(natural, use.source, node):
+                    raise NotUnderstood(
+                        use.line,
+                        "{name} is not always set: {producer!r} has not failed on all paths to this line",
+                        name=use.name,
+                        producer=producer,
+                    )
+            elif not nodes.has_results(natural, use.source, node):
+                raise NotUnderstood(
+                    use.line,
+                    "{name} is not always set: {producer!r} does not run on all paths to this line",
+                    name=use.name,
+                    producer=producer,
+                )
+
+    # ------------------------------------------------------------------------------------------------ actions
+    def updated(self, old: Action) -> Action | None:
+        """Return an action of the old project as the script states it, None if it is removed."""
+        number = self._number_of.get(old.name)
+        if number is not None and self.ids[number] == old.id:
+            return self.action(number, old)
+        if old.id not in self._reached and number is None:
+            self.unreachable[old.id] = old
+            return old
+        return None
+
+    def check_names(self, actions: Iterable[Action]) -> None:
+        """Raise NotUnderstood if two actions of the program or function name the same result."""
+        named = {name: old.name for old in self.unreachable.values() for name in old.names()}
+        for action in actions:
+            if action.id in self.unreachable:
+                continue
+            for output in action.names():
+                if output in named:
+                    raise NotUnderstood(
+                        self.calls[self._number_of[action.name]].line,
+                        "{output} is already a result of the action {named!r}",
+                        output=output,
+                        named=named[output],
+                    )
+                named[output] = action.name
+
+    def action(self, number: int, old: Action | None) -> Action:
+        """Return the action of a call. `old`: the same action in the old project."""
+        call = self.calls[number]
+        given = {} if old is None else {parameter.name: parameter for parameter in old.parameters}
+        found: dict[str, ActionParameter] = {}
+        for meta in call.declared.parameters:
+            if (node := call.arguments.get(meta.name)) is None:
+                continue
+            if meta.name in call.results:
+                source, flow, output = call.results[meta.name]
+                link = f"{self.ids[source]}/{flow}/{output}"
+                found[meta.name] = ActionParameter(meta.name, ActionParameterType.LINK, json_of(link))
+            elif meta.name in call.passed:
+                passed = json_of(call.passed[meta.name])
+                found[meta.name] = ActionParameter(meta.name, ActionParameterType.FUNCTION_PARAMETER, passed)
+            else:
+                found[meta.name] = self._values.constant(
+                    node, meta, call.object_id, call.type_name, call.declared.name, given.get(meta.name)
+                )
+        order = [*(name for name in given if name in found), *(name for name in found if name not in given)]
+        return Action(
+            call.name,
+            f"{call.object_id}/{call.declared.name}",
+            self.ids[number],
+            [found[name] for name in order],
+            self._flows(call, old),
+            self._error_output(call, old),
+        )
+
+    def _error_output(self, call: Call, old: Action | None) -> str | Unset:
+        if not call.error:
+            return UNSET
+        if old is not None and self._variables.errors.get(old.id) == call.error:
+            return old.error_output
+        if not is_valid_name(call.error):
+            raise NotUnderstood(call.line, "{variable} is not a valid name of an error", variable=call.error)
+        return call.error
+
+    def _flows(self, call: Call, old: Action | None) -> list[Flow]:
+        before = [] if old is None else self._variables.results.get(old.id, [])
+        outputs = []
+        for place, variable in enumerate(call.outputs):
+            if old is not None and place < len(before) and before[place] == variable:
+                outputs.append(old.outputs()[place])
+                continue
+            if not is_valid_name(variable):
+                raise NotUnderstood(call.line, "{variable} is not a valid name of a result", variable=variable)
+            outputs.append(variable)
+        if old is not None and old.outputs() == outputs:
+            return old.flows
+        return [Flow(outputs=outputs)]
+
+    # ------------------------------------------------------------------------------------------------ logic
+    def logic(self) -> list[LogicItem]:
+        """Return the logic. Unchanged items are the old ones, in their order."""
+        old_items: dict[str, list[LogicItem]] = {}
+        for item in self._old_logic:
+            old_items.setdefault(item.start.partition("/")[0], []).append(item)
+        unchanged: dict[int, LogicItem] = {}
+        changed: list[LogicItem] = []
+        for number, paths in self._paths.items():
+            start = START if number == START_NODE else self.ids[number]
+            old = old_items.get(start, [])
+            wanted = self._steps(paths, old)
+            wanted += [self._exit(one) for one in self._exits.get(number, ())]
+            same = {_key(item): item for item in old}
+            keys = [_key(item) for item in wanted]
+            # The order of conditions matters; the edge without a condition is always the last.
+            ordered = len(paths) <= 2 or [key for key in same if key[1]] == [key for key in keys if key[1]]
+            if len(same) == len(old) == len(keys) and set(same) == set(keys) and ordered:
+                unchanged |= {id(item): item for item in old}
+                continue
+            spare = {(item.end.partition("/")[0], item.is_error_exit): item for item in old}
+            for item in wanted:
+                former = spare.pop((item.end, item.is_error_exit), None)
+                changed.append(replace(item, start=start, id=former.id if former else new_id("lit")))
+        known = {*self.ids, *self.unreachable, END}
+        for item in self._old_logic:
+            if item.start.partition("/")[0] in self.unreachable and item.end.partition("/")[0] in known:
+                unchanged[id(item)] = item
+        return [*(item for item in self._old_logic if id(item) in unchanged), *changed]
+
+    def _end(self, target: int) -> str:
+        return END if target == END_NODE else self.ids[target]
+
+    def _exit(self, found: ErrorExit) -> LogicItem:
+        return LogicItem("", self._end(found.target), error_kinds=list(found.kinds))
+
+    def _steps(self, paths: list[LogicPath], old: list[LogicItem]) -> list[LogicItem]:
+        """Return the ordinary steps of an action, without start and id."""
+        before = {_key(item) for item in old}
+        steps: list[LogicItem] = []
+        for path in paths:
+            end = self._end(path.target)
+            if path.taken is not None:
+                steps.append(LogicItem("", end, self._logic_if(path.taken)))
+                continue
+            opposites = [
+                self._logic_if(one._replace(value=not one.value)) for one in path.tried if isinstance(one.value, bool)
+            ]
+            known = [one for one in opposites if _key(LogicItem("", end, one)) in before]
+            chosen = [*known, *reversed(opposites)]
+            steps.append(LogicItem("", end, chosen[0] if chosen else UNSET))
+        return steps
+
+    def _logic_if(self, condition: Condition) -> ProjectLogicIf:
+        return ProjectLogicIf(f"{self.ids[condition.action]}/default/{condition.output}", json_of(condition.value))
+
+
+def _merged(paths: list[LogicPath]) -> list[LogicPath]:
+    """Remove conditions without effect: those of the last edges if these lead to the same action."""
+    *others, last = paths
+    while others and others[-1].target == last.target:
+        others.pop()
+    return [*others, last._replace(tried=tuple(path.taken for path in others if path.taken is not None))]
+
+
+def _condition_key(condition: ProjectLogicIf | Unset) -> _ConditionKey:
+    if isinstance(condition, Unset):
+        return None
+    try:
+        value = json.loads(condition.value)
+    except ValueError:
+        return condition.what, condition.value
+    return condition.what, (type(value).__name__, value)
+
+
+def _key(item: LogicItem) -> tuple[str, _ConditionKey, frozenset[str]]:
+    kinds = frozenset(item.error_kinds or ())
+    return item.end.partition("/")[0], _condition_key(item.condition), kinds
+
+
+def reached(logic: Iterable[LogicItem]) -> set[str]:
+    """Return the ids of the actions reachable from START, which are those in the script of the project."""
+    following: dict[str, list[str]] = {}
+    for item in logic:
+        following.setdefault(item.start.partition("/")[0], []).append(item.end.partition("/")[0])
+    seen: set[str] = set()
+    waiting = [START]
+    while waiting:
+        for action_id in following.get(waiting.pop(), ()):
+            if action_id != END and action_id not in seen:
+                seen.add(action_id)
+                waiting.append(action_id)
+    return seen
