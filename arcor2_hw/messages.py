@@ -71,8 +71,17 @@ class Message(Struct, frozen=True, omit_defaults=True):
     @classmethod
     def joined(cls, messages: Sequence["Message"]) -> "Message":
         """Return messages as one, separated by spaces. Clients translate each as a part of it."""
+        return cls._parts(messages, " ")
+
+    @classmethod
+    def listed(cls, messages: Sequence["Message"]) -> "Message":
+        """Return messages as one, separated by commas."""
+        return cls._parts(messages, ", ")
+
+    @classmethod
+    def _parts(cls, messages: Sequence["Message"], separator: str) -> "Message":
         parts = {f"part{number}": message for number, message in enumerate(messages, 1)}
-        return cls.of(" ".join(f"{{{name}}}" for name in parts), **parts) if len(parts) != 1 else messages[0]
+        return cls.of(separator.join(f"{{{name}}}" for name in parts), **parts) if len(parts) != 1 else messages[0]
 
     def translation(self) -> dict[str, Any]:
         """Return the fields `key` and `values` that are sent next to the text; empty if the text itself is the key."""

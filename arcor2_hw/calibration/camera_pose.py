@@ -13,7 +13,7 @@ from arcor2_hw.calibration.camera_results import CameraPose, LensCheck, LensStat
 from arcor2_hw.calibration.detection import Detection, detect_layout
 from arcor2_hw.calibration.diagnosis import check_not_mirrored, wanted_markers
 from arcor2_hw.calibration.drawing import GOOD, Canvas, error_picture
-from arcor2_hw.calibration.layout import Layout
+from arcor2_hw.calibration.layout import Layout, called
 from arcor2_hw.calibration.lens import Array, Lens
 from arcor2_hw.calibration.lens_check import Checked, check_of_lens
 from arcor2_hw.calibration.pictures import Picture, grey_of, one_by_one
@@ -296,14 +296,6 @@ def _verdict(
             )
         )
     return grade, Message.joined(parts)
-
-
-def called(name: str) -> Message:
-    """Return the name of a marker or board as a value of messages."""
-    kind, _, number = name.partition(" ")
-    if kind == "marker":
-        return Message.of("marker {number}", number=number)
-    return Message.of("board {number}", number=number)
 
 
 def draw_camera_pose(picture: Picture, parameters: CameraParameters, layout: Layout, result: CameraPose) -> bytes:

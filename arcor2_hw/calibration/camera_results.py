@@ -193,14 +193,14 @@ class HandEyeMethod(Data, frozen=True):
     translation: float
 
 
-class HandEyeError(Data, frozen=True):
+class HandEyeError(TranslatableData, frozen=True):
     """How well one sample fits.
 
     Attributes:
         residual: Root mean square error of the corners, px.
         largest: Largest error of a corner, px.
         used: Whether it was used.
-        problem: Why it was not used.
+        problem: Why it was not used. `key` and `values` translate it.
     """
 
     sample: int
@@ -211,8 +211,10 @@ class HandEyeError(Data, frozen=True):
     problem: str = ""
 
 
-class HandEye(Data, frozen=True):
+class HandEye(TranslatableData, frozen=True):
     """The pose of a camera on the flange (eye_in_hand), or in the robot's base frame (eye_to_hand).
+
+    `key` and `values` translate the verdict.
 
     Attributes:
         target: Pose of the target in the base frame (eye_in_hand) or on the flange (eye_to_hand).
@@ -256,14 +258,14 @@ class IntrinsicsOptions(Data, frozen=True):
     blur_threshold: float = 150.0
 
 
-class ViewError(Data, frozen=True):
+class ViewError(TranslatableData, frozen=True):
     """How well one image fits.
 
     Attributes:
         residual: Root mean square error of the corners, px.
         largest: Largest error of a corner, px.
         used: Whether it was used.
-        problem: Why it was not used.
+        problem: Why it was not used. `key` and `values` translate it.
     """
 
     view: int
@@ -274,8 +276,8 @@ class ViewError(Data, frozen=True):
     problem: str = ""
 
 
-class Intrinsics(Data, frozen=True):
-    """The intrinsics of a camera for images of width × height.
+class Intrinsics(TranslatableData, frozen=True):
+    """The intrinsics of a camera for images of width × height. `key` and `values` translate the verdict.
 
     Attributes:
         deviations: Standard deviations of fx, fy, cx, cy, px.

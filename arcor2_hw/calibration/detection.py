@@ -9,7 +9,7 @@ import numpy as np
 from arcor2_hw.calibration.boards import CORNER_DEVIATION, board_of, check_layout, measured_board, seen_of_board
 from arcor2_hw.calibration.diagnosis import check_not_mirrored, check_visible, glare_of, wanted_markers
 from arcor2_hw.calibration.edges import Measured
-from arcor2_hw.calibration.layout import CharucoBoard, Layout, MarkerDictionary
+from arcor2_hw.calibration.layout import CharucoBoard, Layout, MarkerDictionary, called
 from arcor2_hw.calibration.lens import Array, Lens
 from arcor2_hw.calibration.markers import detect, measured
 from arcor2_hw.calibration.pictures import Grey
@@ -201,24 +201,35 @@ def _missing(greys: Sequence[Grey], layout: Layout, contents: Sequence[_ImageCon
     Raises:
         CalibrationRefused: The image is mirrored.
     """
-    wanted = [f"marker {marker.marker_id}" for marker in layout.markers[:8]]
-    wanted += [f"a board of {board.columns} × {board.rows} squares" for board in layout.boards]
+    wanted = [called(f"marker {marker.marker_id}") for marker in layout.markers[:8]]
+    wanted += [
+        Message.of("a board of {columns} × {rows} squares", columns=board.columns, rows=board.rows)
+        for board in layout.boards
+    ]
     unclear = sorted({number for content in contents for number in content.unclear})
     others = sorted({number for content in contents for number in content.strangers})
     glare = glare_of(greys[0])
     if unclear:
-        text = f"Marker {', '.join(map(str, unclear))} was recognized, but its edges cannot be measured."
+        numbers = ", ".join(map(str, unclear))
+        parts = [Message.of("Marker {numbers} was recognized, but its edges cannot be measured.", numbers=numbers)]
     elif any(content.pieces for content in contents):
-        text = f"Too little is seen of {' and '.join(wanted)}: only some of its markers."
+        text = "Too little is visible of {wanted}: only some of its markers."
+        parts = [Message.of(text, wanted=Message.listed(wanted))]
     else:
         check_not_mirrored(greys[0], wanted_markers(layout))
-        text = f"No configured marker or board is visible: {', '.join(wanted)}."
+        text = "No configured marker or board is visible: {wanted}."
+        parts = [Message.of(text, wanted=Message.listed(wanted))]
         if others:
-            text += f" The image has markers that are not configured: {', '.join(map(str, others[:8]))}."
+            numbers = ", ".join(map(str, others[:8]))
+            parts.append(Message.of("The image has markers that are not configured: {numbers}.", numbers=numbers))
     if glare:
-        text += f" {glare:.0%} of the image is overexposed: avoid glare, and reduce the light or the exposure time."
-        return CalibrationRefused(text, reason=Reason.OVEREXPOSED)
+        overexposed = "{share:.0%} of the image is overexposed: avoid glare, and reduce the light or the exposure time."
+        parts.append(Message.of(overexposed, share=glare))
+        return CalibrationRefused(Message.joined(parts), reason=Reason.OVEREXPOSED)
     if not others:
-        text += " The image is sharp. Check that the markers are not covered, are flat, have a white margin, and are"
-        text += " large enough in the image."
-    return CalibrationRefused(text, reason=Reason.NO_MARKER)
+        text = (
+            "The image is sharp. Check that the markers are not covered, are flat, have a white margin, and are "
+            "large enough in the image."
+        )
+        parts.append(Message.of(text))
+    return CalibrationRefused(Message.joined(parts), reason=Reason.NO_MARKER)

@@ -32,6 +32,7 @@ from arcor2_hw.calibration.rigid import crossed, inverted, mean_rotation, motion
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.messages import Message
 
 FEWEST: Final = 3
 MOST_SAMPLES: Final = 300
@@ -81,7 +82,7 @@ def find_hand_eye(
         check_pose(each.flange, f"the flange's pose of sample {index}")
     if not (0 < options.robot_position < 1 and 0 < options.robot_orientation < 1):
         raise InvalidData("robot_position and robot_orientation must be small positive numbers, in m and rad")
-    problems: dict[int, str] = {}
+    problems: dict[int, Message] = {}
     stations: list[Station] = []
     eyes: list[Array] = []
     lens: Lens | None = None
@@ -93,13 +94,13 @@ def find_hand_eye(
             seen = detect_layout([grey], lens, target, options.blur_threshold, options.largest_blur).seen
             found = search(lens, seen, Hints(), PoseOptions(largest_deviation=_TARGET_DEVIATION))
         except CalibrationRefused as error:
-            problems[index] = str(error)
+            problems[index] = error.message
         else:
             if found.covariance[0, 0] + found.covariance[1, 1] + found.covariance[2, 2] < 3 * _TARGET_DEVIATION**2:
                 stations.append(Station(index, hand, seen))
                 eyes.append(found.pose)
             else:
-                problems[index] = "the target is too far away, or seen only from the front"
+                problems[index] = Message.of("the target is too far away, or seen only from the front")
         if progress is not None:
             progress(index + 1, len(samples))
     assert lens is not None
@@ -107,8 +108,9 @@ def find_hand_eye(
     _check_turns([each.hand for each in stations], options)
     best, methods = _solve(lens, stations, eyes, options)
     while (worst := _outlier(best)) is not None and len(stations) > max(FEWEST, len(samples) // 2):
-        problems[stations[worst].index] = (
-            f"it contradicts the others by {_root_mean_square(best.errors[worst]):.1f} px: was the arm still moving?"
+        problems[stations[worst].index] = Message.of(
+            "it contradicts the others by {residual:.1f} px: was the arm still moving?",
+            residual=_root_mean_square(best.errors[worst]),
         )
         stations = [each for i, each in enumerate(stations) if i != worst]
         eyes = [each for i, each in enumerate(eyes) if i != worst]
@@ -117,7 +119,7 @@ def find_hand_eye(
     return _result(best, methods, stations, problems, mounting, options, lens)
 
 
-def _check_enough(stations: list[Station], problems: dict[int, str]) -> None:
+def _check_enough(stations: list[Station], problems: dict[int, Message]) -> None:
     """Require enough images of the target.
 
     Raises:
@@ -215,7 +217,7 @@ def _result(
     best: Mount,
     methods: list[HandEyeMethod],
     stations: list[Station],
-    problems: dict[int, str],
+    problems: dict[int, Message],
     mounting: Mounting,
     options: HandEyeOptions,
     lens: Lens,
@@ -242,7 +244,7 @@ def _result(
     orientation = float(np.sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
     if checked.contradicted and not position <= options.largest_deviation:
         raise CalibrationRefused(
-            "The camera's place would be off by {position:.0f} mm.{verdict}",
+            "The camera's place would be off by {position:.0f} mm. {verdict}",
             f"at most {options.largest_deviation * 1000:.1f} mm",
             Reason.IMPLAUSIBLE,
             position=position * 1000,
@@ -260,20 +262,35 @@ def _result(
         HandEyeError(s.index, len(e), _root_mean_square(e), float(np.linalg.norm(e, axis=1).max()))
         for s, e in zip(stations, best.errors, strict=True)
     ]
-    errors += [HandEyeError(index, 0, 0.0, 0.0, used=False, problem=problem) for index, problem in problems.items()]
+    errors += [
+        HandEyeError(index, 0, 0.0, 0.0, used=False, problem=problem.text, **problem.translation())
+        for index, problem in problems.items()
+    ]
     errors.sort(key=lambda each: each.sample)
-    where = "on the flange" if mounting == "eye_in_hand" else "beside the robot"
     count = len(stations)
-    verdict = (
-        f"The camera's position {where} is known to {position * 1000:.1f} mm and its direction to "
-        f"{math.degrees(orientation):.2f}° (standard deviations; {count} pictures, residual {residual:.2f} px)."
+    text = (
+        "The camera's position on the flange is known to {position:.1f} mm and its direction to {direction:.2f}° "
+        "(standard deviations; pictures: {count}, residual {residual:.2f} px)."
+        if mounting == "eye_in_hand"
+        else "The camera's position next to the robot is known to {position:.1f} mm and its direction to "
+        "{direction:.2f}° (standard deviations; pictures: {count}, residual {residual:.2f} px)."
     )
-    verdict += checked.verdict
+    known = Message.of(
+        text, position=position * 1000, direction=math.degrees(orientation), count=count, residual=residual
+    )
+    parts = [known, checked.verdict]
     grade = Grade.GOOD if position <= _GOOD and count >= 8 and checked.is_good else Grade.USABLE
     if count < 8:
-        verdict += " Ten pictures or more improve the result."
+        parts.append(Message.of("Ten pictures or more improve the result."))
     if problems:
-        verdict += f" {len(problems)} of {count + len(problems)} pictures could not be used."
+        parts.append(
+            Message.of(
+                "Pictures that could not be used: {unused} of {count}.",
+                unused=len(problems),
+                count=count + len(problems),
+            )
+        )
+    verdict = Message.joined(parts)
     views = [(f"sample {s.index}", s.pixels, e, True) for s, e in zip(stations, best.errors, strict=True)]
     return HandEye(
         mounting=mounting,
@@ -286,6 +303,7 @@ def _result(
         position_deviation=position,
         orientation_deviation=orientation,
         grade=grade,
-        verdict=verdict,
-        picture=error_picture((lens.width, lens.height), views, verdict.split(" (")[0] + "."),
+        verdict=verdict.text,
+        picture=error_picture((lens.width, lens.height), views, verdict.text.split(" (")[0] + "."),
+        **verdict.translation(),
     )

@@ -11,6 +11,7 @@ from arcor2_hw.calibration.hand_eye_problem import Mount, Station, errors_at, sl
 from arcor2_hw.calibration.lens import Array, Lens
 from arcor2_hw.calibration.lens_check import CERTAIN, SIGNIFICANT, is_misfit
 from arcor2_hw.calibration.rigid import inverted, moved, rotation_vector
+from arcor2_hw.messages import Message, translatable
 
 _ROUNDS: Final = 4
 _POSE: Final = 12
@@ -53,33 +54,63 @@ class Checked:
         return self.confirmed and not (self.contradicted or self.misfit or self.robot_misfit)
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Message:
         """Return what confirms or contradicts the result, and what to do."""
-        known = (
-            f"The motions of the robot confirm the size of the target to {self.size[1]:.2%} and the focal length to "
-            f"{self.focal[1]:.2%}"
-        )
-        text = f" {known}." if self.confirmed and not self.contradicted else ""
-        if not self.confirmed and not self.contradicted:
-            by_size, by_focal = (1000 * distance for distance in self.by_percent)
-            text = (
-                f" {known} only. The stated accuracy does not include their errors: 1 % of the size moves the camera "
-                f"by {by_size:.1f} mm, 1 % of the focal length by {by_focal:.1f} mm. Measure the target exactly, or "
-                "take more pictures, farther apart."
-            )
-        if self.contradicted:
-            what = [
-                f"the {name} seems {abs(value - 1):.1%} {'larger' if value > 1 else 'smaller'} (± {deviation:.1%})"
-                for name, (value, deviation) in (("target", self.size), ("focal length", self.focal))
-                if abs(value - 1) > CERTAIN * deviation
-            ]
-            found = " and ".join(what) or "the size of the target or the focal length is wrong"
-            text += f" The motions of the robot contradict target or lens: {found}. Measure the target and the lens."
+        parts = [self._contradiction() if self.contradicted else self._confirmation()]
         if self.misfit:
-            text += " The corners fit neither target nor lens: check that the target is flat, and the intrinsics."
+            misfit = "The corners fit neither target nor lens: check that the target is flat, and the intrinsics."
+            parts.append(Message.of(misfit))
         if self.robot_misfit:
-            text += f" The poses of the robot are {self.robot:.0f} times less accurate than expected."
-        return text
+            inaccurate = "The poses of the robot are {factor:.0f} times less accurate than expected."
+            parts.append(Message.of(inaccurate, factor=self.robot))
+        return Message.joined(parts)
+
+    def _confirmation(self) -> Message:
+        size, focal = self.size[1], self.focal[1]
+        if self.confirmed:
+            return Message.of(
+                "The motions of the robot confirm the size of the target to {size:.2%} and the focal length to "
+                "{focal:.2%}.",
+                size=size,
+                focal=focal,
+            )
+        by_size, by_focal = (1000 * distance for distance in self.by_percent)
+        return Message.of(
+            "The motions of the robot confirm the size of the target to {size:.2%} and the focal length to {focal:.2%} "
+            "only. The stated accuracy does not include their errors: 1 % of the size moves the camera by "
+            "{by_size:.1f} mm, 1 % of the focal length by {by_focal:.1f} mm. Measure the target exactly, or take more "
+            "pictures, farther apart.",
+            size=size,
+            focal=focal,
+            by_size=by_size,
+            by_focal=by_focal,
+        )
+
+    def _contradiction(self) -> Message:
+        found = []
+        for (value, deviation), larger, smaller in (
+            (
+                self.size,
+                translatable("The target seems {difference} larger (± {deviation})."),
+                translatable("The target seems {difference} smaller (± {deviation})."),
+            ),
+            (
+                self.focal,
+                translatable("The focal length seems {difference} larger (± {deviation})."),
+                translatable("The focal length seems {difference} smaller (± {deviation})."),
+            ),
+        ):
+            if abs(value - 1) > CERTAIN * deviation:
+                text = larger if value > 1 else smaller
+                found.append(Message.of(text, difference=f"{abs(value - 1):.1%}", deviation=f"{deviation:.1%}"))
+        wrong = found or [Message.of("The size of the target or the focal length is wrong.")]
+        return Message.joined(
+            [
+                Message.of("The motions of the robot contradict target or lens."),
+                *wrong,
+                Message.of("Measure the target and the lens."),
+            ]
+        )
 
 
 def check_of_hand_eye(lens: Lens, stations: Sequence[Station], found: Mount, robot: tuple[float, float]) -> Checked:

@@ -19,6 +19,7 @@ from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.results import Grade
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.messages import Message
 
 MOST_PICTURES: Final = 300
 _FLAGS: Final = {
@@ -82,7 +83,7 @@ def find_intrinsics(
     made = board_of(board)
     size = (0, 0)
     views: list[_View] = []
-    problems: dict[int, str] = {}
+    problems: dict[int, Message] = {}
     for index, grey in enumerate(one_by_one(pictures)):
         size = grey.shape[1], grey.shape[0]
         points, pixels = seen_of_board(grey, board, made, detect(grey, board.dictionary))
@@ -96,21 +97,22 @@ def find_intrinsics(
     solved = _solve(views, size, options)
     while (outlier := _outlier(solved)) is not None and len(views) > options.fewest_views:
         residual = _root_mean_square(solved.errors[outlier])
-        problems[views[outlier].index] = f"its corners are off by {residual:.1f} px: moved, bent or blurred"
+        text = "its corners are off by {residual:.1f} px: moved, bent or blurred"
+        problems[views[outlier].index] = Message.of(text, residual=residual)
         views = [view for i, view in enumerate(views) if i != outlier]
         solved = _solve(views, size, options)
     _check_enough(views, problems, size, options)
     return _result(views, solved, problems, size, options, len(pictures))
 
 
-def _why_not(grey: Grey, options: IntrinsicsOptions) -> str:
+def _why_not(grey: Grey, options: IntrinsicsOptions) -> Message:
     if sharpness_of(grey) < options.blur_threshold:
-        return "the board is not visible, or the picture is blurred"
-    return "the board is not visible, only in part, or too small"
+        return Message.of("the board is not visible, or the picture is blurred")
+    return Message.of("the board is not visible, only in part, or too small")
 
 
 def _check_enough(
-    views: list[_View], problems: dict[int, str], size: tuple[int, int], options: IntrinsicsOptions
+    views: list[_View], problems: dict[int, Message], size: tuple[int, int], options: IntrinsicsOptions
 ) -> None:
     """Require enough views and coverage.
 
@@ -118,15 +120,17 @@ def _check_enough(
         CalibrationRefused: There are too few views, or too little coverage.
     """
     if len(views) < options.fewest_views:
-        if not views:
-            reason, text = Reason.NO_MARKER, "The board is in none of the pictures. Check its description."
-        else:
-            reason = Reason.TOO_FEW_POINTS
-            text = (
-                f"The board is well visible in {len(views)} pictures only; at least {options.fewest_views} are needed."
-            )
         first = next((f"picture {index}: {problem}" for index, problem in problems.items()), "")
-        raise CalibrationRefused(text, first, reason)
+        if not views:
+            text = "The board is in none of the pictures. Check its description."
+            raise CalibrationRefused(text, first, Reason.NO_MARKER)
+        raise CalibrationRefused(
+            "The board is well visible in {count} pictures only; at least {fewest} are needed.",
+            first,
+            Reason.TOO_FEW_POINTS,
+            count=len(views),
+            fewest=options.fewest_views,
+        )
     covered = coverage_of([view.pixels for view in views], size)
     if covered < options.smallest_coverage:
         raise CalibrationRefused(
@@ -197,7 +201,7 @@ def _tilt_between(normals: Array) -> float:
 def _result(
     views: list[_View],
     solved: _Solved,
-    problems: dict[int, str],
+    problems: dict[int, Message],
     size: tuple[int, int],
     options: IntrinsicsOptions,
     pictures: int,
@@ -237,7 +241,10 @@ def _result(
         ViewError(view.index, len(left), _root_mean_square(left), float(np.linalg.norm(left, axis=1).max()))
         for view, left in zip(views, solved.errors, strict=True)
     ]
-    errors += [ViewError(index, 0, 0.0, 0.0, used=False, problem=problem) for index, problem in problems.items()]
+    errors += [
+        ViewError(index, 0, 0.0, 0.0, used=False, problem=problem.text, **problem.translation())
+        for index, problem in problems.items()
+    ]
     errors.sort(key=lambda each: each.view)
     grade, verdict = _verdict(len(views), pictures, residual, focal * fx, focal, centre, covered)
     return Intrinsics(
@@ -251,30 +258,40 @@ def _result(
         coverage=covered,
         views=errors,
         grade=grade,
-        verdict=verdict,
+        verdict=verdict.text,
         picture=error_picture(
             size,
             [(f"picture {v.index}", v.pixels, e, True) for v, e in zip(views, solved.errors, strict=True)],
             f"{len(views)} pictures, rms {residual:.2f} px, corners in {covered:.0%} of the picture",
         ),
+        **verdict.translation(),
     )
 
 
 def _verdict(
     used: int, pictures: int, residual: float, focal_px: float, focal: float, centre: float, covered: float
-) -> tuple[Grade, str]:
+) -> tuple[Grade, Message]:
     """Return how good intrinsics are, and what would improve them."""
-    text = (
-        f"The focal length is known to {focal_px:.1f} px and the principal point to {centre:.1f} px (standard "
-        f"deviations, {used} of {pictures} pictures, residual {residual:.2f} px, corners in {covered:.0%} of it)."
-    )
+    parts = [
+        Message.of(
+            "The focal length is known to {focal:.1f} px and the principal point to {centre:.1f} px (standard "
+            "deviations, {used} of {pictures} pictures, residual {residual:.2f} px, corners in {covered:.0%} of it).",
+            focal=focal_px,
+            centre=centre,
+            used=used,
+            pictures=pictures,
+            residual=residual,
+            covered=covered,
+        )
+    ]
     grade = Grade.GOOD
     if focal > _GOOD:
-        text += " More pictures of a tilted board improve the result."
+        parts.append(Message.of("More pictures of a tilted board improve the result."))
         grade = Grade.USABLE
     if covered < 0.7:
-        text += " Parts of the picture's edge were never covered; the lens is extrapolated there."
+        text = "Parts of the picture's edge were never covered; the lens is extrapolated there."
+        parts.append(Message.of(text))
         grade = Grade.USABLE
     if used < pictures:
-        text += f" {pictures - used} {'pictures were' if pictures - used > 1 else 'picture was'} not used."
-    return grade, text
+        parts.append(Message.of("Pictures that were not used: {unused}.", unused=pictures - used))
+    return grade, Message.joined(parts)

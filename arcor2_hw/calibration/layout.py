@@ -10,6 +10,7 @@ from msgspec import field
 
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.messages import Message
 
 MarkerDictionary = Literal[
     "4x4_50", "4x4_100", "4x4_250", "4x4_1000",
@@ -67,3 +68,11 @@ class Layout(Data, frozen=True):
     boards: list[CharucoBoard] = field(default_factory=list)
     size: float = 0.1
     dictionary: MarkerDictionary = "4x4_50"
+
+
+def called(name: str) -> Message:
+    """Return the name of a marker or board as a value of messages."""
+    kind, _, number = name.partition(" ")
+    if kind == "marker":
+        return Message.of("marker {number}", number=number)
+    return Message.of("board {number}", number=number)

@@ -7,11 +7,13 @@ from typing import Final
 import numpy as np
 
 from arcor2_hw.calibration.camera_results import PoseOptions
+from arcor2_hw.calibration.layout import called
 from arcor2_hw.calibration.lens import Array, Lens
 from arcor2_hw.calibration.pose_problem import Hints, PoseProblem, Seen, Solution
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.rigid import apart, inverted
 from arcor2_hw.data.camera import CameraParameters
+from arcor2_hw.messages import Message
 
 _TRIED: Final = 4
 """Number of best starts that are refined."""
@@ -69,11 +71,11 @@ def search(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions)
         names = {each.key: each.name for each in used}
         if len(names) < 3:
             raise CalibrationRefused(
-                "The picture contradicts what is said of {names} by {worst:.0f} px: "
-                "it stands elsewhere, or has another size.",
+                "The picture contradicts the configuration of {names} by {worst:.0f} px: "
+                "it is at another place, or has another size.",
                 f"residual {worst:.1f} px, at most {options.largest_residual:.1f}",
                 Reason.IMPLAUSIBLE,
-                names=" and ".join(sorted(names.values())),
+                names=Message.listed([called(name) for name in sorted(names.values())]),
                 worst=worst,
             )
         left_out.add(worst_key)
@@ -126,14 +128,14 @@ def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
         distance, angle = apart(inverted(best.pose), inverted(other.pose))
         if other.cost - best.cost < _TELL_APART and distance > 2 * options.largest_deviation:
             raise CalibrationRefused(
-                "The picture fits two places of the camera, {distance:.0f} mm and {angle:.0f}° "
-                "apart: {problem} seen from nearly straight ahead. What helps: a second marker, a view from the "
+                "The picture fits two places of the camera, {distance:.0f} mm and {angle:.0f}° apart, because it "
+                "was taken from nearly straight ahead of {names}. What helps: a second marker, a view from the "
                 "side or from nearer, the direction of gravity, or where the camera roughly is.",
                 f"costs {best.cost:.1f} and {other.cost:.1f}",
                 Reason.AMBIGUOUS,
                 distance=distance * 1000,
                 angle=np.degrees(angle),
-                problem=_who(problem),
+                names=Message.listed([called(name) for name in sorted({each.name for each in problem.seen})]),
             )
     return best
 
@@ -192,9 +194,3 @@ def _same(a: Array, b: Array) -> bool:
 def _allowed(pose: Array, options: PoseOptions) -> bool:
     """Return whether the camera may be at a pose."""
     return not isinstance(options.lowest, float | int) or float(inverted(pose)[2, 3]) >= options.lowest
-
-
-def _who(problem: PoseProblem) -> str:
-    """Name the detected targets."""
-    names = sorted({each.name for each in problem.seen})
-    return f"{names[0]} is" if len(names) == 1 else f"{', '.join(names)} are"

@@ -6,6 +6,7 @@ from arcor2_hw.data.base import Unset, now
 from arcor2_hw.data.calibration import CalibrationCheck, CalibrationInput, CalibrationKind, CalibrationRecord
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.messages import Message
 
 __all__ = ["CalibrationCheck", "CalibrationInput", "CalibrationKind", "CalibrationRecord", "check_against"]
 
@@ -36,12 +37,28 @@ def check_against(
     if not (math.isfinite(distance) and math.isfinite(angle)):
         raise InvalidData("The measured pose is not finite.")
     passed = distance <= distance_limit and angle <= angle_limit
-    difference = f"{distance * 1e3:.1f} mm and {math.degrees(angle):.2f}°"
-    limits = f"{distance_limit * 1e3:.1f} mm and {math.degrees(angle_limit):.2f}°"
-    verdict = (
-        f"{record.object_name} is still as calibrated on {record.date[:10]}: {difference} off, within {limits}."
+    verdict = Message.of(
+        "{name} is still as calibrated on {date}: {difference} off, within {limits}."
         if passed
-        else f"{record.object_name} differs by {difference} from the calibration of {record.date[:10]}, "
-        f"more than {limits}: calibrate it again, or check what was moved."
+        else "{name} differs by {difference} from the calibration of {date}, more than {limits}: calibrate it again, "
+        "or check what was moved.",
+        name=record.object_name,
+        date=record.date[:10],
+        difference=_shown(distance, angle),
+        limits=_shown(distance_limit, angle_limit),
     )
-    return CalibrationCheck(record.id, now(), distance, angle, distance_limit, angle_limit, passed, verdict)
+    return CalibrationCheck(
+        record.id,
+        now(),
+        distance,
+        angle,
+        distance_limit,
+        angle_limit,
+        passed,
+        verdict.text,
+        **verdict.translation(),
+    )
+
+
+def _shown(distance: float, angle: float) -> Message:
+    return Message.of("{distance:.1f} mm and {angle:.2f}°", distance=distance * 1e3, angle=math.degrees(angle))

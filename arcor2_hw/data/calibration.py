@@ -68,8 +68,11 @@ class CalibrationRecord(TranslatableData, frozen=True):
     date: Timestamp = field(default_factory=now)
 
 
-class CalibrationCheck(Data, frozen=True):
-    """A later measurement compared with a record: distance (m), angle (rad), and whether both are within limits."""
+class CalibrationCheck(TranslatableData, frozen=True):
+    """A later measurement compared with a record: distance (m), angle (rad), and whether both are within limits.
+
+    key and values translate the verdict.
+    """
 
     record_id: str
     date: Timestamp

@@ -7,6 +7,7 @@ from typing import Any, Final
 from msgspec import field
 
 from arcor2_hw.data.base import Data
+from arcor2_hw.messages import Message
 
 HIDDEN: Final = "***"
 """Shown instead of a secret; as the value of a setting it means the stored one."""
@@ -36,8 +37,8 @@ def is_secret_name(name: str) -> bool:
 class ObjectSecrets(Data, frozen=True):
     """Secrets of one object for the cell host.
 
-    values: values by the name of the setting. problem: why other secrets are withheld; empty when none are stored.
+    values: values by the name of the setting. problem: why other secrets are withheld; None when none are withheld.
     """
 
     values: dict[str, str] = field(default_factory=dict)
-    problem: str = ""
+    problem: Message | None = None

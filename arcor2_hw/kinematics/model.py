@@ -22,6 +22,7 @@ from arcor2_hw.kinematics.model_package import MAX_MESH, Package
 from arcor2_hw.kinematics.shapes import Array, MeshUse, Shape
 from arcor2_hw.kinematics.tree import Tree
 from arcor2_hw.kinematics.urdf import describe
+from arcor2_hw.messages import Message
 
 _PARALLEL: Final = 1e-6
 _TOUCHING: Final = 1e-5
@@ -178,11 +179,11 @@ class RobotModel(JointSet):
     def _made(self, link: str, kind: str, every: tuple[Geometry, ...], use: MeshUse) -> list[LinkShape]:
         made = []
         for number, geometry in enumerate(every):
-            where = f"{self.name}: link {link}, {kind}"
+            where = Message.of("{robot}: link {name}, {kind}", robot=self.name, name=link, kind=kind)
             made.append(LinkShape(link, f"{link} {number}", self._shape(geometry, where, use), geometry.origin))
         return _capsules(made) if kind == "collision" else made
 
-    def _shape(self, geometry: Geometry, where: str, use: MeshUse) -> Shape:
+    def _shape(self, geometry: Geometry, where: Message, use: MeshUse) -> Shape:
         what = geometry.what
         if isinstance(what, MeshFile):
             if 0.0 in what.scale:
@@ -191,7 +192,11 @@ class RobotModel(JointSet):
                 )
             path = self._package.locate(what.reference, self._beside)
             mesh = read_mesh(self._package.read(path, MAX_MESH), path, what.scale, upright=False)
-            return mesh if use == "exact" else shapes.hull_of(mesh.vertices, f"{where}: the mesh {path}")
+            return (
+                mesh
+                if use == "exact"
+                else shapes.hull_of(mesh.vertices, Message.of("{place}: the mesh {path}", place=where, path=path))
+            )
         made = {"box": shapes.Box, "cylinder": shapes.Cylinder, "sphere": shapes.Sphere, "capsule": shapes.Capsule}
         shape: Shape = made[what.kind](*what.sizes)
         shapes.check(shape, where)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from arcor2_hw.data import object_type
 from arcor2_hw.kinematics.errors import BadMesh, ZeroLength
 from arcor2_hw.kinematics.primitives import Box, Capsule, Cylinder, Sphere, primitive_of
+from arcor2_hw.messages import Message
 
 __all__ = [
     "Array",
@@ -57,7 +58,7 @@ class TriangleMesh:
 Shape = Box | Cylinder | Capsule | Sphere | Hull | TriangleMesh
 
 
-def check(shape: Shape, what: str) -> None:
+def check(shape: Shape, what: str | Message) -> None:
     """Require finite sizes above zero.
 
     Args:
@@ -80,7 +81,7 @@ def check(shape: Shape, what: str) -> None:
             )
 
 
-def hull_of(vertices: Array, what: str) -> Hull:
+def hull_of(vertices: Array, what: str | Message) -> Hull:
     """Compute the convex hull of points (n, 3).
 
     Raises:
@@ -117,7 +118,7 @@ def of_model(model: object_type.Models, mesh: TriangleMesh | None = None, use: M
         return primitive_of(model)
     if mesh is None:
         raise BadMesh("The mesh {asset_id} of {id} was not read.", asset_id=model.asset_id, id=model.id)
-    return mesh if use == "exact" else hull_of(mesh.vertices, f"The mesh {model.asset_id}")
+    return mesh if use == "exact" else hull_of(mesh.vertices, Message.of("The mesh {path}", path=model.asset_id))
 
 
 def triangles_of(shape: Shape) -> TriangleMesh:

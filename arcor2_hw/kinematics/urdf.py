@@ -36,6 +36,7 @@ from arcor2_hw.kinematics.description import (
 from arcor2_hw.kinematics.errors import JointLoop, ModelError, UnsafeDescription
 from arcor2_hw.kinematics.shapes import Array
 from arcor2_hw.kinematics.xml_parser import parse_xml
+from arcor2_hw.messages import Message, translatable
 
 MAX_PARTS: Final = 2000
 """Maximum number of links."""
@@ -59,14 +60,22 @@ def describe(content: bytes, name: str) -> Description:
     if root.tag != "robot":
         raise ModelError("{name} describes a {tag}, not a robot.", name=name, tag=root.tag)
     robot = root.get("name") or name
-    links = _unique([_link(each, robot) for each in root.findall("link")], f"{robot}: link")
+    links = _unique(
+        [_link(each, robot) for each in root.findall("link")],
+        translatable("{robot}: link {name} is defined twice."),
+        robot,
+    )
     if not links:
         raise ModelError("{robot} has no links.", robot=robot)
     if len(links) > MAX_PARTS:
         raise UnsafeDescription(
             "{robot} has {count} links; the maximum is {max_parts}.", robot=robot, count=len(links), max_parts=MAX_PARTS
         )
-    joints = _unique([_joint(each, robot) for each in root.findall("joint")], f"{robot}: joint")
+    joints = _unique(
+        [_joint(each, robot) for each in root.findall("joint")],
+        translatable("{robot}: joint {name} is defined twice."),
+        robot,
+    )
     base, ordered = _tree(robot, links, joints.values())
     _check_mimics(robot, joints)
     ours = root.find("arcor2_hw")
@@ -81,24 +90,24 @@ def describe(content: bytes, name: str) -> Description:
     return replace(found, end_effectors=effectors or _leaves(found), settings=settings, touching=frozenset(pairs))
 
 
-def _unique(parts: Iterable[_Part], what: str) -> dict[str, _Part]:
+def _unique(parts: Iterable[_Part], refusal: str, robot: str) -> dict[str, _Part]:
     found: dict[str, _Part] = {}
     for part in parts:
         if part.name in found:
-            raise ModelError("{what} {name} is defined twice.", what=what, name=part.name)
+            raise ModelError(refusal, robot=robot, name=part.name)
         found[part.name] = part
     return found
 
 
 # ------------------------------------------------------------------------------------------------ parts
-def _text(element: Element, attribute: str, where: str) -> str:
+def _text(element: Element, attribute: str, where: str | Message) -> str:
     value = element.get(attribute)
     if not value:
         raise ModelError("{place}: {tag} has no {attribute}.", place=where, tag=element.tag, attribute=attribute)
     return value
 
 
-def _numbers(element: Element, attribute: str, default: tuple[float, ...], where: str) -> tuple[float, ...]:
+def _numbers(element: Element, attribute: str, default: tuple[float, ...], where: str | Message) -> tuple[float, ...]:
     value = element.get(attribute)
     if value is None:
         return default
@@ -118,7 +127,7 @@ def _numbers(element: Element, attribute: str, default: tuple[float, ...], where
     return found
 
 
-def _number(element: Element, attribute: str, default: float, where: str) -> float:
+def _number(element: Element, attribute: str, default: float, where: str | Message) -> float:
     return _numbers(element, attribute, (default,), where)[0]
 
 
@@ -133,7 +142,7 @@ def transform(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> Array:
     return out
 
 
-def _origin(element: Element, where: str) -> Array:
+def _origin(element: Element, where: str | Message) -> Array:
     found = element.find("origin")
     if found is None:
         return np.eye(4)
@@ -142,14 +151,15 @@ def _origin(element: Element, where: str) -> Array:
 
 def _link(element: Element, robot: str) -> Link:
     name = _text(element, "name", robot)
-    where = f"{robot}: link {name}"
+    where = Message.of("{robot}: link {name}", robot=robot, name=name)
     visual, collision = (
-        tuple(_geometry(each, f"{where}, {kind}") for each in element.findall(kind)) for kind in ("visual", "collision")
+        tuple(_geometry(each, Message.of("{place}, {kind}", place=where, kind=kind)) for each in element.findall(kind))
+        for kind in ("visual", "collision")
     )
     return Link(name, visual, collision)
 
 
-def _geometry(element: Element, where: str) -> Geometry:
+def _geometry(element: Element, where: str | Message) -> Geometry:
     found = element.find("geometry")
     what = found[0] if found is not None and len(found) else None
     if what is None:
@@ -171,7 +181,7 @@ def _geometry(element: Element, where: str) -> Geometry:
 
 def _joint(element: Element, robot: str) -> Joint:
     name = _text(element, "name", robot)
-    where = f"{robot}: joint {name}"
+    where = Message.of("{robot}: joint {name}", robot=robot, name=name)
     kind = _text(element, "type", where)
     if kind not in KINDS:
         raise ModelError(
@@ -201,7 +211,7 @@ def _joint(element: Element, robot: str) -> Joint:
     )
 
 
-def _limits(element: Element, kind: str, where: str) -> tuple[float, float, float]:
+def _limits(element: Element, kind: str, where: str | Message) -> tuple[float, float, float]:
     if kind == "fixed":
         return 0.0, 0.0, math.inf
     found = element.find("limit")
@@ -223,7 +233,7 @@ def _limits(element: Element, kind: str, where: str) -> tuple[float, float, floa
     return lower, upper, velocity
 
 
-def _mimic(element: Element, where: str) -> Mimic | None:
+def _mimic(element: Element, where: str | Message) -> Mimic | None:
     found = element.find("mimic")
     if found is None:
         return None
@@ -312,7 +322,7 @@ def _end_effector(element: Element, found: Description) -> EndEffector:
     link = _text(element, "link", found.name)
     if link not in found.links:
         raise ModelError("{name}: the end effector {link} is not a link of the robot.", name=found.name, link=link)
-    where = f"{found.name}: end effector {link}"
+    where = Message.of("{robot}: end effector {name}", robot=found.name, name=link)
     free = frozenset((element.get("free") or "").split())
     if free not in (frozenset(), frozenset({"rz"}), frozenset(ORIGIN[3:])):
         raise ModelError(
@@ -327,7 +337,7 @@ def _end_effector(element: Element, found: Description) -> EndEffector:
 
 def _setting(element: Element, found: Description) -> Setting:
     name, component = _text(element, "name", found.name), _text(element, "component", found.name)
-    where = f"{found.name}: setting {name}"
+    where = Message.of("{robot}: setting {name}", robot=found.name, name=name)
     if (joint := element.get("joint")) is not None:
         if joint not in {each.name for each in found.joints}:
             raise ModelError("{place}: joint {joint} does not exist.", place=where, joint=joint)

@@ -81,8 +81,12 @@ class Line:
                 "{device} cannot be reached within {timeout:.1f} s", device=self.who, timeout=timeout
             ) from None
         except (OSError, ValueError) as error:
-            why = "is used by another program" if "exclusively" in str(error) else "cannot be opened"
-            raise NotConnected("{device}: the port {reason}", str(error), device=self.who, reason=why) from error
+            text = (
+                "{device}: the port is used by another program"
+                if "exclusively" in str(error)
+                else "{device}: the port cannot be opened"
+            )
+            raise NotConnected(text, str(error), device=self.who) from error
         self.loss = None
 
     def close(self) -> None:
@@ -168,9 +172,12 @@ class Line:
                     received = (received + data)[-LONGEST_ANSWER:]
                     if (found := answer(received)) is not None:
                         return found
-        how = "gave no valid answer to" if received else "did not answer"
-        message = f"{self.who} {how} {name} within {limit:.3g} s"
-        raise self.broken(DeviceTimeout(message, repr(received[-200:])))
+        text = (
+            "{device} gave no valid answer to {request} within {limit:.3g} s"
+            if received
+            else "{device} did not answer {request} within {limit:.3g} s"
+        )
+        raise self.broken(DeviceTimeout(text, repr(received[-200:]), device=self.who, request=name, limit=limit))
 
     def ask_text(self, question: str, end: bytes = b"\r") -> str:
         """Send a line of ASCII text and return the line of the answer, both without `end`."""
@@ -199,8 +206,8 @@ class Line:
         return port
 
     def _lost(self, error: Exception) -> DeviceError:
-        text = f"{self.who}: the connection was lost: unplugged, or the port was closed"
-        return self.broken(ConnectionLost(text, str(error)))
+        text = "{device}: the connection was lost: unplugged, or the port was closed"
+        return self.broken(ConnectionLost(text, str(error), device=self.who))
 
 
 class _Port(Protocol):

@@ -172,8 +172,12 @@ class ModbusLink:
                 raise DeviceTimeout(
                     "{device} did not accept the connection within {timeout:.1f} s", device=self.who, timeout=timeout
                 )
-            why = "the port cannot be opened" if self._serial_port else "connection refused. Is the device switched on?"
-            raise NotConnected("{device} cannot be reached: {reason}", device=self.who, reason=why)
+            raise NotConnected(
+                "{device} cannot be reached: the port cannot be opened"
+                if self._serial_port
+                else "{device} cannot be reached: connection refused. Is the device switched on?",
+                device=self.who,
+            )
         self._client = client
 
     def _close(self) -> None:

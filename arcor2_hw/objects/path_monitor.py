@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from arcor2_hw.exceptions import Arcor2Error, Cancelled, PathBlocked, Refused
+from arcor2_hw.exceptions import Arcor2Error, Cancelled, PathBlocked, Refused, message_of
+from arcor2_hw.messages import Message
 from arcor2_hw.objects.obstacle_snapshot import ObstacleSnapshot, Others, build_world, other_robots
 from arcor2_hw.objects.robot import Robot
 
@@ -89,7 +90,7 @@ class PathMonitor:
                 self._problem = error
             except Exception as error:
                 log.exception("the path of %s cannot be checked", self._robot.name)
-                self._problem = Refused(str(error))
+                self._problem = Refused(message_of(error))
             if self._contact is not None or self._problem is not None:
                 self._stop()
                 return
@@ -147,23 +148,30 @@ class PathMonitor:
             except Exception:
                 log.exception("%s could not be stopped in front of an obstacle", self._robot.name)
 
-    def _message(self) -> str:
+    def _message(self) -> Message:
         name, contact = self._robot.name, self._contact
         if contact is None:
-            return (
-                f"{name} stopped: its surroundings changed, and the rest of its path cannot be checked: "
-                f"{self._problem} Fix the cause, then start the move again."
+            return Message.of(
+                "{name} stopped: its surroundings changed, and the rest of its path cannot be checked: "
+                "{problem} Fix the cause, then start the move again.",
+                name=name,
+                problem=self._problem,
             )
-        obstacle = contact.second
         touched = self._touched()
         if touched is not None:
-            return (
-                f"{name} stopped at once, but {touched.second} appeared within its braking distance: {touched} are in "
-                "contact. Check for damage, and move the robot clear before you go on."
+            return Message.of(
+                "{name} stopped at once, but {obstacle} appeared within its braking distance: {contact} are in "
+                "contact. Check for damage, and move the robot clear before you go on.",
+                name=name,
+                obstacle=touched.second,
+                contact=touched.message,
             )
-        return (
-            f"{name} stopped: {obstacle} came into its path; {contact} would collide. "
-            f"Remove {obstacle} or choose another path, then start the move again."
+        return Message.of(
+            "{name} stopped: {obstacle} came into its path; {contact} would collide. "
+            "Remove {obstacle} or choose another path, then start the move again.",
+            name=name,
+            obstacle=contact.second,
+            contact=contact.message,
         )
 
     def _touched(self) -> "Contact | None":

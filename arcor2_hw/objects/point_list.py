@@ -6,6 +6,7 @@ from typing import Final
 
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.exceptions import OutOfRange
+from arcor2_hw.messages import Message
 from arcor2_hw.objects.small import IOPoint, OnLoss, PointDirection, PointKind
 
 OPTIONS: Final = {"DI": ("debounce",), "DO": ("on_loss",), "AI": ("scale", "unit"), "AO": ("scale", "unit", "on_loss")}
@@ -63,7 +64,7 @@ def io_point(
     for word in words:
         key, sign, value = word.partition("=")
         if not sign or not value or key not in known or key in options:
-            allowed = ", ".join(sorted(known)) or "no options"
+            allowed = ", ".join(sorted(known)) or Message.of("no options")
             raise OutOfRange(
                 "{parameter} must give {name} ({type}) only {allowed}, each once, not {word!r}",
                 parameter=parameter,

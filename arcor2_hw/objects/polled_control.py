@@ -152,7 +152,8 @@ class PolledControl(Connected, typing.Generic[T]):
         self.observing.check()
         if not self.in_control:
             owner = self.control_owner()
-            why = f"{owner} has control" if owner and self.why_not == NOBODY else self.why_not
+            other = bool(owner) and self.why_not == NOBODY
+            why = Message.of("{owner} has control", owner=owner) if other else Message.of(self.why_not)
             raise NotInControl("{device}: {what} is refused: {reason}", device=self.who, what=what, reason=why)
 
     def send(self, what: str, write: Callable[[], None], go_on: GoOn | None = None) -> None:

@@ -16,6 +16,7 @@ from pathlib import Path
 from arcor2_hw.data.address import HOST
 from arcor2_hw.data.device import DEVICE_FILES
 from arcor2_hw.exceptions import OutOfRange
+from arcor2_hw.messages import Message
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,7 +67,8 @@ class Settings:
 
     The metadata `"found_by"` names the search (arcor2_hw.data.discovery.Search) that finds values of a setting:
     `serial` or `oak` for an address, `can` for the number of a node on the bus of the settings interface, channel and
-    bitrate. The editor then offers what it finds.
+    bitrate, `ur` or `modbus` for an address in the network, among those that the user enters. The editor then offers
+    what it finds.
     """
 
     def __post_init__(self) -> None:
@@ -87,16 +89,20 @@ def check_host(host: str, port: int = 1) -> None:
 
 def check_url(name: str, url: str, *schemes: str) -> urllib.parse.SplitResult:
     """Check a URL of one of the schemes, and return its parts: host, optional port and path, nothing else."""
-    problem = f"{name} must be {' or '.join(f'{scheme}://host:port' for scheme in schemes)}"
+    allowed: str | Message = f"{schemes[0]}://host:port"
+    for scheme in schemes[1:]:
+        allowed = Message.of("{first} or {second}", first=allowed, second=f"{scheme}://host:port")
     try:
         parts = urllib.parse.urlsplit(url)
         sound = bool(parts.hostname and HOST.fullmatch(parts.hostname)) and parts.port != 0
     except ValueError:
-        raise OutOfRange(problem) from None
+        raise OutOfRange("{name} must be {allowed}", name=name, allowed=allowed) from None
     if "@" in parts.netloc or parts.query or parts.fragment:
-        raise OutOfRange("{problem}, without user, password, query and fragment", problem=problem)
+        raise OutOfRange(
+            "{name} must be {allowed}, without user, password, query and fragment", name=name, allowed=allowed
+        )
     if not sound or parts.scheme not in schemes or not url.startswith(parts.scheme) or not url.isprintable():
-        raise OutOfRange("{problem}, not {url!r}", problem=problem, url=url)
+        raise OutOfRange("{name} must be {allowed}, not {url!r}", name=name, allowed=allowed, url=url)
     return parts
 
 
@@ -110,15 +116,19 @@ def check_serial_port(name: str, port: str, *, sockets: bool = True) -> None:
         if parts.port is None or parts.path.strip("/"):
             raise OutOfRange("{name} must be socket://host:port, not {port!r}", name=name, port=port)
         return
-    problem = f"{name} must be the path of a serial device{', or socket://host:port' if sockets else ''}, not {port!r}"
+    text = (
+        "{name} must be the path of a serial device, or socket://host:port, not {port!r}"
+        if sockets
+        else "{name} must be the path of a serial device, not {port!r}"
+    )
     if not port.startswith("/") or "\0" in port:
-        raise OutOfRange(problem)
+        raise OutOfRange(text, name=name, port=port)
     try:
         present = Path(port).stat()
     except OSError:
         return  # not plugged in
     if not stat.S_ISCHR(present.st_mode):
-        raise OutOfRange(problem)
+        raise OutOfRange(text, name=name, port=port)
 
 
 def device_file(name: str, path: str) -> str:

@@ -14,6 +14,7 @@ from arcor2_hw.kinematics.arm import NEAR_SINGULAR, Arm
 from arcor2_hw.kinematics.errors import MotionInCollision, NoStraightLine
 from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.shapes import Array
+from arcor2_hw.messages import Message
 
 OFF_LINE: Final = 0.0005
 """Maximum distance of the end effector from its line between two waypoints, m."""
@@ -91,13 +92,26 @@ class _Line:
             return False
         return not self._turns or at.orientation.angle_to(wanted.orientation) <= OFF_TURN
 
-    def _why(self, q: Array, share: float, after: Array | None) -> str:
-        where = f"{self._name} cannot go straight: {share * self._length:.3f} m along its line "
+    def _why(self, q: Array, share: float, after: Array | None) -> Message:
         if near := self._arm.near_limits(q):
-            return where + f"{', '.join(near)} would leave {'its limit' if len(near) == 1 else 'their limits'}."
+            return Message.of(
+                "{name} cannot go straight: {distance:.3f} m along its line {joints} would leave its limit."
+                if len(near) == 1
+                else "{name} cannot go straight: {distance:.3f} m along its line {joints} would leave their limits.",
+                name=self._name,
+                distance=share * self._length,
+                joints=", ".join(near),
+            )
         if self._arm.smallest(q) < NEAR_SINGULAR:
-            return where + "it reaches a singularity, where joints would have to flip."
-        return where + ("the line is out of reach." if after is None else "joints would have to flip.")
+            text = (
+                "{name} cannot go straight: {distance:.3f} m along its line it reaches a singularity, where joints "
+                "would have to flip."
+            )
+        elif after is None:
+            text = "{name} cannot go straight: {distance:.3f} m along its line the line is out of reach."
+        else:
+            text = "{name} cannot go straight: {distance:.3f} m along its line joints would have to flip."
+        return Message.of(text, name=self._name, distance=share * self._length)
 
 
 def free_line(sweep: Sweep, start: Array, target: Array, name: str = "") -> list[Array]:
@@ -128,7 +142,9 @@ def require_free(sweep: Sweep, way: Sequence[Array], name: str) -> None:
     """
     if (hit := sweep.first_hit(way)) is not None:
         length = float(np.linalg.norm(sweep.arm.forward(way[-1])[:3, 3] - sweep.arm.forward(way[0])[:3, 3]))
-        where = f"{hit.share * length:.3f} m along its line"
         raise MotionInCollision(
-            "{name} cannot go straight: {place} it is in collision: {what}.", name=name, place=where, what=hit.what
+            "{name} cannot go straight: {distance:.3f} m along its line it is in collision: {what}.",
+            name=name,
+            distance=hit.share * length,
+            what=hit.what,
         )

@@ -110,7 +110,7 @@ class Planner:
             NoPath: No path was found in time.
             Cancelled: `stopped` returned true.
         """
-        self._check(goal, "to", 1e-4)
+        self._check_goal(goal)
         if hit := self.sweep.hit(goal):
             raise GoalInCollision("{name} would be in collision at the goal: {hit}.", name=self.name, hit=hit)
         return self.to_any(start, [goal], within=within, seed=seed, stopped=stopped)
@@ -125,7 +125,7 @@ class Planner:
         stopped: Stopped | None = None,
     ) -> list[Array]:
         """Plan a path to the nearest possible of several collision-free goals; see `to_joints`."""
-        self._check(start, "from", BEYOND)
+        self._check_start(start)
         if hit := self.sweep.hit(start):
             raise StartInCollision("{name} is in collision at the start: {hit}.", name=self.name, hit=hit)
         goals = sorted(goals, key=lambda q: self._length([start, q]))[:MOST_GOALS]
@@ -142,25 +142,36 @@ class Planner:
             if all(self.sweep.is_free_between(a, b) for a, b in itertools.pairwise(way)):
                 return way
         between = self.sweep.first_hit([start, goals[0]])
-        hit = f"; the direct path meets {between.what}" if between is not None else ""
+        if between is None:
+            raise NoPath("{name} found no collision-free path within {within:g} s.", name=self.name, within=within)
         raise NoPath(
-            "{name} found no collision-free path within {within:g} s{hit}.", name=self.name, within=within, hit=hit
+            "{name} found no collision-free path within {within:g} s; the direct path meets {hit}.",
+            name=self.name,
+            within=within,
+            hit=between.what,
         )
 
-    def _check(self, q: Array, which: str, slack: float) -> None:
+    def _check_start(self, q: Array) -> None:
+        self._check_finite(q)
+        if beyond := self._beyond_limits(q, BEYOND):
+            raise InvalidData(
+                "{name} cannot move from there: {names} would be beyond the limits.", name=self.name, names=beyond
+            )
+
+    def _check_goal(self, q: Array) -> None:
+        self._check_finite(q)
+        if beyond := self._beyond_limits(q, 1e-4):
+            raise InvalidData(
+                "{name} cannot move there: {names} would be beyond the limits.", name=self.name, names=beyond
+            )
+
+    def _check_finite(self, q: Array) -> None:
         if q.shape != (self.arm.dof,) or not np.isfinite(q).all():
-            raise InvalidData(
-                "{name} needs {dof} finite joint values to plan {which}.", name=self.name, dof=self.arm.dof, which=which
-            )
-        if not self.arm.within(q, slack):
-            over = (q < self.arm.lower - slack) | (q > self.arm.upper + slack)
-            names = ", ".join(name for name, is_over in zip(self.arm.joint_names, over, strict=True) if is_over)
-            raise InvalidData(
-                "{name} cannot move {which} there: {names} would be beyond the limits.",
-                name=self.name,
-                which=which,
-                names=names,
-            )
+            raise InvalidData("{name} needs {dof} finite joint values to plan.", name=self.name, dof=self.arm.dof)
+
+    def _beyond_limits(self, q: Array, slack: float) -> str:
+        over = (q < self.arm.lower - slack) | (q > self.arm.upper + slack)
+        return ", ".join(name for name, is_over in zip(self.arm.joint_names, over, strict=True) if is_over)
 
     def _length(self, way: Sequence[Array]) -> float:
         """Return the length of a path in joint values times their levers, m."""

@@ -183,7 +183,7 @@ def with_secrets(name: str, parameters: Mapping[str, Parameter], secrets: Object
         if not is_reference(parameter.value.strip('"')):
             continue
         if key not in secrets.values:
-            if secrets.problem:
+            if secrets.problem is not None:
                 raise AddressChanged(secrets.problem)
             raise InvalidData(
                 "{name}: the secret setting {key} is not stored on this server. Enter it in the settings of {name}, "

@@ -112,8 +112,12 @@ class Holds:
     def _check_expired(self, hold: _Hold) -> None:
         """End a hold whose lease has expired."""
         if hold.newest.until <= time.monotonic():
-            what = "jog" if hold.kind is HoldKind.JOG else "hold"
-            self.end(hold, Cancelled("{name}: the {what} was not renewed in time", name=hold.device.name, what=what))
+            text = (
+                "{name}: the jog was not renewed in time"
+                if hold.kind is HoldKind.JOG
+                else "{name}: the hold was not renewed in time"
+            )
+            self.end(hold, Cancelled(text, name=hold.device.name))
 
     # -------------------------------------------------------------------------------- calls of the driver
     def _pass_on(self, hold: _Hold) -> None:

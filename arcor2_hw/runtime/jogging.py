@@ -177,9 +177,12 @@ class Jog:
             return math.inf
         left = limits[1] - joint.value if rate > 0.0 else joint.value - limits[0]
         if left <= AT_LIMIT:
-            side, name = "upper" if rate > 0.0 else "lower", joint.name
             raise OutOfRange(
-                "{robot}: the joint {joint} is at its {side} limit", robot=self._robot.name, joint=name, side=side
+                "{robot}: the joint {joint} is at its upper limit"
+                if rate > 0.0
+                else "{robot}: the joint {joint} is at its lower limit",
+                robot=self._robot.name,
+                joint=joint.name,
             )
         return left / (abs(rate) * (valid_for + STOPPING_TIME))
 

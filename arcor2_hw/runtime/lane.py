@@ -156,17 +156,14 @@ class Lane:
         """End a call whose deadline has passed, and all queued calls."""
         if job is not self._current:
             current = self._current
-            busy = "" if current is None else f": the device is busy with {current.method}"
-            job.finish(
-                None,
-                DeviceTimeout(
-                    "{device}: {method} did not get its turn within {deadline:g} s{busy}",
-                    device=self.device,
-                    method=job.method,
-                    deadline=deadline,
-                    busy=busy,
-                ),
+            text = (
+                "{device}: {method} did not get its turn within {deadline:g} s"
+                if current is None
+                else "{device}: {method} did not get its turn within {deadline:g} s: the device is busy with {running}"
             )
+            running = "" if current is None else current.method
+            error = DeviceTimeout(text, device=self.device, method=job.method, deadline=deadline, running=running)
+            job.finish(None, error)
         elif job.give_up(
             DeviceTimeout(
                 "{device}: {method} did not finish within {deadline:g} s",

@@ -329,7 +329,7 @@ class Program:
         error = ConnectionLost(
             "{name}: the program was stopped, because the connection is lost: {reason}",
             name=device.name,
-            reason=reason or "unknown reason",
+            reason=reason or Message.of("unknown reason"),
         )
         with self._reporting:
             if self.ended or self.stop_requested or self.error is not None:

@@ -9,6 +9,8 @@ import sys
 from collections.abc import AsyncIterator, Mapping, Sequence
 from typing import Final
 
+from arcor2_hw.messages import Message
+
 LONGEST_LINE: Final = 64 * 1024
 """Maximum length of a line of output, bytes; the rest of a longer line is dropped."""
 _CHUNK: Final = 65536
@@ -105,12 +107,12 @@ class ChildProcess:
             yield line.decode(errors="backslashreplace")
 
 
-def describe_exit(status: int) -> str:
+def describe_exit(status: int) -> Message:
     """Describe an exit status: "was killed by SIGKILL", "ended with status 3" or "ended"."""
     if status < 0:
         try:
-            name = signal.Signals(-status).name
+            name: str | Message = signal.Signals(-status).name
         except ValueError:
-            name = f"signal {-status}"
-        return f"was killed by {name}"
-    return f"ended with status {status}" if status else "ended"
+            name = Message.of("signal {number}", number=-status)
+        return Message.of("was killed by {signal}", signal=name)
+    return Message.of("ended with status {status}", status=status) if status else Message.of("ended")

@@ -214,21 +214,21 @@ def test_a_target_of_another_size_is_refused(mounting: Mounting, size: float) ->
     error = refused(lambda: find_hand_eye(samples(mounting), GIVEN, target, mounting))
     assert error.reason == Reason.IMPLAUSIBLE
     wrong = f"{abs(1 / size - 1):.1%} {'smaller' if size > 1 else 'larger'}"
-    assert f"the target seems {wrong}" in str(error)
+    assert f"The target seems {wrong}" in str(error)
 
 
 def test_a_target_half_a_percent_off_is_not_good() -> None:
     target = Layout(boards=[CharucoBoard(7, 5, 0.0402, 0.03015)])
     found = find_hand_eye(samples("eye_in_hand"), GIVEN, target, "eye_in_hand")
     assert found.grade == Grade.USABLE
-    assert "the target seems 0.5% smaller" in found.verdict
+    assert "The target seems 0.5% smaller" in found.verdict
     assert off(found.pose, FLANGE_FROM_CAMERA)[0] < 3 * found.position_deviation
 
 
 def test_a_focal_length_off_is_refused() -> None:
     shown = CameraParameters(606.0, 605.0, 322.0, 237.0, list(LENS.coefficients))
     error = refused(lambda: find_hand_eye(samples("eye_in_hand"), shown, TARGET, "eye_in_hand"))
-    assert "the focal length seems 1.0% smaller" in str(error)
+    assert "The focal length seems 1.0% smaller" in str(error)
 
 
 def test_the_verdict_states_the_effect_of_a_size_that_is_not_confirmed() -> None:

@@ -98,7 +98,7 @@ def test_the_result_lists_views_and_picture_size() -> None:
     assert not result.views[0].used
     assert "not visible" in result.views[0].problem
     assert all(view.corners >= 6 and view.residual < 0.3 for view in result.views[1:])
-    assert "1 picture was not used" in result.verdict
+    assert "Pictures that were not used: 1." in result.verdict
     assert cv2.imdecode(np.frombuffer(result.picture, np.uint8), cv2.IMREAD_COLOR).std() > 5
 
 

@@ -113,7 +113,7 @@ def test_impossible_plans_are_refused_with_the_reason() -> None:
     far[0, 3] = 2.0
     with pytest.raises(OutOfReach):
         planner(world).to_pose(READY, far)
-    with pytest.raises(InvalidData, match=r"to there: elbow_joint .* limits"):
+    with pytest.raises(InvalidData, match=r"cannot move there: elbow_joint .* limits"):
         planner(world).to_joints(READY, READY + np.array((0.0, 0.0, 5.0, 0.0, 0.0, 0.0)))
     for nonsense in (np.full(6, np.nan), np.zeros(5)):
         with pytest.raises(InvalidData):

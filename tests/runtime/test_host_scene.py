@@ -11,6 +11,7 @@ import pytest
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.scene import SceneObjectOverride
 from arcor2_hw.data.secret import ObjectSecrets, new_reference
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from tests.waiting import wait_for
 
@@ -255,7 +256,8 @@ def test_a_missing_secret_is_named(host: HostProcess) -> None:
 
 def test_a_secret_for_another_address_is_withheld(host: HostProcess) -> None:
     message = open_scene([type_code("Device", DEVICE)], scene_object("a", "Device", file=new_reference()))
-    host.send(msgspec.structs.replace(message, secrets={"obj_a": ObjectSecrets(problem="Enter the file again.")}))
+    withheld = ObjectSecrets(problem=Message.of("Enter the file again."))
+    host.send(msgspec.structs.replace(message, secrets={"obj_a": withheld}))
     error = host.expect(m.SceneFailed).error
     assert (error.object_id, error.code, error.message.text) == ("obj_a", "address_changed", "Enter the file again.")
 

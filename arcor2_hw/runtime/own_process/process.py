@@ -162,7 +162,7 @@ def _end_message(name: str, code: int) -> Message:
     if code >= 0:
         return Message.of("{name}: the process of the device ended with status {code}", name=name, code=code)
     try:
-        which = signal.Signals(-code).name
+        which: str | Message = signal.Signals(-code).name
     except ValueError:
-        which = f"signal {-code}"
+        which = Message.of("signal {number}", number=-code)
     return Message.of("{name}: the process of the device was killed by {signal}", name=name, signal=which)

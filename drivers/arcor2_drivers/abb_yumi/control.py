@@ -10,6 +10,7 @@ from typing import Final
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import ProgramState, Safety
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, NotInControl, Refused, SafetyStop
+from arcor2_hw.messages import Message
 from arcor2_hw.objects.arm import StopCounter, label
 
 from .arms import Arms, other_arm
@@ -156,8 +157,9 @@ class Control:
         if session is not None and session.ended is None:
             return session
         self._observer.observing.check()
-        why = f": {session.ended}" if session is not None else ". Take control first."
-        raise NotInControl("Control of {name} is not taken{reason}", name=self._arms.name, reason=why)
+        if session is None:
+            raise NotInControl("Control of {name} is not taken. Take control first.", name=self._arms.name)
+        raise NotInControl("Control of {name} is not taken: {reason}", name=self._arms.name, reason=session.ended)
 
     @property
     def rws(self) -> Rws:
@@ -299,7 +301,7 @@ class Control:
             return NotInControl(
                 "The motors of {name} ({address}) were switched off.", f"{code} {title}", name=name, address=rws.address
             )
-        cause = title or "the event log has no cause"
+        cause = title or Message.of("the event log has no cause")
         return DeviceFault(
             "RAPID stopped on {name} ({address}): {cause}", f"{code}", code, name=name, address=rws.address, cause=cause
         )

@@ -154,11 +154,15 @@ class Conveyor(PolledControl[State], Machine, Axis):
         go_on = self.begin(what)
         now = self.fresh()
         if not self.in_control:
-            refused = f"{self.who}: {what} is refused in state {now.power}"
+            owner = self.control_owner()
             raise NotInControl(
-                "{refused}: {control_owner} has control",
-                refused=refused,
-                control_owner=self.control_owner() or "nobody",
+                "{device}: {what} is refused in state {state}: {owner} has control"
+                if owner
+                else "{device}: {what} is refused in state {state}: nobody has control",
+                device=self.who,
+                what=what,
+                state=now.power,
+                owner=owner,
             )
         if resting and not self._motion.is_stopped(now):
             raise Refused("{device}: {what} is refused while the belt moves: halt it first", device=self.who, what=what)

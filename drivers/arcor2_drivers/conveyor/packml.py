@@ -7,7 +7,7 @@ Aborted: after a fault or abort; at standstill without torque until it is cleare
 import contextlib
 import threading
 from collections.abc import Callable, Iterator
-from typing import Final
+from typing import Any, Final
 
 from arcor2_hw.exceptions import Refused
 from arcor2_hw.messages import Message
@@ -83,7 +83,7 @@ class Unit:
     def command(self, command: MachineCommand, now: State, go_on: GoOn) -> None:
         """Do what the command means to a belt; return when that is done. Raises Refused, naming command and state."""
         name, state = command.name.lower(), self.state(now)
-        refused = f"{self._who}: {name} is refused in state {state.name.capitalize()}"
+        values: dict[str, Any] = {"device": self._who, "name": name, "state": state.name.capitalize()}
         acts: dict[MachineCommand, tuple[MachineState, Callable[[], None]]] = {
             MachineCommand.RESET: (S.RESETTING, lambda: self._ready(name, go_on)),
             MachineCommand.START: (S.STARTING, lambda: self._run(self._speed, name, go_on)),
@@ -94,11 +94,11 @@ class Unit:
             MachineCommand.CLEAR: (S.CLEARING, lambda: self._clear(go_on)),
         }
         if command not in acts:
-            raise Refused("{refused}: a belt has no such command", refused=refused)
+            raise Refused("{device}: {name} is refused in state {state}: a belt has no such command", **values)
         if state not in ALLOWED[command]:
-            raise Refused("{refused}: this state does not allow it", refused=refused)
+            raise Refused("{device}: {name} is refused in state {state}: this state does not allow it", **values)
         if command is MachineCommand.HOLD and now.mode != Mode.PROFILE_VELOCITY:
-            raise Refused("{refused}: a move cannot be held, only stopped", refused=refused)
+            raise Refused("{device}: {name} is refused in state {state}: a move cannot be held, only stopped", **values)
         passing, act = acts[command]
         self._passing = passing
         try:

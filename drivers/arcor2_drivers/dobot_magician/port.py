@@ -31,8 +31,12 @@ class Port:
             )
             self._serial.reset_input_buffer()
         except (serial.SerialException, OSError, ValueError) as e:
-            why = "is used by another program" if "exclusively" in str(e) else "cannot be opened"
-            raise NotConnected("{device}: the port {reason}.", str(e), device=who, reason=why) from e
+            text = (
+                "{device}: the port is used by another program"
+                if "exclusively" in str(e)
+                else "{device}: the port cannot be opened"
+            )
+            raise NotConnected(text, str(e), device=who) from e
 
     @property
     def garbage(self) -> int:

@@ -3,7 +3,7 @@
 import threading
 import time
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 from arcor2_hw.data.base import Timestamp, now
 from arcor2_hw.exceptions import (
@@ -149,8 +149,15 @@ class Tester(ModbusDevice[Inputs]):
         inputs = self.fresh()
         owner = self.owner_of(inputs)
         if owner != US:
-            refused = f"{self.who}: {what} is refused in state {title(inputs.state)}"
-            raise NotInControl("{refused}: {owner} has control", refused=refused, owner=owner or "nobody")
+            raise NotInControl(
+                "{device}: {what} is refused in state {state}: {owner} has control"
+                if owner
+                else "{device}: {what} is refused in state {state}: nobody has control",
+                device=self.who,
+                what=what,
+                state=title(inputs.state),
+                owner=owner,
+            )
         return inputs
 
     # -------------------------------------------------------------------------------- commands
@@ -226,11 +233,16 @@ class Tester(ModbusDevice[Inputs]):
         began = time.monotonic()
 
         def done(inputs: Inputs) -> bool:
-            where = f"{self.who}: {what} is refused in state {title(inputs.state)}"
+            values: dict[str, Any] = {"device": self.who, "what": what, "state": title(inputs.state)}
             if inputs.emergency_stop:
-                raise SafetyStop("{place}: the emergency stop is pressed", kind="emergency_stop", place=where)
+                raise SafetyStop(
+                    "{device}: {what} is refused in state {state}: the emergency stop is pressed",
+                    kind="emergency_stop",
+                    **values,
+                )
             if inputs.state not in registers.DOOR_MAY_MOVE | registers.PASSING:
-                raise Refused("{place}: the door moves only when no test runs", place=where)
+                text = "{device}: {what} is refused in state {state}: the door moves only when no test runs"
+                raise Refused(text, **values)
             return arrived(inputs)
 
         def movable(inputs: Inputs) -> bool:

@@ -152,8 +152,9 @@ class Control:
             assert self.session is not None
             return self.session
         self._observer.observing.check()
-        why = f": {session.ended}" if session is not None else ". Take control first."
-        raise NotInControl("Control of {name} is not taken{reason}", name=self._arm.name, reason=why)
+        if session is None:
+            raise NotInControl("Control of {name} is not taken. Take control first.", name=self._arm.name)
+        raise NotInControl("Control of {name} is not taken: {reason}", name=self._arm.name, reason=session.ended)
 
     def obstacles(self, sample: Sample, control: ControlMode) -> list[str]:
         """Return what prevents the arm from accepting commands."""

@@ -7,6 +7,7 @@ from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Reading
 from arcor2_hw.exceptions import DeviceFault, DeviceTimeout, OutOfRange, Refused
 from arcor2_hw.keep_alive import once_within
+from arcor2_hw.messages import Message
 from arcor2_hw.objects.small import IOPoint, OnLoss, PointDirection, PointKind
 
 from .control import Control
@@ -79,7 +80,7 @@ class DigitalIO:
                 "Input {number} of {name} was not {value} in {timeout:g} s.",
                 number=number,
                 name=self.name,
-                value="on" if value else "off",
+                value=Message.of("on" if value else "off"),
                 timeout=timeout,
             )
 
@@ -125,7 +126,7 @@ class DigitalIO:
                 "Output {output} of {name} did not switch {value}.",
                 output=output,
                 name=self.name,
-                value="on" if value else "off",
+                value=Message.of("on" if value else "off"),
             )
 
     def _on_switched(self, output: int, value: bool) -> None:

@@ -16,6 +16,7 @@ from arcor2_hw.exceptions import (
     Stale,
 )
 from arcor2_hw.keep_alive import once_within
+from arcor2_hw.messages import Message
 from arcor2_hw.objects import Generic
 from arcor2_hw.objects.small import HasPoints, IOPoint, OnLoss, PointDirection, PointKind
 
@@ -140,7 +141,7 @@ class Carrier:
                 carrier=self.name,
                 kind_of_point=f"{kind.value} {direction.value}",
                 point=name,
-                points=", ".join(points) or "none",
+                points=", ".join(points) or Message.of("none"),
             )
         return points[name]
 

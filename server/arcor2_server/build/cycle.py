@@ -16,6 +16,7 @@ from arcor2_hw.data.project import (
     parse_link,
 )
 from arcor2_hw.exceptions import ERROR_KINDS, Arcor2Error, InvalidData, InvalidProject
+from arcor2_hw.messages import Message
 from arcor2_server.build import expressions
 from arcor2_server.build.error_exits import nodes_of
 from arcor2_server.build.frame import ERROR, NEXT_ACTION, REFERENCES, Frame, References
@@ -216,11 +217,12 @@ class Cycle:
                 "action {user!r}: {name} is {type}, which a condition cannot use",
                 user=user,
                 name=name,
-                type=kind or "nothing",
+                type=kind or Message.of("nothing"),
             )
         variable = self._result(number, source, condition.output, kind)
         if type(condition.value) is not BRANCHABLE[kind]:
-            allowed = "true and false" if kind == "boolean" else "strings" if kind == "string_enum" else "integers"
+            text = "true and false" if kind == "boolean" else "strings" if kind == "string_enum" else "integers"
+            allowed = Message.of(text)
             raise InvalidProject(
                 "action {user!r}: {variable} is {type}; a condition can compare it with {allowed}, not with {value!r}",
                 user=user,

@@ -124,13 +124,14 @@ class _Plan(Data, frozen=True):
     source: bool
 
 
-def _plan(package: Imported, saved: _Saved, options: ImportOptions) -> tuple[_Plan, list[str]]:
+def _plan(package: Imported, saved: _Saved, options: ImportOptions) -> tuple[_Plan, list[Message]]:
     """Return the plan, and a message for each document that must not be overwritten."""
-    conflicts: list[str] = []
+    conflicts: list[Message] = []
 
-    def differs(what: str, option: str, allowed: bool) -> None:
+    def differs(what: Message, option: str, allowed: bool) -> None:
         if not allowed:
-            conflicts.append(f"{what} is already saved and differs. Set {option} to replace it.")
+            text = "{what} is already saved and differs. Set {option} to replace it."
+            conflicts.append(Message.of(text, what=what, option=option))
 
     written: list[ObjectTypeSource] = []
     for name, one in package.types.items():
@@ -139,32 +140,33 @@ def _plan(package: Imported, saved: _Saved, options: ImportOptions) -> tuple[_Pl
         old_model = saved.models.get(name)
         other_model = not isinstance(model, Unset) and model != old_model
         if other_model and old_model is not None:
-            differs(f"The collision model of {name}", "overwriteCollisionModels", options.overwrite_collision_models)
+            what = Message.of("The collision model of {name}", name=name)
+            differs(what, "overwriteCollisionModels", options.overwrite_collision_models)
         lost_model = old is not None and isinstance(old.model, Unset) != isinstance(one.model, Unset)
         if old is not None and (old.code != one.code or lost_model):
-            differs(f"The object type {name}", "overwriteObjectTypes", options.overwrite_object_types)
+            what = Message.of("The object type {name}", name=name)
+            differs(what, "overwriteObjectTypes", options.overwrite_object_types)
         if old is None or old.code != one.code or other_model or lost_model:
             description = UNSET if old is None else old.description
             written.append(msgspec.structs.replace(one, description=description))
     scene = saved.scene is None or _without_times(saved.scene) != _without_times(package.scene)
     if scene and saved.scene is not None:
-        differs(f"The scene {saved.scene.name}", "overwriteScene", options.overwrite_scene)
+        what = Message.of("The scene {name}", name=saved.scene.name)
+        differs(what, "overwriteScene", options.overwrite_scene)
     project = saved.project is None or _without_times(saved.project) != _without_times(package.project)
     if project and saved.project is not None:
-        differs(f"The project {saved.project.name}", "overwriteProject", options.overwrite_project)
+        what = Message.of("The project {name}", name=saved.project.name)
+        differs(what, "overwriteProject", options.overwrite_project)
     source = package.needs_source and saved.source != package.script
     if source and saved.source is not None:
-        differs(
-            f"The script of the project {package.project.name}",
-            "overwriteProjectSources",
-            options.overwrite_project_sources,
-        )
-    for what, name, other, own in (
-        ("scene", package.scene.name, saved.scene_of_name, package.scene.id),
-        ("project", package.project.name, saved.project_of_name, package.project.id),
-    ):
-        if other is not None and other != own:
-            conflicts.append(f"Another {what} has the name {name}. Rename one of them.")
+        what = Message.of("The script of the project {name}", name=package.project.name)
+        differs(what, "overwriteProjectSources", options.overwrite_project_sources)
+    if saved.scene_of_name not in (None, package.scene.id):
+        text = "Another scene has the name {name}. Rename one of them."
+        conflicts.append(Message.of(text, name=package.scene.name))
+    if saved.project_of_name not in (None, package.project.id):
+        text = "Another project has the name {name}. Rename one of them."
+        conflicts.append(Message.of(text, name=package.project.name))
     return _Plan(written, scene, project, source), conflicts
 
 
@@ -203,15 +205,15 @@ class PackageImport:
             await storage.project_named(package.project.name),
         )
 
-    def _open_conflicts(self, plan: _Plan, package: Imported) -> list[str]:
+    def _open_conflicts(self, plan: _Plan, package: Imported) -> list[Message]:
         """Return a message for each open document: saving it later would undo the import."""
         session = self._session
         scene, project = session.scene, session.project
         found = []
         if plan.scene and scene is not None and scene.id == package.scene.id:
-            found.append(f"The scene {scene.name} is open. Close it first.")
+            found.append(Message.of("The scene {name} is open. Close it first.", name=scene.name))
         if (plan.project or plan.source) and project is not None and project.id == package.project.id:
-            found.append(f"The project {project.name} is open. Close it first.")
+            found.append(Message.of("The project {name} is open. Close it first.", name=project.name))
         return found
 
     def _check_meshes(self, package: Imported) -> None:
@@ -247,7 +249,7 @@ class PackageImport:
             package = await asyncio.to_thread(_checked, package, self._types.files(), options)
             plan, conflicts = _plan(package, await self._saved(package), options)
             if conflicts := [*conflicts, *self._open_conflicts(plan, package)]:
-                raise Conflict(" ".join(conflicts))
+                raise Conflict(Message.joined(conflicts))
             if plan != _Plan([], False, False, False):
                 await self._write(package, plan)
         return ImportedIds(package.scene.id, package.project.id)

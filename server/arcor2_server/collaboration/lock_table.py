@@ -79,8 +79,12 @@ class LockTable:
     def require_held(self, user: str, item: str, *, tree: bool = False) -> None:
         """Raise Locked unless the user holds the write lock of an id (`held(x)`); with `tree`, of its tree."""
         if not self.holds(user, item, tree=tree):
-            what = "the tree of " if tree else ""
-            raise Locked("{user} does not hold the write lock of {what}{item!r}.", user=user, what=what, item=item)
+            text = (
+                "{user} does not hold the write lock of the tree of {item!r}."
+                if tree
+                else "{user} does not hold the write lock of {item!r}."
+            )
+            raise Locked(text, user=user, item=item)
 
     def holds_read(self, user: str, item: str) -> bool:
         """Return whether the user holds a read lock of an id."""

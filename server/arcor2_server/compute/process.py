@@ -104,7 +104,7 @@ class ComputeProcess:
                         on_progress(message.share, message.message)
         except TimeoutError:
             await self.close()
-            raise ComputeTimeout(_too_long(task, within)) from None
+            raise ComputeTimeout(_TOO_LONG, task=task.label, within=within) from None
         except (OSError, EOFError, msgspec.MsgspecError, ValueError) as error:
             raise await self._missing_answer(task, within, error) from error
         if isinstance(message, m.Failed):
@@ -143,7 +143,7 @@ class ComputeProcess:
         detail = "\n".join([f"pid {self.process.pid}: {error!r}", *self._lines])
         log.error("compute worker ended", pid=self.process.pid, task=type(task).__name__, status=code, detail=detail)
         if code == -signal.SIGALRM:
-            return ComputeTimeout(_too_long(task, within), detail)
+            return ComputeTimeout(_TOO_LONG, detail, task=task.label, within=within)
         return ComputeStopped(
             "The compute worker {code} while it worked on {label}.", detail, code=describe_exit(code), label=task.label
         )
@@ -162,11 +162,7 @@ class ComputeProcess:
             log.info("compute worker output", pid=self.process.pid, text=line)
 
 
-def _too_long(task: Task[Any], within: float) -> str:
-    what = task.label[:1].upper() + task.label[1:]
-    return f"{what} took longer than {within:g} s, and was cancelled."
-
-
+_TOO_LONG: Final = "Took longer than {within:g} s, and was cancelled: {task}."
 _CLASSES: Final[dict[str, type[Arcor2Error]]] = {
     kind.code: kind
     for kind in (*vars(exceptions).values(), CalibrationRefused, NotInstalled)

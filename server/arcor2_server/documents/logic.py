@@ -8,6 +8,7 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction
 from arcor2_hw.data.project import END, START, Action, LogicItem, ProjectLogicIf
 from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.messages import Message, translatable
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.item_indexes import action_of
 from arcor2_server.documents.logic_graph import BRANCHABLE, error_kinds_problem
@@ -182,7 +183,8 @@ def _check_condition(
     except msgspec.DecodeError:
         value = None
     if type(value) is not kind:
-        wanted = {bool: "true or false", int: "an integer", str: "a text in quotes"}[kind]
+        expected = {bool: "true or false", int: "an integer", str: "a text in quotes"}
+        wanted = Message.of(translatable(expected)[kind])
         raise InvalidData(
             "A condition on {output} compares with {wanted}, not with {value}.",
             output=outputs[index],

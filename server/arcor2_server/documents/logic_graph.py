@@ -123,7 +123,7 @@ def _ordered(edges: list[Edge], source: Action, actions: Sequence[Action]) -> tu
     for edge in conditional:
         assert edge.condition is not None
         if covered or edge.condition in tested:
-            where = "the end" if edge.target == END_NODE else repr(actions[edge.target].name)
+            where = Message.of("the end") if edge.target == END_NODE else repr(actions[edge.target].name)
             raise InvalidProject(
                 "action {name!r}: the connection to {place} is never taken", name=source.name, place=where
             )
@@ -132,9 +132,12 @@ def _ordered(edges: list[Edge], source: Action, actions: Sequence[Action]) -> tu
     if not covered and not unconditional:
         [one, *more] = tested
         result = actions[one.action].outputs()[one.output]
-        when = "no condition holds" if more else f"{result} is not {_shown(one.value)}"
-        if not more and isinstance(one.value, bool):
-            when = f"{result} is {_shown(not one.value)}"
+        if more:
+            when = Message.of("no condition holds")
+        elif isinstance(one.value, bool):
+            when = Message.of("{result} is {value}", result=result, value=_shown(not one.value))
+        else:
+            when = Message.of("{result} is not {value}", result=result, value=_shown(one.value))
         raise InvalidProject("action {name!r}: no action follows it when {when}", name=source.name, when=when)
     if len(conditional) == 2 and not unconditional:
         conditional.sort(key=lambda edge: _is_boolean(edge.condition) and edge.condition.value is False)

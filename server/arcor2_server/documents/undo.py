@@ -6,6 +6,7 @@ from typing import Final
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.project import END, START
 from arcor2_hw.data.role import Role
+from arcor2_hw.messages import Message
 from arcor2_server.documents.changes import OF_SCENE, Change, Edit, EditKind, Kind, net
 from arcor2_server.documents.checks.object_types import Types
 from arcor2_server.documents.consistency import Inconsistent, check_consistent, title
@@ -31,30 +32,33 @@ def require_applicable(
     for change in changes:
         item = document.find(change.kind, change.id)
         if (None if item is None else item.value) != change.before:
-            what = "removed" if item is None else "changed"
+            by = _author(history, {change.id}, after, user)
             raise RequestRefused(
-                "{change} was {what} since{by}.",
+                "{change} was removed since{by}." if item is None else "{change} was changed since{by}.",
                 change=title(change),
-                what=what,
-                by=_author(history, {change.id}, after, user),
+                by=by,
             )
     try:
         check_consistent(document, changes, types)
     except Inconsistent as error:
         author = _author(history, error.ids, after, user)
-        cause = f" The later edit was made{author}." if author else ""
-        raise RequestRefused("{reason}{cause}", reason=error, cause=cause) from None
+        if not author:
+            raise RequestRefused(error.message) from None
+        raise RequestRefused("{reason} The later edit was made{author}.", reason=error, author=author) from None
 
 
-def _author(history: History, ids: set[str], after: int, user: str) -> str:
+def _author(history: History, ids: set[str], after: int, user: str) -> Message | str:
     """Return the author and number of the latest conflicting edit: ` by bob (edit 7)`; empty if there is none."""
     edit = history.last_change_of(ids, after=after, user=user)
     if edit is None:
         return ""
     if edit.kind is EditKind.EXTERNAL:
-        return f" outside the editor, while the document was closed (edit {edit.number})"
-    author = "you" if edit.user == user else edit.user
-    return f" by {author} (edit {edit.number}{f', {edit.request}' if edit.request else ''})"
+        text = " outside the editor, while the document was closed (edit {number})"
+        return Message.of(text, number=edit.number)
+    number = f"{edit.number}, {edit.request}" if edit.request else edit.number
+    if edit.user == user:
+        return Message.of(" by you (edit {number})", number=number)
+    return Message.of(" by {user} (edit {number})", user=edit.user, number=number)
 
 
 def role_for(changes: Iterable[Change]) -> Role:

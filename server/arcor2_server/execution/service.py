@@ -360,7 +360,7 @@ class Execution(PackageLibrary):
             if state is S.PAUSED:
                 self.program.handle_paused()
 
-    def _host_ended(self, reason: str) -> None:
+    def _host_ended(self, reason: Message) -> None:
         """Report that the host has ended before the program."""
         if self.state is not S.STOPPING:
             self._fail(Message.of("Connection to the program lost: {reason}.", reason=reason), "ConnectionLost")

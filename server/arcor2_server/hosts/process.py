@@ -15,6 +15,7 @@ import structlog
 from arcor2_hw.actions.json_values import encode
 from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.child_process import ChildProcess, describe_exit
 
@@ -55,7 +56,7 @@ class HostUser(Protocol):
     def host_silent(self, host: "CellHost", silent: bool) -> None:
         """Handle that the host stopped answering, or answers again."""
 
-    def host_ended(self, host: "CellHost", reason: str) -> None:
+    def host_ended(self, host: "CellHost", reason: Message) -> None:
         """Handle the end of the host. This is the last call."""
 
 
@@ -105,7 +106,7 @@ class CellHost:
         self.user: HostUser | None = None
         self.ready: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self.ended: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self.reason = ""
+        self.reason: Message | None = None
         """Why the host has ended; empty while it runs."""
         self._connection = connection
         self._number = itertools.count(1)
@@ -149,7 +150,7 @@ class CellHost:
     @property
     def alive(self) -> bool:
         """Whether the host has not ended."""
-        return not self.reason
+        return self.reason is None
 
     # -------------------------------------------------------------------------------- sending
     def send(self, message: m.ToHost) -> None:
@@ -166,7 +167,7 @@ class CellHost:
             TimeoutError: no message was received within the time limit.
         """
         future: asyncio.Future[T] = asyncio.get_running_loop().create_future()
-        if self.reason:
+        if self.reason is not None:
             raise ConnectionLost(self.reason)
         self._waiting.append((kind, future))
         async with asyncio.timeout(timeout):
@@ -245,7 +246,7 @@ class CellHost:
         self, message: Callable[..., m.ToHost], *fields: Any, limit: float | None = None, **more: Any
     ) -> bytes:
         """Send a message with a new number and wait for the answer at most `limit` s."""
-        if self.reason:
+        if self.reason is not None:
             raise ConnectionLost(self.reason)
         number = next(self._number)
         future: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
@@ -297,11 +298,11 @@ class CellHost:
                 received = self._connection.chunks
                 await asyncio.wait({waiting if lost.done() else lost}, timeout=LATE_TIMEOUT)
             if not waiting.done():
-                self._report_end("the cell host closed its connection")
+                self._report_end(Message.of("the cell host closed its connection"))
                 _, late = await asyncio.wait({waiting}, timeout=EXIT_TIMEOUT)
                 if late:
                     self.kill()
-            self._report_end(f"the cell host {describe_exit(await waiting)}")
+            self._report_end(Message.of("the cell host {end}", end=describe_exit(await waiting)))
         finally:
             self.kill()
             waiting.cancel()
@@ -316,8 +317,8 @@ class CellHost:
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self.pid, signal.SIGKILL)  # the host was the leader of their process group
 
-    def _report_end(self, reason: str) -> None:
-        if self.reason:
+    def _report_end(self, reason: Message) -> None:
+        if self.reason is not None:
             return
         self.reason = reason
         error = ConnectionLost(reason)

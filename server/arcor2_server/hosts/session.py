@@ -7,6 +7,7 @@ import msgspec
 import structlog
 
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub
@@ -42,12 +43,12 @@ class HostSession:
         self.board = DeviceBoard(hub)
         self.streams = RobotStreams(hub, self.send, to_all_clients=to_all_clients)
         self._on_message: Callable[[CellHost, m.ServerBound], None] = lambda _host, _message: None
-        self._on_end: Callable[[str], None] = lambda _reason: None
+        self._on_end: Callable[[Message], None] = lambda _reason: None
         self._pool = pool
         self._what = what
         hub.on_leave.append(self.streams.forget)
 
-    def observe(self, on_message: Callable[[CellHost, m.ServerBound], None], on_end: Callable[[str], None]) -> None:
+    def observe(self, on_message: Callable[[CellHost, m.ServerBound], None], on_end: Callable[[Message], None]) -> None:
         """Register the owner of the session.
 
         Args:
@@ -102,7 +103,7 @@ class HostSession:
             self.board.set_answering(not silent)
             log.warning(f"{self._what} does not answer" if silent else f"{self._what} answers again", pid=host.pid)
 
-    def host_ended(self, host: CellHost, reason: str) -> None:
+    def host_ended(self, host: CellHost, reason: Message) -> None:
         """Report that the host has ended."""
         if host is self.host:
             self._on_end(reason)

@@ -309,7 +309,7 @@ class ObjectTypes(TypeCatalog):
         if name in BUILT_IN:
             raise InvalidData("The object type {name} is built in and cannot be deleted.", name=self.shown_name(name))
         if name in self._installed and name not in self._uploaded:
-            origin = self._origin(name) or "an installed distribution"
+            origin = self._origin(name) or Message.of("an installed distribution")
             raise InvalidData(
                 "The object type {name} belongs to {origin} and cannot be deleted: uninstall {origin}.",
                 name=self.shown_name(name),

@@ -11,6 +11,7 @@ from arcor2_hw.data.device import Alarm, Health, Identity
 from arcor2_hw.data.rpc import CheckConnectionData
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.errors import RequestRefused
 from arcor2_server.hosts.pool import CellHosts
@@ -44,9 +45,9 @@ class _Outcome:
     def host_silent(self, host: CellHost, silent: bool) -> None:
         """Ignore it: the time limit ends the check."""
 
-    def host_ended(self, host: CellHost, reason: str) -> None:  # noqa: ARG002
+    def host_ended(self, host: CellHost, reason: Message) -> None:  # noqa: ARG002
         if not self.opened.done():
-            self.opened.set_exception(ConnectionLost(reason[:1].upper() + reason[1:] + "."))
+            self.opened.set_exception(ConnectionLost("Connection to the devices lost: {reason}.", reason=reason))
 
 
 @dataclass(frozen=True, slots=True)

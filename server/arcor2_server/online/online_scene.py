@@ -310,10 +310,10 @@ class OnlineScene:
         if self._answer is not None and not self._answer.done():
             self._answer.set_result(error)
 
-    def _host_ended(self, reason: str) -> None:
+    def _host_ended(self, reason: Message) -> None:
         """Go offline."""
         if self._answer is not None and not self._answer.done():
-            self._answer.set_exception(ConnectionLost(reason[:1].upper() + reason[1:] + "."))
+            self._answer.set_exception(ConnectionLost("Connection to the devices lost: {reason}.", reason=reason))
         elif self.online:
             message = Message.of("Connection to the devices lost: {reason}.", reason=reason)
             self._publish(SceneStateEnum.STOPPING, message)

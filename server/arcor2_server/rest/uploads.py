@@ -68,7 +68,7 @@ def _count(request: Request[Any, Any, Any], task: Task, size: int | None) -> Non
             else:
                 task.at(None, Message.of("{received:.1f} MB received.", received=received / 1e6))
         elif message["type"] == "http.disconnect":
-            task.cancel(f"The client disconnected after {received / 1e6:.1f} MB.")
+            task.cancel(Message.of("The client disconnected after {received:.1f} MB.", received=received / 1e6))
         return message
 
     request.receive = counted

@@ -211,11 +211,12 @@ class ObjectTypeRequests:
             method, parents = dynamic[args.param_id]
             given = [parent.id for parent in args.parent_params]
             if sorted(given) != sorted(parents):
-                needed = ", ".join(sorted(parents)) or "no other one"
                 raise RequestRefused(
-                    "The values of {param_id} depend on {needed}. Give exactly these parameters.",
+                    "The values of {param_id} depend on {needed}. Give exactly these parameters."
+                    if parents
+                    else "The values of {param_id} depend on no other parameter.",
                     param_id=args.param_id,
-                    needed=needed,
+                    needed=", ".join(sorted(parents)),
                 )
             kinds = {
                 parameter.name: parameter.type

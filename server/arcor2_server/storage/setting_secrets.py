@@ -23,6 +23,7 @@ from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.data.secret import HIDDEN, ObjectSecrets, is_reference, is_secret_name
 from arcor2_hw.exceptions import AddressChanged, InvalidData, InvalidPackage, NotFound
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime.documents import read_document
 from arcor2_server.files import replace_file
 from arcor2_server.storage.secret_store import Secret, SecretStore
@@ -253,7 +254,7 @@ class SettingSecrets:
         parameters = {each.name: each for layer in layers for each in layer}
         address = self.address(obj.name, obj.type, parameters.values())
         values: dict[str, str] = {}
-        problem = ""
+        problem: Message | None = None
         for key, parameter in parameters.items():
             secret = self.store.find(_text(parameter.value))
             if secret is None or (secret.type, secret.setting) != (obj.type, key):
@@ -277,10 +278,13 @@ class SettingSecrets:
         return found
 
 
-def _enter_again(name: str, secret: Secret, address: str) -> str:
-    return (
-        f"Enter the {secret.setting} of {name!r} again: its host changed from {secret.address or 'none'} "
-        f"to {address or 'none'}."
+def _enter_again(name: str, secret: Secret, address: str) -> Message:
+    return Message.of(
+        "Enter the {setting} of {name!r} again: its host changed from {before} to {after}.",
+        setting=secret.setting,
+        name=name,
+        before=secret.address or Message.of("none"),
+        after=address or Message.of("none"),
     )
 
 

@@ -173,7 +173,8 @@ class RobotCalibrations:
                 self._publish(Message.of(text, robot=robot.name, reason=error))
             return
         before = self.stored(robot)
-        refused = await self._refused(robot, calibration)
+        refusal = await self._refused(robot, calibration)
+        refused = "" if refusal is None else refusal.text
         found = RobotCalibration(robot.id, robot.name, self._device(robot), now(), calibration, refused)
         same = before is not None and (before.calibration, before.refused) == (calibration, refused)
         self._stored.pop(robot.id, None)
@@ -192,26 +193,26 @@ class RobotCalibrations:
             return
         for notify in self.on_change:
             notify(robot)
-        if refused:
+        if refusal is not None:
             text = "{robot}: The calibration in the controller cannot be used. Kinematics are nominal. {reason}"
-            self._publish(Message.of(text, robot=robot.name, reason=refused))
+            self._publish(Message.of(text, robot=robot.name, reason=refusal))
         else:
             used = "{robot}: The calibration in the controller is now used."
             self._publish(Message.of(used, robot=robot.name), bad=False)
 
-    async def _refused(self, robot: SceneObject, calibration: KinematicCalibration) -> str:
-        """Return why a calibration cannot be used, empty if it can."""
+    async def _refused(self, robot: SceneObject, calibration: KinematicCalibration) -> Message | None:
+        """Return why a calibration cannot be used, None if it can."""
         file = self._robots.model_of_type(robot.type)
         if file is None:
-            return f"{robot.name} has no model (URDF)."
+            return Message.of("{name} has no model (URDF).", name=robot.name)
         settings = self._robots.settings_of(robot)
         try:
             await self._compute.run(DescribeRobot(RobotSource(file, settings=settings, calibration=calibration)))
         except InvalidData as error:
-            return str(error)
+            return error.message
         except Arcor2Error as error:  # reported again when the calibration is used
             log.warning("kinematic calibration not checked", robot=robot.name, reason=str(error))
-        return ""
+        return None
 
     def _publish(self, message: Message, *, bad: bool = True) -> None:
         """Notify all clients which kinematics of a robot are used, and why."""

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.hosts import process as host_module
 from arcor2_server.hosts.process import CellHost, _Connection
@@ -21,8 +22,8 @@ class Listener:
     def host_silent(self, host: CellHost, silent: bool) -> None:
         raise AssertionError
 
-    def host_ended(self, host: CellHost, reason: str) -> None:
-        self.texts.append(reason)
+    def host_ended(self, host: CellHost, reason: Message) -> None:
+        self.texts.append(reason.text)
 
 
 @pytest.mark.parametrize("closes", [True, False])
