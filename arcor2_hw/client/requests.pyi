@@ -368,7 +368,13 @@ class Requests(ABC):
         """ExportFunction. Needs the role operator."""
 
     async def find_devices(
-        self, *, type: str, setting: str, parameters: Sequence[Parameter] = (), timeout: float | None = None
+        self,
+        *,
+        type: str,
+        setting: str,
+        parameters: Sequence[Parameter] = (),
+        addresses: str = "",
+        timeout: float | None = None,
     ) -> list[FoundDevice]:
         """FindDevices: a type of devices, the setting whose values are searched, and the other settings.
 

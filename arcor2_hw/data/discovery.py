@@ -1,6 +1,7 @@
 """Results of the integrator's commands: devices found on a machine, and the state of the devices of a cell."""
 
 import enum
+from typing import Final
 
 from msgspec import field
 
@@ -9,11 +10,17 @@ from arcor2_hw.data.device import Alarm, Connection, Health, Identity
 
 
 class Search(enum.StrEnum):
-    """What can be searched for: serial ports, nodes of a CAN bus, OAK cameras."""
+    """What can be searched for: serial ports, nodes of a CAN bus, OAK cameras, devices in a network."""
 
     SERIAL = "serial"
     CAN = "can"
     OAK = "oak"
+    UR = "ur"
+    MODBUS = "modbus"
+
+
+NETWORK: Final = (Search.UR, Search.MODBUS)
+"""Searches of addresses that a user enters."""
 
 
 class Found(Data, frozen=True):

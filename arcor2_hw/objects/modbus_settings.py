@@ -30,7 +30,7 @@ class ModbusSettings(Settings):
     :param request_timeout: time the device has to answer one request, s
     """
 
-    host: str = ""
+    host: str = dataclasses.field(default="", metadata={"found_by": "modbus"})
     port: int = 502
     serial_port: str = dataclasses.field(default="", metadata={"found_by": "serial"})
     baudrate: Annotated[int, Range(300, 921600)] = 19200

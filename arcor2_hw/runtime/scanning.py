@@ -1,11 +1,12 @@
 """Scan for connected devices. Runs in its own process, because vendor libraries may hang or crash.
 
-`python -m arcor2_hw.runtime.scanning serial | can BUS | oak` prints a JSON list of Found, or on stderr the message of
-an error in JSON. Serial ports are not
-opened. On a CAN bus it listens, then reads the identity object of each node by SDO, which does not change the nodes.
+`python -m arcor2_hw.runtime.scanning serial | can BUS | oak | ur ADDRESSES | modbus ADDRESSES [--port PORT]` prints a
+JSON list of Found, or on stderr the message of an error in JSON. Serial ports are not opened. On a CAN bus it listens,
+then reads the identity object of each node by SDO, which does not change the nodes.
 """
 
 import argparse
+import asyncio
 import logging
 import os
 import sys
@@ -18,6 +19,7 @@ import msgspec
 from arcor2_hw.data.discovery import Found, Search
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotConnected, NotFound
 from arcor2_hw.objects.settings import check_serial_port
+from arcor2_hw.runtime.network_search import DASHBOARD_PORT, Probe, addresses_of, modbus_device, search, universal_robot
 
 LISTEN_TIME: Final = 1.2
 """Time of listening on a CAN bus, s. Nodes usually send a heartbeat at least once a second."""
@@ -147,18 +149,25 @@ def oak_cameras() -> list[Found]:
     ]
 
 
+def _in_network(probe: Probe, where: str, port: int) -> list[Found]:
+    return asyncio.run(search(probe, addresses_of(where), port))
+
+
 def main() -> None:
     """Scan for one kind of device and print the result."""
     parser = argparse.ArgumentParser(description="Scan for connected devices.")
     parser.add_argument("kind", choices=tuple(Search))
-    parser.add_argument("bus", nargs="?", default="")
+    parser.add_argument("where", nargs="?", default="", help="the CAN bus, or addresses in the network")
+    parser.add_argument("--port", type=int, default=502, help="port of Modbus TCP")
     options = parser.parse_args()
     results = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # so that output of vendor libraries does not mix with the result
     kinds: dict[str, Callable[[], list[Found]]] = {
         Search.SERIAL: serial_ports,
         Search.OAK: oak_cameras,
-        Search.CAN: lambda: can_nodes(options.bus),
+        Search.CAN: lambda: can_nodes(options.where),
+        Search.UR: lambda: _in_network(universal_robot, options.where, DASHBOARD_PORT),
+        Search.MODBUS: lambda: _in_network(modbus_device, options.where, options.port),
     }
     try:
         found = kinds[options.kind]()

@@ -749,7 +749,7 @@ def test_secret_settings_are_marked() -> None:
     problem = lib.analyse("Wrong").problem
     assert problem is not None
     assert "a secret setting must be of type str" in str(problem)
-    assert "found_by must be serial, can, oak, not 'dowsing'" in str(lib.analyse("Lost").problem)
+    assert "found_by must be serial, can, oak, ur, modbus, not 'dowsing'" in str(lib.analyse("Lost").problem)
 
 
 ROBOT = """

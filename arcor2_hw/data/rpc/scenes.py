@@ -89,11 +89,15 @@ class CopySceneArgs(Data, frozen=True):
 
 
 class FindDevicesArgs(Data, frozen=True):
-    """Arguments of FindDevices: a type of devices, the setting whose values are searched, and the other settings."""
+    """Arguments of FindDevices: a type of devices, the setting whose values are searched, and the other settings.
+
+    addresses: of a search in the network: addresses and networks, separated by commas or spaces.
+    """
 
     type: str
     setting: str
     parameters: list[Parameter] = field(default_factory=list)
+    addresses: str = ""
 
 
 class FoundDevice(Data, frozen=True):

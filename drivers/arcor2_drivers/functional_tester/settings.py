@@ -25,7 +25,7 @@ class FunctionalTesterSettings(Settings):
     :param door_timeout: time the door has to reach its end position, s
     """
 
-    host: str
+    host: str = dataclasses.field(metadata={"found_by": "modbus"})
     port: int = 502
     unit_id: Annotated[int, Range(0, 255)] = 1
     watchdog_ms: Annotated[int, Range(200, LONGEST_WATCHDOG, "ms")] = 2000

@@ -49,7 +49,7 @@ class UrSettings(Settings):
     :param part_offset_z: shift of a gripped part from the tool center point along the tool, m
     """
 
-    host: str
+    host: str = dataclasses.field(metadata={"found_by": "ur"})
     payload_mass: float = dataclasses.field(default=-1.0, metadata={"for_control": True})
     payload_cog_x: Annotated[float, Range(-1.0, 1.0)] = 0.0
     payload_cog_y: Annotated[float, Range(-1.0, 1.0)] = 0.0

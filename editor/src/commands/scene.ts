@@ -102,9 +102,10 @@ export async function findDevices(
   type: string,
   setting: string,
   parameters: Parameter[],
+  addresses = "",
 ): Promise<{ found: FoundDevice[] } | { refused: string }> {
   try {
-    return { found: await call("FindDevices", { type, setting, parameters }, { deadline: FOUND_WITHIN }) };
+    return { found: await call("FindDevices", { type, setting, parameters, addresses }, { deadline: FOUND_WITHIN }) };
   } catch (error) {
     return { refused: sentence(error) };
   }

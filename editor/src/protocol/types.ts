@@ -307,7 +307,11 @@ export interface CalibrateRobotArgs {
   move_to_calibration_pose?: boolean;
 }
 
-/** A later measurement compared with a record: distance (m), angle (rad), and whether both are within limits. */
+/**
+ * A later measurement compared with a record: distance (m), angle (rad), and whether both are within limits.
+ *
+ * key and values translate the verdict.
+ */
 export interface CalibrationCheck {
   record_id: string;
   date: string;
@@ -317,6 +321,8 @@ export interface CalibrationCheck {
   angle_limit: number;
   passed: boolean;
   verdict: string;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /** An input of a calibration: SHA-256 in hex, size in bytes, and the path of the file if it is stored. */
@@ -537,11 +543,16 @@ export interface ExecuteActionArgs {
   action_id: string;
 }
 
-/** Arguments of FindDevices: a type of devices, the setting whose values are searched, and the other settings. */
+/**
+ * Arguments of FindDevices: a type of devices, the setting whose values are searched, and the other settings.
+ *
+ * addresses: of a search in the network: addresses and networks, separated by commas or spaces.
+ */
 export interface FindDevicesArgs {
   type: string;
   setting: string;
   parameters?: Parameter[];
+  addresses?: string;
 }
 
 /**

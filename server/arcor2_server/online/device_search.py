@@ -19,13 +19,20 @@ BUS: Final = ("interface", "channel", "bitrate")
 """Settings that describe a CAN bus, as in python-can."""
 
 
-async def search(kind: Search, bus: str = "") -> list[Found]:
-    """Search for devices of one kind, CAN nodes on a bus (as `device scan --can`).
+async def search(kind: Search, where: str = "", port: int | None = None) -> list[Found]:
+    """Search for devices of one kind.
+
+    Args:
+        kind: What is searched for.
+        where: The CAN bus (as `device scan --can`), or the addresses in the network.
+        port: Port of Modbus TCP; by default 502.
 
     Raises:
         RequestRefused: The search failed or took too long; the message says why.
     """
-    command = [sys.executable, "-P", "-m", "arcor2_hw.runtime.scanning", kind.value, *([bus] if bus else [])]
+    command = [sys.executable, "-P", "-m", "arcor2_hw.runtime.scanning", kind.value, *([where] if where else [])]
+    if port is not None:
+        command += ["--port", str(port)]
     pipe = asyncio.subprocess.PIPE
     process = await asyncio.create_subprocess_exec(*command, stdin=asyncio.subprocess.DEVNULL, stdout=pipe, stderr=pipe)
     try:

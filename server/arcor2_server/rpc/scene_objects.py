@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 
+import structlog
 from msgspec.structs import replace
 
 from arcor2_hw.actions.json_values import decode_json, encode
 from arcor2_hw.data.base import UNSET, Unset, new_id
-from arcor2_hw.data.discovery import Search
+from arcor2_hw.data.discovery import NETWORK, Search
 from arcor2_hw.data.events import ChangeType, SceneStateEnum
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models, ObjectModel, ObjectTypeSource
@@ -27,6 +28,7 @@ from arcor2_hw.data.rpc import (
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_hw.messages import Message
+from arcor2_hw.runtime.network_search import addresses_of
 from arcor2_server.collaboration.locks import ADDING_OBJECT, SCENE, Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Kind
@@ -47,6 +49,8 @@ from arcor2_server.rpc.registry import Context, rpc
 from arcor2_server.storage import AssetStore, Storage
 from arcor2_server.workspace.pivot import pivot_offset
 from arcor2_server.workspace.robots import optional
+
+log = structlog.get_logger(__name__)
 
 
 def _model_of(model: ObjectModel) -> Models:
@@ -156,15 +160,20 @@ class SceneObjectRequests:
         wanted = settings.get(args.setting)
         if wanted is None or isinstance(wanted.found_by, Unset):
             raise InvalidData("No search finds the setting {setting} of {type}.", setting=args.setting, type=args.type)
-        kind, bus = Search(wanted.found_by), ""
+        kind, where, port = Search(wanted.found_by), "", None
+        values = {each.name: each.default_value for each in settings.values() if each.default_value is not UNSET}
+        values |= {each.name: each.value for each in args.parameters}
         if kind is Search.CAN:
             self._online.require_offline()  # a serial adapter serves only one program
-            values = {each.name: each.default_value for each in settings.values() if each.default_value is not UNSET}
-            values |= {each.name: each.value for each in args.parameters}
-            bus = bus_of({name: decode_json(value, str | int) for name, value in values.items() if name in BUS})
+            where = bus_of({name: decode_json(value, str | int) for name, value in values.items() if name in BUS})
+        elif kind in NETWORK:
+            where = ",".join(addresses_of(args.addresses))
+            log.info("network searched", kind=kind.value, addresses=args.addresses, user=context.user)
+            if kind is Search.MODBUS and "port" in values:
+                port = decode_json(values["port"], int)
         return [
             FoundDevice(encode(value_of(found, kind)), found.address, found.description, found.serial)
-            for found in await search(kind, bus)
+            for found in await search(kind, where, port)
         ]
 
     # ------------------------------------------------------------------------------------ changing

@@ -44,6 +44,25 @@ async def test_nodes_of_a_can_bus_are_offered_as_values_of_the_setting(server: S
 
 
 @serving()
+async def test_devices_at_entered_addresses_are_offered_as_values_of_the_setting(server: Server) -> None:
+    server.types.settings["Tester"] = [
+        ParameterMeta("host", "string", found_by="modbus"),
+        ParameterMeta("port", "integer", default_value="502"),
+    ]
+    tester = FakeProcess("functional_tester")
+    try:
+        host, _, port = tester.ready["modbus"].rpartition(":")
+        args = {"type": "Tester", "setting": "host", "parameters": [{"name": "port", "type": "integer", "value": port}]}
+        (found,) = await server.ask("FindDevices", args | {"addresses": f"{host}, 127.0.0.8/30"})
+        assert json.loads(found.value) == found.address == host
+        assert found.description
+        with pytest.raises(InvalidData, match="Enter the addresses"):  # nothing is searched by itself
+            await server.ask("FindDevices", args)
+    finally:
+        tester.end()
+
+
+@serving()
 async def test_a_search_that_cannot_work_says_why(server: Server) -> None:
     server.types.settings["Belt"] = SETTINGS
     with pytest.raises(InvalidData, match="No search finds the setting bitrate of Belt"):

@@ -11,9 +11,9 @@ test("found devices are offered by what they are, with address and serial number
   const adapter = { value: '"/dev/ttyUSB3"', address: "/dev/ttyUSB3", description: "Scale", serial: "A5" };
   const bare = { value: '"/dev/ttyS1"', address: "/dev/ttyS1", description: "", serial: "" };
   const markup = shown([adapter, bare], bare.value);
-  expect(markup).toContain("<strong>Scale</strong>");
+  expect(markup).toContain(">Scale</strong>");
   expect(markup).toContain("/dev/ttyUSB3 · serial number A5");
-  expect(markup).toContain("<strong>/dev/ttyS1</strong>");
+  expect(markup).toContain(">/dev/ttyS1</strong>");
   expect(markup.match(/aria-pressed="(true|false)"/g)).toEqual(['aria-pressed="false"', 'aria-pressed="true"']);
 });
 
