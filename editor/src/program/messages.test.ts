@@ -1,7 +1,7 @@
 import { expect, it } from "vitest";
 import type { TraceEntry } from "../protocol/types";
 import type { State } from "../store/state";
-import { shownMessage } from "./messages";
+import { shownMessage, splitAddress } from "./messages";
 
 const entry = (number: number, action_id: string, ...parameters: string[]): TraceEntry => ({
   run: 1,
@@ -40,4 +40,14 @@ it("shows the latest message of the run", () => {
 
 it("shows nothing before the document is known", () => {
   expect(shownMessage({ ...stateOf(entry(1, "greet", "one")), doc: null })).toBe("");
+});
+
+it("separates the addresses of a device from a message", () => {
+  const lost = { text: "robot (UR5e): the connection was lost", address: "host 127.163.219.71" };
+  expect(splitAddress(`${lost.text} [${lost.address}]`)).toEqual(lost);
+  const refused = splitAddress("robot: No RTDE port at 127.120.197.184:30004.");
+  expect(refused).toEqual({ text: "robot: No RTDE port.", address: "127.120.197.184:30004" });
+  expect(splitAddress("Motory robotu r1 (10.0.0.5) byly vypnuty.").text).toBe("Motory robotu r1 byly vypnuty.");
+  for (const text of ["Ready.", "version 1.2.3 at 5.0 s", "use [a] or [b] here", "[host x]"])
+    expect(splitAddress(text)).toEqual({ text, address: "" });
 });

@@ -11,3 +11,18 @@ export function shownMessage({ doc, program }: Pick<State, "doc" | "program">): 
   const text = program.trace.findLast((each) => shows(each.action_id))?.parameters?.[0];
   return text === undefined ? "" : String(JSON.parse(text));
 }
+
+/** The address that the server adds at the end of a message, and IP addresses in a sentence, with their preposition. */
+const LABEL = /(?<=\S) \[([^[\]]+)\]$/;
+const HOST = / (?:\(|\p{Ll}{2,5} )?((?:\d{1,3}\.){3}\d{1,3}(?::\d+)?)\)?/gu;
+
+/** Split a message of a device into the text for operators, and the addresses in it, which are for technicians. */
+export function splitAddress(message: string): { text: string; address: string } {
+  const found = new Set<string>();
+  const take = (_: string, address: string) => {
+    found.add(address);
+    return "";
+  };
+  const text = message.replace(LABEL, take).replace(HOST, take);
+  return { text, address: [...found].join(", ") };
+}

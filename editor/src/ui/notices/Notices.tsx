@@ -2,7 +2,7 @@
  * The newest message and the newest task. Errors stay until they are dismissed, other messages disappear by themselves.
  *
  * They have a space of their own, so that they never cover a control: a row of the screen, or a part of the Stop dock
- * while something may move. A tap shows all messages.
+ * while something may move. A tap shows all messages with the addresses of devices, which only technicians need.
  */
 
 import { t } from "@lingui/core/macro";
@@ -16,6 +16,8 @@ import { Button } from "../kit/kit";
 import { openOverlay } from "../search/overlay";
 import "./notices.css";
 
+/** The address of a device, which the server adds at the end of a message. */
+const ADDRESS = /(?<=\S) \[[^[\]]+\]$/;
 /** How long a message that is not an error stays, s. */
 const STAY = 6;
 
@@ -47,7 +49,7 @@ export function Notices({ docked = false }: { docked?: boolean }) {
             title={t`Show all messages`}
             onClick={() => openOverlay("messages")}
           >
-            <span>{newest.text}</span>
+            <span>{newest.text.replace(ADDRESS, "")}</span>
             {more > 0 && <span className="tag">+{more}</span>}
           </button>
           <Button look="plain" icon="close" aria-label={t`Dismiss`} onPress={() => dismiss(newest.id)} />

@@ -8,7 +8,7 @@ import { type ComponentType, useEffect, useState } from "react";
 import * as commands from "../../commands/run";
 import { storeGeneralState } from "../../commands/viewstate";
 import { ago } from "../../formats";
-import { shownMessage } from "../../program/messages";
+import { shownMessage, splitAddress } from "../../program/messages";
 import { dismissal, lastRun, type Result, resultOf, undismissedRun } from "../../program/results";
 import { theSession } from "../../session/session";
 import { usersOfDocument } from "../../store/absentUsers";
@@ -111,7 +111,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
                 {result.name}, {ago(run.ended ?? run.started)}
               </p>
             )}
-            {result?.detail && <p>{withNames(state, result.detail)}</p>}
+            {result?.detail && <Reason>{withNames(state, result.detail)}</Reason>}
             {result?.tone === "bad" && (
               <p className="operator-advice">{t`Fix the cause, then press Start. If it fails again, call for help.`}</p>
             )}
@@ -180,6 +180,22 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   );
 }
 
+/** A message of a device. Its address, which only a technician needs, is shown on request. */
+function Reason({ children }: { children: string }) {
+  const { text, address } = splitAddress(children);
+  return (
+    <div>
+      {text}
+      {address && (
+        <details className="operator-more">
+          <summary>{t`Details`}</summary>
+          <p data-name>{address}</p>
+        </details>
+      )}
+    </div>
+  );
+}
+
 /** Report in one line how the last run ended. */
 function LastRun() {
   const run = useEditor((state) => lastRun(state));
@@ -198,10 +214,11 @@ function Devices() {
   return (
     <section className="exception" role="alert">
       {wrong.map((each) => (
-        <p key={each.object_id}>
+        <div key={each.object_id}>
           <Icon name="plug" />{" "}
-          <strong>{t`${doc.objects[each.object_id]?.name ?? t`A device`} does not answer.`}</strong> {each.reason}
-        </p>
+          <strong>{t`${doc.objects[each.object_id]?.name ?? t`A device`} does not answer.`}</strong>
+          {each.reason && <Reason>{each.reason}</Reason>}
+        </div>
       ))}
     </section>
   );

@@ -3,6 +3,7 @@
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, plural, t } from "@lingui/core/macro";
 import { ago, duration } from "../../formats";
+import { splitAddress } from "../../program/messages";
 import type { Run, RunEnd } from "../../protocol/types";
 import { useEditor } from "../../store/store";
 import { useTicking } from "../times";
@@ -50,6 +51,7 @@ function summary(run: Run): string {
   const parts = [plural(run.actions, { one: "# action", other: "# actions" })];
   if (took !== undefined) parts.push(duration(took));
   if (run.stopped_by) parts.push(t`stopped by ${run.stopped_by}`);
-  if (run.error) parts.push(run.last_action?.name ? `${run.last_action.name}: ${run.error}` : run.error);
+  const error = splitAddress(run.error ?? "").text;
+  if (error) parts.push(run.last_action?.name ? `${run.last_action.name}: ${error}` : error);
   return parts.join(" · ");
 }
