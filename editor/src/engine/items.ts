@@ -31,11 +31,14 @@ export interface ObjectItem extends Base {
   fault: boolean;
   /** What the device reports of what one can see, by name; undefined while it is unknown. */
   values?: Readonly<Record<string, number>> | undefined;
-  /** Parts that sensors detect on it, in its frame. */
+  /** Places on it at which sensors detect parts, in its frame. */
   parts?: readonly DetectedPart[] | undefined;
 }
 
+/** A part at a sensor; `seen` while the sensor detects one. */
 export interface DetectedPart {
+  sensor: string;
+  seen: boolean;
   position: Position;
   size: Position;
 }

@@ -69,11 +69,9 @@ test("parts are drawn where sensors detect them", () => {
     const state = stateWith([], [{ object_id: "obj_io", values: { stop: on }, parts: [] }]);
     return partsOn({ ...state, view: { ...state.view, scene: { "part/obj_io/stop": view } } }, "obj_belt");
   };
-  expect(detected(1)).toEqual({ "part/obj_io/stop": { position, size } });
-  expect([detected(0), detected(1, null), detected(1, { on: "obj_belt", size })]).toEqual([
-    undefined,
-    undefined,
-    undefined,
-  ]);
+  const sensor = "part/obj_io/stop";
+  expect(detected(1)).toEqual([{ sensor, seen: true, position, size }]);
+  expect(detected(0)).toEqual([{ sensor, seen: false, position, size }]);
+  expect([detected(1, null), detected(1, { on: "obj_belt", size })]).toEqual([undefined, undefined]);
   expect(detected(1, { on: "obj_other", position, size })).toBeUndefined();
 });

@@ -33,19 +33,17 @@ function finite(value: unknown, names: string): value is Position {
   return [...names].every((name) => Number.isFinite((value as Record<string, unknown> | undefined)?.[name]));
 }
 
-/** Return the parts that sensors detect on an object, by the sensor; undefined without one. */
-export function partsOn(
-  { view, live }: Pick<State, "view" | "live">,
-  id: string,
-): Record<string, DetectedPart> | undefined {
-  const found: Record<string, DetectedPart> = {};
+/** Return the places at which sensors detect parts on an object; undefined without a sensor. */
+export function partsOn({ view, live }: Pick<State, "view" | "live">, id: string): DetectedPart[] | undefined {
+  const found: DetectedPart[] = [];
   for (const [key, value] of Object.entries(view.scene)) {
-    const [kind, sensor = "", name = ""] = key.split("/");
-    if (kind !== "part" || live.values[sensor]?.values[name] !== 1) continue;
+    const [kind, device = "", name = ""] = key.split("/");
+    if (kind !== "part") continue;
     const { on, position, size } = (value ?? {}) as Record<string, unknown>;
-    if (on === id && finite(position, "xyz") && finite(size, "xyz")) found[key] = { position, size };
+    const seen = live.values[device]?.values[name] === 1;
+    if (on === id && finite(position, "xyz") && finite(size, "xyz")) found.push({ sensor: key, seen, position, size });
   }
-  return Object.keys(found).length > 0 ? found : undefined;
+  return found.length > 0 ? found : undefined;
 }
 
 /** Return the object of a separate gripper that a robot carries; undefined without one. */

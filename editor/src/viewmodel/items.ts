@@ -68,7 +68,7 @@ export class ItemMaker {
       const gripper = robot && gripperOf(state, object);
       const live = [robot ? state.live.values[object.id] : values, gripper, gripper && state.live.values[gripper.id]];
       const parts = partsOn(state, object.id);
-      const detected = parts && Object.keys(parts).join();
+      const detected = parts?.map(({ sensor, seen }) => sensor + seen).join();
       const looks = [type, robot, fault, robot && online, model, ghost, robot && axes, detected, ...live];
       add(object.id, [object, place, preview, ...looks, ...notify(object.id)], () => {
         const pose = {
@@ -87,7 +87,7 @@ export class ItemMaker {
             ...toolOf(state, object),
           };
         const shape = shapeOf(type && model ? { ...type, object_model: model } : type);
-        return { ...base, kind: "object", shape, values, parts: parts && Object.values(parts) };
+        return { ...base, kind: "object", shape, values, parts };
       });
     }
     const size = pointSize(state);

@@ -18,6 +18,7 @@ import {
 import type { ObjectItem, Shape } from "../items";
 import { readMesh } from "../loaders/glb";
 import type { DeviceModel } from "../models";
+import type { Parts } from "../parts";
 import { setPose } from "../poses";
 import { surface } from "../surface";
 import { type Context, disposeTree, ownedBy, seenThrough, Thing } from "../thing";
@@ -38,7 +39,8 @@ export class ObjectThing extends Thing<ObjectItem> {
   private reason = "";
   private model: DeviceModel | null = null;
   private values: ObjectItem["values"];
-  private parts: ObjectItem["parts"];
+  /** Loaded for the first object with sensors. */
+  private parts: Parts | null = null;
   private readonly partMaterial = surface(this.context, { color: PART });
 
   constructor(item: ObjectItem, context: Context) {
@@ -54,8 +56,8 @@ export class ObjectThing extends Thing<ObjectItem> {
       this.shape = shape;
       this.build(item.shape);
     }
+    if (item.parts || this.parts) void this.showParts();
     if (item.values !== this.values) this.showValues(item);
-    if (item.parts !== this.parts) this.showParts(item);
     const { palette } = this.context;
     const color = item.selected
       ? palette.selected
@@ -88,7 +90,8 @@ export class ObjectThing extends Thing<ObjectItem> {
   }
 
   override step(seconds: number): boolean {
-    return this.model?.step(seconds) ?? false;
+    const glides = this.parts?.step(seconds);
+    return this.model?.step(seconds) || glides || false;
   }
 
   override dispose(): void {
@@ -96,22 +99,18 @@ export class ObjectThing extends Thing<ObjectItem> {
     super.dispose();
     this.material.dispose();
     this.edges.dispose();
+    this.parts?.dispose();
     this.partMaterial.dispose();
   }
 
   /** Show the parts that sensors detect on it. */
-  private showParts({ parts = [] }: ObjectItem): void {
-    this.parts = this.item.parts;
-    for (const child of this.root.children.filter((each) => each.userData.part)) {
-      child.removeFromParent();
-      disposeTree(child);
+  private async showParts(): Promise<void> {
+    if (!this.parts) {
+      const { Parts } = await import("../parts");
+      this.parts ??= new Parts(this.root, this.partMaterial);
     }
-    for (const { position, size } of parts) {
-      const mesh = new Mesh(new BoxGeometry(size.x, size.y, size.z), this.partMaterial);
-      mesh.userData.part = mesh.castShadow = true;
-      mesh.position.set(position.x, position.y, position.z);
-      this.root.add(mesh);
-    }
+    const { parts = [], values } = this.item;
+    if (this.parts.show(parts, values?.velocity ?? 0)) this.context.animate(this);
     this.context.invalidate();
   }
 

@@ -1,0 +1,96 @@
+/**
+ * Parts on an object, drawn where sensors detect them. On a belt that runs, a part that leaves a sensor glides at the
+ * reported speed until the next sensor detects it. A separate chunk.
+ */
+
+import { BoxGeometry, type Material, Mesh, type Object3D } from "three";
+import type { DetectedPart } from "./items";
+
+/** Time that a part waits at a sensor which does not detect it, s; then somebody has taken it. */
+const LATE = 2;
+
+interface Glider {
+  mesh: Mesh;
+  to: DetectedPart;
+  /** Time since it has arrived, s. */
+  waits: number;
+}
+
+export class Parts {
+  private places: readonly DetectedPart[] = [];
+  private readonly meshes = new Map<DetectedPart["sensor"], Mesh>();
+  private gliders: Glider[] = [];
+  private velocity = 0;
+
+  constructor(
+    private readonly root: Object3D,
+    private readonly material: Material,
+  ) {}
+
+  /** Show what the sensors report, and the speed of the object along its x axis, m/s. Return whether parts glide. */
+  show(places: readonly DetectedPart[], velocity: number): boolean {
+    const before = new Set(this.places.filter(({ seen }) => seen).map(({ sensor }) => sensor));
+    this.places = places;
+    this.velocity = velocity;
+    for (const place of places) {
+      const { sensor, seen } = place;
+      if (seen) this.detected(place);
+      else if (before.has(sensor)) this.left(place);
+    }
+    for (const [sensor, mesh] of this.meshes) {
+      if (places.some((each) => each.seen && each.sensor === sensor)) continue;
+      this.drop(mesh);
+      this.meshes.delete(sensor);
+    }
+    return this.glides;
+  }
+
+  /** Move the parts for a time, s; without end: draw no parts between sensors. Return whether they move further. */
+  step(seconds: number): boolean {
+    for (const glider of [...this.gliders]) {
+      const { mesh, to } = glider;
+      const left = to.position.x - mesh.position.x;
+      const way = Math.min(Math.abs(this.velocity) * seconds, Math.abs(left));
+      if (way > 0) mesh.position.x += Math.sign(left) * way;
+      else if (this.velocity !== 0) glider.waits += seconds;
+      if (seconds < Infinity && glider.waits < LATE) continue;
+      this.gliders.splice(this.gliders.indexOf(glider), 1);
+      this.drop(mesh);
+    }
+    return this.glides;
+  }
+
+  dispose(): void {
+    for (const mesh of [...this.meshes.values(), ...this.gliders.map((each) => each.mesh)]) this.drop(mesh);
+  }
+
+  private get glides(): boolean {
+    return this.gliders.length > 0 && this.velocity !== 0;
+  }
+
+  private detected(place: DetectedPart): void {
+    for (const glider of this.gliders.filter(({ to }) => to.sensor === place.sensor)) this.drop(glider.mesh);
+    this.gliders = this.gliders.filter(({ to }) => to.sensor !== place.sensor);
+    if (!this.meshes.has(place.sensor)) this.meshes.set(place.sensor, this.mesh(place));
+  }
+
+  /** A part has left a sensor: it is under way to the next one, if the object moves. */
+  private left(place: DetectedPart): void {
+    const ahead = ({ position }: DetectedPart) => (position.x - place.position.x) * Math.sign(this.velocity);
+    const next = this.places.filter((each) => ahead(each) > 0).sort((a, b) => ahead(a) - ahead(b))[0];
+    if (next && !next.seen) this.gliders.push({ mesh: this.mesh(place), to: next, waits: 0 });
+  }
+
+  private mesh({ position, size }: DetectedPart): Mesh {
+    const mesh = new Mesh(new BoxGeometry(size.x, size.y, size.z), this.material);
+    mesh.castShadow = true;
+    mesh.position.set(position.x, position.y, position.z);
+    this.root.add(mesh);
+    return mesh;
+  }
+
+  private drop(mesh: Mesh): void {
+    mesh.removeFromParent();
+    mesh.geometry.dispose();
+  }
+}
