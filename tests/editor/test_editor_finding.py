@@ -298,6 +298,42 @@ async def _names(screen: Screen) -> list[str]:
     return names
 
 
+async def test_crowded_objects_have_one_label_and_the_selection_has_views_from_above_and_a_side(
+    place: Place, browser: Browser
+) -> None:
+    point, tester = place.point("fixture"), place.object("tester")
+    async with screen_of(browser, place.cell.url, "phone", touch=True) as screen:
+        page = screen.page
+        await _came_in(screen, "Nora", place)
+        await _drawn(screen, point.id, [[0, -9, 5], [0, 0, 0]])
+        crowd = page.get_by_role("button", name=re.compile(r"^\d objects: .*tester.*Zoom in$"))
+        await expect(crowd).to_have_count(1)
+        assert not {"tester", "table"} & set(await _names(screen))
+        assert await screen.faults() == []
+        before = (await screen.item(tester))["screen"]
+        await crowd.click()
+        await expect(crowd).to_have_count(0)
+        assert (await screen.item(tester))["screen"] != before
+        # The views are drawn on demand; closed, nothing of them is drawn.
+        await page.set_viewport_size(VIEWPORTS["ipad"])  # type: ignore[arg-type]
+        await screen.settle()
+        watchers = await page.evaluate("__engine.watchers.size")
+        await screen.tap(tester)
+        await screen.press("Views")
+        await page.get_by_role("menuitem", name="Top and side views").click()
+        views = page.get_by_role("group", name="Top and side views of tester")
+        await views.get_by_text(re.compile(r"^Top")).wait_for()
+        await screen.settle()
+        assert await screen.faults() == []
+        await screen.picture("insets ipad")
+        await views.get_by_role("button", name="View: Top").click()
+        height = await page.evaluate("() => __engine.view.camera.getWorldDirection(__engine.view.target.clone()).z")
+        assert height < -0.99
+        await views.get_by_role("button", name="Close top and side views").click()
+        await expect(views).to_have_count(0)
+        assert await page.evaluate("__engine.watchers.size") == watchers
+
+
 async def _drawn(screen: Screen, item: str, view: Any) -> float:
     """Return the scale at which a point is drawn from a viewpoint."""
     frames = await screen.frames()

@@ -41,7 +41,7 @@ export class View {
   private readonly forget = new AbortController();
 
   constructor(
-    private readonly element: HTMLElement,
+    readonly element: HTMLElement,
     private readonly changed: () => void,
   ) {
     this.camera.up.set(0, 0, 1);

@@ -1,6 +1,6 @@
 /** The 3D view: shows items, follows robots, reports taps. It does not use React, and draws only after changes. */
 
-import { Fog, Scene, type Vector3, type WebGLRenderer } from "three";
+import { type Box3, Fog, Scene, type Vector3, type WebGLRenderer } from "three";
 import type { Telemetry } from "../store/telemetry";
 import { Animation } from "./animation";
 import { Batches } from "./batches";
@@ -10,7 +10,7 @@ import { Floor, lowest } from "./floor";
 import { Frames } from "./frames";
 import type { Item } from "./items";
 import { labelsOf, placeConditions } from "./labelling";
-import { Labels } from "./labels";
+import { type Label, Labels, type Rect } from "./labels";
 import { LazyDrop } from "./lazyDrop";
 import { LazyGizmo } from "./lazyGizmo";
 import { LazyPath } from "./lazyPath";
@@ -24,7 +24,7 @@ import { type Probe, probe } from "./probe";
 import { rendererOf } from "./renderer";
 import { Resolution } from "./resolution";
 import type { LowQuality, Quality } from "./surface";
-import type { Context, Thing } from "./thing";
+import { boundsOf, type Context, type Thing } from "./thing";
 import { make } from "./things/make";
 import { type JointLimit, RobotThing } from "./things/robot";
 
@@ -45,6 +45,9 @@ const SMALL: ReadonlySet<Item["kind"]> = new Set(["point", "orientation", "actio
 /** Time between two frames, s. */
 const PERIODS: Record<Quality, number> = { low: 1 / 30, high: 1 / 60 };
 
+/** Time between two checks of the age of reports, ms. */
+const CHECKED = 250;
+
 export class Engine {
   readonly view: View;
   readonly scene = new Scene();
@@ -53,9 +56,11 @@ export class Engine {
   /** Number of drawn frames. */
   frames = 0;
   onTap: (hits: Hit[], floor: Vector3 | null) => void = () => {};
+  /** Return the labels that are drawn, and places that they leave free, pixels. */
+  arrange: (labels: Label[]) => [Label[], Rect[]] = (labels) => [labels, []];
 
   private readonly watchers = new Set<() => void>();
-  private readonly renderer: WebGLRenderer;
+  readonly renderer: WebGLRenderer;
   private readonly things = new Map<string, Thing>();
   private readonly batches: Batches;
   private readonly labels: Labels;
@@ -72,6 +77,7 @@ export class Engine {
   private width = 1;
   private height = 1;
   private hovered = "";
+  private checkedAt = 0;
   private readonly fitting: Fitting;
   private readonly notes = new Map<string, string>();
   /** Text shown next to an item while it is moved, instead of its height. */
@@ -132,7 +138,7 @@ export class Engine {
     this.setDark(options.dark);
     this.floorGrid.number(() => this.draw()).catch(() => {});
     this.ends.push(options.telemetry.subscribe((id) => this.reported(id)));
-    const ageTimer = setInterval(() => this.checkAges(), 250);
+    const ageTimer = setInterval(() => this.checkAges(), CHECKED);
     this.ends.push(() => clearInterval(ageTimer));
     const watch = new ResizeObserver(() => this.resize());
     watch.observe(canvas.parentElement ?? canvas);
@@ -235,10 +241,15 @@ export class Engine {
     return onFloor(x, y, { width: this.width, height: this.height }, this.view.camera, 20, level);
   }
 
-  /** Bring an item, or all items, into the view; `best` chooses the direction too. */
-  focus(id?: string, best = false): void {
+  /** Bring an item, some or all items into the view; `best` chooses the direction too. */
+  focus(id?: string | readonly string[], best = false): void {
     this.place();
-    this.fitting.focus(id, best);
+    this.fitting.focus(id === undefined ? id : [id].flat(), best);
+  }
+
+  /** Return the box around an item in the world. */
+  bounds(thing: Thing): Box3 {
+    return boundsOf(thing);
   }
 
   private loaded(id: string): void {
@@ -317,7 +328,11 @@ export class Engine {
     this.draw();
   }
 
-  private checkAges(): void {
+  /** Mark robots whose reports are old. After a pause of the page, reports that wait are handled first. */
+  private checkAges(now = performance.now()): void {
+    const paused = now - this.checkedAt > 2 * CHECKED;
+    this.checkedAt = now;
+    if (paused) return;
     for (const thing of this.things.values()) if (thing instanceof RobotThing && thing.checkAge()) this.invalidate();
   }
 
@@ -350,6 +365,7 @@ export class Engine {
     const moving = this.animation.step(seconds);
     if (moving) this.renderer.shadowMap.needsUpdate = true;
     this.render();
+    for (const watcher of this.watchers) watcher();
     return flying || moving;
   }
 
@@ -390,11 +406,10 @@ export class Engine {
     this.drop.tell(this.things.values(), this.palette, this.notes);
     if (this.messageLog.id) this.notes.set(this.messageLog.id, this.messageLog.text);
     const labels = labelsOf(this.things, this.hovered, this.notes, camera.position, this.width);
-    this.labels.show(labels, camera, this.width, this.height);
+    this.labels.show(...this.arrange(labels), camera, this.width, this.height);
     placeConditions(this.things, this.labels, camera, this.width, this.height);
     this.renderer.render(this.scene, camera);
     this.frames++;
-    for (const watcher of this.watchers) watcher();
     if (this.movedRobots.size > 0) this.draw();
   }
 }

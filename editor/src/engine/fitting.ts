@@ -6,8 +6,8 @@ import { corners } from "./framing";
 import type { Item } from "./items";
 import { boundsOf, type Thing } from "./thing";
 
-/** Time after a fit in which the places of devices arrive, ms. */
-const SOON = 1500;
+/** Time after a fit in which the places of devices arrive, ms: on a slow network, some seconds. */
+const SOON = 8000;
 
 export class Fitting {
   /** Position of the camera after the last fit to all items. */
@@ -21,10 +21,10 @@ export class Fitting {
     private readonly things: ReadonlyMap<string, Thing>,
   ) {}
 
-  /** Bring an item, or all items, into the view. Frames have to be up to date. */
-  focus(id?: string, best = false): void {
-    this.fit(id, best);
-    this.awaited = new Set(id === undefined ? this.things.keys() : []);
+  /** Bring these or all items into the view. Frames have to be up to date. */
+  focus(ids?: readonly string[], best = false): void {
+    this.fit(ids, best);
+    this.awaited = new Set(ids ? [] : this.things.keys());
     this.fittedAt = performance.now();
   }
 
@@ -43,11 +43,11 @@ export class Fitting {
     if (this.awaited.delete(id)) this.refit();
   }
 
-  private fit(id?: string, best = false): void {
+  private fit(ids?: readonly string[], best = false): void {
     const boxes = [...this.things.values()]
-      .filter(({ item }) => (id === undefined ? item.faint < 1 : item.id === id))
-      .map((thing) => boundsOf(thing).expandByScalar(id === undefined ? 0.01 : 0.12));
+      .filter(({ item }) => (ids ? ids.includes(item.id) : item.faint < 1))
+      .map((thing) => boundsOf(thing).expandByScalar(ids ? 0.12 : 0.01));
     this.view.fit(corners(boxes), best);
-    this.fitted = id === undefined ? this.view.camera.position.clone() : null;
+    this.fitted = ids ? null : this.view.camera.position.clone();
   }
 }

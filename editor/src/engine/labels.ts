@@ -45,14 +45,14 @@ export class Labels {
     this.sizes = new ResizeObserver(draw);
   }
 
-  /** Move the labels to the items as drawn. */
-  show(labels: Label[], camera: PerspectiveCamera, width: number, height: number): void {
-    const placed: Rect[] = [];
+  /** Move the labels to the items as drawn; leave the `taken` places free. */
+  show(labels: Label[], taken: Rect[], camera: PerspectiveCamera, width: number, height: number): void {
+    const placed = [...taken];
     this.placed = placed;
     const tried = new Set<string>();
     const wanted = [...labels].sort((a, b) => b.weight - a.weight);
     for (const label of wanted) {
-      if (placed.length >= MOST_LABELS || tried.size >= MOST_TRIED) break;
+      if (placed.length >= MOST_LABELS + taken.length || tried.size >= MOST_TRIED) break;
       label.anchor(at).project(camera);
       if (at.z > 1 || Math.abs(at.x) > 1 || Math.abs(at.y) > 1) continue;
       const x = ((at.x + 1) / 2) * width;

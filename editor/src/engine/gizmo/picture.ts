@@ -42,6 +42,7 @@ export class Picture {
   constructor(scene: Scene) {
     // Not pickable: the gizmo finds its handles itself.
     this.root.userData.ground = true;
+    this.root.userData.handles = true;
     scene.add(this.root);
   }
 

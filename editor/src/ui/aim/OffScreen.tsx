@@ -9,7 +9,7 @@ import { nameOf } from "../../viewmodel/names";
 import { atEdge, type Rect } from "./edge";
 
 /** Controls at the edge of the view. */
-const OTHERS = ".view-controls, .centre-top > *, .stop, .aim-bar, .fly-pad";
+const OTHERS = ".view-controls, .centre-top > *, .stop, .aim-bar, .fly-pad, .insets";
 
 export function OffScreen({ engine }: { engine: Engine }) {
   const id = useEditor((state) => state.ui.selection?.id ?? "");
@@ -65,8 +65,8 @@ export function OffScreen({ engine }: { engine: Engine }) {
   );
 }
 
-/** Areas that the arrow must not cover, pixels in the view. */
-function taken(view: DOMRect): Rect[] {
+/** Areas of controls that nothing else must cover, pixels in the view. */
+export function taken(view: DOMRect): Rect[] {
   return [...document.querySelectorAll(OTHERS)]
     .map((each) => each.getBoundingClientRect())
     .filter((box) => box.width > 0)

@@ -1,8 +1,8 @@
 /** Controls of the view: show all, view cube, fly or orbit, saved views. */
 
-import { i18n, type MessageDescriptor } from "@lingui/core";
-import { msg, t } from "@lingui/core/macro";
-import { useEffect, useRef, useState } from "react";
+import { i18n } from "@lingui/core";
+import { t } from "@lingui/core/macro";
+import { Suspense, useEffect, useRef, useState } from "react";
 import { followItemRequests } from "../../commands/handover";
 import { storeGeneralState, storeViewState } from "../../commands/viewstate";
 import type { ViewMode, ViewName, Viewpoint } from "../../engine/camera";
@@ -12,27 +12,21 @@ import { now, useEditor } from "../../store/store";
 import { Aim } from "../aim/Aim";
 import { OffScreen } from "../aim/OffScreen";
 import { Button } from "../kit/kit";
+import { lazyComponent } from "../kit/lazy";
 import { AskName, More } from "../kit/lazyControls";
 import type { Choice } from "../kit/props";
 import { isTyping } from "../search/overlay";
+import { Clusters } from "./Clusters";
 import { FlyPad } from "./FlyPad";
+import { type Direction, SIDES } from "./sides";
 import "../aim/aim.css";
 import "./view.css";
 
-type Direction = [number, number, number];
-
-/** Faces of the cube: name, normal, and directions of the text and its upper edge. */
-const SIDES: [ViewName, MessageDescriptor, Direction, Direction, Direction][] = [
-  ["top", msg`Top`, [0, 0, 1], [1, 0, 0], [0, 1, 0]],
-  ["front", msg`Front`, [0, -1, 0], [1, 0, 0], [0, 0, 1]],
-  ["back", msg`Back`, [0, 1, 0], [-1, 0, 0], [0, 0, 1]],
-  ["side", msg`Right`, [1, 0, 0], [0, 1, 0], [0, 0, 1]],
-  ["left", msg`Left`, [-1, 0, 0], [0, -1, 0], [0, 0, 1]],
-];
 /** Half edge, pixels. */
 const HALF = 30;
 
 const KEY = "bookmarks";
+const Insets = lazyComponent(() => import("./Insets"));
 
 interface Bookmark extends Viewpoint {
   name: string;
@@ -54,6 +48,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
   const stored = useEditor((state) => state.view.user[KEY]);
   const [mode, setMode] = useState<ViewMode>("orbit");
   const [naming, setNaming] = useState(false);
+  const [insets, setInsets] = useState(false);
   const bookmarks = bookmarksOf(stored);
   const always = useEditor(aimsAlways);
   const listed = useEditor((state) => state.ui.crosshair.listed);
@@ -78,6 +73,12 @@ export default function ViewControls({ engine }: { engine: Engine }) {
       label: always ? t`Close the crosshair` : t`Select with crosshair ( X )`,
       icon: "point",
       act: switchCrosshair,
+    },
+    {
+      id: "insets",
+      label: insets ? t`Close top and side views` : t`Top and side views`,
+      icon: "eye",
+      act: () => setInsets(!insets),
     },
     { id: "keep", label: t`Save view…`, icon: "plus", act: () => setNaming(true) },
     ...bookmarks.map((each, n) => ({
@@ -104,6 +105,12 @@ export default function ViewControls({ engine }: { engine: Engine }) {
       </div>
       {(always || listed) && <Aim engine={engine} />}
       <OffScreen engine={engine} />
+      <Clusters engine={engine} />
+      {insets && (
+        <Suspense fallback={null}>
+          <Insets engine={engine} onLook={look} onClose={() => setInsets(false)} />
+        </Suspense>
+      )}
       {mode === "fly" && <FlyPad view={engine.view} onDone={() => change("orbit")} />}
       {naming && (
         <AskName
