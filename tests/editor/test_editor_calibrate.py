@@ -7,7 +7,6 @@ import re
 from collections.abc import AsyncIterator
 
 import httpx
-import msgspec
 import numpy as np
 import pytest
 import pytest_asyncio
@@ -20,12 +19,12 @@ from arcor2_hw.data import rpc
 from arcor2_hw.data.events import SceneStateEnum
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Mesh, ObjectModel
-from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.scene import Scene, SceneObject
 from tests.e2e.harness import Cell, scene_state, until
-from tests.e2e.seen_workplace import CAMERA, MARKERS, ROBOT, SIZE, Q, in_view, off, pose, tilted
+from tests.e2e.seen_workplace import CAMERA, ROBOT, off
 from tests.editor import texts
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
+from tests.editor.seen_scene import camera_of, configure_markers, new_scene
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
@@ -126,36 +125,18 @@ STL = "".join(
 )
 
 
-def setting(name: str, value: str | float) -> Parameter:
-    return Parameter(name, "string" if isinstance(value, str) else "double", msgspec.json.encode(value).decode())
-
-
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def camera(shared_cell: Cell) -> AsyncIterator[None]:
     """A simulated camera in the shared workplace."""
-    await shared_cell.start_fake("camera", "arcor2_fakes.oak_d", "--width", "1280", "--height", "720", "--fps", "5")
-    yield
-    await shared_cell.children.pop("camera").stop()
+    async with camera_of(shared_cell):
+        yield
 
 
 @pytest_asyncio.fixture(loop_scope="session")
 async def seen(cell: Cell, camera: None) -> AsyncIterator[tuple[Client, dict[str, str]]]:
     """A camera that sees a robot and markers, in a scene whose poses of camera and robot are wrong."""
-    await cell.tell("camera", "scene", things=in_view())
-    await cell.tell("camera", "camera", pose=pose(CAMERA))
-    await cell.tell("robot", "place", q=Q)
     client = await cell.client("helper")
-    await client.new_scene("by pictures")
-    near = Pose(CAMERA.position + Position(0.1, -0.05, 0.08), CAMERA.orientation)
-    wrong = Pose(ROBOT.position + Position(0.02, -0.015, 0.01), ROBOT.orientation * tilted(0.03))
-    slow = [setting("max_age", 5.0), setting("frame_timeout", 10.0)]  # a busy machine renders slowly
-    address = setting("address", cell.at["camera"]["stream"])
-    await client.add_object_to_scene(name="eye", type="OakD", pose=near, parameters=[address, *slow])
-    await client.add_object_to_scene(name="arm", type="UR5e", pose=wrong, parameters=[setting("host", cell.robot_host)])
-    await client.save_scene()
-    scene = next(each for each in await client.list_scenes() if each.name == "by pictures")
-    objects = (await client.get_scene(scene.id)).objects
-    yield client, {"scene": scene.id} | {each.name: each.id for each in objects}
+    yield client, await new_scene(cell, client)
 
 
 async def _stands(screen: Screen, id: str) -> Pose:  # noqa: A002
@@ -222,10 +203,7 @@ async def test_camera_and_robot_are_calibrated_from_pictures(
         await failed.filter(has_text="No markers are configured").wait_for()
         await panel.get_by_text("Failed: No markers are configured").wait_for()
         assert await bar.get_by_text("No markers are configured").count() == 1
-        markers = [{"marker_id": n, "pose": {"position": {"x": x, "y": y}}} for n, (x, y) in MARKERS.items()]
-        configured = {"marker_size": SIZE, "markers": markers}
-        async with httpx.AsyncClient(timeout=60, base_url=cell.url.replace("ws", "http", 1)) as rest:
-            assert (await rest.put("/api/calibration/markers", json=configured)).status_code == 200
+        await configure_markers(cell)
         before = await _stands(screen, ids["eye"])
         # The failed attempt does not hide the running one.
         await asyncio.gather(panel.get_by_text("In progress: ").wait_for(), screen.press(texts.FIND_BY_MARKERS))

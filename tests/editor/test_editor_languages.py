@@ -7,23 +7,26 @@ finds no serious or critical violation. Czech is shown in dark colours, the othe
 
 import asyncio
 import re
-from collections.abc import AsyncIterator, Callable, Iterable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import AsyncExitStack, asynccontextmanager
 
+import msgspec
 import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, Page, expect
 
 from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
-from arcor2_hw.data.events import SceneStateEnum
+from arcor2_hw.data.events import ProcessStateEnum, SceneStateEnum
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
-from tests.e2e.harness import Cell, scene_state
+from arcor2_server.demo.workplace import load
+from tests.e2e.harness import WORKPLACE, Cell, scene_state
 from tests.editor import texts
 from tests.editor.pseudo import LOCALE, PseudoWords, names_in, untranslated, use_pseudo_locale
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
+from tests.editor.seen_scene import NAMES, camera_of, configure_markers, new_scene
 from tests.editor.tour import Tour
 from tests.editor.words import Words
 
@@ -48,7 +51,12 @@ PEOPLE = {"colleague", "helper", "CO", "HE", *(f"Visitor {each}" for each in LAN
 async def documents(module_cell: Cell) -> AsyncIterator[tuple[Scene, Project]]:
     """The scene and project of three devices, saved, built and closed."""
     client = await module_cell.client("colleague")
-    scene, project = await module_cell.open(client)
+    workplace = load(WORKPLACE)
+    steps = [
+        msgspec.structs.replace(each, parameters={"timeout": 60.0}) if each.name == "scan" else each
+        for each in workplace.steps
+    ]
+    scene, project = await module_cell.open(client, workplace=msgspec.structs.replace(workplace, steps=steps))
     await module_cell.build(client, project)
     yield scene, project
 
@@ -105,12 +113,13 @@ async def test_language_follows_the_browser_and_is_then_stored_with_the_user(
 class Visitor:
     """One page in one language. Collects texts that are not translated or cut off, and violations of accessibility."""
 
-    def __init__(self, screen: Screen, language: str, documents: tuple[Scene, Project]) -> None:
+    def __init__(self, screen: Screen, language: str, documents: tuple[Scene, Project], robot_host: str) -> None:
         self.screen = screen
         self.language = language
         self.pseudo = language == "pseudo"
-        self.tour = Tour(screen, f"Visitor {language}", PseudoWords() if self.pseudo else Words(language), *documents)
-        self.names = names_in(*documents) | PEOPLE | DEFINED_BY_DEVICES
+        words = PseudoWords() if self.pseudo else Words(language)
+        self.tour = Tour(screen, f"Visitor {language}", words, *documents, robot_host)
+        self.names = names_in(*documents) | NAMES | PEOPLE | DEFINED_BY_DEVICES
         self._sizes = ["ipad", "phone"]
 
     async def faults(self, screens: AsyncIterator[str]) -> list[str]:
@@ -141,10 +150,11 @@ async def visitors(
             locale = LOCALE if language == "pseudo" else language
             opened = screen_of(browser, module_cell.url, "ipad", touch=True, locale=locale, dark=language == DARK)
             screen = await stack.enter_async_context(opened)
-            screen.expected_errors = ("409 (Conflict)", "400 (Bad Request)")  # refused requests on purpose
+            # Refused requests on purpose.
+            screen.expected_errors = ("409 (Conflict)", "400 (Bad Request)", "404 (Not Found)")
             if language == "pseudo":
                 await use_pseudo_locale(screen.page)
-            found.append(Visitor(screen, language, documents))
+            found.append(Visitor(screen, language, documents, module_cell.robot_host))
         await visit(found, lambda each: each.tour.join())
         yield found
 
@@ -174,8 +184,25 @@ async def online(client: Client) -> AsyncIterator[None]:
         await scene_state(client, SceneStateEnum.STOPPED, 30)
 
 
+async def calibrate(client: Client, object_id: str, begin: Awaitable[None]) -> None:
+    """Calibrate the pose of an object, and wait for the end."""
+    await client.write_lock(object_id)
+    await begin
+    while (event := await client.next_event("ProcessState", timeout=60)).data.state is ProcessStateEnum.STARTED:
+        pass
+    assert event.data.state is ProcessStateEnum.FINISHED, event.data.message
+    await client.write_unlock(object_id)
+
+
 async def test_home(visitors: list[Visitor]) -> None:
     await visit(visitors, lambda each: each.tour.home())
+
+
+async def test_guided_tour(visitors: list[Visitor], client: Client) -> None:
+    try:
+        await visit(visitors[:1], lambda each: each.tour.guided())
+    finally:
+        await client.close_project(force=True)
 
 
 async def test_scene(visitors: list[Visitor], client: Client, documents: tuple[Scene, Project]) -> None:
@@ -196,12 +223,29 @@ async def test_project(visitors: list[Visitor], client: Client, documents: tuple
         await client.close_project(force=True)
 
 
-async def test_running_program(visitors: list[Visitor], client: Client) -> None:
+async def test_running_program(visitors: list[Visitor], client: Client, module_cell: Cell) -> None:
     (package,) = await client.list_packages()
     await client.call("RunPackage", rpc.RunPackageArgs(package.id, start_paused=True))
     while (await client.next_event("PackageState")).data.state is not PackageStateEnum.PAUSED:
         pass
     await visit(visitors, lambda each: each.tour.running())
-    # Without a board, the reader finds no code, and the run fails.
+    await module_cell.tell("reader", "present", code="PCB-1")
+    await module_cell.tell("reader", "late", seconds=60)
     await client.call("ResumePackage")
+    await visit(visitors, lambda each: each.tour.executing())
+    await module_cell.tell("reader", "power_cycle")
     await visit(visitors, lambda each: each.tour.failed())
+
+
+async def test_calibration(visitors: list[Visitor], client: Client, module_cell: Cell) -> None:
+    async with camera_of(module_cell, width=640, height=360):
+        ids = await new_scene(module_cell, client)
+        try:
+            async with online(client):
+                await visit(visitors, lambda each: each.tour.camera())
+                await configure_markers(module_cell)
+                await calibrate(client, ids["eye"], client.calibrate_camera(ids["eye"]))
+                await calibrate(client, ids["arm"], client.calibrate_robot(ids["arm"], camera_id=ids["eye"]))
+                await visit(visitors, lambda each: each.tour.calibrated())
+        finally:
+            await client.close_scene(force=True)

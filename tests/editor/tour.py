@@ -1,14 +1,17 @@
 """A tour of the screens and dialogs of the editor in any language."""
 
+import re
 from collections.abc import AsyncIterator
 
-from playwright.async_api import Locator
+from playwright.async_api import Locator, expect
 
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from tests.editor import texts
 from tests.editor.screen import USERS, Screen
 from tests.editor.words import Words
+
+GUIDED_STEPS = 10
 
 
 class Tour:
@@ -17,12 +20,15 @@ class Tour:
     The caller opens and closes documents, goes online and runs programs, so that several pages visit the same state.
     """
 
-    def __init__(self, screen: Screen, user: str, words: Words, scene: Scene, project: Project) -> None:
+    def __init__(
+        self, screen: Screen, user: str, words: Words, scene: Scene, project: Project, robot_host: str
+    ) -> None:
         self.screen = screen
         self.user = user
         self.words = words
         self.project = project
         self.scene = scene
+        self.robot_host = robot_host
 
     def _button(self, english: str, **values: str) -> Locator:
         name = self.words(english, **values)
@@ -92,6 +98,17 @@ class Tour:
         async for shown in self._dialog("delete a scene in use"):
             yield shown
 
+    async def guided(self) -> AsyncIterator[str]:
+        """Open the project with the guided tour, and skip all its steps."""
+        page, words = self.screen.page, self.words
+        await self._button("Start here").click()
+        shown = page.get_by_role("region", name=words("Guided tour"))
+        for number in range(1, GUIDED_STEPS + 1):
+            await shown.get_by_text(f"{number}/{GUIDED_STEPS}", exact=True).wait_for()
+            yield f"guided tour, step {number}"
+            await shown.get_by_role("button", name=re.compile(f"^({words('Skip step')}|{words('Next')})$")).click()
+        await shown.wait_for(state="detached")
+
     async def scene_editor(self) -> AsyncIterator[str]:
         """Visit the tools of the open scene, the wizard of a device and a selected device."""
         page, words = self.screen.page, self.words
@@ -111,6 +128,16 @@ class Tour:
         await self._button("Test connection").click()
         await self._panel.get_by_role("status").get_by_role("alert").wait_for()
         yield "failed test of a connection"
+        await self._button("Search network…").click()
+        await self._panel.get_by_label(words("Addresses to search")).fill(f"{self.robot_host}, 127.0.0.8/30")
+        yield "search of the network"
+        await self._button("Search").click()
+        found = self._panel.get_by_role("list", name=words("Found devices")).get_by_role("button")
+        await found.wait_for()
+        yield "found device"
+        # The found device is the value of the setting.
+        await found.click()
+        await expect(self._panel.locator(".value-field input").first).to_have_value(self.robot_host)
         await self._button("← All types").click()
         await self._button("Mesh…").click()
         yield "mesh"
@@ -175,6 +202,46 @@ class Tour:
         await self._tool(texts.DEVICES)
         yield "devices online"
         await self._button(texts.CLOSE_PANEL).click()
+
+    async def camera(self) -> AsyncIterator[str]:
+        """Visit the section of a camera that is online, with a picture, and a calibration that is refused."""
+        page, words = self.screen.page, self.words
+        await page.get_by_role("button", name=words(texts.STOP_MOTION)).wait_for()
+        await self._select("eye")
+        await self._button("Take a picture").click()
+        await page.get_by_role("img", name=words("Camera picture")).wait_for()
+        yield "camera"
+        await self._button("Check lens with markers").click()
+        await self._panel.get_by_role("status").filter(has_text=re.compile(r"\S")).first.wait_for()
+        yield "refused check of the lens"
+
+    async def calibrated(self) -> AsyncIterator[str]:
+        """Visit the sections of a camera and a robot with stored calibrations, and the check of the lens."""
+        words = self.words
+        await self._select("eye")
+        history = self._panel.get_by_role("list", name=words("Calibration history"))
+        await history.wait_for()
+        await self._button("Check lens with markers").click()
+        await (
+            self._button("Check lens with markers")
+            .and_(self._panel.locator("[data-disabled]"))
+            .wait_for(state="detached")
+        )
+        yield "calibrated camera"
+        await self._select("arm")
+        await history.wait_for()
+        yield "calibrated robot"
+        await self._button(texts.CLOSE_PANEL).click()
+
+    async def executing(self) -> AsyncIterator[str]:
+        """Visit the screens of the program while an action runs, and leave the operator's screen open."""
+        page, words = self.screen.page, self.words
+        await page.evaluate("location.hash = ''")
+        bar = page.get_by_role("group", name=words(texts.PROGRAM_STATE))
+        await bar.get_by_role("button", name=words("Pause"), exact=True).wait_for()
+        yield "running program"
+        await self._operator()
+        yield "operator, running program"
 
     async def running(self) -> AsyncIterator[str]:
         """Visit the screens of the program, which is paused before its first action."""
