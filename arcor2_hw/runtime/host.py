@@ -378,7 +378,7 @@ class Host:
             self.program.stop()
             self._interrupt_script()
 
-    def _device_lost(self, device: Device, reason: str) -> None:
+    def _device_lost(self, device: Device, reason: Message | None) -> None:
         """End the program if it needs a device that is lost. An online scene continues without the device."""
         program = self.program
         if program is None or not device.recipe.cls.loss_ends_program or not program.device_lost(device, reason):

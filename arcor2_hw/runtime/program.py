@@ -324,7 +324,7 @@ class Program:
         self.cell.abandon()
         self.gate.stop()
 
-    def device_lost(self, device: Device, reason: str) -> bool:
+    def device_lost(self, device: Device, reason: Message | None) -> bool:
         """Stop the program because the connection of a device is lost. Return whether the program was still running."""
         error = ConnectionLost(
             "{name}: the program was stopped, because the connection is lost: {reason}",

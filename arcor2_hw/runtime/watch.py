@@ -36,7 +36,10 @@ class Watch:
     """
 
     def __init__(
-        self, cell: Cell, post: Callable[[DeviceChanged], None], lost: Callable[[Device, str], None] = lambda *_: None
+        self,
+        cell: Cell,
+        post: Callable[[DeviceChanged], None],
+        lost: Callable[[Device, Message | None], None] = lambda *_: None,
     ) -> None:
         self._cell = cell
         self._post = post
@@ -113,7 +116,7 @@ class Watch:
             self._reported[device.id] = found
             self._post(found)
         if connection is not was and (connection is Connection.LOST or (connection is Connection.FAILED and device.up)):
-            self._lost(device, "" if why is None else why.text)
+            self._lost(device, why)
 
 
 def _held_parts(instance: Generic) -> list[HeldPart]:
