@@ -43,12 +43,26 @@ class Sweep:
     The other joints of the robot, other robots and all bodies are taken as they are when the sweep is created. Bodies
     attached to the robot are checked too. Not safe for use by two threads at once.
 
+    Args:
+        world: The world.
+        robot: Id of the robot.
+        arm: The arm.
+        resolution: Maximum travel between two checked configurations, m.
+        farthest: Maximum travel covered by one check with an enlarged margin, m.
+
     Attributes:
         levers: Maximum travel of any point of the robot per unit of each joint, m per rad or m per m.
         checks: Number of configurations checked so far.
     """
 
-    def __init__(self, world: CollisionWorld, robot: str, arm: Arm, resolution: float = RESOLUTION) -> None:
+    def __init__(
+        self,
+        world: CollisionWorld,
+        robot: str,
+        arm: Arm,
+        resolution: float = RESOLUTION,
+        farthest: float = FARTHEST,
+    ) -> None:
         if not 1e-4 <= resolution <= 1.0:
             raise InvalidData("The resolution must be 0.0001 to 1 m, not {resolution!r}.", resolution=resolution)
         self.world, self.robot, self.arm, self.resolution = world, robot, arm, resolution
@@ -56,7 +70,7 @@ class Sweep:
         self._q = self._standing.q.copy()
         self.levers = levers(self._standing)[arm.indices]
         self.checks = 0
-        self._levels = int(np.log2(FARTHEST / resolution)) if resolution < FARTHEST else 0
+        self._levels = int(np.log2(farthest / resolution)) if resolution < farthest else 0
 
     def travel(self, a: Array, b: Array) -> float:
         """Return an upper bound of the travel of any point of the robot from `a` to `b`, m."""
@@ -65,12 +79,12 @@ class Sweep:
     def is_free(self, q: Array) -> bool:
         """Return whether joint values are free of collision."""
         self.checks += 1
-        return self.world.is_free(self.robot, self._whole(q))
+        return self.world.is_free(self.robot, self.whole(q))
 
     def hit(self, q: Array) -> str:
         """Return the first contact at joint values as text, empty when there is none."""
         self.checks += 1
-        return self.world.first_contact(self.robot, self._whole(q))
+        return self.world.first_contact(self.robot, self.whole(q))
 
     def is_free_between(self, a: Array, b: Array, resolution: float | None = None) -> bool:
         """Return whether the motion from `a` to `b` is free of collision. `a` itself is taken to be free.
@@ -95,7 +109,7 @@ class Sweep:
         """
         way, count = b - a, self._count(a, b, self.resolution)
         standing = self._standing
-        if any(standing.in_self_collision(self._whole(a + number / count * way)) for number in _far_apart(count)):
+        if any(standing.in_self_collision(self.whole(a + number / count * way)) for number in _far_apart(count)):
             return False
         chunks = self._chunks(count)
         return self._first_near(a, way, _far_apart(chunks), chunks) is None
@@ -106,7 +120,7 @@ class Sweep:
         Collisions of the robot with itself are ignored.
         """
         self.checks += 1
-        if not self.world.is_free_around(self.robot, self._whole(waypoints[0])):
+        if not self.world.is_free_around(self.robot, self.whole(waypoints[0])):
             return waypoints[0]
         for a, b in itertools.pairwise(waypoints):
             chunks = self._chunks(self._count(a, b, self.resolution))
@@ -129,14 +143,15 @@ class Sweep:
     def _near(self, a: Array, way: Array, middle: float, half: float, levels: int) -> float | None:
         self.checks += 1
         more = self.resolution / 2.0 * 2.0**levels if levels else 0.0
-        if self.world.is_free_around(self.robot, self._whole(a + middle * way), more):
+        if self.world.is_free_around(self.robot, self.whole(a + middle * way), more):
             return None
         if not levels:
             return middle
         before = self._near(a, way, middle - half / 2.0, half / 2.0, levels - 1)
         return before if before is not None else self._near(a, way, middle + half / 2.0, half / 2.0, levels - 1)
 
-    def _whole(self, q: Array) -> Array:
+    def whole(self, q: Array) -> Array:
+        """Return the joint values of the model for those of the arm, a view that the next call overwrites."""
         self._q[self.arm.indices] = q
         return self._q
 

@@ -3,10 +3,12 @@
 A path is a list of waypoints, joint values of the arm. Between two of them all joints move in proportion.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+import pinocchio as pin
 
 from arcor2_hw.collision.sweep import Sweep
 from arcor2_hw.data.geometry import Orientation, Pose, Position
@@ -35,7 +37,15 @@ def interpolate(a: Pose, b: Pose, share: float) -> Pose:
     return Pose(Position(start.x + share * way.x, start.y + share * way.y, start.z + share * way.z), rotated)
 
 
-def straight_line(arm: Arm, start: Array, target: Array, name: str = "") -> list[Array]:
+def straight_line(
+    arm: Arm,
+    start: Array,
+    target: Array,
+    name: str = "",
+    *,
+    coarse: float = 1.0,
+    inverse: InverseKinematics | None = None,
+) -> list[Array]:
     """Compute waypoints that move the end effector in a straight line.
 
     Between waypoints the end effector stays within OFF_LINE and OFF_TURN of the line.
@@ -45,29 +55,47 @@ def straight_line(arm: Arm, start: Array, target: Array, name: str = "") -> list
         start: Joint values at the start.
         target: Pose at the end, (4, 4), in the frame of the model's root link.
         name: Name of the robot in messages.
+        coarse: Factor on OFF_LINE and OFF_TURN, for fewer waypoints where the robot does not follow them.
+        inverse: Inverse kinematics of the arm, for callers that compute many lines.
 
     Raises:
         OutOfReach: The target is out of reach.
         NoStraightLine: The line is interrupted; the message says where, and whether by reach, a limit or a singularity.
     """
-    return _Line(arm, start, Pose.from_matrix(target), name or arm.model.name).waypoints(start)
+    inverse = inverse or InverseKinematics(arm)
+    return _Line(inverse, start, target, name or arm.model.name, coarse).waypoints(start)
 
 
 class _Line:
-    def __init__(self, arm: Arm, start: Array, target: Pose, name: str) -> None:
-        self._arm, self._inverse, self._name = arm, InverseKinematics(arm), name
-        self._from, self._to = arm.pose(start), target
-        self._length = self._from.position.distance_to(target.position)
+    """Poses are matrices: a line has many, and `Pose` is ten times slower."""
+
+    def __init__(self, inverse: InverseKinematics, start: Array, target: Array, name: str, coarse: float) -> None:
+        arm = inverse.arm
+        self._arm, self._inverse, self._name = arm, inverse, name
+        self._off_line, self._trace = coarse * OFF_LINE, 1.0 + 2.0 * math.cos(coarse * OFF_TURN)
+        self._longer = math.sqrt(coarse)  # the deviation grows with the square of the distance between waypoints
+        self._to = target
+        self._from = arm.forward(start).copy()
+        self._way = target[:3, 3] - self._from[:3, 3]
+        self._length = float(np.linalg.norm(self._way))
         self._turns = int(np.count_nonzero(arm.rows >= 3)) == 3
         if not self._turns:  # a rotation is not commanded: it follows from the position
-            self._from = Pose(self._from.position, target.orientation)
+            self._from[:3, :3] = target[:3, :3]
+        self._turn = pin.log3(self._from[:3, :3].T @ target[:3, :3])
+
+    def _pose(self, share: float) -> Array:
+        """Return the pose at a share (0 to 1) of the line, with a rotation about one axis."""
+        pose = self._from.copy()
+        pose[:3, :3] = pose[:3, :3] @ pin.exp3(share * self._turn)
+        pose[:3, 3] += share * self._way
+        return pose
 
     def waypoints(self, start: Array) -> list[Array]:
-        angle = self._from.orientation.angle_to(self._to.orientation) if self._turns else 0.0
-        count = max(1, int(np.ceil(self._length / PIECE)), int(np.ceil(angle / TURN)))
+        angle = float(np.linalg.norm(self._turn)) if self._turns else 0.0
+        count = max(1, math.ceil(self._length / (self._longer * PIECE)), math.ceil(angle / (self._longer * TURN)))
         way, before = [start], 0.0
-        if next(self._inverse.candidates(self._to.matrix(), start), None) is None:
-            self._inverse.solve(self._to.matrix(), start)  # raises
+        if next(self._inverse.candidates(self._to, start), None) is None:
+            self._inverse.solve(self._to, start)  # raises
         for number in range(1, count + 1):
             share = number / count
             way += self._piece(way[-1], before, share, _HALVINGS)
@@ -76,42 +104,36 @@ class _Line:
 
     def _piece(self, q: Array, here: float, there: float, halvings: int) -> list[Array]:
         """Return the waypoints after `q`, which is at the share `here`, up to the share `there`."""
-        pose = interpolate(self._from, self._to, there)
-        after = next(self._inverse.candidates(pose.matrix(), q), None)
+        after = next(self._inverse.candidates(self._pose(there), q), None)
         if after is not None and self._keeps((q + after) / 2.0, (here + there) / 2.0):
             return [after]
         if halvings == 0:
-            raise NoStraightLine(self._why(q, there, after), f"at {there:.3f} of the path")
+            raise self._interrupted(q, there, after)
         middle = (here + there) / 2.0
         first = self._piece(q, here, middle, halvings - 1)
         return first + self._piece(first[-1], middle, there, halvings - 1)
 
     def _keeps(self, q: Array, share: float) -> bool:
-        at, wanted = self._arm.pose(q), interpolate(self._from, self._to, share)
-        if at.position.distance_to(wanted.position) > OFF_LINE:
+        at, wanted = self._arm.forward(q), self._pose(share)
+        if math.dist(at[:3, 3].tolist(), wanted[:3, 3].tolist()) > self._off_line:
             return False
-        return not self._turns or at.orientation.angle_to(wanted.orientation) <= OFF_TURN
+        return not self._turns or float(np.vdot(at[:3, :3], wanted[:3, :3])) >= self._trace
 
-    def _why(self, q: Array, share: float, after: Array | None) -> Message:
-        if near := self._arm.near_limits(q):
-            return Message.of(
-                "{name} cannot go straight: {distance:.3f} m along its line {joints} would leave its limit."
-                if len(near) == 1
-                else "{name} cannot go straight: {distance:.3f} m along its line {joints} would leave their limits.",
-                name=self._name,
-                distance=share * self._length,
-                joints=", ".join(near),
-            )
-        if self._arm.smallest(q) < NEAR_SINGULAR:
+    def _interrupted(self, q: Array, share: float, after: Array | None) -> NoStraightLine:
+        near = self._arm.near_limits(q)
+        if near:
+            text = "{name} cannot go straight: after {distance:.3f} m of its line, {joints} would leave the limits."
+        elif self._arm.smallest(q) < NEAR_SINGULAR:
             text = (
-                "{name} cannot go straight: {distance:.3f} m along its line it reaches a singularity, where joints "
-                "would have to flip."
+                "{name} cannot go straight: after {distance:.3f} m, its line passes a singularity, where joints would "
+                "have to flip."
             )
         elif after is None:
-            text = "{name} cannot go straight: {distance:.3f} m along its line the line is out of reach."
+            text = "{name} cannot go straight: after {distance:.3f} m, its line is out of reach."
         else:
-            text = "{name} cannot go straight: {distance:.3f} m along its line joints would have to flip."
-        return Message.of(text, name=self._name, distance=share * self._length)
+            text = "{name} cannot go straight: after {distance:.3f} m of its line, joints would have to flip."
+        detail = f"at {share:.3f} of the path"
+        return NoStraightLine(text, detail, name=self._name, distance=share * self._length, joints=", ".join(near))
 
 
 def free_line(sweep: Sweep, start: Array, target: Array, name: str = "") -> list[Array]:

@@ -64,7 +64,7 @@ def test_an_impossible_line_is_refused_with_the_point_where_it_fails() -> None:
         straight_line(arm, READY, moved(here, 1.5, 0.0, 0.0).matrix())
     # Past the axis of the foot, where there is no room for a tool that points down.
     near = Pose(Position(-0.45, 0.12, here.position.z), here.orientation)
-    with pytest.raises(NoStraightLine, match=r"arm cannot go straight: 0\.\d+ m along its line"):
+    with pytest.raises(NoStraightLine, match=r"arm cannot go straight: after 0\.\d+ m"):
         straight_line(arm, READY, near.matrix(), "arm")
     # Through the axis of the shoulder: the base would have to flip.
     start = np.array((0.0, -2.2, 2.2, -1.57, -1.57, 0.0))
