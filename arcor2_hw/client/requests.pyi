@@ -10,6 +10,7 @@ from arcor2_hw.client.stream import LIMIT, EventStream, TypedEvent
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.calibration import CalibrationCheck, CalibrationKind
 from arcor2_hw.data.camera import CameraParameters, EstimatedPose, MarkerCorners
+from arcor2_hw.data.dry_run import DryRunHead
 from arcor2_hw.data.editor import (
     HistoryChangedData,
     MovePreviewData,
@@ -71,6 +72,7 @@ from arcor2_hw.data.project import (
 )
 from arcor2_hw.data.robot import Joint, RobotArg, RobotMeta
 from arcor2_hw.data.rpc.calibrations import ListCalibrationsData
+from arcor2_hw.data.rpc.dry_runs import GetDryRunData
 from arcor2_hw.data.rpc.editor import GetExecutionTraceData, ListRunsData, SetViewStateData
 from arcor2_hw.data.rpc.execution import BuildProjectData
 from arcor2_hw.data.rpc.functions import (
@@ -290,6 +292,9 @@ class Requests(ABC):
     async def cancel_action(self, *, timeout: float | None = None) -> None:
         """CancelAction. Needs the role operator."""
 
+    async def cancel_dry_run(self, *, timeout: float | None = None) -> None:
+        """CancelDryRun. Needs the role standard user."""
+
     async def check_calibration(
         self,
         id: str,
@@ -404,6 +409,9 @@ class Requests(ABC):
         self, *, camera_parameters: CameraParameters, image: str, inverse: bool = False, timeout: float | None = None
     ) -> EstimatedPose:
         """GetCameraPose. Needs the role technician."""
+
+    async def get_dry_run(self, *, number: int | Unset = UNSET, timeout: float | None = None) -> GetDryRunData:
+        """GetDryRun: the number of a dry run; default: the newest one of the open project. Needs the role operator."""
 
     async def get_end_effector_pose(
         self, *, robot_id: str, end_effector_id: str, arm_id: str | Unset = UNSET, timeout: float | None = None
@@ -904,6 +912,15 @@ class Requests(ABC):
     ) -> SetViewStateData:
         """SetViewState: values by key; null removes a value, other keys are unchanged. Needs the role operator."""
 
+    async def start_dry_run(
+        self,
+        *,
+        from_action: str | Unset = UNSET,
+        branches: dict[str, str] | Unset = UNSET,
+        timeout: float | None = None,
+    ) -> DryRunHead:
+        """StartDryRun. Needs the role standard user."""
+
     async def start_scene(self, *, dry_run: bool = False, timeout: float | None = None) -> None:
         """StartScene. Needs the role standard user."""
 
@@ -1200,6 +1217,10 @@ class Requests(ABC):
     def follow(
         self, name: Literal["ChangedObjectTypes"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[list[ObjectTypeMeta]]]: ...
+    @overload
+    def follow(
+        self, name: Literal["DryRunChanged"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[DryRunHead]]: ...
     @overload
     def follow(
         self, name: Literal["ExecutionTrace"], /, *, limit: int = LIMIT

@@ -19,6 +19,7 @@ class WorkerKind(enum.StrEnum):
     KINEMATICS = "kinematics"
     CALIBRATION = "calibration"
     MESHES = "meshes"
+    DRY_RUN = "dry_run"
 
 
 class Task(Struct, Generic[R], frozen=True, tag=True):
@@ -30,6 +31,7 @@ class Task(Struct, Generic[R], frozen=True, tag=True):
         worker: The kind of worker that runs it.
         timeout: Maximum time, s.
         label: The task in messages, such as "forward kinematics".
+        cancellable: Whether the worker ends when the caller is cancelled; otherwise the computation runs to its end.
     """
 
     result_type: ClassVar[Any]
@@ -37,6 +39,7 @@ class Task(Struct, Generic[R], frozen=True, tag=True):
     worker: ClassVar[WorkerKind]
     timeout: ClassVar[float] = 10.0
     label: ClassVar[str]
+    cancellable: ClassVar[bool] = False
 
 
 class ComputeStopped(Arcor2Error):

@@ -163,3 +163,19 @@ class MoveResult(Data, frozen=True):
     speed: float
     duration: float
     end: MoveEnd
+
+
+class RobotMaxima(Data, frozen=True):
+    """The maxima at speed 1 that the settings of a robot state; 0: not stated.
+
+    Attributes:
+        joint_speed: rad/s.
+        joint_acceleration: rad/s².
+        tcp_speed: m/s.
+        tcp_acceleration: m/s².
+    """
+
+    joint_speed: float = 0.0
+    joint_acceleration: float = 0.0
+    tcp_speed: float = 0.0
+    tcp_acceleration: float = 0.0

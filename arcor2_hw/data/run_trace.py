@@ -1,6 +1,6 @@
 """The trace of a run: when each device executed which action, also as a Chrome trace."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from msgspec import UNSET, field
@@ -49,6 +49,14 @@ class RunTrace(Data, frozen=True):
     devices: list[TracedDevice] = field(default_factory=list)
     spans: list[Span] = field(default_factory=list)
     omitted: int = 0
+
+
+def traced_devices(spans: Sequence[Span], names: Mapping[str, str]) -> list[TracedDevice]:
+    """Return the devices of spans in the order of their first span. Devices without a name get their id."""
+    busy: dict[str, float] = {}
+    for span in (span for span in spans if span.device):  # the call of a function has none
+        busy[span.device] = busy.get(span.device, 0.0) + span.duration
+    return [TracedDevice(key, names.get(key, key), round(sum_, 6)) for key, sum_ in busy.items()]
 
 
 def chrome_trace(name: str, devices: Sequence[TracedDevice], spans: Sequence[Span]) -> dict[str, Any]:

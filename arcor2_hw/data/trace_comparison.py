@@ -4,7 +4,7 @@ import itertools
 import statistics
 from collections.abc import Sequence
 
-from msgspec import UNSET
+from msgspec import UNSET, field
 
 from arcor2_hw.data.base import Data, Unset
 from arcor2_hw.data.run_trace import RunTrace, Span, TracedDevice
@@ -38,12 +38,26 @@ class Wait(Data, frozen=True):
     duration: float
 
 
+class DeviceWait(Data, frozen=True):
+    """A time in which a device waits between two of its actions while another device executes actions.
+
+    for_device: id of the device that is busy for most of it. before: name of the action after it.
+    """
+
+    device: str
+    for_device: str
+    before: str
+    start: float
+    duration: float
+
+
 class TraceSummary(Data, frozen=True):
     """The times of a run, s.
 
     whole: from the start of the first action to the end of the last one. cycles: number of complete cycles; a cycle
     lasts from the start of the first action to its next start. cycle: median of their durations; without a complete
     cycle, the whole time. devices: the bottleneck, which is busy for the largest share, first. waits: longest first.
+    device_waits: the longest one of each device, longest first.
     """
 
     whole: float
@@ -52,6 +66,7 @@ class TraceSummary(Data, frozen=True):
     devices: list[DeviceTimes]
     actions: list[ActionTimes]
     waits: list[Wait]
+    device_waits: list[DeviceWait] = field(default_factory=list)
 
 
 class ActionDifference(Data, frozen=True):
@@ -104,7 +119,27 @@ def summarize(trace: RunTrace) -> TraceSummary:
         sorted(devices, key=lambda device: -device.busy),
         [_action_times(same) for same in by_action.values()],
         sorted(waits, key=lambda wait: -wait.duration),
+        _device_waits(trace.devices, spans),
     )
+
+
+def _device_waits(devices: Sequence[TracedDevice], spans: Sequence[Span]) -> list[DeviceWait]:
+    """Return the longest wait of each device between two of its actions for another device, longest first."""
+    found = []
+    for device in devices:
+        own = [span for span in spans if span.device == device.id]
+        names = {span.start: span.name for span in reversed(own)}
+        gaps = [(start, end) for (_, start), (end, _) in itertools.pairwise(covered(own))]
+        start, end = max(gaps, key=lambda gap: gap[1] - gap[0], default=(0.0, 0.0))
+        busy: dict[str, float] = {}
+        for span in spans:
+            overlap = min(span.start + span.duration, end) - max(span.start, start)
+            if span.device != device.id and overlap > 0.0:
+                busy[span.device] = busy.get(span.device, 0.0) + overlap
+        if busy:
+            other = max(busy, key=lambda key: busy[key])
+            found.append(DeviceWait(device.id, other, names[end], start, end - start))
+    return sorted(found, key=lambda wait: -wait.duration)
 
 
 def _key(action: Span | ActionTimes) -> tuple[str, str]:

@@ -16,7 +16,6 @@ from arcor2_hw.kinematics.arm import NEAR_SINGULAR, Arm
 from arcor2_hw.kinematics.errors import MotionInCollision, NoStraightLine
 from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.shapes import Array
-from arcor2_hw.messages import Message
 
 OFF_LINE: Final = 0.0005
 """Maximum distance of the end effector from its line between two waypoints, m."""

@@ -14,6 +14,8 @@ from arcor2_hw.calibration.refusals import CalibrationRefused
 from arcor2_hw.compute import calibration_tasks as t
 from arcor2_hw.compute import messages as m
 from arcor2_hw.compute import task as task_module
+from arcor2_hw.compute.dry_run_tasks import DryRunTask
+from arcor2_hw.compute.program_walk import END_STEP, Edge, Graph, Step
 from arcor2_hw.compute.task import ComputeBusy, ComputeStopped, ComputeTimeout, WorkerKind
 from arcor2_hw.compute.tasks import AnyTask
 from arcor2_hw.compute.worker import function_of
@@ -264,3 +266,19 @@ def test_every_task_has_a_worker_and_a_description() -> None:
         assert callable(function_of(kind)), kind
         assert isinstance(kind.label, str)
         assert kind.timeout > 0
+
+
+async def test_a_cancellable_task_stops_its_worker(compute: Compute) -> None:
+    """The next task runs in a new process."""
+    targets = [*range(1, 4), END_STEP]
+    steps = [Step(f"act_{n}", str(n), "arm", [Edge(target)]) for n, target in enumerate(targets)]
+    task = DryRunTask(Graph(steps), {"arm": "arm"})
+    running = asyncio.create_task(compute.run(task))
+    await until(lambda: compute.pid(WorkerKind.DRY_RUN) is not None)
+    pid = compute.pid(WorkerKind.DRY_RUN)
+    assert pid is not None
+    running.cancel()
+    await asyncio.gather(running, return_exceptions=True)
+    await until(lambda: not psutil.pid_exists(pid))
+    assert [span.name for span in (await compute.run(task)).prediction.trace.spans] == ["0", "1", "2", "3"]
+    assert compute.pid(WorkerKind.DRY_RUN) != pid

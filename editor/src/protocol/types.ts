@@ -11,7 +11,7 @@ export interface AcknowledgeStopArgs {
 }
 
 /**
- * An action on an action point, or of a function.
+ * An action on an action point.
  *
  * `error_output` names the error for the actions after an error exit; without it, the error is not stored.
  */
@@ -22,6 +22,13 @@ export interface Action {
   parameters: ActionParameter[];
   flows: Flow[];
   error_output?: string;
+}
+
+/** The source of the duration of an action. count: number of executions of which it is the median. */
+export interface ActionDuration {
+  action_id: string;
+  source: DurationSource;
+  count: number;
 }
 
 /** Data of the event ActionExecution. */
@@ -54,7 +61,7 @@ export interface ActionParamValuesArgs {
   parent_params?: IdValue[];
 }
 
-/** A literal, a project parameter, a parameter of the function, or a link to a result, depending on `type`. */
+/** A literal, a project parameter or a link to a result, depending on `type`. */
 export interface ActionParameter {
   name: string;
   type: string;
@@ -95,6 +102,16 @@ export interface ActionStateBeforeData {
   parameters?: string[];
   action_point_ids?: string[];
   thread_id?: number;
+}
+
+/** An action in a run. median: of its durations, s. total: sum of its durations, s. */
+export interface ActionTimes {
+  action_id: string;
+  name: string;
+  device: string;
+  count: number;
+  median: number;
+  total: number;
 }
 
 /** Arguments of AddAction; `error_output` names its error. */
@@ -143,30 +160,6 @@ export interface AddApUsingRobotArgs {
   end_effector_id: string;
   name: string;
   arm_id?: string;
-}
-
-/** Arguments of AddFunction. */
-export interface AddFunctionArgs {
-  name: string;
-}
-
-/** Answer to AddFunction. */
-export interface AddFunctionData {
-  id: string;
-}
-
-/** Arguments of AddFunctionParameter; `value` is the parameter for the present calls of the function. */
-export interface AddFunctionParameterArgs {
-  function_id: string;
-  name: string;
-  type: string;
-  value?: Parameter;
-}
-
-/** Arguments of AddFunctionResult; `link` is `<action id>/default/<output index>`. */
-export interface AddFunctionResultArgs {
-  function_id: string;
-  link: string;
 }
 
 /** Arguments of AddLogicItem; `error_kinds` make the item an error exit. */
@@ -220,6 +213,14 @@ export interface Alarm {
   remedy_message?: Message;
 }
 
+/** An assumption of a dry run, as a sentence. action_id: the action that it concerns. */
+export interface Assumption {
+  text: string;
+  action_id?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
+}
+
 /** Arguments of Authenticate. */
 export interface AuthenticateArgs {
   token: string;
@@ -231,7 +232,7 @@ export interface AuthenticateData {
   role: string;
 }
 
-/** An action without parameters and flows; `type` is `<object id>/<action name>`, or `<function id>/call`. */
+/** An action without parameters and flows; `type` is `<object id>/<action name>`. */
 export interface BareAction {
   name: string;
   type: string;
@@ -276,12 +277,6 @@ export interface Box {
   size_x: number;
   size_y: number;
   size_z: number;
-}
-
-/** The call stack of a branch, from the program itself to the innermost function. */
-export interface Branch {
-  id: string;
-  frames: Frame[];
 }
 
 /** Arguments of BuildProject. */
@@ -514,16 +509,69 @@ export interface DeleteOverrideArgs {
   override: Parameter;
 }
 
-/** Arguments of DissolveCall: an action that calls a function, and whether to remove the function. */
-export interface DissolveCallArgs {
-  action_id: string;
-  remove_function?: boolean;
+/** A device in a run. busy: time during which it executed actions, s. share: `busy` divided by the whole time. */
+export interface DeviceTimes {
+  id: string;
+  name: string;
+  busy: number;
+  share: number;
 }
 
-/** Answer to DissolveCall: the actions that replace the call. */
-export interface DissolveCallData {
-  action_ids: string[];
+/**
+ * A time in which a device waits between two of its actions while another device executes actions.
+ *
+ * for_device: id of the device that is busy for most of it. before: name of the action after it.
+ */
+export interface DeviceWait {
+  device: string;
+  for_device: string;
+  before: string;
+  start: number;
+  duration: number;
 }
+
+/**
+ * A dry run without its result, and data of the event DryRunChanged.
+ *
+ * number: grows by one with each dry run since the start of the server. revision: revision of the project (see
+ * History) that was checked. from_action: the first action, omitted for START. error: why it failed, with `key` and
+ * `values`. cycle: the predicted cycle time, s.
+ */
+export interface DryRunHead {
+  number: number;
+  project_id: string;
+  project_name: string;
+  revision: number;
+  state: DryRunState;
+  started: string;
+  started_by?: string;
+  from_action?: string;
+  error?: string;
+  cycle?: number;
+  key?: string;
+  values?: Record<string, string | Message>;
+}
+
+/** The first action that would fail. reason: why, as a sentence. pose: where, in the world. */
+export interface DryRunProblem {
+  action_id: string;
+  name: string;
+  reason: string;
+  pose?: Pose;
+  key?: string;
+  values?: Record<string, string | Message>;
+}
+
+/** State of a dry run. */
+export type DryRunState = "running" | "finished" | "failed" | "cancelled";
+
+/**
+ * Source of the duration of an action.
+ *
+ * planned: the timing of its planned motion. action: the median of this action in earlier runs. method: the median of
+ * other actions of the same object type that call the same method. unknown: there is none, and 0 s are counted.
+ */
+export type DurationSource = "planned" | "action" | "method" | "unknown";
 
 /** Pose of one end effector in the world. */
 export interface EefPose {
@@ -584,30 +632,7 @@ export interface FoundDevice {
   serial: string;
 }
 
-/**
- * A position in the program or in a function.
- *
- * action_id: the action that runs, or that is announced. function_id: the function that contains it; omitted in the
- * program itself. call_action_id: the action of the frame before this one that called the function.
- */
-export interface Frame {
-  action_id: string;
-  function_id?: string;
-  call_action_id?: string;
-}
-
-/**
- * A function with the functions that it calls, and the items to which their actions refer.
- *
- * functions: called functions come before their callers; the exported function is the last one.
- */
-export interface FunctionExport {
-  scene_id: string;
-  functions: ProjectFunction[];
-  references: NamedReference[];
-}
-
-/** A result of a function: its type, and the result `<action id>/default/<output index>` of one of its actions. */
+/** A result of a project function. */
 export interface FunctionReturns {
   type: string;
   link: string;
@@ -623,6 +648,24 @@ export interface GetCameraPoseArgs {
   camera_parameters: CameraParameters;
   image: string;
   inverse?: boolean;
+}
+
+/** Arguments of GetDryRun: the number of a dry run; default: the newest one of the open project. */
+export interface GetDryRunArgs {
+  number?: number;
+}
+
+/**
+ * Answer to GetDryRun.
+ *
+ * prediction: the result, if the dry run has finished. outdated: whether the project was edited since. stored: the
+ * dry runs of the project with a result, newest first.
+ */
+export interface GetDryRunData {
+  dry_run: DryRunHead;
+  outdated: boolean;
+  stored: DryRunHead[];
+  prediction?: Prediction;
 }
 
 /** Arguments of GetEndEffectorPose. */
@@ -796,22 +839,6 @@ export interface Identity {
   firmware: string;
 }
 
-/**
- * Arguments of ImportFunction.
- *
- * points: the action points of the open project, by the id or name of the exported ones. Other items are found by
- * their id, else by their name.
- */
-export interface ImportFunctionArgs {
-  function: FunctionExport;
-  points?: Record<string, string>;
-}
-
-/** Answer to ImportFunction: the ids of the new functions, in the order of the export. */
-export interface ImportFunctionData {
-  ids: string[];
-}
-
 /** Answer to ImportScript: the new revision, and the changed items. */
 export interface ImportScriptData {
   revision: number;
@@ -947,23 +974,6 @@ export interface LogicItem {
 /** Values of WhatEnum in ShowMainScreen. */
 export type MainScreen = "ScenesList" | "ProjectsList" | "PackagesList";
 
-/**
- * Arguments of MakeFunction: the name of the function, its actions, and the name of the action that calls it.
- *
- * `call_name`: by default the name of the function, with a number if an action has it.
- */
-export interface MakeFunctionArgs {
-  name: string;
-  action_ids: string[];
-  call_name?: string;
-}
-
-/** Answer to MakeFunction: the function, and the action that calls it. */
-export interface MakeFunctionData {
-  function_id: string;
-  action_id: string;
-}
-
 /** The four corners of one marker. */
 export interface MarkerCorners {
   marker_id: number;
@@ -1064,22 +1074,6 @@ export interface NamedOrientation {
   name: string;
   orientation: Orientation;
   id: string;
-}
-
-/**
- * An item to which the actions of an exported function refer.
- *
- * kind: pose, position, joints, object or project_parameter. point_id, point: id and name of the action point of a
- * pose, position or joints. type: object type, or type of a project parameter. robot_id: the robot of joints.
- */
-export interface NamedReference {
-  kind: string;
-  id: string;
-  name: string;
-  point_id?: string;
-  point?: string;
-  type?: string;
-  robot_id?: string;
 }
 
 /** Arguments of NewProject. */
@@ -1350,6 +1344,20 @@ export interface Position {
 }
 
 /**
+ * The result of a dry run.
+ *
+ * trace: as of a real run, with the number 0; `error` of a span is the reason why the action would fail. durations:
+ * the source of the duration of each action. problem: the first one, omitted if there is none.
+ */
+export interface Prediction {
+  trace: RunTrace;
+  summary: TraceSummary;
+  durations: ActionDuration[];
+  assumptions: Assumption[];
+  problem?: DryRunProblem;
+}
+
+/**
  * What a user views and edits, as reported by the client.
  *
  * document: id of the viewed scene, project or package. selected, aimed, editing: ids in it. view: name of the screen
@@ -1375,19 +1383,6 @@ export interface ProcessStateData {
 
 /** Values of StateEnum in ProcessState. */
 export type ProcessStateEnum = "started" | "finished" | "failed";
-
-/**
- * The position of a program; without branches no action has been announced, or the run has ended.
- *
- * run: number of the run; 0 before the first one.
- */
-export interface ProgramPosition {
-  run: number;
-  branches: Branch[];
-}
-
-/** Where a step ends: before the next action of the same function or a caller, of any function, or of a caller. */
-export type ProgramStep = "over" | "into" | "out";
 
 /** A project with its content. */
 export interface Project {
@@ -1424,11 +1419,7 @@ export interface ProjectExceptionData {
   values?: Record<string, string | Message>;
 }
 
-/**
- * A named group of actions with logic of its own, which actions of type `<function id>/call` call.
- *
- * `type` of a parameter is the name of a parameter type. Its `value` has no meaning, and is empty.
- */
+/** A named group of actions with logic of its own. */
 export interface ProjectFunction {
   name: string;
   actions: Action[];
@@ -1585,18 +1576,6 @@ export interface RemoveFromSceneArgs {
   force?: boolean;
 }
 
-/** Arguments of RemoveFunctionParameter. */
-export interface RemoveFunctionParameterArgs {
-  function_id: string;
-  name: string;
-}
-
-/** Arguments of RemoveFunctionResult; `index` counts from 0. */
-export interface RemoveFunctionResultArgs {
-  function_id: string;
-  index: number;
-}
-
 /** Arguments of RemoveLogicItem. */
 export interface RemoveLogicItemArgs {
   logic_item_id: string;
@@ -1634,12 +1613,6 @@ export interface RenameActionPointOrientationArgs {
 /** Arguments of RenameScene and RenameObject. */
 export interface RenameArgs {
   id: string;
-  new_name: string;
-}
-
-/** Arguments of RenameFunction. */
-export interface RenameFunctionArgs {
-  function_id: string;
   new_name: string;
 }
 
@@ -1861,6 +1834,19 @@ export interface RunStatisticsData {
   run: number;
 }
 
+/**
+ * The executed actions of a run in the order of their start, and their devices in the order of their first action.
+ *
+ * started: start of the first action. omitted: number of actions at the start of a long run that are not stored.
+ */
+export interface RunTrace {
+  run: number;
+  started?: string;
+  devices: TracedDevice[];
+  spans: Span[];
+  omitted: number;
+}
+
 /** A scene with its objects. */
 export interface Scene {
   name: string;
@@ -1951,15 +1937,41 @@ export interface ShowMainScreenData {
   highlight?: string;
 }
 
+/**
+ * One executed action.
+ *
+ * number: number of the action in the run from 1, in the order of their start. device: id of the object. start: since
+ * the first action of the run, s. duration: s. branch: value of the condition after which the action followed the one
+ * before it, as JSON; omitted without a condition. error: why the action failed. thread_id: omitted in the main thread
+ * of the script.
+ */
+export interface Span {
+  number: number;
+  action_id: string;
+  name: string;
+  device: string;
+  start: number;
+  duration: number;
+  branch?: string;
+  error?: string;
+  thread_id?: number;
+}
+
 /** A sphere around its origin, m. */
 export interface Sphere {
   id: string;
   radius: number;
 }
 
-/** Arguments of StepAction. */
-export interface StepActionArgs {
-  mode?: ProgramStep;
+/**
+ * Arguments of StartDryRun.
+ *
+ * from_action: first action; default: the one after START. branches: for actions with several branches, the id of the
+ * next action, or END.
+ */
+export interface StartDryRunArgs {
+  from_action?: string;
+  branches?: Record<string, string>;
 }
 
 /** Values of Axis in StepRobotEef. */
@@ -2102,7 +2114,7 @@ export interface TemporaryPackageArgs {
  * number: number of the action in the run from 1, in the order of their start. started: time of the start. duration:
  * s, without a pause before it; omitted while it runs. parameters, results: as in ActionStateBefore and
  * ActionStateAfter. error: why it failed, with `key` and `values`. thread_id: omitted in the main thread of the
- * script. call: number of the call of the function that contains the action; omitted in the program itself.
+ * script.
  */
 export interface TraceEntry {
   run: number;
@@ -2115,9 +2127,33 @@ export interface TraceEntry {
   results?: string[];
   error?: string;
   thread_id?: number;
-  call?: number;
   key?: string;
   values?: Record<string, string | Message>;
+}
+
+/**
+ * The times of a run, s.
+ *
+ * whole: from the start of the first action to the end of the last one. cycles: number of complete cycles; a cycle
+ * lasts from the start of the first action to its next start. cycle: median of their durations; without a complete
+ * cycle, the whole time. devices: the bottleneck, which is busy for the largest share, first. waits: longest first.
+ * device_waits: the longest one of each device, longest first.
+ */
+export interface TraceSummary {
+  whole: number;
+  cycles: number;
+  cycle: number;
+  devices: DeviceTimes[];
+  actions: ActionTimes[];
+  waits: Wait[];
+  device_waits: DeviceWait[];
+}
+
+/** A device of a trace. busy: sum of the durations of its actions, s. */
+export interface TracedDevice {
+  id: string;
+  name: string;
+  busy: number;
 }
 
 /** Arguments of GetActions. */
@@ -2184,22 +2220,6 @@ export interface UpdateActionPointPositionArgs {
 export interface UpdateActionPointUsingRobotArgs {
   action_point_id: string;
   robot: RobotArg;
-}
-
-/** Arguments of UpdateFunctionParameter; `value` replaces the parameter in the present calls of the function. */
-export interface UpdateFunctionParameterArgs {
-  function_id: string;
-  name: string;
-  new_name?: string;
-  type?: string;
-  value?: Parameter;
-}
-
-/** Arguments of UpdateFunctionResult; `index` counts from 0. */
-export interface UpdateFunctionResultArgs {
-  function_id: string;
-  index: number;
-  link: string;
 }
 
 /** Arguments of UpdateLock. */
@@ -2304,6 +2324,13 @@ export interface ViewState {
   user?: string;
 }
 
+/** A time in which no device executed an action; `before` is the name of the action after it. */
+export interface Wait {
+  before: string;
+  start: number;
+  duration: number;
+}
+
 /** Arguments of WriteLock. */
 export interface WriteLockArgs {
   object_id: string;
@@ -2325,9 +2352,6 @@ export interface Requests {
   AddActionPointOrientation: { args: AddActionPointOrientationArgs; data: undefined };
   AddActionPointOrientationUsingRobot: { args: AddActionPointOrientationUsingRobotArgs; data: undefined };
   AddApUsingRobot: { args: AddApUsingRobotArgs; data: undefined };
-  AddFunction: { args: AddFunctionArgs; data: AddFunctionData };
-  AddFunctionParameter: { args: AddFunctionParameterArgs; data: undefined };
-  AddFunctionResult: { args: AddFunctionResultArgs; data: undefined };
   AddLogicItem: { args: AddLogicItemArgs; data: undefined };
   AddObjectToScene: { args: AddObjectToSceneArgs; data: undefined };
   AddOverride: { args: AddOverrideArgs; data: undefined };
@@ -2342,6 +2366,7 @@ export interface Requests {
   CameraColorImage: { args: CameraColorImageArgs; data: string };
   CameraColorParameters: { args: CameraColorParametersArgs; data: CameraParameters };
   CancelAction: { args: undefined; data: undefined };
+  CancelDryRun: { args: undefined; data: undefined };
   CheckCalibration: { args: CheckCalibrationArgs; data: CalibrationCheck };
   CheckConnection: { args: CheckConnectionArgs; data: CheckConnectionData };
   CheckScript: { args: ScriptArgs; data: CheckScriptData };
@@ -2355,20 +2380,18 @@ export interface Requests {
   DeletePackage: { args: IdArgs; data: undefined };
   DeleteProject: { args: IdArgs; data: undefined };
   DeleteScene: { args: IdArgs; data: string[] };
-  DissolveCall: { args: DissolveCallArgs; data: DissolveCallData };
   ExecuteAction: { args: ExecuteActionArgs; data: undefined };
-  ExportFunction: { args: IdArgs; data: FunctionExport };
   FindDevices: { args: FindDevicesArgs; data: FoundDevice[] };
   ForwardKinematics: { args: ForwardKinematicsArgs; data: Pose };
   GetActions: { args: TypeArgs; data: ObjectAction[] };
   GetBreakpoints: { args: GetBreakpointsArgs | undefined; data: ProjectBreakpoints };
   GetCameraPose: { args: GetCameraPoseArgs; data: EstimatedPose };
+  GetDryRun: { args: GetDryRunArgs | undefined; data: GetDryRunData };
   GetEndEffectorPose: { args: GetEndEffectorPoseArgs; data: Pose };
   GetEndEffectors: { args: GetEndEffectorsArgs; data: string[] };
   GetExecutionTrace: { args: GetExecutionTraceArgs | undefined; data: GetExecutionTraceData };
   GetGrippers: { args: GetGrippersArgs; data: string[] };
   GetObjectTypes: { args: undefined; data: ObjectTypeMeta[] };
-  GetProgramPosition: { args: undefined; data: ProgramPosition };
   GetProject: { args: IdArgs; data: Project };
   GetRobotArms: { args: GetRobotArmsArgs; data: string[] };
   GetRobotJoints: { args: GetRobotJointsArgs; data: Joint[] };
@@ -2379,7 +2402,6 @@ export interface Requests {
   HandTeachingMode: { args: HandTeachingModeArgs; data: undefined };
   History: { args: HistoryArgs | undefined; data: HistoryData };
   HoldHandTeaching: { args: HoldHandTeachingArgs; data: undefined };
-  ImportFunction: { args: ImportFunctionArgs; data: ImportFunctionData };
   ImportScript: { args: ScriptArgs; data: ImportScriptData };
   InverseKinematics: { args: InverseKinematicsArgs; data: Joint[] };
   JogRobot: { args: JogRobotArgs; data: JogRobotData };
@@ -2389,7 +2411,6 @@ export interface Requests {
   ListProjects: { args: undefined; data: ListProjectsData[] };
   ListRuns: { args: ListRunsArgs | undefined; data: ListRunsData };
   ListScenes: { args: undefined; data: ListScenesData[] };
-  MakeFunction: { args: MakeFunctionArgs; data: MakeFunctionData };
   MarkersCorners: { args: MarkersCornersArgs; data: MarkerCorners[] };
   MoveToActionPoint: { args: MoveToActionPointArgs; data: undefined };
   MoveToJoints: { args: MoveToJointsArgs; data: undefined };
@@ -2419,16 +2440,12 @@ export interface Requests {
   RemoveActionPointJoints: { args: RemoveActionPointJointsArgs; data: undefined };
   RemoveActionPointOrientation: { args: RemoveActionPointOrientationArgs; data: undefined };
   RemoveFromScene: { args: RemoveFromSceneArgs; data: undefined };
-  RemoveFunction: { args: IdArgs; data: undefined };
-  RemoveFunctionParameter: { args: RemoveFunctionParameterArgs; data: undefined };
-  RemoveFunctionResult: { args: RemoveFunctionResultArgs; data: undefined };
   RemoveLogicItem: { args: RemoveLogicItemArgs; data: undefined };
   RemoveProjectParameter: { args: RemoveProjectParameterArgs; data: undefined };
   RenameAction: { args: RenameActionArgs; data: undefined };
   RenameActionPoint: { args: RenameActionPointArgs; data: undefined };
   RenameActionPointJoints: { args: RenameActionPointJointsArgs; data: undefined };
   RenameActionPointOrientation: { args: RenameActionPointOrientationArgs; data: undefined };
-  RenameFunction: { args: RenameFunctionArgs; data: undefined };
   RenameObject: { args: RenameArgs; data: undefined };
   RenamePackage: { args: RenamePackageArgs; data: undefined };
   RenameProject: { args: RenameProjectArgs; data: undefined };
@@ -2443,9 +2460,10 @@ export interface Requests {
   SetBreakpoints: { args: SetBreakpointsArgs; data: ProjectBreakpoints };
   SetEefPerpendicularToWorld: { args: SetEefPerpendicularToWorldArgs; data: undefined };
   SetViewState: { args: SetViewStateArgs; data: SetViewStateData };
+  StartDryRun: { args: StartDryRunArgs | undefined; data: DryRunHead };
   StartScene: { args: undefined; data: undefined };
   StartSceneKeepGoing: { args: undefined; data: undefined };
-  StepAction: { args: StepActionArgs | undefined; data: undefined };
+  StepAction: { args: undefined; data: undefined };
   StepRobotEef: { args: StepRobotEefArgs; data: undefined };
   StopAll: { args: undefined; data: StopAllData };
   StopPackage: { args: undefined; data: undefined };
@@ -2466,8 +2484,6 @@ export interface Requests {
   UpdateActionPointParent: { args: UpdateActionPointParentArgs; data: undefined };
   UpdateActionPointPosition: { args: UpdateActionPointPositionArgs; data: undefined };
   UpdateActionPointUsingRobot: { args: UpdateActionPointUsingRobotArgs; data: undefined };
-  UpdateFunctionParameter: { args: UpdateFunctionParameterArgs; data: undefined };
-  UpdateFunctionResult: { args: UpdateFunctionResultArgs; data: undefined };
   UpdateLock: { args: UpdateLockArgs; data: undefined };
   UpdateLogicItem: { args: UpdateLogicItemArgs; data: undefined };
   UpdateObjectModel: { args: UpdateObjectModelArgs; data: undefined };
@@ -2499,8 +2515,8 @@ export interface Events {
   ActionStateBefore: ActionStateBeforeData;
   BreakpointsChanged: ProjectBreakpoints;
   ChangedObjectTypes: ObjectTypeMeta[];
+  DryRunChanged: DryRunHead;
   ExecutionTrace: TraceEntry;
-  FunctionChanged: ProjectFunction;
   HandTeachingMode: HandTeachingModeData;
   HistoryChanged: HistoryChangedData;
   JointsChanged: ProjectRobotJoints;
@@ -2521,7 +2537,6 @@ export interface Events {
   PackageInfo: PackageInfoData;
   PackageState: PackageStateData;
   ProcessState: ProcessStateData;
-  ProgramPosition: ProgramPosition;
   ProjectChanged: BareProject;
   ProjectClosed: undefined;
   ProjectException: ProjectExceptionData;
@@ -2577,9 +2592,6 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   AddActionPointOrientation: 2,
   AddActionPointOrientationUsingRobot: 2,
   AddApUsingRobot: 2,
-  AddFunction: 2,
-  AddFunctionParameter: 2,
-  AddFunctionResult: 2,
   AddLogicItem: 2,
   AddObjectToScene: 4,
   AddOverride: 3,
@@ -2594,6 +2606,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   CameraColorImage: 1,
   CameraColorParameters: 1,
   CancelAction: 1,
+  CancelDryRun: 2,
   CheckCalibration: 1,
   CheckConnection: 4,
   CheckScript: 2,
@@ -2607,20 +2620,18 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   DeletePackage: 3,
   DeleteProject: 2,
   DeleteScene: 4,
-  DissolveCall: 2,
   ExecuteAction: 2,
-  ExportFunction: 1,
   FindDevices: 4,
   ForwardKinematics: 2,
   GetActions: 1,
   GetBreakpoints: 1,
   GetCameraPose: 4,
+  GetDryRun: 1,
   GetEndEffectorPose: 1,
   GetEndEffectors: 1,
   GetExecutionTrace: 1,
   GetGrippers: 1,
   GetObjectTypes: 1,
-  GetProgramPosition: 1,
   GetProject: 1,
   GetRobotArms: 1,
   GetRobotJoints: 1,
@@ -2631,7 +2642,6 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   HandTeachingMode: 2,
   History: 1,
   HoldHandTeaching: 2,
-  ImportFunction: 2,
   ImportScript: 2,
   InverseKinematics: 2,
   JogRobot: 2,
@@ -2641,7 +2651,6 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   ListProjects: 1,
   ListRuns: 1,
   ListScenes: 1,
-  MakeFunction: 2,
   MarkersCorners: 4,
   MoveToActionPoint: 2,
   MoveToJoints: 2,
@@ -2671,16 +2680,12 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   RemoveActionPointJoints: 2,
   RemoveActionPointOrientation: 2,
   RemoveFromScene: 4,
-  RemoveFunction: 2,
-  RemoveFunctionParameter: 2,
-  RemoveFunctionResult: 2,
   RemoveLogicItem: 2,
   RemoveProjectParameter: 3,
   RenameAction: 2,
   RenameActionPoint: 2,
   RenameActionPointJoints: 2,
   RenameActionPointOrientation: 2,
-  RenameFunction: 2,
   RenameObject: 4,
   RenamePackage: 3,
   RenameProject: 2,
@@ -2695,6 +2700,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   SetBreakpoints: 2,
   SetEefPerpendicularToWorld: 2,
   SetViewState: 1,
+  StartDryRun: 2,
   StartScene: 2,
   StartSceneKeepGoing: 2,
   StepAction: 1,
@@ -2718,8 +2724,6 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   UpdateActionPointParent: 2,
   UpdateActionPointPosition: 2,
   UpdateActionPointUsingRobot: 2,
-  UpdateFunctionParameter: 2,
-  UpdateFunctionResult: 2,
   UpdateLock: 2,
   UpdateLogicItem: 2,
   UpdateObjectModel: 4,
@@ -2743,15 +2747,14 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
 /** Additional events, sent only to clients that subscribed to them. */
 export const ADDITIONAL_EVENTS = [
   "BreakpointsChanged",
+  "DryRunChanged",
   "ExecutionTrace",
-  "FunctionChanged",
   "HistoryChanged",
   "MovePreview",
   "ObjectHealth",
   "ObjectObservations",
   "ObjectState",
   "ObjectValues",
-  "ProgramPosition",
   "ReachabilityChanged",
   "RobotHold",
   "RunChanged",

@@ -95,8 +95,23 @@ class _Worker:
     async def _run(self, job: _Job) -> None:
         try:
             process = await self._running_process()
-            value = await process.compute(job.task, job.within, job.world, job.on_progress, job.place)
+            computing = asyncio.create_task(
+                process.compute(job.task, job.within, job.world, job.on_progress, job.place)
+            )
+            if job.task.cancellable:
+                job.result.add_done_callback(lambda result: result.cancelled() and computing.cancel())
+            try:
+                value = await computing
+            finally:
+                if not computing.done():
+                    computing.cancel()
         except asyncio.CancelledError:
+            serving = asyncio.current_task()
+            if job.result.cancelled() and (serving is None or not serving.cancelling()):
+                stopped, self.process = self.process, None
+                if stopped is not None:
+                    await stopped.close()
+                return
             _fail(job, ComputeStopped("The server is ending."))
             raise
         except Exception as error:  # noqa: BLE001 - `run` raises it in the caller
@@ -141,7 +156,10 @@ class Compute:
         on_progress: ProgressCallback | None = None,
         background: bool = False,
     ) -> R:
-        """Return the result of a task. If the caller is cancelled, a started computation still runs to its end.
+        """Return the result of a task.
+
+        If the caller is cancelled, a started computation still runs to its end, unless the task is cancellable: then
+        its worker is stopped.
 
         Args:
             task: the task.

@@ -9,7 +9,7 @@ from msgspec import UNSET, Struct
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.events import PackageInfoData
-from arcor2_hw.data.run_trace import RunTrace, Span, TracedDevice
+from arcor2_hw.data.run_trace import RunTrace, Span, traced_devices
 from arcor2_hw.runtime import messages as m
 
 MAX_SPANS: Final = 10_000
@@ -92,16 +92,11 @@ class RunTraceCollector:
         """Return the trace of the actions that have ended so far."""
         if self._began is None:
             return RunTrace(self.run)
-        busy: dict[str, float] = {}
         spans = sorted(self._spans, key=lambda span: span.number)
-        for span in spans:
-            if not span.device:  # the call of a function
-                continue
-            busy[span.device] = busy.get(span.device, 0.0) + span.duration
         return RunTrace(
             self.run,
             datetime.fromtimestamp(self._began, UTC).isoformat(timespec="microseconds"),
-            [TracedDevice(key, self._names.get(key, key), round(sum_, 6)) for key, sum_ in busy.items()],
+            traced_devices(spans, self._names),
             spans,
             self._ended - len(spans),
         )

@@ -1,0 +1,57 @@
+"""The walk through the logic of a program: branches, loops, and the branches that a run took."""
+
+from arcor2_hw.compute.program_walk import END_STEP, Edge, Graph, Step, UsualBranch, usual_branches, walk
+
+
+def graph(edges: dict[str, list[str]], **more: object) -> Graph:
+    """Build a graph from the ids of the actions that follow each action; conditions are the numbers of the edges."""
+    numbers = {name: number for number, name in enumerate(edges)} | {"END": END_STEP}
+    steps = [
+        Step(name, name.upper(), "dev", [Edge(numbers[each], str(n)) for n, each in enumerate(following)])
+        for name, following in edges.items()
+    ]
+    return Graph(steps, **more)  # type: ignore[arg-type]
+
+
+def names(made: Graph, first: int = 0) -> str:
+    return "".join(made.steps[visit.step].action_id for visit in walk(made, first).visits)
+
+
+BRANCHED = {"a": ["b", "c"], "b": ["d"], "c": ["d"], "d": ["END"]}
+
+
+def test_without_runs_the_first_branch_is_taken_and_named() -> None:
+    walked = walk(graph(BRANCHED))
+    assert [(visit.step, visit.branch) for visit in walked.visits][:2] == [(0, walked.visits[0].branch), (1, "0")]
+    assert names(graph(BRANCHED)) == "abd"
+    (assumption,) = walked.assumptions
+    assert assumption.action_id == "a"
+    assert assumption.text == "After A, the first branch leads to B, because no run shows which one is usual."
+    assert assumption.values == {"name": "A", "next": "B"}
+
+
+def test_the_branch_of_the_newest_run_is_taken_unless_the_client_asks_for_another() -> None:
+    usual = {"a": UsualBranch(7, "c")}
+    made = graph(BRANCHED, usual=usual)
+    assert names(made) == "acd"
+    assert walk(made).assumptions[0].text == "After A, the branch leads to C, as most often in run 7."
+    asked = graph(BRANCHED, usual=usual, wanted={"a": "b"})
+    assert names(asked) == "abd"
+    assert walk(asked).assumptions[0].text == "After A, the requested branch leads to B."
+    # A run of an older version took a branch that no longer exists.
+    assert names(graph(BRANCHED, usual={"a": UsualBranch(7, "gone")})) == "abd"
+
+
+def test_a_loop_ends_after_one_cycle_and_a_walk_may_start_anywhere() -> None:
+    looping = graph({"a": ["b"], "b": ["c"], "c": ["a"]})
+    assert names(looping) == "abc"
+    assert walk(looping).assumptions[0].text == "The loop back to A ends after one cycle."
+    assert names(looping, 1) == "bca"
+    assert names(graph(BRANCHED), 2) == "cd"
+
+
+def test_the_usual_branch_is_the_most_frequent_one() -> None:
+    edges = {"a": ["b", "END"], "b": ["a", "c"], "c": ["END"]}
+    # Four cycles; the third one ended after a, and the next started with a again.
+    found = usual_branches(3, [*"ab", "c", *"ab", "c", "a", *"ab"], edges)
+    assert found == {"a": UsualBranch(3, "b"), "b": UsualBranch(3, "c"), "c": UsualBranch(3, "END")}
