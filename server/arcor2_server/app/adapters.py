@@ -29,6 +29,7 @@ from arcor2_server.rpc.calibration import CalibrationRequests
 from arcor2_server.rpc.calibration_records import CalibrationRecordRequests
 from arcor2_server.rpc.cameras import CameraRequests
 from arcor2_server.rpc.copying import CopyRequests
+from arcor2_server.rpc.dry_runs import DryRunRequests
 from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.editor import SharedStateRequests
 from arcor2_server.rpc.execution import ExecutionRequests
@@ -72,6 +73,7 @@ def request_handlers(s: Server) -> Handlers:
         CameraRequests(s.session, s.online, editing, s.cameras),
         CopyRequests(s.locks, s.session, editing),
         SharedStateRequests(s.locks, s.session, s.previews, s.view_states, s.breakpoints, s.presence),
+        DryRunRequests(s.dry_runs),
         ExecutionRequests(
             s.locks, s.types, s.session, s.online, s.execution, s.tasks, s.package_runs, s.temporary_runs
         ),

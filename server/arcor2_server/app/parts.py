@@ -21,6 +21,7 @@ from arcor2_server.documents import Session
 from arcor2_server.documents.dependents import Dependents
 from arcor2_server.documents.edit_notifications import EditNotifications
 from arcor2_server.documents.saved_problems import SavedProblems
+from arcor2_server.dry_run.service import DryRuns
 from arcor2_server.execution.breakpoints import SharedBreakpoints
 from arcor2_server.execution.package_runs import PackageRuns
 from arcor2_server.execution.run_message import RunMessages
@@ -169,6 +170,7 @@ class Server:
         runs = self.runs = Runs(hub)
         await runs.open(shared)
         closed(runs)
+        self.dry_runs = closed(DryRuns(hub, types, session, tasks, compute, robots, scene_collisions, runs))
         breakpoints = self.breakpoints = SharedBreakpoints(hub, storage, session, shared)
         connect_edits(edit_notifications, previews, breakpoints)
         messages = RunMessages(settings, secrets, breakpoints, host_world)

@@ -9,6 +9,7 @@ from arcor2_hw.data.editor import Run
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import ListRunsArgs
 from arcor2_hw.data.run_trace import RunTrace, chrome_trace
+from arcor2_hw.data.trace_comparison import TraceSummary, summarize
 from arcor2_hw.exceptions import NotFound
 from arcor2_server.execution.runs import Runs
 from arcor2_server.rest.general import SERVER
@@ -30,6 +31,12 @@ class RunOperations:
     async def run_trace(self, number: str) -> RunTrace:
         """Return the executed actions of a run by device."""
         return await self._runs.run_trace(_number(number))
+
+    @operation("GET", "/api/runs/{number}/summary", SERVER, Role.OPERATOR, plain=True)
+    async def run_summary(self, number: str) -> TraceSummary:
+        """Return cycle time, bottleneck and waits of a run."""
+        trace = await self._runs.run_trace(_number(number))
+        return await asyncio.to_thread(summarize, trace)
 
     @operation("GET", "/api/runs/{number}/chrome-trace", SERVER, Role.OPERATOR, media_type="application/octet-stream")
     async def run_chrome_trace(self, number: str) -> Binary:

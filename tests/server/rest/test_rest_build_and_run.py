@@ -263,6 +263,8 @@ async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess
             span["device"],
             pytest.approx(sum(one["duration"] for one in trace["spans"])),
         )
+        summary = granted(await http.get(path + "/summary"))
+        assert summary["devices"][0]["id"] == device["id"]
         exported = await http.get(path + "/chrome-trace")
         assert "attachment" in exported.headers["Content-Disposition"]
         assert span["name"] in [event["name"] for event in exported.json()["traceEvents"]]

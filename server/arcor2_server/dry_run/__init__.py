@@ -1,0 +1,1 @@
+"""Dry runs: the predicted times of the open project, without devices."""

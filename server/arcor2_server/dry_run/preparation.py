@@ -1,0 +1,178 @@
+"""Prepares the task of a dry run from a project: the graph, the motions, and what earlier runs tell."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from arcor2_hw.compute.dry_run_tasks import ActionMoves, DryRunTask, MovingRobot
+from arcor2_hw.compute.program_walk import END_STEP, Edge, Graph, Step, action_of
+from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.dry_run import Assumption, DurationSource
+from arcor2_hw.data.object_type import ObjectAction
+from arcor2_hw.data.project import Action, Project
+from arcor2_hw.data.project_index import ProjectIndex
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.data.rpc import StartDryRunArgs
+from arcor2_hw.data.run_trace import RunTrace
+from arcor2_hw.data.scene import Scene
+from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
+from arcor2_hw.messages import Message
+from arcor2_server.documents import logic_graph
+from arcor2_server.dry_run import experience
+from arcor2_server.dry_run.motions import UnknownTarget, maxima_of, moves_of
+
+
+class Device(Struct, frozen=True):
+    """An object of the scene.
+
+    Args:
+        name: its name.
+        type: its object type.
+        actions: the actions of the type, by name.
+        robot: whether it is a robot.
+        model: whether it has a model (URDF) in the collision world.
+        settings: its settings with defaults.
+        joints: the present joint values of a robot; empty: unknown.
+    """
+
+    name: str
+    type: str
+    actions: Mapping[str, ObjectAction]
+    robot: bool = False
+    model: bool = False
+    settings: Mapping[str, Any] = {}
+    joints: Sequence[Joint] = ()
+
+
+class Experience(Struct, frozen=True):
+    """What earlier runs tell.
+
+    Args:
+        traces: the traces of the newest runs of the project, the newest first.
+        unchanged: those of them after which neither the project nor the scene was edited.
+        additions: by how much the motions of a method took longer than planned before, s, by method.
+    """
+
+    traces: Sequence[RunTrace]
+    unchanged: Sequence[RunTrace]
+    additions: Mapping[str, float]
+
+
+def prepare(
+    scene: Scene, project: Project, devices: Mapping[str, Device], earlier: Experience, args: StartDryRunArgs
+) -> DryRunTask:
+    """Return the task of a dry run. It takes tenths of a second for large projects.
+
+    Args:
+        scene: the scene.
+        project: the project.
+        devices: the objects of the scene, by id.
+        earlier: what earlier runs tell.
+        args: the arguments of the request.
+
+    Raises:
+        InvalidProject: the logic of the project is incomplete.
+        NotFound: the requested action is not part of the program.
+        InvalidData: a requested branch does not exist.
+    """
+    flow = logic_graph.read(project)
+    index = ProjectIndex(scene, project)
+    steps = [
+        _step(action, edges, bool(exits))
+        for action, edges, exits in zip(flow.actions, flow.edges, flow.exits, strict=True)
+    ]
+    graph = Graph(steps)
+    following = {step.action_id: [action_of(graph, edge) for edge in step.edges] for step in steps}
+    branches = {} if isinstance(args.branches, Unset) else args.branches
+    for action_id, wanted in branches.items():
+        if wanted not in following.get(action_id, ()):
+            raise InvalidData("The program has no branch from {action} to {next}.", action=action_id, next=wanted)
+    traces = earlier.traces
+    usual = experience.branches(traces[0], following) if traces else {}
+    moves, assumptions = _moves(flow.actions, index, devices)
+    methods = {action.id: _method(action, devices) for action in flow.actions}
+    measured = experience.durations(earlier.unchanged, {key: one.method for key, one in moves.items()})
+    return DryRunTask(
+        Graph(steps, branches, usual),
+        {key: device.name for key, device in devices.items()},
+        _first(steps, args.from_action),
+        {step.device: _moving(devices[step.device], project, step.device) for step in steps if step.action_id in moves},
+        moves,
+        experience.durations(traces, methods),
+        {key: one.seconds for key, one in measured.items() if one.source.source is DurationSource.ACTION},
+        dict(earlier.additions),
+        assumptions,
+    )
+
+
+def _step(action: Action, edges: Sequence[logic_graph.Edge], exits: bool) -> Step:
+    object_id, _ = action.parse_type()
+    return Step(action.id, action.name, object_id, [_edge(edge) for edge in edges], exits)
+
+
+def _edge(edge: logic_graph.Edge) -> Edge:
+    target = END_STEP if edge.target == logic_graph.END_NODE else edge.target
+    value = UNSET if edge.condition is None else msgspec.json.encode(edge.condition.value).decode()
+    return Edge(target, value)
+
+
+def _first(steps: Sequence[Step], wanted: str | Unset) -> int:
+    if isinstance(wanted, Unset):
+        return 0
+    for number, step in enumerate(steps):
+        if step.action_id == wanted:
+            return number
+    raise NotFound("The program does not execute an action {id}.", id=wanted)
+
+
+def _method(action: Action, devices: Mapping[str, Device]) -> experience.Method:
+    object_id, method = action.parse_type()
+    device = devices.get(object_id)
+    return f"{'' if device is None else device.type}.{method}"
+
+
+def _moving(device: Device, project: Project, key: str) -> MovingRobot:
+    joints = list(device.joints)
+    if not joints:
+        stored = (each for point in project.action_points for each in point.robot_joints if each.robot_id == key)
+        joints = next((each.joints for each in stored if isinstance(each.arm_id, Unset)), [])
+    return MovingRobot(device.name, maxima_of(device.settings), joints)
+
+
+def _moves(
+    actions: Sequence[Action], index: ProjectIndex, devices: Mapping[str, Device]
+) -> tuple[dict[str, ActionMoves], list[Assumption]]:
+    """Return the motions of actions, and assumptions about those that cannot be planned."""
+    found: dict[str, ActionMoves] = {}
+    assumptions: list[Assumption] = []
+    without_model: dict[str, None] = {}
+    for action in actions:
+        object_id, method = action.parse_type()
+        device = devices.get(object_id)
+        declared = None if device is None else device.actions.get(method)
+        if device is None or declared is None or not device.robot:
+            continue
+        try:
+            moves = moves_of(action, declared, _method(action, devices), index, device.settings)
+        except UnknownTarget:
+            text = "The target of {name} is the result of another action, so its motion is not planned."
+            assumptions.append(_assumption(Message.of(text, name=action.name), action.id))
+            continue
+        except (Arcor2Error, msgspec.DecodeError) as error:
+            message = Message.of("The motion of {name} is not planned: {reason}", name=action.name, reason=error)
+            assumptions.append(_assumption(message, action.id))
+            continue
+        if moves is not None and not device.model:
+            without_model[device.name] = None
+        elif moves is not None:
+            found[action.id] = moves
+    for name in without_model:
+        message = Message.of("{name} has no model (URDF), so its motions are not planned.", name=name)
+        assumptions.append(_assumption(message))
+    return found, assumptions
+
+
+def _assumption(message: Message, action_id: str | Unset = UNSET) -> Assumption:
+    return Assumption(message.text, action_id, **message.translation())
