@@ -1,26 +1,24 @@
 """`arcor2-hw package`: list packages, past runs and their traces, and run a package while showing its progress."""
 
+import asyncio
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
+import msgspec
 from cyclopts import App, Parameter
-from rich.markup import escape
 from rich.table import Table
 
-from arcor2_hw.client import RequestFailed
+from arcor2_hw.client import RequestFailed, Rest
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.editor import Run
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.data.run_trace import RunTrace
-from arcor2_hw.data.trace_comparison import compare, summarize
-from arcor2_hw.exceptions import ConnectionLost, NotFound
+from arcor2_hw.exceptions import ConnectionLost, InvalidData, NotFound
 from arcor2_server.cli.exit_status import ExitStatus, fail
-from arcor2_server.cli.server_connection import HERE, Failed, Server, printable, run
+from arcor2_server.cli.server_connection import HERE, Failed, Server, run
 from arcor2_server.cli.tables import console
-
-LONGEST_WAITS: Final = 3
-"""Number of waits shown with a trace, longest first."""
+from arcor2_server.cli.trace_tables import show_comparison, show_trace
 
 app = App(name="package", help="List and run packages, and show past runs.")
 
@@ -91,7 +89,7 @@ def _seconds(start: str, end: str) -> float:
 
 
 @app.command(name="trace")
-def show_trace(
+def trace_of_run(
     number: Annotated[int, Parameter(help="Number of the run, see `arcor2-hw package runs`.")],
     *,
     output: Annotated[
@@ -105,68 +103,56 @@ def show_trace(
     async def work() -> None:
         async with server.rest() as rest:
             if output is None:
-                _show_trace(await rest.run_trace(number))
+                show_trace(await rest.run_trace(number))
             else:
                 await rest.chrome_trace(number, output)
 
     return run("package trace", work)
 
 
-def _show_trace(trace: RunTrace) -> None:
-    times = summarize(trace)
-    names = {device.id: device.name for device in trace.devices}
-    out = console()
-    table = Table("start", "duration", "device", "action", "branch", "error", box=None, pad_edge=False)
-    for span in trace.spans:
-        texts = (names.get(span.device, ""), span.name, span.branch or "", span.error or "")
-        table.add_row(f"{span.start:.3f} s", f"{span.duration:.3f} s", *(escape(printable(text)) for text in texts))
-    out.print(table if trace.spans else "The run has executed no actions.")
-    out.print(f"cycle: {times.cycle:.3f} s, {times.cycles} complete; all: {times.whole:.3f} s")
-    for device in times.devices:
-        out.print(f"{escape(printable(device.name))}: busy {device.busy:.3f} s, {device.share:.0%}")
-    for wait in times.waits[:LONGEST_WAITS]:
-        out.print(f"wait of {wait.duration:.3f} s at {wait.start:.3f} s, before {escape(printable(wait.before))}")
-    if trace.omitted:
-        out.print(f"The first {trace.omitted} actions are not stored.")
-
-
 @app.command(name="compare")
 def compare_runs(
-    first: Annotated[int, Parameter(help="Number of a run, see `arcor2-hw package runs`.")],
-    second: Annotated[int, Parameter(help="Number of the run to compare it with.")],
+    first: Annotated[
+        str,
+        Parameter(
+            help="Number of a run, see `arcor2-hw package runs`, or a file of `arcor2-hw project dry-run --save`."
+        ),
+    ],
+    second: Annotated[str, Parameter(help="Number or file to compare it with.")],
     *,
     server: Server = HERE,
 ) -> int:
-    """Compare two runs action by action: how long each action, a cycle and the devices took."""
+    """Compare two runs or dry runs action by action: how long each action, a cycle and the devices took."""
 
     async def work() -> None:
         async with server.rest() as rest:
-            _show_comparison(await rest.run_trace(first), await rest.run_trace(second))
+            traces = [await _trace_of(rest, each) for each in (first, second)]
+        show_comparison(traces[0], traces[1], (_title(first), _title(second)))
 
     return run("package compare", work)
 
 
-def _show_comparison(first: RunTrace, second: RunTrace) -> None:
-    old, new = summarize(first), summarize(second)
-    names = {device.id: device.name for device in (*first.devices, *second.devices)}
-    out = console()
-    table = Table("device", "action", f"run {first.run}", f"run {second.run}", "difference", box=None, pad_edge=False)
-    for one in compare(old, new):
-        difference = one.difference
-        table.add_row(
-            escape(printable(names.get(one.device, ""))),
-            escape(printable(one.name)),
-            *("" if isinstance(value, Unset) else f"{value:.3f} s" for value in (one.first, one.second)),
-            "" if difference is None else f"{difference:+.3f} s",
-        )
-    out.print(table)
-    out.print(f"cycle: {old.cycle:.3f} s, {new.cycle:.3f} s, {new.cycle - old.cycle:+.3f} s")
-    shares = {device.id: f"{device.share:.0%}" for device in old.devices}
-    for device in new.devices:
-        before = shares.pop(device.id, "-")
-        out.print(f"{escape(printable(device.name))}: busy {before}, {device.share:.0%}")
-    for key, before in shares.items():
-        out.print(f"{escape(printable(names[key]))}: busy {before}, -")
+async def _trace_of(rest: Rest, text: str) -> RunTrace:
+    """Return the trace of a run by its number, or that in a file.
+
+    Raises:
+        NotFound: the run or the file does not exist.
+        InvalidData: the file contains no trace.
+    """
+    if text.isdecimal():
+        return await rest.run_trace(int(text))
+    try:
+        content = await asyncio.to_thread(Path(text).read_bytes)
+    except OSError as error:
+        raise NotFound("{path} cannot be read: {reason}.", path=text, reason=error.strerror) from None
+    try:
+        return msgspec.json.decode(content, type=RunTrace)
+    except msgspec.MsgspecError as error:
+        raise InvalidData("{path} contains no trace: {reason}.", path=text, reason=error) from None
+
+
+def _title(text: str) -> str:
+    return f"run {text}" if text.isdecimal() else Path(text).stem
 
 
 @app.command(name="run")

@@ -1,4 +1,4 @@
-"""`arcor2-hw project`: list, export, import, check and compare projects, and exchange functions between them."""
+"""`arcor2-hw project`: list, export, import, check, compare and dry-run projects, and exchange functions."""
 
 import re
 from pathlib import Path
@@ -31,6 +31,7 @@ app = document_commands(
     )
 )
 
+app.command("arcor2_server.cli.dry_run:project_dry_run", name="dry-run")
 
 USER: Final = "import of a function"
 """The user name of the command, which the history of the project shows."""
