@@ -16,11 +16,13 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint, RobotMaxima
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.kinematics.arm import Arm
+from arcor2_hw.kinematics.errors import OutOfReach
 from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.shapes import Array
 from arcor2_hw.messages import Message
 from arcor2_hw.planning.paths import straight_line
 from arcor2_hw.planning.planner import Planner
+from arcor2_hw.planning.reachability import why_out_of_reach
 from arcor2_hw.planning.timing import FASTEST, JERK_RAMP, RAMP, MotionLimits, with_stops
 
 RESOLUTION: Final = 0.02
@@ -114,9 +116,11 @@ class MotionTimer:
         pose = target if isinstance(target, Pose) else None
         try:
             path = self._path(start, target, linear, safe)
+        except OutOfReach:
+            assert pose is not None
+            return Outcome(start, None, why_out_of_reach(self.arm, self._in_root(pose)), pose)
         except Arcor2Error as error:
-            place = pose or Pose.from_matrix(self._base @ self.arm.forward(start))
-            return Outcome(start, None, error.message, place)
+            return Outcome(start, None, error.message, pose or Pose.from_matrix(self._base @ self.arm.forward(start)))
         seconds = self._line_time(path, speed, acceleration) if linear else self._joint_time(path, speed, acceleration)
         goal = path[-1]
         if not self.arm.within(goal, _STANDS):
@@ -139,7 +143,7 @@ class MotionTimer:
                 return straight_line(self.arm, start, matrix, self._name, coarse=COARSE, inverse=self._inverse)
             goal = next(self._inverse.candidates(matrix, start), None)
             if goal is None:
-                goal = self._inverse.solve(matrix, start)  # raises with the reason
+                raise OutOfReach
         else:
             goal = self.arm.values(target)
         return Planner(self.sweep, self._name).to_joints(start, goal) if safe else [start, goal]

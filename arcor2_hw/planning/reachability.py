@@ -192,7 +192,7 @@ class Reachability:
             second = second or Judgement(Reach.NEAR_LIMIT, joints, one.reservation)
         if best := second or hit:
             return best, _around(boxes)
-        return Judgement(Reach.OUT_OF_REACH, reason=self._reason(entry.target)), None
+        return Judgement(Reach.OUT_OF_REACH, reason=why_out_of_reach(self.arm, entry.target)), None
 
     def _collision(self, whole: Array) -> Message:
         if found := self._world.contacts(self._name, whole):
@@ -209,15 +209,17 @@ class Reachability:
             return Message.of("The arm would be near a singularity.")
         return None
 
-    def _reason(self, target: Array) -> Message:
-        distance = float(np.linalg.norm(target[:3, 3] - self.arm.centre))
-        if distance > self.arm.reach:
-            return Message.of(
-                "The pose is {distance:.2f} m from the robot, which reaches at most {reach:.2f} m.",
-                distance=distance,
-                reach=self.arm.reach,
-            )
-        return Message.of("The robot does not reach the pose with this orientation.")
+
+def why_out_of_reach(arm: Arm, target: Array) -> Message:
+    """Return why an arm does not reach a pose (4, 4) in the frame of the model's root link."""
+    distance = float(np.linalg.norm(target[:3, 3] - arm.centre))
+    if distance > arm.reach:
+        return Message.of(
+            "The pose is {distance:.2f} m from the robot, which reaches at most {reach:.2f} m.",
+            distance=distance,
+            reach=arm.reach,
+        )
+    return Message.of("The robot does not reach the pose with this orientation.")
 
 
 def _around(boxes: list[Array]) -> Array:

@@ -108,6 +108,7 @@ def test_a_target_out_of_reach_has_no_planned_time() -> None:
     found = predict(program({"near": line(0.4, 0.2), "far": line(3.0, 0.0)}, durations=known))
     problem = problem_of(found)
     assert (problem.action_id, problem.pose) == ("far", at(3.0, 0.0))
+    assert problem.reason.startswith("The pose is 3.01 m from the robot")
     assert found.trace.spans[1].duration == 2.5
     assert found.durations[1].source is DurationSource.ACTION
 

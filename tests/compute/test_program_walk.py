@@ -14,7 +14,7 @@ def graph(edges: dict[str, list[str]], **more: object) -> Graph:
 
 
 def names(made: Graph, first: int = 0) -> str:
-    return "".join(made.steps[visit.step].action_id for visit in walk(made, first).visits)
+    return " ".join(made.steps[visit.step].action_id for visit in walk(made, first).visits)
 
 
 BRANCHED = {"a": ["b", "c"], "b": ["d"], "c": ["d"], "d": ["END"]}
@@ -23,7 +23,7 @@ BRANCHED = {"a": ["b", "c"], "b": ["d"], "c": ["d"], "d": ["END"]}
 def test_without_runs_the_first_branch_is_taken_and_named() -> None:
     walked = walk(graph(BRANCHED))
     assert [(visit.step, visit.branch) for visit in walked.visits][:2] == [(0, walked.visits[0].branch), (1, "0")]
-    assert names(graph(BRANCHED)) == "abd"
+    assert names(graph(BRANCHED)) == "a b d"
     (assumption,) = walked.assumptions
     assert assumption.action_id == "a"
     assert assumption.text == "After A, the first branch leads to B, because no run shows which one is usual."
@@ -33,21 +33,21 @@ def test_without_runs_the_first_branch_is_taken_and_named() -> None:
 def test_the_branch_of_the_newest_run_is_taken_unless_the_client_asks_for_another() -> None:
     usual = {"a": UsualBranch(7, "c")}
     made = graph(BRANCHED, usual=usual)
-    assert names(made) == "acd"
+    assert names(made) == "a c d"
     assert walk(made).assumptions[0].text == "After A, the branch leads to C, as most often in run 7."
     asked = graph(BRANCHED, usual=usual, wanted={"a": "b"})
-    assert names(asked) == "abd"
+    assert names(asked) == "a b d"
     assert walk(asked).assumptions[0].text == "After A, the requested branch leads to B."
     # A run of an older version took a branch that no longer exists.
-    assert names(graph(BRANCHED, usual={"a": UsualBranch(7, "gone")})) == "abd"
+    assert names(graph(BRANCHED, usual={"a": UsualBranch(7, "gone")})) == "a b d"
 
 
 def test_a_loop_ends_after_one_cycle_and_a_walk_may_start_anywhere() -> None:
     looping = graph({"a": ["b"], "b": ["c"], "c": ["a"]})
-    assert names(looping) == "abc"
+    assert names(looping) == "a b c"
     assert walk(looping).assumptions[0].text == "The loop back to A ends after one cycle."
-    assert names(looping, 1) == "bca"
-    assert names(graph(BRANCHED), 2) == "cd"
+    assert names(looping, 1) == "b c a"
+    assert names(graph(BRANCHED), 2) == "c d"
 
 
 def test_the_usual_branch_is_the_most_frequent_one() -> None:

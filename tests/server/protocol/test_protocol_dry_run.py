@@ -85,7 +85,7 @@ async def test_a_dry_run_predicts_the_open_project_until_it_is_edited(tmp_path: 
         problem = answer["prediction"]["problem"]
         assert (problem["action_id"], problem["name"]) == (back, "back")
         assert problem["pose"]["position"]["x"] == 3.0
-        assert "ur" in problem["reason"]
+        assert "reaches at most" in problem["reason"]
         assert "key" not in problem
         stored = [each["number"] for each in answer["stored"]]
         assert stored == [head["number"] + 1, head["number"]]
