@@ -22,6 +22,7 @@ from benchmarks import (
     computing,
     demo,
     documents,
+    dry_run,
     kinematics,
     listeners,
     meshes,
@@ -58,6 +59,7 @@ GROUPS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
     "kinematics": lambda report, _: kinematics.run(report),
     "stops": lambda report, _: stops.run(report, LONG in sys.argv),
     "demo": lambda report, folder: demo.run(report, folder, LONG in sys.argv),
+    "dry_run": dry_run.run,
     "recovery": lambda report, _: recovery.run(report, LONG in sys.argv),
 }
 

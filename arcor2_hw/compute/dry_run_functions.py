@@ -76,9 +76,10 @@ class _Robot:
         return self._timers[link]
 
     def place(self, q: "Array") -> None:
-        """Set the joint values."""
+        """Set the joint values. The world needs them only for other robots and other arms."""
         self.q, self.moved = q, True
-        self._world.set_joints(self.key, q)
+        if len(self._world.robots) > 1 or len(self.standing.model.end_effectors) > 1:
+            self._world.set_joints(self.key, q)
 
 
 class _Cycle:
