@@ -343,6 +343,14 @@ function program(state: State, event: ServerEvent): Partial<State> | null {
       const rest = now.trace.filter((each) => each.run === event.data.run && each.number !== event.data.number);
       return become({ trace: [...rest, event.data].slice(-TRACE) });
     }
+    case "DryRunChanged": {
+      const known = now.dryRun;
+      const same = known?.dry_run.number === event.data.number ? known : null;
+      if (event.data.project_id !== state.doc?.project?.id) return {};
+      return become({
+        dryRun: { outdated: false, stored: known?.stored ?? [], ...same, dry_run: inUserLanguage(event.data) },
+      });
+    }
     case "RunChanged":
       return { program: withRuns(now, [event.data]) };
     case "RunStatistics": {

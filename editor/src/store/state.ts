@@ -9,6 +9,7 @@ import type {
   BareActionPoint,
   BareProject,
   BareScene,
+  GetDryRunData,
   HistoryChangedData,
   ListProjectsData,
   ListScenesData,
@@ -137,6 +138,8 @@ export interface Program {
   trace: TraceEntry[];
   /** The run history of the server, newest first. */
   runs: Run[];
+  /** The newest dry run of the open project; null if it is not known. */
+  dryRun: GetDryRunData | null;
   /** Number of the newest run that was running while this page was open. */
   watched: number;
 }
@@ -219,6 +222,7 @@ export const NO_PROGRAM: Program = {
   running: [],
   trace: [],
   runs: [],
+  dryRun: null,
   watched: 0,
 };
 

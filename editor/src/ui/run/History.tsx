@@ -2,11 +2,16 @@
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, plural, t } from "@lingui/core/macro";
+import { useState } from "react";
+import { loadTiming, sentence, type Timing } from "../../commands/dryRun";
 import { ago, duration } from "../../formats";
 import { splitAddress } from "../../program/messages";
 import type { Run, RunEnd } from "../../protocol/types";
-import { useEditor } from "../../store/store";
+import { notify, useEditor } from "../../store/store";
+import { Gantt } from "../gantt/Gantt";
+import { Button } from "../kit/kit";
 import { useTicking } from "../times";
+import { Facts } from "./DryRun";
 
 const WORDS: Record<RunEnd, MessageDescriptor> = {
   running: msg`running`,
@@ -38,10 +43,35 @@ export function History() {
               {each.started_by && <span className="quiet"> {t`by ${each.started_by}`}</span>}
             </span>
             <span className="quiet small">{summary(each)}</span>
+            {each.end !== "running" && each.actions > 0 && <RunChart number={each.number} />}
           </li>
         ))}
       </ul>
     </section>
+  );
+}
+
+/** A button that shows the chart of a run. */
+function RunChart({ number }: { number: number }) {
+  const [timing, setTiming] = useState<Timing | null>(null);
+  const show = () => {
+    if (timing) setTiming(null);
+    else loadTiming(`run ${number}`).then(setTiming, (error: unknown) => notify("error", sentence(error)));
+  };
+  return (
+    <div className="timing">
+      <div className="row">
+        <Button look="plain" icon="list" aria-expanded={timing !== null} onPress={show}>
+          {timing ? t`Hide chart` : t`Chart`}
+        </Button>
+      </div>
+      {timing && (
+        <>
+          <Facts summary={timing.summary} />
+          <Gantt name={t`Run ${number}`} trace={timing.trace} summary={timing.summary} span={timing.summary.cycle} />
+        </>
+      )}
+    </div>
   );
 }
 

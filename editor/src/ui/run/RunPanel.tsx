@@ -10,6 +10,7 @@ import { select, setUi, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
 import { AskName } from "../kit/lazyControls";
+import { DryRun } from "./DryRun";
 import { History } from "./History";
 import { LastResult } from "./Result";
 import { phaseName, RunButtons } from "./RunBar";
@@ -90,6 +91,7 @@ export default function RunPanel() {
           select({ kind: "action", id });
         }}
       />
+      <DryRun />
       <History />
       {asking && doc?.project && (
         <AskName

@@ -1,0 +1,59 @@
+/** Geometry of a Gantt chart. Bars that would be narrower than a pixel are joined, so that long runs stay fast. */
+
+import type { Span } from "../../protocol/types";
+
+/** Smallest width of a bar, and largest gap that is not drawn, pixels. */
+const PIXEL = 1;
+
+export interface Bar {
+  x: number;
+  width: number;
+  failed: boolean;
+  /** The only action of the bar; undefined for several. */
+  span?: Span;
+}
+
+/** Return the bars of each device between two times, s. `scale` is in pixels per s; x is relative to the time 0. */
+export function bars(spans: readonly Span[], from: number, to: number, scale: number): Map<string, Bar[]> {
+  const found = new Map<string, Bar[]>();
+  for (const span of spans) {
+    const end = span.start + span.duration;
+    if (end < from || span.start > to) continue;
+    const row = found.get(span.device) ?? [];
+    found.set(span.device, row);
+    const x = span.start * scale;
+    const width = Math.max(PIXEL, span.duration * scale);
+    const failed = span.error !== undefined;
+    const last = row.at(-1);
+    const tiny = last && Math.min(width, last.width) <= 2 * PIXEL;
+    if (tiny && x - last.x - last.width < PIXEL && failed === last.failed) {
+      last.width = Math.max(last.width, x + width - last.x);
+      delete last.span;
+    } else row.push({ x, width, failed, span });
+  }
+  return found;
+}
+
+/** Return times of marks, s, at round numbers and at least `space` pixels apart. */
+export function ticks(from: number, to: number, scale: number, space: number): number[] {
+  const least = space / scale;
+  const power = 10 ** Math.floor(Math.log10(least));
+  const step = [1, 2, 5, 10].map((each) => each * power).find((each) => each >= least) ?? 10 * power;
+  const first = Math.ceil(from / step - 1e-9);
+  return Array.from({ length: Math.max(0, Math.floor(to / step + 1e-9) - first + 1) }, (_, n) => (first + n) * step);
+}
+
+/** Return the action of a device nearest to a time, at most `within` s away. */
+export function nearest(spans: readonly Span[], device: string, time: number, within: number): Span | undefined {
+  let best: Span | undefined;
+  let least = within;
+  for (const span of spans) {
+    if (span.device !== device) continue;
+    const away = Math.max(span.start - time, time - span.start - span.duration, 0);
+    if (away > least || (best && away === least)) continue;
+    best = span;
+    least = away;
+    if (away === 0) break;
+  }
+  return best;
+}
