@@ -57,7 +57,7 @@ class TraceSummary(Data, frozen=True):
     whole: from the start of the first action to the end of the last one. cycles: number of complete cycles; a cycle
     lasts from the start of the first action to its next start. cycle: median of their durations; without a complete
     cycle, the whole time. devices: the bottleneck, which is busy for the largest share, first. waits: longest first.
-    device_waits: the longest one of each device, longest first.
+    device_waits: the longest one of each device, in the order of the devices.
     """
 
     whole: float
@@ -104,7 +104,7 @@ def summarize(trace: RunTrace) -> TraceSummary:
     whole = max(span.start + span.duration for span in spans) - begin
     starts = [span.start for span in spans if _key(span) == _key(spans[0])]
     cycles = [after - before for before, after in itertools.pairwise(starts)]
-    devices = [_times(device, spans, whole) for device in trace.devices]
+    devices = sorted((_times(device, spans, whole) for device in trace.devices), key=lambda device: -device.busy)
     by_action: dict[tuple[str, str], list[Span]] = {}
     for span in spans:
         by_action.setdefault(_key(span), []).append(span)
@@ -116,15 +116,15 @@ def summarize(trace: RunTrace) -> TraceSummary:
         whole,
         len(cycles),
         statistics.median(cycles) if cycles else whole,
-        sorted(devices, key=lambda device: -device.busy),
+        devices,
         [_action_times(same) for same in by_action.values()],
         sorted(waits, key=lambda wait: -wait.duration),
-        _device_waits(trace.devices, spans),
+        _device_waits(devices, spans),
     )
 
 
-def _device_waits(devices: Sequence[TracedDevice], spans: Sequence[Span]) -> list[DeviceWait]:
-    """Return the longest wait of each device between two of its actions for another device, longest first."""
+def _device_waits(devices: Sequence[DeviceTimes], spans: Sequence[Span]) -> list[DeviceWait]:
+    """Return the longest wait of each device between two of its actions for another device."""
     found = []
     for device in devices:
         own = [span for span in spans if span.device == device.id]
@@ -139,7 +139,7 @@ def _device_waits(devices: Sequence[TracedDevice], spans: Sequence[Span]) -> lis
         if busy:
             other = max(busy, key=lambda key: busy[key])
             found.append(DeviceWait(device.id, other, names[end], start, end - start))
-    return sorted(found, key=lambda wait: -wait.duration)
+    return found
 
 
 def _key(action: Span | ActionTimes) -> tuple[str, str]:

@@ -4,7 +4,7 @@ import pytest
 
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.run_trace import RunTrace, Span, TracedDevice
-from arcor2_hw.data.trace_comparison import ActionDifference, Wait, compare, summarize
+from arcor2_hw.data.trace_comparison import ActionDifference, DeviceWait, Wait, compare, summarize
 
 
 def trace(*spans: Span) -> RunTrace:
@@ -31,6 +31,11 @@ def test_a_summary_states_cycle_time_bottleneck_and_waits() -> None:
         ("b", 2, 0.5, 1.0),
     ]
     assert found.waits[0] == Wait("a", 3.75, 1.25)
+    # The arm waits for the belt, and from 3.75 s on for nothing; the belt waits for the arm.
+    assert found.device_waits == [
+        DeviceWait("arm", "belt", "a", pytest.approx(3.2), pytest.approx(1.8)),
+        DeviceWait("belt", "arm", "b", 1.5, 1.75),
+    ]
     assert [round(wait.duration, 6) for wait in found.waits] == [1.25, 0.5, 0.05]
 
 

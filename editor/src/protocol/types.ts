@@ -2137,7 +2137,7 @@ export interface TraceEntry {
  * whole: from the start of the first action to the end of the last one. cycles: number of complete cycles; a cycle
  * lasts from the start of the first action to its next start. cycle: median of their durations; without a complete
  * cycle, the whole time. devices: the bottleneck, which is busy for the largest share, first. waits: longest first.
- * device_waits: the longest one of each device, longest first.
+ * device_waits: the longest one of each device, in the order of the devices.
  */
 export interface TraceSummary {
   whole: number;

@@ -52,7 +52,7 @@ export function DryRun() {
         </>
       ) : (
         <div className="row">
-          <Button icon="zoom" why={why} onPress={() => void startDryRun()}>{t`Dry run`}</Button>
+          <Button icon="eye" why={why} onPress={() => void startDryRun()}>{t`Dry run`}</Button>
         </div>
       )}
       {!mine && <p className="quiet small">{t`Predicts the cycle without devices. Nothing moves.`}</p>}
