@@ -9,6 +9,7 @@ import pytest_asyncio
 from playwright.async_api import Browser, expect
 
 from arcor2_hw.data import rpc
+from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.project import ActionParameter
 from tests.e2e.harness import Cell, until
@@ -220,3 +221,34 @@ async def test_package_is_built_under_the_proposed_name(work: Work) -> None:
     await work.screen.sees(f"Package {work.project.name} created.")
     (package,) = await work.client.call("ListPackages")
     assert package.package_meta.name == work.project.name
+
+
+async def test_a_dry_run_predicts_the_cycle_and_shows_what_fails(work: Work) -> None:
+    """Nothing moves and the scene stays offline."""
+    page = work.screen.page
+    await work.tool(texts.RUN)
+    predicted = work.panel.get_by_role("region", name="Dry run", exact=True)
+    await work.tap_button("Dry run", predicted)
+    await predicted.get_by_text("No problems found.").wait_for(timeout=BEGUN)
+    await expect(predicted).to_contain_text("Bottleneck")
+    chart = predicted.get_by_role("region", name="Chart: Dry run 1")
+    robot = chart.get_by_role("img", name="robot: busy for")
+    await robot.locator("rect").first.click()
+    await predicted.get_by_role("button", name="Show pick").wait_for()
+    await work.screen.picture("dry run")
+
+    # An edit makes the result outdated.
+    await work.client.write_lock(work.point("good"), lock_tree=True)
+    await work.client.update_action_point_position(
+        action_point_id=work.point("good"), new_position=Position(0.0, 3.0, 0.1)
+    )
+    await work.client.write_unlock(work.point("good"))
+    await predicted.get_by_text("The program was edited since.").wait_for()
+    await work.tap_button("Dry run", predicted)
+    problem = predicted.get_by_role("alert")
+    await expect(problem).to_contain_text("into_good_box would fail", timeout=BEGUN)
+    await expect(problem).to_contain_text("reaches at most")
+    await predicted.get_by_label("Compare with").select_option("dry 1")
+    await predicted.get_by_role("table").get_by_text("into_good_box").wait_for()
+    await problem.get_by_role("button", name="Show into_good_box").click()
+    await page.get_by_role("complementary").get_by_role("heading", name="into_good_box", exact=True).wait_for()

@@ -94,7 +94,11 @@ export function Gantt({ name, trace, summary, span: visible }: GanttProps) {
                 onClick={tap(device.id)}
               >
                 {(rows.get(device.id) ?? []).map((bar) => (
-                  <Rect key={bar.x} bar={bar} chosen={bar.span !== undefined && bar.span === chosen} />
+                  <Rect
+                    key={bar.span?.number ?? `at ${bar.x}`}
+                    bar={bar}
+                    chosen={bar.span !== undefined && bar.span === chosen}
+                  />
                 ))}
               </svg>
             </div>

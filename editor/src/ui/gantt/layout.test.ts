@@ -37,6 +37,11 @@ describe("bars", () => {
     expect(row[0]?.width).toBeLessThan(302);
   });
 
+  test("next to a short one keep their action", () => {
+    const row = bars([span(1, "arm", 0, 0.001), span(2, "arm", 0.001, 2)], 0, 10, 10).get("arm");
+    expect(row?.map((bar) => bar.span?.number)).toEqual([1, 2]);
+  });
+
   test("that fail are not hidden in others", () => {
     const spans = [span(1, "arm", 0, 0.01), span(2, "arm", 0.01, 0.01, "It fails."), span(3, "arm", 0.02, 0.01)];
     expect(

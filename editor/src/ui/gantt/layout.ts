@@ -25,7 +25,7 @@ export function bars(spans: readonly Span[], from: number, to: number, scale: nu
     const width = Math.max(PIXEL, span.duration * scale);
     const failed = span.error !== undefined;
     const last = row.at(-1);
-    const tiny = last && Math.min(width, last.width) <= 2 * PIXEL;
+    const tiny = width <= 2 * PIXEL && last && (last.span === undefined || last.width <= 2 * PIXEL);
     if (tiny && x - last.x - last.width < PIXEL && failed === last.failed) {
       last.width = Math.max(last.width, x + width - last.x);
       delete last.span;

@@ -3,6 +3,7 @@
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 import * as documents from "../../commands/documents";
+import { notPredictable, startDryRun } from "../../commands/dryRun";
 import { chooseLanguage } from "../../commands/language";
 import { goOffline, goOnline, stopMotion } from "../../commands/operation";
 import { storeGeneralState } from "../../commands/viewstate";
@@ -24,6 +25,12 @@ import { openOverlay } from "./overlay";
 
 export function entriesOf(state: State): Entry[] {
   return [...(state.doc ? [...ofWorkplace(state), ...things(state)] : ofHome(state)), ...everywhere(state)];
+}
+
+/** Start a dry run, and show its panel. */
+function predict() {
+  setUi({ tool: "run" });
+  return startDryRun();
 }
 
 function ofWorkplace(state: State): Entry[] {
@@ -73,6 +80,7 @@ function ofWorkplace(state: State): Entry[] {
           cannotSwitch || (live.state === "stopped" ? "" : t`Wait until the change of state is complete.`),
           goOnline,
         ),
+    ...(state.doc?.project ? [entry("dry-run", t`Dry run`, notPredictable(state), predict)] : []),
     entry("cross", aimsAlways(state) ? t`Close the crosshair` : t`Select with crosshair`, "", () =>
       storeGeneralState({ aiming: !aimsAlways(state) || null }),
     ),
