@@ -134,7 +134,7 @@ def _device_waits(devices: Sequence[DeviceTimes], spans: Sequence[Span]) -> list
         busy: dict[str, float] = {}
         for span in spans:
             overlap = min(span.start + span.duration, end) - max(span.start, start)
-            if span.device != device.id and overlap > 0.0:
+            if span.device and span.device != device.id and overlap > 0.0:
                 busy[span.device] = busy.get(span.device, 0.0) + overlap
         if busy:
             other = max(busy, key=lambda key: busy[key])

@@ -11,7 +11,7 @@ export interface AcknowledgeStopArgs {
 }
 
 /**
- * An action on an action point.
+ * An action on an action point, or of a function.
  *
  * `error_output` names the error for the actions after an error exit; without it, the error is not stored.
  */
@@ -61,7 +61,7 @@ export interface ActionParamValuesArgs {
   parent_params?: IdValue[];
 }
 
-/** A literal, a project parameter or a link to a result, depending on `type`. */
+/** A literal, a project parameter, a parameter of the function, or a link to a result, depending on `type`. */
 export interface ActionParameter {
   name: string;
   type: string;
@@ -162,6 +162,30 @@ export interface AddApUsingRobotArgs {
   arm_id?: string;
 }
 
+/** Arguments of AddFunction. */
+export interface AddFunctionArgs {
+  name: string;
+}
+
+/** Answer to AddFunction. */
+export interface AddFunctionData {
+  id: string;
+}
+
+/** Arguments of AddFunctionParameter; `value` is the parameter for the present calls of the function. */
+export interface AddFunctionParameterArgs {
+  function_id: string;
+  name: string;
+  type: string;
+  value?: Parameter;
+}
+
+/** Arguments of AddFunctionResult; `link` is `<action id>/default/<output index>`. */
+export interface AddFunctionResultArgs {
+  function_id: string;
+  link: string;
+}
+
 /** Arguments of AddLogicItem; `error_kinds` make the item an error exit. */
 export interface AddLogicItemArgs {
   start: string;
@@ -232,7 +256,7 @@ export interface AuthenticateData {
   role: string;
 }
 
-/** An action without parameters and flows; `type` is `<object id>/<action name>`. */
+/** An action without parameters and flows; `type` is `<object id>/<action name>`, or `<function id>/call`. */
 export interface BareAction {
   name: string;
   type: string;
@@ -277,6 +301,12 @@ export interface Box {
   size_x: number;
   size_y: number;
   size_z: number;
+}
+
+/** The call stack of a branch, from the program itself to the innermost function. */
+export interface Branch {
+  id: string;
+  frames: Frame[];
 }
 
 /** Arguments of BuildProject. */
@@ -530,6 +560,17 @@ export interface DeviceWait {
   duration: number;
 }
 
+/** Arguments of DissolveCall: an action that calls a function, and whether to remove the function. */
+export interface DissolveCallArgs {
+  action_id: string;
+  remove_function?: boolean;
+}
+
+/** Answer to DissolveCall: the actions that replace the call. */
+export interface DissolveCallData {
+  action_ids: string[];
+}
+
 /**
  * A dry run without its result, and data of the event DryRunChanged.
  *
@@ -632,7 +673,30 @@ export interface FoundDevice {
   serial: string;
 }
 
-/** A result of a project function. */
+/**
+ * A position in the program or in a function.
+ *
+ * action_id: the action that runs, or that is announced. function_id: the function that contains it; omitted in the
+ * program itself. call_action_id: the action of the frame before this one that called the function.
+ */
+export interface Frame {
+  action_id: string;
+  function_id?: string;
+  call_action_id?: string;
+}
+
+/**
+ * A function with the functions that it calls, and the items to which their actions refer.
+ *
+ * functions: called functions come before their callers; the exported function is the last one.
+ */
+export interface FunctionExport {
+  scene_id: string;
+  functions: ProjectFunction[];
+  references: NamedReference[];
+}
+
+/** A result of a function: its type, and the result `<action id>/default/<output index>` of one of its actions. */
 export interface FunctionReturns {
   type: string;
   link: string;
@@ -839,6 +903,22 @@ export interface Identity {
   firmware: string;
 }
 
+/**
+ * Arguments of ImportFunction.
+ *
+ * points: the action points of the open project, by the id or name of the exported ones. Other items are found by
+ * their id, else by their name.
+ */
+export interface ImportFunctionArgs {
+  function: FunctionExport;
+  points?: Record<string, string>;
+}
+
+/** Answer to ImportFunction: the ids of the new functions, in the order of the export. */
+export interface ImportFunctionData {
+  ids: string[];
+}
+
 /** Answer to ImportScript: the new revision, and the changed items. */
 export interface ImportScriptData {
   revision: number;
@@ -974,6 +1054,23 @@ export interface LogicItem {
 /** Values of WhatEnum in ShowMainScreen. */
 export type MainScreen = "ScenesList" | "ProjectsList" | "PackagesList";
 
+/**
+ * Arguments of MakeFunction: the name of the function, its actions, and the name of the action that calls it.
+ *
+ * `call_name`: by default the name of the function, with a number if an action has it.
+ */
+export interface MakeFunctionArgs {
+  name: string;
+  action_ids: string[];
+  call_name?: string;
+}
+
+/** Answer to MakeFunction: the function, and the action that calls it. */
+export interface MakeFunctionData {
+  function_id: string;
+  action_id: string;
+}
+
 /** The four corners of one marker. */
 export interface MarkerCorners {
   marker_id: number;
@@ -1074,6 +1171,22 @@ export interface NamedOrientation {
   name: string;
   orientation: Orientation;
   id: string;
+}
+
+/**
+ * An item to which the actions of an exported function refer.
+ *
+ * kind: pose, position, joints, object or project_parameter. point_id, point: id and name of the action point of a
+ * pose, position or joints. type: object type, or type of a project parameter. robot_id: the robot of joints.
+ */
+export interface NamedReference {
+  kind: string;
+  id: string;
+  name: string;
+  point_id?: string;
+  point?: string;
+  type?: string;
+  robot_id?: string;
 }
 
 /** Arguments of NewProject. */
@@ -1384,6 +1497,19 @@ export interface ProcessStateData {
 /** Values of StateEnum in ProcessState. */
 export type ProcessStateEnum = "started" | "finished" | "failed";
 
+/**
+ * The position of a program; without branches no action has been announced, or the run has ended.
+ *
+ * run: number of the run; 0 before the first one.
+ */
+export interface ProgramPosition {
+  run: number;
+  branches: Branch[];
+}
+
+/** Where a step ends: before the next action of the same function or a caller, of any function, or of a caller. */
+export type ProgramStep = "over" | "into" | "out";
+
 /** A project with its content. */
 export interface Project {
   name: string;
@@ -1419,7 +1545,11 @@ export interface ProjectExceptionData {
   values?: Record<string, string | Message>;
 }
 
-/** A named group of actions with logic of its own. */
+/**
+ * A named group of actions with logic of its own, which actions of type `<function id>/call` call.
+ *
+ * `type` of a parameter is the name of a parameter type. Its `value` has no meaning, and is empty.
+ */
 export interface ProjectFunction {
   name: string;
   actions: Action[];
@@ -1576,6 +1706,18 @@ export interface RemoveFromSceneArgs {
   force?: boolean;
 }
 
+/** Arguments of RemoveFunctionParameter. */
+export interface RemoveFunctionParameterArgs {
+  function_id: string;
+  name: string;
+}
+
+/** Arguments of RemoveFunctionResult; `index` counts from 0. */
+export interface RemoveFunctionResultArgs {
+  function_id: string;
+  index: number;
+}
+
 /** Arguments of RemoveLogicItem. */
 export interface RemoveLogicItemArgs {
   logic_item_id: string;
@@ -1613,6 +1755,12 @@ export interface RenameActionPointOrientationArgs {
 /** Arguments of RenameScene and RenameObject. */
 export interface RenameArgs {
   id: string;
+  new_name: string;
+}
+
+/** Arguments of RenameFunction. */
+export interface RenameFunctionArgs {
+  function_id: string;
   new_name: string;
 }
 
@@ -1943,7 +2091,8 @@ export interface ShowMainScreenData {
  * number: number of the action in the run from 1, in the order of their start. device: id of the object. start: since
  * the first action of the run, s. duration: s. branch: value of the condition after which the action followed the one
  * before it, as JSON; omitted without a condition. error: why the action failed. thread_id: omitted in the main thread
- * of the script.
+ * of the script. call: number of the call of the function that contains the action; omitted in the program itself. The
+ * span of a call has no device.
  */
 export interface Span {
   number: number;
@@ -1955,6 +2104,7 @@ export interface Span {
   branch?: string;
   error?: string;
   thread_id?: number;
+  call?: number;
 }
 
 /** A sphere around its origin, m. */
@@ -1972,6 +2122,11 @@ export interface Sphere {
 export interface StartDryRunArgs {
   from_action?: string;
   branches?: Record<string, string>;
+}
+
+/** Arguments of StepAction. */
+export interface StepActionArgs {
+  mode?: ProgramStep;
 }
 
 /** Values of Axis in StepRobotEef. */
@@ -2114,7 +2269,7 @@ export interface TemporaryPackageArgs {
  * number: number of the action in the run from 1, in the order of their start. started: time of the start. duration:
  * s, without a pause before it; omitted while it runs. parameters, results: as in ActionStateBefore and
  * ActionStateAfter. error: why it failed, with `key` and `values`. thread_id: omitted in the main thread of the
- * script.
+ * script. call: number of the call of the function that contains the action; omitted in the program itself.
  */
 export interface TraceEntry {
   run: number;
@@ -2127,6 +2282,7 @@ export interface TraceEntry {
   results?: string[];
   error?: string;
   thread_id?: number;
+  call?: number;
   key?: string;
   values?: Record<string, string | Message>;
 }
@@ -2220,6 +2376,22 @@ export interface UpdateActionPointPositionArgs {
 export interface UpdateActionPointUsingRobotArgs {
   action_point_id: string;
   robot: RobotArg;
+}
+
+/** Arguments of UpdateFunctionParameter; `value` replaces the parameter in the present calls of the function. */
+export interface UpdateFunctionParameterArgs {
+  function_id: string;
+  name: string;
+  new_name?: string;
+  type?: string;
+  value?: Parameter;
+}
+
+/** Arguments of UpdateFunctionResult; `index` counts from 0. */
+export interface UpdateFunctionResultArgs {
+  function_id: string;
+  index: number;
+  link: string;
 }
 
 /** Arguments of UpdateLock. */
@@ -2352,6 +2524,9 @@ export interface Requests {
   AddActionPointOrientation: { args: AddActionPointOrientationArgs; data: undefined };
   AddActionPointOrientationUsingRobot: { args: AddActionPointOrientationUsingRobotArgs; data: undefined };
   AddApUsingRobot: { args: AddApUsingRobotArgs; data: undefined };
+  AddFunction: { args: AddFunctionArgs; data: AddFunctionData };
+  AddFunctionParameter: { args: AddFunctionParameterArgs; data: undefined };
+  AddFunctionResult: { args: AddFunctionResultArgs; data: undefined };
   AddLogicItem: { args: AddLogicItemArgs; data: undefined };
   AddObjectToScene: { args: AddObjectToSceneArgs; data: undefined };
   AddOverride: { args: AddOverrideArgs; data: undefined };
@@ -2380,7 +2555,9 @@ export interface Requests {
   DeletePackage: { args: IdArgs; data: undefined };
   DeleteProject: { args: IdArgs; data: undefined };
   DeleteScene: { args: IdArgs; data: string[] };
+  DissolveCall: { args: DissolveCallArgs; data: DissolveCallData };
   ExecuteAction: { args: ExecuteActionArgs; data: undefined };
+  ExportFunction: { args: IdArgs; data: FunctionExport };
   FindDevices: { args: FindDevicesArgs; data: FoundDevice[] };
   ForwardKinematics: { args: ForwardKinematicsArgs; data: Pose };
   GetActions: { args: TypeArgs; data: ObjectAction[] };
@@ -2392,6 +2569,7 @@ export interface Requests {
   GetExecutionTrace: { args: GetExecutionTraceArgs | undefined; data: GetExecutionTraceData };
   GetGrippers: { args: GetGrippersArgs; data: string[] };
   GetObjectTypes: { args: undefined; data: ObjectTypeMeta[] };
+  GetProgramPosition: { args: undefined; data: ProgramPosition };
   GetProject: { args: IdArgs; data: Project };
   GetRobotArms: { args: GetRobotArmsArgs; data: string[] };
   GetRobotJoints: { args: GetRobotJointsArgs; data: Joint[] };
@@ -2402,6 +2580,7 @@ export interface Requests {
   HandTeachingMode: { args: HandTeachingModeArgs; data: undefined };
   History: { args: HistoryArgs | undefined; data: HistoryData };
   HoldHandTeaching: { args: HoldHandTeachingArgs; data: undefined };
+  ImportFunction: { args: ImportFunctionArgs; data: ImportFunctionData };
   ImportScript: { args: ScriptArgs; data: ImportScriptData };
   InverseKinematics: { args: InverseKinematicsArgs; data: Joint[] };
   JogRobot: { args: JogRobotArgs; data: JogRobotData };
@@ -2411,6 +2590,7 @@ export interface Requests {
   ListProjects: { args: undefined; data: ListProjectsData[] };
   ListRuns: { args: ListRunsArgs | undefined; data: ListRunsData };
   ListScenes: { args: undefined; data: ListScenesData[] };
+  MakeFunction: { args: MakeFunctionArgs; data: MakeFunctionData };
   MarkersCorners: { args: MarkersCornersArgs; data: MarkerCorners[] };
   MoveToActionPoint: { args: MoveToActionPointArgs; data: undefined };
   MoveToJoints: { args: MoveToJointsArgs; data: undefined };
@@ -2440,12 +2620,16 @@ export interface Requests {
   RemoveActionPointJoints: { args: RemoveActionPointJointsArgs; data: undefined };
   RemoveActionPointOrientation: { args: RemoveActionPointOrientationArgs; data: undefined };
   RemoveFromScene: { args: RemoveFromSceneArgs; data: undefined };
+  RemoveFunction: { args: IdArgs; data: undefined };
+  RemoveFunctionParameter: { args: RemoveFunctionParameterArgs; data: undefined };
+  RemoveFunctionResult: { args: RemoveFunctionResultArgs; data: undefined };
   RemoveLogicItem: { args: RemoveLogicItemArgs; data: undefined };
   RemoveProjectParameter: { args: RemoveProjectParameterArgs; data: undefined };
   RenameAction: { args: RenameActionArgs; data: undefined };
   RenameActionPoint: { args: RenameActionPointArgs; data: undefined };
   RenameActionPointJoints: { args: RenameActionPointJointsArgs; data: undefined };
   RenameActionPointOrientation: { args: RenameActionPointOrientationArgs; data: undefined };
+  RenameFunction: { args: RenameFunctionArgs; data: undefined };
   RenameObject: { args: RenameArgs; data: undefined };
   RenamePackage: { args: RenamePackageArgs; data: undefined };
   RenameProject: { args: RenameProjectArgs; data: undefined };
@@ -2463,7 +2647,7 @@ export interface Requests {
   StartDryRun: { args: StartDryRunArgs | undefined; data: DryRunHead };
   StartScene: { args: undefined; data: undefined };
   StartSceneKeepGoing: { args: undefined; data: undefined };
-  StepAction: { args: undefined; data: undefined };
+  StepAction: { args: StepActionArgs | undefined; data: undefined };
   StepRobotEef: { args: StepRobotEefArgs; data: undefined };
   StopAll: { args: undefined; data: StopAllData };
   StopPackage: { args: undefined; data: undefined };
@@ -2484,6 +2668,8 @@ export interface Requests {
   UpdateActionPointParent: { args: UpdateActionPointParentArgs; data: undefined };
   UpdateActionPointPosition: { args: UpdateActionPointPositionArgs; data: undefined };
   UpdateActionPointUsingRobot: { args: UpdateActionPointUsingRobotArgs; data: undefined };
+  UpdateFunctionParameter: { args: UpdateFunctionParameterArgs; data: undefined };
+  UpdateFunctionResult: { args: UpdateFunctionResultArgs; data: undefined };
   UpdateLock: { args: UpdateLockArgs; data: undefined };
   UpdateLogicItem: { args: UpdateLogicItemArgs; data: undefined };
   UpdateObjectModel: { args: UpdateObjectModelArgs; data: undefined };
@@ -2517,6 +2703,7 @@ export interface Events {
   ChangedObjectTypes: ObjectTypeMeta[];
   DryRunChanged: DryRunHead;
   ExecutionTrace: TraceEntry;
+  FunctionChanged: ProjectFunction;
   HandTeachingMode: HandTeachingModeData;
   HistoryChanged: HistoryChangedData;
   JointsChanged: ProjectRobotJoints;
@@ -2537,6 +2724,7 @@ export interface Events {
   PackageInfo: PackageInfoData;
   PackageState: PackageStateData;
   ProcessState: ProcessStateData;
+  ProgramPosition: ProgramPosition;
   ProjectChanged: BareProject;
   ProjectClosed: undefined;
   ProjectException: ProjectExceptionData;
@@ -2592,6 +2780,9 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   AddActionPointOrientation: 2,
   AddActionPointOrientationUsingRobot: 2,
   AddApUsingRobot: 2,
+  AddFunction: 2,
+  AddFunctionParameter: 2,
+  AddFunctionResult: 2,
   AddLogicItem: 2,
   AddObjectToScene: 4,
   AddOverride: 3,
@@ -2620,7 +2811,9 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   DeletePackage: 3,
   DeleteProject: 2,
   DeleteScene: 4,
+  DissolveCall: 2,
   ExecuteAction: 2,
+  ExportFunction: 1,
   FindDevices: 4,
   ForwardKinematics: 2,
   GetActions: 1,
@@ -2632,6 +2825,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   GetExecutionTrace: 1,
   GetGrippers: 1,
   GetObjectTypes: 1,
+  GetProgramPosition: 1,
   GetProject: 1,
   GetRobotArms: 1,
   GetRobotJoints: 1,
@@ -2642,6 +2836,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   HandTeachingMode: 2,
   History: 1,
   HoldHandTeaching: 2,
+  ImportFunction: 2,
   ImportScript: 2,
   InverseKinematics: 2,
   JogRobot: 2,
@@ -2651,6 +2846,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   ListProjects: 1,
   ListRuns: 1,
   ListScenes: 1,
+  MakeFunction: 2,
   MarkersCorners: 4,
   MoveToActionPoint: 2,
   MoveToJoints: 2,
@@ -2680,12 +2876,16 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   RemoveActionPointJoints: 2,
   RemoveActionPointOrientation: 2,
   RemoveFromScene: 4,
+  RemoveFunction: 2,
+  RemoveFunctionParameter: 2,
+  RemoveFunctionResult: 2,
   RemoveLogicItem: 2,
   RemoveProjectParameter: 3,
   RenameAction: 2,
   RenameActionPoint: 2,
   RenameActionPointJoints: 2,
   RenameActionPointOrientation: 2,
+  RenameFunction: 2,
   RenameObject: 4,
   RenamePackage: 3,
   RenameProject: 2,
@@ -2724,6 +2924,8 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   UpdateActionPointParent: 2,
   UpdateActionPointPosition: 2,
   UpdateActionPointUsingRobot: 2,
+  UpdateFunctionParameter: 2,
+  UpdateFunctionResult: 2,
   UpdateLock: 2,
   UpdateLogicItem: 2,
   UpdateObjectModel: 4,
@@ -2749,12 +2951,14 @@ export const ADDITIONAL_EVENTS = [
   "BreakpointsChanged",
   "DryRunChanged",
   "ExecutionTrace",
+  "FunctionChanged",
   "HistoryChanged",
   "MovePreview",
   "ObjectHealth",
   "ObjectObservations",
   "ObjectState",
   "ObjectValues",
+  "ProgramPosition",
   "ReachabilityChanged",
   "RobotHold",
   "RunChanged",

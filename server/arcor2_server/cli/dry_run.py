@@ -108,10 +108,9 @@ async def _open(client: Client, wanted: str) -> tuple[bool, Project]:
 
 def _action(project: Project, wanted: str) -> str:
     """Return the id of an action by its name or id."""
-    for point in project.action_points:
-        for action in point.actions:
-            if wanted in (action.name, action.id):
-                return action.id
+    for action in project.all_actions():
+        if wanted in (action.name, action.id):
+            return action.id
     raise NotFound("The project {name} has no action {wanted}.", name=project.name, wanted=wanted)
 
 

@@ -53,5 +53,6 @@ def branches(trace: RunTrace, edges: Mapping[str, list[str]]) -> dict[str, Usual
         trace: the trace of the run.
         edges: ids of the actions that may follow each action, or END.
     """
-    executed = [span.action_id for span in trace.spans if isinstance(span.thread_id, Unset)]
+    own = (span for span in trace.spans if isinstance(span.thread_id, Unset) and isinstance(span.call, Unset))
+    executed = [span.action_id for span in own]
     return usual_branches(trace.run, executed, edges)

@@ -79,8 +79,9 @@ def prepare(
     """
     flow = logic_graph.read(project)
     index = ProjectIndex(scene, project)
+    calls = {function.id for function in project.functions}
     steps = [
-        _step(action, edges, bool(exits))
+        _step(action, edges, bool(exits), calls)
         for action, edges, exits in zip(flow.actions, flow.edges, flow.exits, strict=True)
     ]
     graph = Graph(steps)
@@ -107,9 +108,10 @@ def prepare(
     )
 
 
-def _step(action: Action, edges: Sequence[logic_graph.Edge], exits: bool) -> Step:
+def _step(action: Action, edges: Sequence[logic_graph.Edge], exits: bool, functions: set[str]) -> Step:
     object_id, _ = action.parse_type()
-    return Step(action.id, action.name, object_id, [_edge(edge) for edge in edges], exits)
+    device = "" if object_id in functions else object_id
+    return Step(action.id, action.name, device, [_edge(edge) for edge in edges], exits)
 
 
 def _edge(edge: logic_graph.Edge) -> Edge:
@@ -130,7 +132,7 @@ def _first(steps: Sequence[Step], wanted: str | Unset) -> int:
 def _method(action: Action, devices: Mapping[str, Device]) -> experience.Method:
     object_id, method = action.parse_type()
     device = devices.get(object_id)
-    return f"{'' if device is None else device.type}.{method}"
+    return f"{object_id if device is None else device.type}.{method}"
 
 
 def _moving(device: Device, project: Project, key: str) -> MovingRobot:
@@ -150,6 +152,10 @@ def _moves(
     without_model: dict[str, None] = {}
     for action in actions:
         object_id, method = action.parse_type()
+        if index.find_function(object_id) is not None:
+            text = "{name} calls a function: it takes as long as in earlier runs, and its motions are not planned."
+            assumptions.append(_assumption(Message.of(text, name=action.name), action.id))
+            continue
         device = devices.get(object_id)
         declared = None if device is None else device.actions.get(method)
         if device is None or declared is None or not device.robot:
