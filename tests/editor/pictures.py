@@ -68,20 +68,6 @@ async def _tablet(browser: Browser, run: Run, to: Path) -> None:
         await take("program")
 
 
-async def _operator(browser: Browser, run: Run, to: Path) -> None:
-    """Take a picture while the robot carries out an action of the demo's first run."""
-    at = await until(run.at, "the addresses of the demo", 240)
-    async with screen_of(browser, at["url"]) as screen:
-        page = screen.page
-        await page.goto(f"{screen.url}/?q=high#/operator")
-        await page.get_by_label(texts.YOUR_NAME).fill("Olga")
-        await screen.press(texts.JOIN)
-        await page.locator(".operator[data-tone=running]").wait_for(timeout=240_000)
-        await screen.until("() => window.__engine?.ids().some((id) => __engine.item(id).endEffectors?.length)")
-        await page.locator(".operator-detail").filter(has_text="robot").first.wait_for(timeout=120_000)
-        (to / "editor-operator.png").write_bytes(await page.screenshot())
-
-
 async def _lists(browser: Browser, run: Run, to: Path) -> None:
     at = run.at()
     assert at is not None
@@ -113,7 +99,6 @@ async def main(to: Path) -> None:
     to.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="arcor2-hw-pictures-") as name:
         async with demo(Path(name), "--boards", "1", "--seed", str(SEED)) as run, running_browser() as browser:
-            await _operator(browser, run, to)
             await until(lambda: "The server runs at" in run.output, "the demo to serve", 240)
             await _tablet(browser, run, to)
             await _phone(browser, run, to)
