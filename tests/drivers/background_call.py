@@ -1,4 +1,4 @@
-"""A call on a separate thread."""
+"""A call in a separate thread."""
 
 import threading
 import time
@@ -9,7 +9,7 @@ from arcor2_hw.testing.own_time import own_time
 
 
 class BackgroundCall:
-    """A call on a thread of its own; `result` gives its result or raises its error."""
+    """A call in its own thread; `result` returns its result or raises its error."""
 
     def __init__(self, call: Callable[..., Any], *arguments: Any, **options: Any) -> None:
         self._value: Any = None

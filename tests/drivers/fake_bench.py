@@ -1,4 +1,4 @@
-"""Benches of drivers on their fakes. The fake injects the faults of the cable, or a wire that is recorded."""
+"""Benches of drivers on their fakes. Either the fake injects connection faults, or a recording wire in between."""
 
 import abc
 import tempfile
@@ -14,12 +14,12 @@ from tests.fakes.conftest import FakeProcess
 
 
 class _OnFake(Bench):
-    """A driver on its fake.
+    """A driver connected to its fake.
 
     Attributes:
         module: Module of the fake.
         options: Arguments of the fake.
-        link: Name of the link to its serial port; empty for a device in the network.
+        link: Name of the link to its serial port; empty for a network device.
         port: Key of its address in the ready line.
         nowhere: Address where nothing answers.
         folder: Directory that exists while the fake runs.
@@ -36,7 +36,7 @@ class _OnFake(Bench):
 
     @abc.abstractmethod
     def build(self, address: str) -> Generic:
-        """Return a new object for the device at an address, not connected."""
+        """Return a new, unconnected object for the device at an address."""
 
     def start(self) -> None:
         self.folder = tempfile.TemporaryDirectory()
@@ -63,11 +63,11 @@ class _OnFake(Bench):
 
 
 class FakeBench(_OnFake, FakeFaults):
-    """A driver on its fake, which injects the faults of the cable."""
+    """A driver connected to its fake, which injects connection faults."""
 
 
 class WiredBench(_OnFake):
-    """A driver on its fake, with a wire between that is cut and recorded."""
+    """A driver connected to its fake through a wire that can be cut and is recorded."""
 
     def start(self) -> None:
         super().start()

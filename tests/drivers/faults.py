@@ -1,4 +1,4 @@
-"""Set-ups of fault tests: a port that refuses, a relay that delays, a driver in control, a host that is killed."""
+"""Fixtures of fault tests: a refusing port, a delaying relay, a driver in control, a killed host."""
 
 import socket
 import subprocess
@@ -20,7 +20,7 @@ D = TypeVar("D", bound=Generic)
 
 @contextmanager
 def refusing_address() -> Iterator[str]:
-    """An address on which nothing listens, so that connections are refused."""
+    """Return an address at which nothing listens, so that connections are refused."""
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         yield "{}:{}".format(*taken.getsockname())
@@ -40,7 +40,7 @@ def in_control(device: D) -> D:
 
 @contextmanager
 def host_process(code: str, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
-    """A Python process that a test kills."""
+    """Start a Python process that a test kills."""
     process = subprocess.Popen([sys.executable, "-c", code, *arguments])
     try:
         yield process
@@ -50,7 +50,7 @@ def host_process(code: str, *arguments: str) -> Iterator[subprocess.Popen[bytes]
 
 
 def connect_after_invalid_answers(fake: FakeProcess, device: Generic, fault: str, error: type[DeviceError]) -> None:
-    """A fault of the wire ends connecting with an error that names the device; healed, it connects."""
+    """Assert that a wire fault ends connecting with an error that names the device, and that it connects afterwards."""
     fake.control.do(fault)
     with pytest.raises(error, match=f"^{device.name} at {fake.ready['modbus']}"):
         device.connect(0.6)
@@ -59,7 +59,7 @@ def connect_after_invalid_answers(fake: FakeProcess, device: Generic, fault: str
 
 
 def disconnect_from_silence(fake: FakeProcess, device: Generic) -> None:
-    """Disconnecting from a silent device ends and may be repeated; healed, it connects again."""
+    """Assert that disconnecting from a silent device ends and may be repeated, and that it connects afterwards."""
     fake.control.do("silence")
     device.disconnect()
     assert device.connection is Connection.OFFLINE

@@ -1,4 +1,4 @@
-"""A relay between a Modbus TCP host and its device that counts requests and can hold one answer back or spoil it."""
+"""A relay between a Modbus TCP host and its device that counts requests and can delay or falsify an answer."""
 
 import collections
 import contextlib
@@ -12,7 +12,7 @@ _HEADER = 7
 
 
 def _read(source: socket.socket) -> bytes:
-    """Read one Modbus TCP frame; empty when the other end has closed."""
+    """Read one Modbus TCP frame; return nothing if the other end has closed."""
     data = b""
     while len(data) < _HEADER or len(data) < 6 + int.from_bytes(data[4:6], "big"):
         more = source.recv(512)
@@ -23,7 +23,7 @@ def _read(source: socket.socket) -> bytes:
 
 
 class Relay:
-    """Listens on `address`; each connection is served by a thread of its own, one request at a time."""
+    """Listens on `address`; serves each connection in its own thread, one request at a time."""
 
     def __init__(self, device: str) -> None:
         host, _, port = device.rpartition(":")
@@ -40,15 +40,15 @@ class Relay:
         self._sockets: list[socket.socket] = []
 
     def delay_next(self, function: int, seconds: float) -> None:
-        """Hold the next answer of this function code back."""
+        """Delay the next answer with this function code."""
         self._delays[function] = seconds
 
     def renumber_next(self, function: int) -> None:
-        """Give the next answer of this function code the number of another transaction."""
+        """Change the transaction number of the next answer with this function code."""
         self._renumber.add(function)
 
     def repeat_last(self, function: int) -> None:
-        """From now on answer each request of this function code with what was answered last."""
+        """From now on answer each request with this function code with the last answer."""
         self._repeated[function] = self._last[function]
 
     def __enter__(self) -> Self:
@@ -97,6 +97,6 @@ class Relay:
                     answer = bytes([answer[0] ^ 1]) + answer[1:]
                 host.sendall(answer)
         except OSError:
-            pass  # the other end has gone
+            pass  # the other end has closed
         finally:
             device.close()

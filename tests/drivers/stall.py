@@ -3,9 +3,9 @@
 import ctypes
 
 BUSY = 0.5
-"""Seconds of a stall that must not stop a robot."""
+"""Duration of a stall that must not stop a robot, s."""
 
 
 def stall(seconds: float) -> None:
-    """Keep the interpreter, as a C extension does that does not release it."""
+    """Hold the interpreter lock, like a C extension that does not release it."""
     ctypes.PyDLL(None).usleep(round(seconds * 1e6))

@@ -1,4 +1,4 @@
-"""Surroundings of a robot made of boxes parallel to the axes of the world."""
+"""Surroundings of a robot: boxes parallel to the axes of the world."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -54,7 +54,7 @@ class BoxSurroundings:
         return None
 
     def touches(self, model: RobotModel, base: Pose, seen: Iterable[Iterable[float]]) -> set[str]:
-        """Name what the robot touches in joint values, by a world made here."""
+        """Return the names of what the robot touches at joint values, computed with a separate collision world."""
         world = CollisionWorld()
         world.add_robot("arm", model, base)
         for name, (at, sizes) in self.boxes.items():

@@ -1,4 +1,4 @@
-"""A driver passes the conformance suite unchanged when its instances run in a process of their own."""
+"""A driver passes the conformance suite unchanged when its objects run in a separate process."""
 
 from arcor2_drivers.barcode_reader.barcode_reader import BarcodeReader
 from arcor2_drivers.barcode_reader.settings import BarcodeReaderSettings
@@ -31,8 +31,8 @@ class OwnProcessBench(BarcodeReaderBench):
 class TestConformance(Conformance):
     benches = (OwnProcessBench,)
 
-    # The process with its socket is there from the constructor until the cell host ends it, which
-    # tests/runtime/test_own_process.py shows; and a level is reached by the driver, wherever it runs.
+    # The process and its socket exist from the constructor until the cell host ends it, which
+    # tests/runtime/test_own_process.py shows. The level belongs to the driver, not to where it runs.
     test_constructor_opens_nothing = None
     test_nothing_is_left_behind = None
     test_level = None

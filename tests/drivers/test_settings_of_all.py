@@ -36,7 +36,7 @@ VALID: dict[str, dict[str, Any]] = {
     "YuMi": {"host": "10.0.0.7"},
     "ZplPrinter": {"port": "/dev/ttyUSB0"},
 }
-"""Settings of each type, with everything given that names a port, a URL or a file."""
+"""Settings of each type, with a value for every setting that names a port, a URL or a file."""
 WRONG = {
     "port": ["spy:///dev/null?file=/tmp/x", "alt:///dev/null?class=x", "/etc/passwd"],
     "file": ["/data/tokens.json", "../tokens.json"],
@@ -46,7 +46,7 @@ WRONG = {
 
 
 def kind_of(field: "dataclasses.Field[Any]") -> str | None:
-    """Tell what a setting names, by its name; None for one that names nothing outside."""
+    """Return what a setting names (port, URL or file), judged by its name; None for other settings."""
     if field.type not in ("str", str):
         return None
     for kind, names in (

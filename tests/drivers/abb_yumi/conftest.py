@@ -21,7 +21,7 @@ class FakeYumi(FakeProcess):
     def __init__(self, *arguments: str) -> None:
         self.host = own_loopback()
         super().__init__("abb_yumi", "--host", self.host, *arguments)
-        self.truth()  # opens the control channel, which lives as long
+        self.truth()  # opens the control channel
 
     def do(self, command: str, **arguments: Any) -> Any:
         return self.control.do(command, **arguments)
@@ -63,7 +63,7 @@ def make(host: str, pose: Pose | None = None, **changed: Any) -> YuMi:
 
 @pytest.fixture
 def robot(fake: FakeYumi) -> Iterator[YuMi]:
-    """Connected, control not taken."""
+    """Connect without taking control."""
     robot = make(fake.host)
     robot.connect(30.0)
     yield robot
@@ -72,11 +72,11 @@ def robot(fake: FakeYumi) -> Iterator[YuMi]:
 
 @pytest.fixture
 def ready(robot: YuMi) -> YuMi:
-    """Connected and controlled."""
+    """Connect and take control."""
     robot.take_control()
     return robot
 
 
 def under_way(fake: FakeYumi, *arms: str) -> None:
-    """Return when the arms really move."""
+    """Wait until the arms really move."""
     fake.control.wait_until(lambda t: all(t["arms"][arm]["speed"] > 0.05 for arm in arms))

@@ -1,4 +1,4 @@
-"""Observing a YuMi, taking control of it, and the reasons against control."""
+"""Observing a YuMi, taking control of it, and reasons that prevent control."""
 
 import time
 from typing import Any
@@ -17,7 +17,7 @@ from tests.waiting import wait_for
 from .conftest import RWS_PORT, FakeYumi, make
 
 HOME = Position(-0.0096, 0.1826, 0.1986)
-"""m: where RobotStudio shows the left flange in the calibration position, from general knowledge of the robot."""
+"""Position of the left flange in the calibration position according to RobotStudio, m (from general knowledge)."""
 
 
 def test_connecting_only_observes(fake: FakeYumi) -> None:
@@ -204,7 +204,7 @@ def test_power_on_only_switches_the_motors_on(fake: FakeYumi, robot: YuMi) -> No
 
 
 def test_sessions_do_not_accumulate(fake: FakeYumi) -> None:
-    """A controller has 70 sessions; each of 36 connections that command takes two."""
+    """A controller allows 70 sessions; 36 connections with control would need two each."""
     for _ in range(36):
         robot = make(fake.host)
         robot.connect(30.0)

@@ -70,7 +70,7 @@ def test_the_watchdog_stops_the_arms(fake: FakeYumi, ready: YuMi) -> None:
     began = time.monotonic()
     fake.do("silence")
     fake.control.wait_until(lambda t: not any(arm["moving"] for arm in t["arms"].values()), 1.0 + BUSY)
-    assert time.monotonic() - began > 0.2  # the watchdog's time, and not the closing of a socket
+    assert time.monotonic() - began > 0.2  # because of the watchdog, not because a socket was closed
     for doing in (left, right):
         with pytest.raises(ConnectionLost) as error:
             doing.result()
@@ -275,7 +275,7 @@ def test_a_collision_is_acknowledged_by_a_person(fake: FakeYumi, ready: YuMi) ->
     ready.take_control()
     ready.move_to_joints(turned(ready, "left", 1, 0.1), 0.8, arm_id="left")
     fake.do("collide", arm="right")
-    wait_for(lambda: ready.state().safety is Safety.PROTECTIVE_STOP)  # the next one is not acknowledged by the last
+    wait_for(lambda: ready.state().safety is Safety.PROTECTIVE_STOP)  # the earlier acknowledgement does not apply to it
 
 
 def test_a_silent_motion_server_is_named(fake: FakeYumi, robot: YuMi) -> None:

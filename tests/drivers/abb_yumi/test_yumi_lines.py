@@ -132,14 +132,14 @@ def test_nominal_inverse_kinematics_inverts_forward_kinematics(arm: str) -> None
 
 @pytest.fixture
 def pair() -> Iterator[tuple[ArmLine, socket.socket]]:
-    """A line whose command socket is in the hands of the test."""
+    """Return a line whose other end is a socket of the test."""
     ours, theirs = socket.socketpair()
     watch, other_end = socket.socketpair()
     made = ArmLine("yumi", "left", "127.0.0.1", 1, lambda _: None)
 
     def keep_answering() -> None:
         rest = b""
-        with contextlib.suppress(OSError):  # what we did not read when the line was ended is reset
+        with contextlib.suppress(OSError):  # unread data at the end of the line cause a reset
             while data := other_end.recv(4096):
                 *lines, rest = (rest + data).split(b"\n")
                 for each in lines:

@@ -17,7 +17,7 @@ from arcor2_hw.keep_alive import once_within
 from .conftest import BackgroundCall, FakeYumi, under_way
 
 ACROSS = Position(0.0, -0.30, 0.0)
-"""m: from the left arm's home well into the right arm."""
+"""Offset from the left arm's home position well into the right arm, m."""
 
 
 def turned(robot: YuMi, arm: str, axis: int, by: float) -> list[Joint]:
@@ -199,7 +199,7 @@ def at(robot: YuMi, arm: str, degrees: list[float]) -> list[Joint]:
 
 
 def test_the_path_of_the_other_arm_is_considered(fake: FakeYumi, ready: YuMi) -> None:
-    """Each of the two ways is free while the other arm is at home; both at once are not."""
+    """Each of the two paths is free while the other arm is at home; both at once collide."""
     left = at(ready, "left", [-26.0, -117.0, 42.0, 26.0, 25.0, 34.0, 132.0])
     right = at(ready, "right", [32.0, -139.0, 15.0, 5.0, 61.0, 3.0, -141.0])
     home = ready.robot_joints(arm_id="left")

@@ -1,4 +1,4 @@
-"""A fake reader in a process of its own, and the driver on its line."""
+"""A fake reader in a separate process, and the driver on its line."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -14,7 +14,7 @@ __all__ = ["start_fake", "wait_for"]
 
 @pytest.fixture
 def make() -> Iterator[Callable[..., BarcodeReader]]:
-    """Gives ``make("/dev/pts/3", answer_timeout=0.2)``: a driver, not connected; it is disconnected in the end."""
+    """Return ``make("/dev/pts/3", answer_timeout=0.2)``: an unconnected driver; the fixture disconnects it."""
     made: list[BarcodeReader] = []
 
     def build(port: str, **settings: Any) -> BarcodeReader:
@@ -30,7 +30,7 @@ def make() -> Iterator[Callable[..., BarcodeReader]]:
 @pytest.fixture(scope="module")
 def on_pty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeProcess]:
     fake = FakeProcess("barcode_reader", "--link", str(tmp_path_factory.mktemp("line") / "reader"), "--timeout", "0.5")
-    fake.truth()  # opens the control channel, which lives as long
+    fake.truth()  # opens the control channel
     yield fake
     fake.end()
 
@@ -45,7 +45,7 @@ def on_tcp() -> Iterator[FakeProcess]:
 
 @pytest.fixture
 def fake(request: pytest.FixtureRequest) -> FakeProcess:
-    """As delivered, on a pty; on TCP for a test that is parametrized with it. One process each serves a file."""
+    """Reset the fake to its factory state, on a pty or (if parametrized) on TCP. One process serves a file."""
     fake: FakeProcess = request.getfixturevalue(f"on_{getattr(request, 'param', 'pty')}")
     fake.control.do("renew")
     return fake

@@ -1,4 +1,4 @@
-"""Lines of the reader: with any fragmentation or noise, only complete, clean lines come out."""
+"""Lines of the reader: with any fragmentation or noise, only complete, valid lines are returned."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,7 +12,7 @@ framings = st.sampled_from(["{}\r", "{}\r\n", "\x02{}\x03\r", "\x02{}\x03\r\n"])
 
 
 def cut(data: bytes, places: list[int]) -> list[bytes]:
-    """Cut data at these places."""
+    """Split data at these positions."""
     at = sorted({place % (len(data) + 1) for place in places})
     return [data[start:end] for start, end in zip([0, *at], [*at, len(data)], strict=True)]
 

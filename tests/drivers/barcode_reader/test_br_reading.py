@@ -1,4 +1,4 @@
-"""The barcode reader's driver on a fake, on a pty and on TCP: reading once, failing by name, coming back."""
+"""The barcode reader's driver on a fake, on a pty and on TCP: single readings, named errors, reconnecting."""
 
 import itertools
 import os
@@ -31,7 +31,7 @@ on_both = pytest.mark.parametrize("fake", ["pty", "tcp"], indirect=True)
 
 
 def in_background(call: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]:
-    """Run a call in a thread; the list holds what it gave or raised."""
+    """Run a call in a thread; the list gets its result or its exception."""
     outcome: list[Any] = []
 
     def run() -> None:
@@ -47,7 +47,7 @@ def in_background(call: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]
 
 @on_both
 def test_connecting_only_asks(fake: FakeProcess, reader: BarcodeReader) -> None:
-    reader.connect()  # harmless when connected
+    reader.connect()  # has no effect when connected
     assert reader.connection is Connection.ONLINE
     assert reader.health is Health.NORMAL
     assert reader.identify() == Identity("Fake Optics", "BR-20", "FB0001", "2.01")
@@ -84,7 +84,7 @@ def test_a_code_is_consumed_once(fake: FakeProcess, reader: BarcodeReader) -> No
     with pytest.raises(Refused):
         reader.last_code()
     assert reader.code_present(1.0)
-    assert reader.scan(1.0) == "TWICE"  # a reading in between: the stored code is gone
+    assert reader.scan(1.0) == "TWICE"  # a reading in between discards the stored code
     with pytest.raises(Refused):
         reader.last_code()
 
@@ -116,7 +116,7 @@ def test_a_code_decoded_too_late_is_not_matched_to_a_later_trigger(fake: FakePro
 
 
 class UntidyReader:
-    """A reader on TCP whose codes lag behind: what a LON has read too much leaves it just before its next answer."""
+    """A reader on TCP with delayed codes: surplus codes of a LON are sent just before the next answer."""
 
     def __init__(self) -> None:
         self._server = socket.create_server(("127.0.0.1", 0))

@@ -1,1 +1,1 @@
-"""Benches of the drivers of this repository, on their fakes; each module's benches are found by the suite."""
+"""Benches of this repository's drivers, on their fakes. The suite finds the benches of each module."""

@@ -33,7 +33,7 @@ ABSENT = "127.99.77.2"
 
 class YuMiBench(Bench):
     object_type = YuMi
-    connect_timeout = 5.0  # some twenty requests, each of which a busy machine delays
+    connect_timeout = 5.0  # about twenty requests, each of which a busy machine delays
     call_within = 3.0
     fake: FakeYumi
 
@@ -139,10 +139,10 @@ class YuMiBench(Bench):
             "a joint beyond its range": lambda: device.move_to_joints(beyond, 0.5, arm_id="left"),
             "a speed above 1": lambda: device.move_to_joints(joints, 1.5, arm_id="left"),
             "a pose out of reach": lambda: device.move_to_pose("tcp", far, 0.5, arm_id="left"),
-            "a way into the other arm": lambda: device.move_to_pose("tcp", across, 0.5, linear=False, arm_id="left"),
+            "a path into the other arm": lambda: device.move_to_pose("tcp", across, 0.5, linear=False, arm_id="left"),
             "a path of nothing": lambda: device.move_path([], arm_id="left"),
             "a blend of a metre": lambda: device.move_path([across], 1.0, arm_id="left"),
-            "one arm in step with none": lambda: device.move_synchronously({"left": joints}),
+            "a synchronous motion of a single arm": lambda: device.move_synchronously({"left": joints}),
             "a load of 2 kg": lambda: device.set_tool(Pose(), 2.0, tool, arm_id="left"),
         }
 
@@ -178,7 +178,7 @@ class YuMiBench(Bench):
         def protected() -> bool:
             try:
                 return device.state().safety is Safety.PROTECTIVE_STOP
-            except Stale:  # a busy machine looks seldom
+            except Stale:  # a busy machine polls seldom
                 return False
 
         def switched() -> None:

@@ -1,4 +1,4 @@
-"""The barcode reader on its fake, on a pty behind a wire; a reading of a code that is not there is its long act."""
+"""The barcode reader on its fake, on a pty behind a wire. Its long action reads while no code is visible."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -47,7 +47,7 @@ class BarcodeReaderBench(WiredBench):
 
     def run_long(self, device: Generic) -> object:
         assert isinstance(device, BarcodeReader)
-        return device.scan(3.0)  # silence looks like no code to see, until this time is over
+        return device.scan(3.0)  # until this time is over, silence cannot be distinguished from a missing code
 
     def observe(self, device: Generic) -> object:
         return device.identify()
@@ -70,4 +70,4 @@ class BarcodeReaderBench(WiredBench):
 
     def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, BarcodeReader)
-        return {"a reading of an hour": lambda: device.trigger(3600.0), "one of no time": lambda: device.trigger(0.0)}
+        return {"a reading of an hour": lambda: device.trigger(3600.0), "one of 0 s": lambda: device.trigger(0.0)}

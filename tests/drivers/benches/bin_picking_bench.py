@@ -1,4 +1,4 @@
-"""Bin and blister: no device is behind them; a bin sees a picture that was drawn by hand."""
+"""Bin and blister, which have no device; the bin gets a synthetic picture."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -23,7 +23,7 @@ PLACE = (0.06, -0.03)
 
 
 def picture() -> Any:
-    """A part in a crate, seen from 0.5 m above the floor."""
+    """Return a picture of a part in a crate, seen from 0.5 m above the floor."""
     depth = np.full((480, 640), 500, np.uint16)
     scale = LENS.fx / (0.5 - PART[2])
     left, right = (round(LENS.cx + scale * (PLACE[0] + side * PART[0] / 2)) for side in (-1, 1))
@@ -34,11 +34,11 @@ def picture() -> Any:
 
 class BinBench(Bench):
     object_type = Bin
-    connect_timeout = 5.0  # Open3D is loaded by the first
+    connect_timeout = 5.0  # the first object loads Open3D
     address = "crate"
 
     def start(self) -> None:
-        import open3d  # noqa: F401 - not to be counted as the time of the first case
+        import open3d  # noqa: F401 - so that the import does not count as time of the first case
 
     def make(self) -> Generic:
         return Bin("crate_id", "crate", Pose(), BinSettings(0.4, 0.3, 0.1, *PART))
@@ -81,7 +81,7 @@ class BlisterBench(Bench):
     def beyond_limits(self, device: Generic) -> Mapping[str, Callable[[], object]]:
         assert isinstance(device, Blister)
         return {
-            "a row that is not there": lambda: device.place(2, 0),
-            "a column that is not there": lambda: device.set_place(0, 3, True),
-            "noting what was not given": device.part_taken,
+            "a row that does not exist": lambda: device.place(2, 0),
+            "a column that does not exist": lambda: device.set_place(0, 3, True),
+            "taking a part that was not requested": device.part_taken,
         }

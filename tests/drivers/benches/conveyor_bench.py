@@ -1,4 +1,4 @@
-"""The conveyor on its fake: a drive behind a CAN adapter that is a TCP server; the wire between is recorded."""
+"""The conveyor on its fake: a drive behind a CAN adapter that is a TCP server. The wire in between is recorded."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -24,11 +24,11 @@ belt.move_by(20.0, 0.3)
 """
 
 COUNTS = 10000.0
-"""Counts of the drive for a metre of belt."""
+"""Counts of the drive per metre of belt."""
 OPERATIONAL = 5
-"""NMT state (CiA 301) of a drive that is controlled."""
+"""NMT state (CiA 301) of a controlled drive."""
 BUSY = 1000
-"""ms without our heartbeat that the drive bears: the most that the driver allows, as the machine may be busy."""
+"""Time without a heartbeat that the drive tolerates, ms: the driver's maximum, as the machine may be busy."""
 
 
 def build(address: str, **settings: Any) -> Conveyor:
@@ -59,7 +59,7 @@ class ConveyorBench(WiredBench):
         return truth["writes"], truth["nmt"], round(truth["belt"])
 
     def half_frame(self) -> None:
-        """Not before a PDO was torn: of two that come at once the first may be whole, which is an answer."""
+        """Wait until a PDO was cut: if two are sent at once, the first may be complete and count as an answer."""
         wire = self.wire
         assert wire is not None
 
@@ -68,7 +68,7 @@ class ConveyorBench(WiredBench):
 
         before = received()
         super().half_frame()
-        wait_until(lambda: received() > before + 1, 2.0, "what the drive sends by itself")
+        wait_until(lambda: received() > before + 1, 2.0, "a message that the drive sends by itself")
 
     def observe(self, device: Generic) -> object:
         assert isinstance(device, Conveyor)
@@ -119,15 +119,15 @@ class ConveyorBench(WiredBench):
 
     def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, Conveyor)
-        # NMT commands are confirmed by nobody: the start of the node may still be under way.
+        # NMT commands are not confirmed: the start of the node may not be complete yet.
         self.fake.control.wait_until(lambda truth: truth["nmt"] == OPERATIONAL)
         return {
-            "a place beyond the belt": lambda: device.move_by(200.0, 0.3),
-            "a speed above the highest": lambda: device.move_by(0.1, 0.6),
+            "a position beyond the belt": lambda: device.move_by(200.0, 0.3),
+            "a speed above the maximum": lambda: device.move_by(0.1, 0.6),
             "a speed of nothing": lambda: device.move_relative(0.1, 0.0),
             "a run faster than allowed": lambda: device.run(-0.6),
-            "a place before it is homed": lambda: device.move_to(0.1, 0.3),
-            "a start of a belt that was not reset": device.start,
+            "a position before homing": lambda: device.move_to(0.1, 0.3),
+            "starting a belt that was not reset": device.start,
         }
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:

@@ -29,7 +29,7 @@ arm.move_to_joints(joints, 0.05)
 """
 TURN = 1.5  # rad, of the base
 SENT = 1
-"""Bit of a frame's control byte that says that something is written."""
+"""Bit of a frame's control byte that marks a write."""
 
 
 class DobotMagicianBench(FakeBench):
@@ -52,8 +52,8 @@ class DobotMagicianBench(FakeBench):
         return written, truth["suction"], truth["gripper"], truth["steppers"]
 
     def heal(self) -> None:
-        # A motion that was begun is done, as declared; only then may nothing begin any more.
-        wait_until(lambda: not self.running(), 15.0, "the end of a motion that was begun")
+        # A started motion is completed, as declared; only then must nothing start any more.
+        wait_until(lambda: not self.running(), 15.0, "the end of a started motion")
         super().heal()
 
     def observe(self, device: Generic) -> object:
@@ -68,7 +68,7 @@ class DobotMagicianBench(FakeBench):
         return device.suck(True)
 
     def run_long(self, device: Generic) -> object:
-        """Turn the base from one side to the other, which takes some 4 s."""
+        """Turn the base from one side to the other, which takes about 4 s."""
         assert isinstance(device, DobotMagician)
         joints = device.robot_joints()
         joints[0].value = math.copysign(1.5, -joints[0].value)
@@ -148,5 +148,5 @@ class DobotMagicianBench(FakeBench):
         return {
             "a joint beyond its limit": lambda: device.move_to_joints(self._turned(device, 3.0), 0.5),
             "a pose out of reach": lambda: device.move_to_pose(self._tool(device), Pose(Position(2.0, 0.0, 0.0)), 0.5),
-            "a speed above the highest": lambda: device.move_to_joints(self._turned(device, 0.1), 2.0),
+            "a speed above the maximum": lambda: device.move_to_joints(self._turned(device, 0.1), 2.0),
         }

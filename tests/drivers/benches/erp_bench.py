@@ -1,4 +1,4 @@
-"""The planning service on its fake; asking for an order is what speaks with it."""
+"""The planning service on its fake; a request for an order is the communication under test."""
 
 import shutil
 from collections.abc import Callable, Iterator
@@ -39,7 +39,7 @@ class ErpServiceBench(FakeBench):
         return device.next_order(0.0)
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
-        return {}  # no optional method but those that read
+        return {}  # it has only reading optional methods
 
     def results(self, device: Generic) -> Iterator[Check]:
         assert isinstance(device, ErpService)
@@ -61,8 +61,8 @@ class ErpServiceBench(FakeBench):
     def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, ErpService)
         return {
-            "a result of no order": lambda: device.report_result("", "S-1", True),
-            "a result of no piece": lambda: device.report_result("A-1", "", True),
-            "a note as long as a book": lambda: device.report_result("A-1", "S-1", True, "x" * 1000),
+            "a result without an order": lambda: device.report_result("", "S-1", True),
+            "a result without a serial number": lambda: device.report_result("A-1", "", True),
+            "a note that is too long": lambda: device.report_result("A-1", "S-1", True, "x" * 1000),
             "a closing without a reason": lambda: device.close_order("A-1", ""),
         }

@@ -1,4 +1,4 @@
-"""The functional tester on its fake: 4 s a test, all else quick; with a wire between that is cut and recorded."""
+"""The functional tester on its fake: a test takes 4 s, all else is fast. The wire in between is cut and recorded."""
 
 import sys
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""The label printer on its fake, on TCP; a label takes 1.5 s, and is finished without us."""
+"""The label printer on its fake, on TCP; a label takes 1.5 s, and is completed without the driver."""
 
 import contextlib
 import sys
@@ -26,7 +26,7 @@ ASKING = ("~HS", "~HI", "getvar ")
 
 class ZplPrinterBench(FakeBench):
     object_type = ZplPrinter
-    progress_within = 4.0  # a label, which the counter counts when it is printed
+    progress_within = 4.0  # a label, counted when it is printed
     module = "label_printer"
     options = ("--tcp", "127.0.0.1:0", "--duration", "1.5")
 
@@ -85,13 +85,13 @@ class ZplPrinterBench(FakeBench):
         return int(self.fake.truth()["counter"])
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
-        return {}  # no optional method but those that read
+        return {}  # it has only reading optional methods
 
     def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, ZplPrinter)
         return {
-            "what is no label": lambda: device.print("hello"),
+            "a text that is not a label": lambda: device.print("hello"),
             "two labels in one": lambda: device.print("^XA^FDa^FS^PQ2^XZ"),
             "a field that is too long": lambda: device.print_label("x" * 201, "", "1"),
-            "a bar code that Code 128 does not have": lambda: device.print_label("", "", "\u20ac"),
+            "a character that Code 128 does not have": lambda: device.print_label("", "", "\u20ac"),
         }

@@ -1,4 +1,4 @@
-"""The OAK-D on a network source; nothing of it moves or is controlled, so the cases of long acts are not run."""
+"""The OAK-D on a network source. It has neither motion nor control, so the cases of long actions are not run."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -17,7 +17,7 @@ BOARD = {"name": "board", "pose": {"position": [0.12, 0.06, 0.05]}, "size": [0.1
 
 class OakDBench(FakeBench):
     object_type = OakD
-    connect_timeout = 5.0  # a network source renders its first picture only then
+    connect_timeout = 5.0  # a network source renders its first picture after connecting
     stale_after = 1.5
     module = "oak_d"
     options = ("--width", "320", "--height", "180")
@@ -27,7 +27,7 @@ class OakDBench(FakeBench):
         super().start()
         self.do("scene", things=[BOARD])
         first = self.make()
-        first.connect(60.0)  # Open3D is loaded for the first that looks
+        first.connect(60.0)  # the first client loads Open3D
         first.disconnect()
 
     def reset(self) -> None:
@@ -89,7 +89,7 @@ class OakDBench(FakeBench):
         return {
             "no exposure": lambda: device.set_exposure(0.0),
             "an exposure longer than a frame": lambda: device.set_exposure(0.05),
-            "the mean of no frame": lambda: device.depth_image(0),
+            "the mean of zero frames": lambda: device.depth_image(0),
             "the mean of too many frames": lambda: device.depth_image(101),
         }
 
@@ -106,6 +106,6 @@ class OakDBench(FakeBench):
 
 
 def _column(depth: Any) -> float:
-    """Where the board is across the picture, 0 to 1."""
+    """Return the horizontal position of the board in the picture, 0 to 1."""
     columns = np.nonzero(np.abs(depth.astype(int) - 700) < 10)[1]
     return float(columns.mean()) / depth.shape[1]

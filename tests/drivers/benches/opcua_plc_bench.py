@@ -1,4 +1,4 @@
-"""The PLC on its fake: job 3 takes 20 s and is stopped by its request, and by our life sign's end."""
+"""The PLC on its fake: job 3 takes 20 s and is stopped by its request, or when the life sign ends."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -98,8 +98,8 @@ class OpcUaPlcBench(FakeBench):
     def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, OpcUaPlc)
         return {
-            "a speed its type cannot hold": lambda: device.write_analog("speed", 1000.0),
+            "a speed beyond the range of its type": lambda: device.write_analog("speed", 1000.0),
             "a negative speed of an unsigned type": lambda: device.write_analog("speed", -0.1),
-            "an input that is written": lambda: device.write_digital("part", True),
-            "a job its type cannot hold": lambda: device.run_job(100_000),
+            "writing an input": lambda: device.write_digital("part", True),
+            "a job number beyond the range of its type": lambda: device.run_job(100_000),
         }

@@ -1,4 +1,4 @@
-"""The remote I/O block and the tower light on one fake each, with a wire between that is cut and recorded."""
+"""The remote I/O block and the tower light on one fake each. The wire in between is cut and recorded."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -15,7 +15,7 @@ from arcor2_hw.testing.frames import ModbusTcp
 from tests.drivers.fake_bench import WiredBench
 
 QUICK: dict[str, Any] = {"watchdog_ms": 2000, "request_timeout": 0.5}
-LONG = 20.0  # s, of a pulse
+LONG = 20.0  # duration of a pulse, s
 
 ORPHAN_IO = """
 import sys
@@ -118,8 +118,8 @@ class RemoteIOBench(WiredBench):
         assert isinstance(device, RemoteIO)
         return {
             "an analogue value beyond the register": lambda: device.write_analog("pressure", 400_000.0),
-            "an analogue value that is no number": lambda: device.write_analog("pressure", float("nan")),
-            "a point that is not there": lambda: device.write_digital("light", True),
+            "an analogue value that is not a number": lambda: device.write_analog("pressure", float("nan")),
+            "a point that does not exist": lambda: device.write_digital("light", True),
             "writing an input": lambda: device.write("part", True),
             "a digital value for an analogue output": lambda: device.write_digital("pressure", True),
             "a pulse of an input": lambda: device.pulse("part", 1.0),
@@ -184,9 +184,9 @@ class TowerLightBench(RemoteIOBench):
     def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, TowerLight)
         return {
-            "a colour that is not fitted": lambda: device.show(LampColor.BLUE),
-            "a state that it has no pattern for": lambda: device.show_state(MachineStateName.ABORTED),
+            "a colour without a lamp": lambda: device.show(LampColor.BLUE),
+            "a state without a pattern": lambda: device.show_state(MachineStateName.ABORTED),
         }
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
-        return {}  # no optional method that acts
+        return {}  # it has no optional method that acts

@@ -1,4 +1,4 @@
-"""The 2F gripper on its fake. After a connection loss it finishes its motion and holds."""
+"""The 2F gripper on its fake. After a connection loss it completes its motion and holds."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -13,10 +13,10 @@ from arcor2_hw.testing.life import wait_until
 from tests.drivers.fake_bench import FakeBench
 
 PACE = 6.0
-"""How much faster than real the gripper is, so that its activation is quick; gripping is done at its slowest."""
+"""Speed factor of the fake, so that activation is fast; gripping uses the lowest speed."""
 READY = 100.0
 MOVING, GRIPPED = 0, 2
-"""gOBJ of fingers under way, and of fingers stopped by a part while closing."""
+"""Values of gOBJ for moving fingers, and for fingers stopped by a part while closing."""
 ORPHAN = """
 import sys
 import time
@@ -39,10 +39,10 @@ class Robotiq2FBench(FakeBench):
 
     def start(self) -> None:
         super().start()
-        self.beside = BlockingControlClient(self.fake.ready["control"])  # for calls on another thread
+        self.second_control = BlockingControlClient(self.fake.ready["control"])  # for calls in another thread
 
     def end(self) -> None:
-        self.beside.close()
+        self.second_control.close()
         super().end()
 
     def reset(self) -> None:
@@ -60,8 +60,8 @@ class Robotiq2FBench(FakeBench):
         return self.fake.truth()["count"], self.fake.truth()["sets"]
 
     def heal(self) -> None:
-        # A motion that was begun is finished, as declared; only then may nothing begin any more.
-        wait_until(lambda: not self.running(), 10.0, "the end of a motion that was begun")
+        # A started motion is completed, as declared; only then must nothing start any more.
+        wait_until(lambda: not self.running(), 10.0, "the end of a started motion")
         super().heal()
 
     def observe(self, device: Generic) -> object:
@@ -77,13 +77,13 @@ class Robotiq2FBench(FakeBench):
         return device.activate()
 
     def run_long(self, device: Generic) -> object:
-        """Close and open at the slowest, which takes 4.3 s of the gripper's each."""
+        """Close and open at the lowest speed, which takes 4.3 s of the gripper's time each."""
         assert isinstance(device, Robotiq2F)
         if device.state() == "inactive":
-            self.beside.do("pace", factor=READY)
+            self.second_control.do("pace", factor=READY)
             device.activate()
             device.grip(0.085)
-            self.beside.do("pace", factor=1.0)
+            self.second_control.do("pace", factor=1.0)
         return device.grip(0.0 if device.width() > 0.04 else 0.085, speed=0.02)
 
     def running(self) -> bool:
@@ -104,7 +104,7 @@ class Robotiq2FBench(FakeBench):
         return kept if registers["OBJ"] == GRIPPED else None
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
-        return {}  # no optional method but those that read
+        return {}  # it has only reading optional methods
 
     def readings(self, device: Generic) -> list[Check]:
         assert isinstance(device, Robotiq2F)

@@ -10,7 +10,7 @@ from arcor2_hw.testing.bench import Check
 from tests.drivers.fake_bench import FakeBench
 
 ACTING = ("T", "Z", "@", "TI", "ZI", "TA ", "M21")
-"""How the commands begin that change something in the scale; TA alone asks."""
+"""Prefixes of commands that change something in the scale; TA alone only reads."""
 
 
 class MtSicsScaleBench(FakeBench):
@@ -44,7 +44,7 @@ class MtSicsScaleBench(FakeBench):
         return self.observe(device)
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
-        return {}  # no optional method but those that read
+        return {}  # it has only reading optional methods
 
     def readings(self, device: Generic) -> list[Check]:
         assert isinstance(device, MtSicsScale)

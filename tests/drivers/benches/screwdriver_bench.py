@@ -1,6 +1,6 @@
-"""The screwdriver on its fake: the long act waits for two tightenings, and the trigger is pulled once.
+"""The screwdriver on its fake: the long action waits for two tightenings, but the trigger is pulled only once.
 
-A tightening takes 0.5 s, so that it is over when the driver is back after a cut: the controller finishes it.
+A tightening takes 0.5 s and is over when the driver reconnects after a cut: the controller completes it.
 """
 
 import sys
@@ -61,7 +61,7 @@ class OpenProtocolScrewdriverBench(WiredBench):
 
     def start(self) -> None:
         super().start()
-        self.operator = BlockingControlClient(self.fake.ready["control"])  # for the thread of the act
+        self.operator = BlockingControlClient(self.fake.ready["control"])  # for the thread of the action
 
     def end(self) -> None:
         self.operator.close()

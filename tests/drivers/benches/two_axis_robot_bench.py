@@ -26,7 +26,7 @@ joints = robot.robot_joints()
 joints[0].value += 1.5
 robot.move_to_joints(joints, 0.1)
 """
-AT_REST = 0.03  # rad/s: what a servo tells as 0
+STANDSTILL = 0.03  # rad/s: the resolution of a servo's velocity
 
 
 class TwoAxisRobotBench(FakeBench):
@@ -41,11 +41,11 @@ class TwoAxisRobotBench(FakeBench):
         self.fake.control.wait_until(lambda truth: all(servo["answers"] for servo in truth["servos"].values()))
 
     def build(self, address: str) -> TwoAxisRobot:
-        # The longest watchdog: the machine that runs the suite may be busy.
+        # Use the longest watchdog, because the machine that runs the suite may be busy.
         return TwoAxisRobot("arm_id", "arm", Pose(), TwoAxisRobotSettings(address, watchdog=0.4))
 
     def writes(self) -> Any:
-        """All but the LEDs, which are written to keep the bus watchdog from tripping while this process is delayed."""
+        """Return all writes except those to the LEDs, which keep the bus watchdog from tripping."""
         servos = self.fake.truth()["servos"]
         return {number: [each for each in servo["writes"] if each[0] != "led"] for number, servo in servos.items()}
 
@@ -69,7 +69,7 @@ class TwoAxisRobotBench(FakeBench):
         return self._turn(device, 1.5, 0.1)
 
     def running(self) -> bool:
-        return any(abs(servo["speed"]) > AT_REST for servo in self.fake.truth()["servos"].values())
+        return any(abs(servo["speed"]) > STANDSTILL for servo in self.fake.truth()["servos"].values())
 
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, self.address]
@@ -136,5 +136,5 @@ class TwoAxisRobotBench(FakeBench):
             "a pose out of reach": lambda: device.move_to_pose(
                 self._tool(device), Pose(Position(5.0, 0.0, 0.0)), 0.5, linear=False
             ),
-            "a speed above the highest": lambda: device.move_to_joints(self._turned(device, 0.1), 2.0),
+            "a speed above the maximum": lambda: device.move_to_joints(self._turned(device, 0.1), 2.0),
         }

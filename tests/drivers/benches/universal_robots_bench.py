@@ -28,7 +28,7 @@ joints[0].value += 3.0
 robot.move_to_joints(joints, 0.5)
 """
 ABSENT = "127.99.77.1"
-AT_REST = 1e-3  # rad/s: the noise of the encoders of a real arm that stands
+STANDSTILL = 1e-3  # rad/s: the encoder noise of a real arm at standstill
 
 
 class UR5eBench(Bench):
@@ -93,7 +93,7 @@ class UR5eBench(Bench):
         return self._turn(device, 3.0)
 
     def running(self) -> bool:
-        return bool(max(map(abs, self.fake.truth()["qd"])) > AT_REST)
+        return bool(max(map(abs, self.fake.truth()["qd"])) > STANDSTILL)
 
     @contextmanager
     def foreign(self) -> Iterator[None]:
@@ -114,9 +114,9 @@ class UR5eBench(Bench):
 
     def readings(self, device: Generic) -> Iterable[Check]:
         assert isinstance(device, UR5e)
-        device.take_control()  # which tells the controller of its tool
+        device.take_control()  # sends the tool to the controller
         self._turn(device, 0.4)
-        wait_until(lambda: not device.state().moving, 1.0, "being told that it stands")
+        wait_until(lambda: not device.state().moving, 1.0, "the report of standstill")
         truth = self.fake.truth()
         for joint, own in zip(device.robot_joints(), truth["q"], strict=True):
             yield Check(f"{joint.name}, rad", joint.value, own, 1e-4)
@@ -197,8 +197,8 @@ class UR5eBench(Bench):
 
         def collided() -> None:
             self.fake.do("protective_stop")
-            wait_until(lambda: device.state().safety is Safety.PROTECTIVE_STOP, 2.0, "telling the protective stop")
-            wait_until(acknowledged, 8.0, "the unlocking that the controller refuses for a while")
+            wait_until(lambda: device.state().safety is Safety.PROTECTIVE_STOP, 2.0, "the protective stop")
+            wait_until(acknowledged, 8.0, "the acknowledgement, which the controller refuses at first")
             assert self.fake.truth()["safety"] == "NORMAL"
 
         def acknowledged() -> bool:

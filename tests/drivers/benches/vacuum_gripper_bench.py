@@ -63,7 +63,7 @@ class SuctionGripperBench(Bench):
         self.fake.end()
 
     def reset(self) -> None:
-        """The carrier is up during a case, and only then: what it holds is not the case's."""
+        """Connect the carrier before a case and disconnect it afterwards; it is not part of the case."""
         self.fake.control.do("heal")
         self.fake.control.do("renew")
         if self.case_over:
@@ -101,7 +101,7 @@ class SuctionGripperBench(Bench):
         self.fake.control.do("silence")
 
     def heal(self) -> None:
-        """Reconnect the carrier, but not before its watchdog has ended the blast of air."""
+        """Reconnect the carrier, but only after its watchdog has ended the blowing."""
         wait_until(lambda: not self.running(), 3.0, "the watchdog of the carrier")
         self.fake.control.do("heal")
         wait_until(lambda: self.block.connection is not Connection.LOST, 10.0, "the connection of the carrier")

@@ -1,4 +1,4 @@
-"""Crates rendered with noise, and the pictures of them as a camera gives them."""
+"""Crates rendered with noise, as pictures of a camera."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -26,16 +26,16 @@ def turned(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Orientation:
 
 
 def at(x: float, y: float, z: float, turn: Orientation | None = None) -> Pose:
-    """A pose in the crate, as one in the world."""
+    """Convert a pose in the crate to the world."""
     return CRATE * Pose(Position(x, y, z), turn or Orientation())
 
 
-def told(pose: Pose) -> dict[str, Any]:
+def encoded(pose: Pose) -> dict[str, Any]:
     return {"position": list(pose.position), "orientation": list(pose.orientation)}
 
 
 def part(name: str, pose: Pose, size: tuple[float, float, float] = PART) -> dict[str, Any]:
-    return {"name": name, "pose": told(pose), "size": size, "color": (60, 120, 160)}
+    return {"name": name, "pose": encoded(pose), "size": size, "color": (60, 120, 160)}
 
 
 def crate() -> list[dict[str, Any]]:
@@ -51,7 +51,7 @@ def crate() -> list[dict[str, Any]]:
 
 
 class Photographer:
-    """Renders with one lens; the second picture of it is quick."""
+    """Renders pictures with one lens; only the first takes long."""
 
     def __init__(self) -> None:
         from arcor2_fakes.oak_d.optics import Lens
@@ -66,12 +66,12 @@ class Photographer:
         self._number = 0
 
     def __call__(self, *things: dict[str, Any], camera: Pose = CAMERA, with_crate: bool = True) -> Any:
-        """A depth picture of things, in the crate."""
+        """Return a depth picture of objects, in the crate."""
         from PIL import Image
 
         self._number += 1
         self._scene.replace([*(crate() if with_crate else []), *things])
-        self._scene.look_from(told(camera))
+        self._scene.look_from(encoded(camera))
         view = self._renderer.view(self._scene.camera, 0.0, self._scene.things)
         depth = self._sensor.depth(view, self._number, covered=False)
         lens = self._lens

@@ -1,4 +1,4 @@
-"""The next part of a crate, in rendered pictures with noise and known ground truth, and refusals."""
+"""The next part of a crate, in noisy rendered pictures with known ground truth, and refusals."""
 
 from collections.abc import Callable
 from typing import Any
@@ -18,13 +18,13 @@ from .conftest import CRATE, PART, Photographer, at, part, turned
 
 FLAT = PART[2] / 2
 CLOSE = 1.0
-"""mm: what one pixel sees at this distance."""
+"""Size of a pixel at this distance, mm."""
 SAME = (Orientation(), Orientation(1, 0, 0, 0), Orientation(0, 1, 0, 0), Orientation(0, 0, 1, 0))
-"""Turns after which a box looks as before."""
+"""Rotations after which a box looks the same."""
 
 
 def looking(at_: Position, x: float, y: float, z: float) -> Pose:
-    """The pose of a camera that looks at something."""
+    """Return the pose of a camera that looks at a point."""
     eye = np.array([x, y, z])
     forward = np.array(tuple(at_)) - eye
     forward /= np.linalg.norm(forward)
@@ -37,7 +37,7 @@ def looking(at_: Position, x: float, y: float, z: float) -> Pose:
 
 
 def errors(found: Pose, truth: Pose) -> tuple[float, float]:
-    """How far, mm, and how much turned, degrees, a box is from where it really is."""
+    """Return how far (mm) and how much turned (degrees) the found pose of a box is from the true one."""
     turn = min((truth.orientation * same).angle_to(found.orientation) for same in SAME)
     return 1000.0 * found.position.distance_to(truth.position), float(np.degrees(turn))
 
@@ -106,14 +106,14 @@ def test_unreachable_and_missing_parts_are_refused(picture: Photographer, make: 
         crate.next_part(picture(part("wrong", wrong, (0.06, 0.04, 0.03))))
     with pytest.raises(NoDepth, match=r"^crate is not visible"):
         crate.next_part(picture(camera=Pose(Position(0.6, 0.5, 0.7), Orientation(1, 0, 0, 0))))
-    # Two touch, a third lies free: that one is to be had.
+    # Two touch, a third lies free: the third is found.
     free = at(-0.11, 0.0, FLAT, turned(z=90))
     pose, _ = crate.next_part(picture(part("one", one), part("other", other), part("free", free)))
     assert errors(pose, free)[0] < CLOSE
 
 
 def test_a_displaced_crate_is_tolerated(picture: Photographer, make: Callable[..., Bin]) -> None:
-    """The floor is 6 mm higher than the crate's pose says; it is not taken for parts."""
+    """The floor is 6 mm higher than the pose of the crate says; it is not mistaken for parts."""
     crate = make()
     crate.set_pose(CRATE * Pose(Position(0.0, 0.0, -0.006)))
     assert crate.is_empty(picture())
@@ -122,7 +122,7 @@ def test_a_displaced_crate_is_tolerated(picture: Photographer, make: Callable[..
 
 
 def test_parts_are_found_by_mesh(picture: Photographer, make: Callable[..., Bin], tmp_path: Any) -> None:
-    """An angle whose origin is at its corner, so that its pose is not that of its middle."""
+    """An angle bracket whose origin is at its corner, so that its pose differs from that of its centre."""
     import open3d as o3d
 
     foot = o3d.geometry.TriangleMesh.create_box(0.08, 0.04, 0.01)
@@ -140,7 +140,7 @@ def test_parts_are_found_by_mesh(picture: Photographer, make: Callable[..., Bin]
     print(f"off by {distance:.2f} mm, {turn:.2f} degrees; quality {quality:.3f}")  # noqa: T201
     assert (distance < CLOSE, turn < 0.8, quality > 0.93) == (True, True, True)
     tool = crate.grip_pose(pose, 0.1)
-    middle = truth * Pose(Position(0.04, 0.02, 0.15))  # above the middle, 0.1 m over its highest point
+    middle = truth * Pose(Position(0.04, 0.02, 0.15))  # above the centre, 0.1 m over its highest point
     assert tool.position.distance_to(middle.position) < 0.001
 
 

@@ -1,4 +1,4 @@
-"""Models of parts and settings of a crate: invalid ones are refused by name."""
+"""Models of parts and settings of a crate: invalid ones are refused and named."""
 
 from pathlib import Path
 from typing import Any

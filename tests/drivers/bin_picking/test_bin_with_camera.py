@@ -14,15 +14,15 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.runtime.values import decode_arguments, results
 from tests.fakes.conftest import FakeProcess
 
-from .conftest import CRATE, HEIGHT, LENGTH, PART, WIDTH, at, crate, part, told, turned
+from .conftest import CRATE, HEIGHT, LENGTH, PART, WIDTH, at, crate, encoded, part, turned
 
 HANGING = Pose(Position(0.02, 0.01, 0.7), Orientation(1.0, 0.0, 0.0, 0.0))
 
 
 @pytest.fixture(scope="module")
 def fake() -> Iterator[FakeProcess]:
-    running = FakeProcess("oak_d", "--width", "640", "--height", "360")  # a busy machine renders few of more
-    running.control.do("camera", pose=told(HANGING))
+    running = FakeProcess("oak_d", "--width", "640", "--height", "360")  # a busy machine renders few larger pictures
+    running.control.do("camera", pose=encoded(HANGING))
     yield running
     running.end()
 
@@ -37,7 +37,7 @@ def test_a_program_links_picture_part_and_robot(fake: FakeProcess) -> None:
         camera.connect(20.0)
         box.connect()
         fake.control.do("scene", things=[*crate(), part("a", truth)])
-        # As a link goes online: the result of one action as JSON is the argument of the next.
+        # Like a link online: the result of an action as JSON is the argument of the next.
         [depth] = results(camera.depth_image(4))
         part_, quality = results(box.next_part(**decode_arguments(box.next_part, {"depth": depth.encode()}, "crate")))
         arguments = {"part": part_.encode(), "above": b"0.1"}

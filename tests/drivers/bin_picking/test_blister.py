@@ -1,4 +1,4 @@
-"""A blister: parts and places in order, in its own frame, stored over a restart on request."""
+"""A blister: parts and places in order, in its own frame; the state survives a restart on request."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -42,7 +42,7 @@ def test_parts_are_returned_in_order_until_taken(make: Callable[..., Blister]) -
     tray = make()
     places = []
     while not tray.is_empty():
-        assert tray.next_part() == tray.next_part()  # it was not gripped: the same again
+        assert tray.next_part() == tray.next_part()  # it was not gripped: the same part is returned again
         places.append(local(tray.next_part()))
         tray.part_taken()
     assert places == [(x, y, 0.005) for y in (0.02, 0.06) for x in (0.01, 0.04, 0.07)]
@@ -104,7 +104,7 @@ def test_the_state_is_restored_only_from_a_file(make: Callable[..., Blister], tm
     for _ in range(4):
         kept.next_part()
         kept.part_taken()
-    del kept  # not closed: as when its process is killed
+    del kept  # not closed, as if its process was killed
     again = make(state_file=str(file))
     assert again.parts() == 2
     assert local(again.next_part()) == (0.04, 0.06, 0.005)
@@ -132,7 +132,7 @@ def test_a_state_that_cannot_be_stored_is_reported(make: Callable[..., Blister],
         (tmp_path / "bad.json").write_text(text)
         with pytest.raises(NotConnected, match=r"bad\.json"):
             make(state_file=str(tmp_path / "bad.json"))
-        assert (tmp_path / "bad.json").read_text() == text  # for somebody to look at
+        assert (tmp_path / "bad.json").read_text() == text  # so that a person can inspect it
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""A fake conveyor in a process of its own, and the driver on its bus."""
+"""A fake conveyor in a separate process, and the driver on its bus."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -15,14 +15,14 @@ __all__ = ["wait_for"]
 @pytest.fixture(scope="module")
 def one_fake() -> Iterator[FakeProcess]:
     fake = FakeProcess("conveyor")
-    fake.control  # noqa: B018 - opened here, so that it may live as long as the module
+    fake.control  # noqa: B018 - opened here, so that it stays open for the whole module
     yield fake
     fake.end()
 
 
 @pytest.fixture
 def fake(one_fake: FakeProcess) -> FakeProcess:
-    """Healthy and just switched on."""
+    """Reset the fake: no faults, just switched on."""
     one_fake.control.do("heal")
     one_fake.control.do("mute", on=False)
     one_fake.control.do("power_cycle", belt=0)
@@ -32,7 +32,7 @@ def fake(one_fake: FakeProcess) -> FakeProcess:
 
 @pytest.fixture
 def make() -> Iterator[Callable[..., Conveyor]]:
-    """Gives ``make("127.0.0.1:4000", homing_method=19)``: a driver, not connected; it is disconnected in the end."""
+    """Return ``make("127.0.0.1:4000", homing_method=19)``: an unconnected driver; the fixture disconnects it."""
     made: list[Conveyor] = []
 
     def build(address: str, **settings: Any) -> Conveyor:

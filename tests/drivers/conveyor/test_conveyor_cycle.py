@@ -19,7 +19,7 @@ COUNTS = 10000
 
 @contextmanager
 def under_way(fake: FakeProcess, act: Callable[[], None]) -> Iterator[list[Any]]:
-    """`act` in a thread, the belt seen to move with 0.3 m/s; the list holds what it gave or raised."""
+    """Run `act` in a thread and wait until the belt moves at 0.3 m/s; the list gets its result or exception."""
     outcome: list[Any] = []
 
     def run() -> None:
@@ -45,7 +45,7 @@ def test_connecting_observes_and_writes_nothing(fake: FakeProcess, observed: Con
     assert observed.identify().serial == "1005"
     truth = fake.truth()
     assert truth["writes"] == []
-    # only reading requests leave us: initiate upload
+    # the driver sends only read requests: initiate upload
     assert {f["data"][:2] for f in truth["frames"] if f["from_host"]} == {"40"}
     assert {f["id"] for f in truth["frames"] if f["from_host"]} == {0x605}
     with pytest.raises(NotInControl, match=r"^belt at socket://\S+ node 5: run with 0.1 m/s .*Switch on disabled"):
@@ -72,7 +72,7 @@ def test_a_belt_homes_moves_runs_and_halts(fake: FakeProcess, make: Callable[...
         belt.move_to(0.1)
     belt.home()
     assert belt.homed
-    assert fake.truth()["belt"] == pytest.approx(4000, abs=1)  # where its switch is
+    assert fake.truth()["belt"] == pytest.approx(4000, abs=1)  # the position of its switch
     belt.move_to(0.05, 1.0)
     assert fake.truth()["position"] == 500
     belt.move_by(-0.08, 1.0)
@@ -115,7 +115,7 @@ def test_stop_cancels_a_move_for_good(fake: FakeProcess, belt: Conveyor, how: st
     assert stood["velocity"] == 0.0
     assert isinstance(outcome[0], Cancelled), outcome
     assert stood["state"] == {"stop": "switched_on", "quick_stop": "switch_on_disabled"}[how]
-    belt.move_by(0.01, 0.3)  # enabling again lets only this move happen
+    belt.move_by(0.01, 0.3)  # after enabling again only this move happens
     assert fake.truth()["belt"] == pytest.approx(stood["belt"] + 100, abs=2)
 
 
@@ -140,7 +140,7 @@ def test_a_fault_ends_the_move_with_its_text_and_is_reset(fake: FakeProcess, bel
         belt.fault_reset()
     fake.control.do("cause_gone")
     belt.fault_reset()
-    belt.fault_reset()  # harmless
+    belt.fault_reset()  # has no effect without a fault
 
 
 def test_an_emergency_message_ends_a_move(fake: FakeProcess, belt: Conveyor) -> None:

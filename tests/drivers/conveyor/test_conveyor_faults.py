@@ -51,7 +51,7 @@ def test_connecting_to_a_device_with_invalid_answers(
         belt.connect(0.5)
     fake.control.do("heal")
     belt.connect()
-    belt.connect()  # harmless
+    belt.connect()  # has no effect when connected
     assert belt.position().value == 0.0
     belt.disconnect()
     belt.disconnect()
@@ -76,7 +76,7 @@ def test_a_loss_during_a_run_stops_the_belt_and_only_observation_returns(
 
     thread = threading.Thread(target=move)
     thread.start()
-    fake.control.wait_until(lambda t: t["velocity"] > 3900)  # its handshake is over, it waits
+    fake.control.wait_until(lambda t: t["velocity"] > 3900)  # its handshake is over, it waits for the end
     fake.control.do(fault)
     thread.join(30.0)
     assert isinstance(outcome[0], ConnectionLost), outcome
@@ -103,7 +103,7 @@ def test_a_power_cycle_loses_the_homing(fake: FakeProcess, belt: Conveyor, wait_
     assert belt.control_owner() is None
     assert fake.truth()["consumer"] == 0
     belt.take_control()
-    assert fake.truth()["consumer"] == 127 << 16 | 1000  # armed again
+    assert fake.truth()["consumer"] == 127 << 16 | 1000  # the monitor is armed again
 
 
 def test_late_answers_are_ignored(
@@ -149,7 +149,7 @@ def test_the_drive_stops_when_the_process_is_killed(fake: FakeProcess) -> None:
         assert owner.stdout is not None
         assert owner.stdout.readline() == "runs\n"
         began = time.monotonic()
-        while time.monotonic() - began < 0.7:  # longer than the heartbeat's limit: it does run on while we live
+        while time.monotonic() - began < 0.7:  # longer than the heartbeat's limit: it continues while the process lives
             assert fake.truth()["velocity"] == pytest.approx(3000)
             time.sleep(0.05)
         owner.kill()
@@ -180,7 +180,7 @@ def test_a_stall_of_half_a_second_does_not_stop_a_belt(fake: FakeProcess, make: 
 
 
 def test_an_adapter_is_read_in_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Byte by byte, a process in which an action computes falls behind the drive's state."""
+    """Reading byte by byte, a process with a computing action would lag behind the drive's state."""
     adapter, line = os.openpty()
     tty.setraw(line)
     bus = SlcanBus(os.ttyname(line), sleep_after_open=0.0)

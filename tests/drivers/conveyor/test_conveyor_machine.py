@@ -148,7 +148,7 @@ def test_without_control_a_machine_is_only_observed(fake: FakeProcess, observed:
 
 # ------------------------------------------------------------------------------------------------ PDO
 def test_the_state_arrives_by_pdo_during_control(fake: FakeProcess, belt: Conveyor) -> None:
-    """Mapping is written when control is taken (CiA 301, 7.5.2.37: invalid, count 0, entries, count, valid)."""
+    """The mapping is written when control is taken (CiA 301, 7.5.2.37: invalid, count 0, entries, count, valid)."""
     writes = [
         (w["index"], w["subindex"], w["data"])
         for w in fake.truth()["writes"]
@@ -170,7 +170,7 @@ def test_the_state_arrives_by_pdo_during_control(fake: FakeProcess, belt: Convey
         return sum(f["from_host"] and f["data"].startswith("404160") for f in fake.truth()["frames"])
 
     def nothing_is_polled() -> bool:
-        """Return whether 100 PDOs arrived and no poll came in between, as one does when a PDO is late."""
+        """Return whether 100 PDOs arrived without a poll in between, which a late PDO would cause."""
         before, received = polls(), belt._observer.pdos.received
         wait_for(lambda: belt._observer.pdos.received - received >= 100)
         return polls() == before
@@ -201,7 +201,7 @@ def test_the_driver_works_without_pdos(fake: FakeProcess, make: Callable[..., Co
 
 
 def test_a_foreign_nmt_command_ends_control(fake: FakeProcess, belt: Conveyor, wait_for: Callable[..., Any]) -> None:
-    """NMT has no owner. The drive does what 6007h says; we notice by its heartbeat and do not take it back."""
+    """NMT has no owner. The drive reacts as 6007h says; the driver notices and does not retake control."""
     belt.run(0.2)
     foreign = can.Bus(channel=f"socket://{fake.ready['can']}", interface="slcan", bitrate=500000, sleep_after_open=0.0)
     try:
@@ -258,7 +258,7 @@ def test_a_silent_socketcand_server_times_out(make: Callable[..., Conveyor]) -> 
 
 
 def test_socketcand_frames_byte_for_byte() -> None:
-    """Messages of the protocol in one stream, torn anywhere (from general knowledge of it, see the driver's module)."""
+    """Protocol messages in one stream, split anywhere (from general knowledge of it, see the driver's module)."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         sent: list[bytes] = []
         done = threading.Event()

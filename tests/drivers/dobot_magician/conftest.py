@@ -17,7 +17,7 @@ BASE = Pose(Position(0.4, -0.2, 0.138))
 
 @pytest.fixture
 def make() -> Iterator[Callable[..., DobotMagician]]:
-    """Gives ``make("/dev/pts/3", answer_timeout=0.2)``: a driver, not connected; it is disconnected in the end."""
+    """Return ``make("/dev/pts/3", answer_timeout=0.2)``: an unconnected driver; the fixture disconnects it."""
     made: list[DobotMagician] = []
 
     def build(port: str, **settings: Any) -> DobotMagician:
@@ -32,7 +32,7 @@ def make() -> Iterator[Callable[..., DobotMagician]]:
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeProcess]:
-    """One fake for a file's tests: starting one takes longer than most of them."""
+    """Start one fake for all tests of a file, because starting one takes longer than most of them."""
     fake = FakeProcess("dobot_magician", "--link", str(tmp_path_factory.mktemp("dev") / "ttyDOBOT"), "--pace", "12")
     assert fake.control.do("commands")  # the channel is open before the first test
     yield fake
@@ -41,7 +41,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeProcess]:
 
 @pytest.fixture
 def fake(running: FakeProcess) -> FakeProcess:
-    """As delivered, plugged, without faults."""
+    """Reset the fake to its factory state, plugged in and without faults."""
     running.control.do("unplug")
     running.control.do("heal")
     running.control.do("plug")
@@ -51,7 +51,7 @@ def fake(running: FakeProcess) -> FakeProcess:
 
 @pytest.fixture
 def arm(fake: FakeProcess, make: Callable[..., DobotMagician]) -> DobotMagician:
-    """Connected and in control."""
+    """Connect and take control."""
     arm = make(fake.ready["port"], suction_time=0.05, gripper_time=0.05, conveyor_port=0)
     arm.connect()
     arm.take_control()

@@ -1,4 +1,4 @@
-"""Faults of the Magician: of the wire, of the owner, and other clients."""
+"""Faults of the Magician: wire faults, a killed owner, and other clients."""
 
 import os
 import struct
@@ -26,7 +26,7 @@ def ptp(x: float, mode: int = 4) -> bytes:
 
 
 def write(port: str, *frames: bytes) -> None:
-    """Send as a foreign program would, and leave."""
+    """Send frames like a foreign program, and close the port."""
     with serial.Serial(port, 115200, timeout=1.0) as line:
         for frame in frames:
             line.write(frame)
@@ -78,7 +78,7 @@ def test_a_wire_fault_is_a_loss_and_recovers(
     fake.control.do("heal")
     wait_for(lambda: arm.connection, lambda state: state is Connection.BACK)
     wait_for(lambda: arm.health, lambda health: health is Health.NORMAL)
-    with pytest.raises(NotInControl):  # only observation comes back
+    with pytest.raises(NotInControl):  # only observation is restored
         arm.move_to_joints(joints(0, 45, 45, 0), 1.0)
     arm.take_control()
     assert arm.connection is Connection.ONLINE
@@ -94,7 +94,7 @@ def test_late_answers_are_not_used(
     arm.connect()
     fake.control.do("slow", seconds=0.25)
     wait_for(lambda: arm.connection, lambda state: state is Connection.LOST)
-    deadline = time.monotonic() + 0.6  # meanwhile answers to earlier questions keep coming
+    deadline = time.monotonic() + 0.6  # meanwhile answers to earlier requests keep arriving
     while time.monotonic() < deadline:
         assert arm.connection is Connection.LOST
         time.sleep(0.01)
@@ -114,7 +114,7 @@ def test_unplugging_and_plugging_during_a_move(
     assert "a joint move" in str(outcome[0])
     assert "arm at" in str(outcome[0])
     with pytest.raises(ConnectionLost):
-        arm.stop()  # it cannot be sent, and says so
+        arm.stop()  # the stop cannot be sent, and the driver logs it
     fake.control.do("plug")
     wait_for(lambda: arm.connection, lambda state: state is Connection.BACK)
     fake.control.wait_until(lambda truth: not truth["moving"])

@@ -11,7 +11,7 @@ from arcor2_drivers.dobot_magician.kinematics import Unreachable, forward, inver
 from arcor2_hw.data.geometry import Pose
 
 FRAMES = [
-    # Written out by hand by the rule of the protocol's format, not by the code under test.
+    # Written by hand from the protocol's format, not by the code under test.
     (Frame(10, 0, b""), "aa aa 02 0a 00 f6"),
     (Frame(20, 0, b""), "aa aa 02 14 00 ec"),
     (Frame(20, 1, b""), "aa aa 02 14 01 eb"),
@@ -49,7 +49,7 @@ def test_garbage_yields_only_complete_frames() -> None:
             got += buffer.feed(line[at : at + step])
             at += step
         assert got == sent
-    # One that is spoiled is lost, and only that one.
+    # A damaged frame is lost, and only that one.
     whole = encode(Command.POSE, 0, bytes(32))
     for place in range(2, len(whole)):
         spoiled = bytearray(whole)
@@ -74,7 +74,7 @@ def test_alarm_bits_are_decoded() -> None:
 
 def test_inverse_kinematics_inverts_forward_kinematics() -> None:
     tool = forward((0.0, math.pi / 4, math.pi / 4, 0.0), 0.0597, 0.0)
-    assert tool == pytest.approx((0.2591, 0.0, -0.0085, 0.0), abs=1e-4)  # where a homed arm stands, folded at 45°
+    assert tool == pytest.approx((0.2591, 0.0, -0.0085, 0.0), abs=1e-4)  # the pose of a homed arm, folded at 45°
     generator = random.Random(3)
     for _ in range(500):
         q = (
@@ -83,7 +83,7 @@ def test_inverse_kinematics_inverts_forward_kinematics() -> None:
             math.radians(generator.uniform(-10, 90)),
             math.radians(generator.uniform(-90, 90)),
         )
-        if q[1] - q[2] > math.radians(89):  # forearm and rear arm in a line: the linkage does not go there
+        if q[1] - q[2] > math.radians(89):  # forearm and rear arm in a line: the linkage cannot reach this
             continue
         tool = forward(q, 0.06, -0.07)
         assert inverse(tool, 0.06, -0.07) == pytest.approx(q, abs=1e-9)

@@ -23,7 +23,7 @@ DOWN = Orientation(1.0, 0.0, 0.0, 0.0)
 
 
 def at(x: float, y: float, z: float, r: float = 0.0) -> Pose:
-    """Give a pose in the world for the tool's place in the arm's base, in m and degrees."""
+    """Return a pose in the world for a tool position in the arm's base, in m and degrees."""
     turn = Orientation.from_rotation_vector(0.0, 0.0, math.radians(r))
     return BASE * Pose(Position(x, y, z), turn * DOWN)
 
@@ -33,7 +33,7 @@ def joints(*degrees: float) -> list[Joint]:
 
 
 def in_background(call: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]:
-    """Run a call in a thread; the list holds what it gave or raised."""
+    """Run a call in a thread; the list gets its result or its exception."""
     outcome: list[Any] = []
 
     def run() -> None:
@@ -51,7 +51,7 @@ def test_connecting_only_reads(fake: FakeProcess, make: Callable[..., DobotMagic
     arm = make(fake.ready["port"])
     assert arm.connection is Connection.OFFLINE
     arm.connect()
-    arm.connect()  # harmless when connected
+    arm.connect()  # has no effect when connected
     assert arm.connection is Connection.ONLINE
     assert arm.health is Health.NORMAL
     assert arm.identify() == Identity("Dobot", "Dobot Magician", "DT1022049091", "3.6.5")
@@ -65,7 +65,7 @@ def test_connecting_only_reads(fake: FakeProcess, make: Callable[..., DobotMagic
     for act in (arm.home, lambda: arm.suck(True), lambda: arm.conveyor(0.1), lambda: arm.move(at(0.2, 0, 0))):
         with pytest.raises(NotInControl, match=r"^arm at .*ttyDOBOT: control is not taken\.$"):
             act()
-    arm.stop()  # nothing is ours: nothing is sent
+    arm.stop()  # no motion of ours: sends nothing
     arm.disconnect()
     arm.disconnect()
     assert arm.connection is Connection.OFFLINE
@@ -141,12 +141,12 @@ def test_stop_overtakes_a_motion_and_drops_the_queue(
     assert truth["moving"] is False
     assert (truth["queued"], truth["running"], truth["motions"]) == (0, False, 1)
     order = [command for command, control in truth["received"] if control & 1]
-    assert order[-2:] == [242, 245]  # force stop, then clear, and no start behind it
+    assert order[-2:] == [242, 245]  # force stop, then clear, and no start after it
     assert truth["suction"] == [0, 0]
     assert arm.last_move is not None
     assert arm.last_move.end is MoveEnd.STOPPED
     assert arm.control_owner() == "us"
-    arm.move_to_joints(joints(0, 45, 45, 0), 1.0)  # the old motion is not finished first
+    arm.move_to_joints(joints(0, 45, 45, 0), 1.0)  # the old motion is not completed first
     assert fake.truth()["joints"] == pytest.approx([0, 45, 45, 0], abs=0.01)
     assert fake.truth()["motions"] == 2
 
@@ -161,7 +161,7 @@ def test_pick_and_place_switch_the_suction_at_the_part(fake: FakeProcess, arm: D
     assert list(arm.parts) == ["part of arm"]
     assert arm.parts["part of arm"].in_link.position.z == pytest.approx(0.01), "it hangs below the cup"
     arm.stop()
-    assert fake.truth()["suction"] == [1, 1]  # a stop lets nothing fall
+    assert fake.truth()["suction"] == [1, 1]  # a stop does not drop the part
     arm.place(at(0.22, -0.05, -0.02), approach=0.04, speed=1.0, slow_speed=0.5)
     assert fake.truth()["suction"] == [1, 0]
     assert arm.parts == {}
@@ -237,5 +237,5 @@ def test_an_invalid_setting_names_the_parameter() -> None:
             DobotMagicianSettings(**settings)  # type: ignore[arg-type]
 
 
-def test_the_arm_continues_after_a_loss_as_declared() -> None:
+def test_the_arm_continues_after_a_connection_loss_as_declared() -> None:
     assert DobotMagician.loss_reaction.kind is LossKind.CONTINUES

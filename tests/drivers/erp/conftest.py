@@ -1,4 +1,4 @@
-"""A fake planning service in a process of its own, and the drivers on its wire."""
+"""A fake planning service in a separate process, and the drivers connected to it."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -17,7 +17,7 @@ __all__ = ["start_fake", "wait_for"]
 
 
 class Waiting:
-    """A call on a thread of its own."""
+    """A call in its own thread."""
 
     def __init__(self, call: Callable[[], object]) -> None:
         self.result: object = None
@@ -36,7 +36,7 @@ class Waiting:
         return self.result
 
     def outcome_after(self, stop: Callable[[], object]) -> object:
-        """Stop the call until it ends: a stop from before it waits does not count."""
+        """Request stops until the call ends: a stop from before it waits has no effect."""
 
         def ended() -> bool:
             stop()
@@ -47,21 +47,21 @@ class Waiting:
 
 
 def serials(fake: FakeProcess, order: str = "A-1") -> list[str]:
-    """Give what the service has of an order, in the order in which it came."""
+    """Return the serial numbers that the service has of an order, in order of arrival."""
     return [result["serial"] for result in fake.truth()["results"] if result["order"] == order]
 
 
 @pytest.fixture(scope="module")
 def one_fake() -> Iterator[FakeProcess]:
     fake = FakeProcess("erp")
-    fake.truth()  # opens the control channel, which lives as long
+    fake.truth()  # opens the control channel
     yield fake
     fake.end()
 
 
 @pytest.fixture
 def fake(one_fake: FakeProcess) -> Iterator[FakeProcess]:
-    """A service with an empty plan; one process serves the tests of a file."""
+    """Reset the service to an empty plan. One process serves all tests of a file."""
     for command in ("heal", "work", "forget"):
         one_fake.control.do(command)
     yield one_fake
@@ -71,7 +71,7 @@ def fake(one_fake: FakeProcess) -> Iterator[FakeProcess]:
 
 @pytest.fixture
 def make(tmp_path: Path) -> Iterator[Callable[..., ErpService]]:
-    """Gives ``make("http://127.0.0.1:4000", poll=0.1)``: a driver, not connected; it is disconnected in the end."""
+    """Return ``make("http://127.0.0.1:4000", poll=0.1)``: an unconnected driver; the fixture disconnects it."""
     made: list[ErpService] = []
 
     def build(url: str, **settings: Any) -> ErpService:

@@ -1,4 +1,4 @@
-"""Waiting and refused results, and the owner of an outbox."""
+"""Waiting and rejected results, and the owner of an outbox."""
 
 import time
 from collections.abc import Callable
@@ -43,7 +43,7 @@ def test_refused_results_are_stored_separately_and_named(fake: FakeProcess, erp:
     assert erp.health is Health.CHECK_FUNCTION
     before = results_asked(fake)
     time.sleep(1.0)
-    assert results_asked(fake) == before, "it is tried for ever"
+    assert results_asked(fake) == before, "the rejected result is sent again and again"
     fake.control.do("forbid", order=order, on=False)
     assert erp.resend_refused() == 2
     erp.wait_until_sent(30.0)

@@ -37,7 +37,7 @@ def order(fake: FakeProcess) -> str:
 
 @pytest.fixture
 def reporting(tmp_path: Path) -> Any:
-    """Gives ``reporting(url, 0, 5)``: a process that reports and stays; its standard output tells what was stored."""
+    """Return ``reporting(url, 0, 5)``: a process that reports, prints what it stored, and does not end."""
     processes: list[subprocess.Popen[str]] = []
 
     def start(url: str, first: int, count: int) -> subprocess.Popen[str]:
@@ -61,11 +61,11 @@ def test_a_kill_between_sending_and_answer_duplicates_nothing(
     process.wait()
     fake.control.do("slow", seconds=3.0)  # connecting takes as long, too
     process = reporting(fake.ready["url"], 2, 1)
-    fake.control.wait_until(lambda t: len(t["results"]) == 2, within=20.0)  # done; its answer is 3 s away
+    fake.control.wait_until(lambda t: len(t["results"]) == 2, within=20.0)  # stored; the answer follows 3 s later
     process.kill()
     process.wait()
     fake.control.do("heal")
-    repeated = fake.truth()["repeated"]  # the first process, too, may have died before its answer was there
+    repeated = fake.truth()["repeated"]  # the first process, too, may have been killed before it received an answer
     erp = make(fake.ready["url"])
     erp.connect()
     erp.wait_until_sent(5.0)
@@ -97,8 +97,8 @@ def test_many_kills_lose_and_duplicate_nothing(
     erp.wait_until_sent(20.0)
     came = [int(serial.removeprefix("S-")) for serial in serials(fake)]
     assert came == sorted(set(came)), "out of order, or twice"
-    assert set(stored) <= set(came), "what was stored has not come"
-    assert len(set(came) - set(stored)) <= 4, "at most the one result per life that was stored and not yet told of"
+    assert set(stored) <= set(came), "a stored result did not arrive"
+    assert len(set(came) - set(stored)) <= 4, "each process may store one result that it did not print"
 
 
 def test_a_restarted_service_loses_and_duplicates_nothing(
@@ -114,7 +114,7 @@ def test_a_restarted_service_loses_and_duplicates_nothing(
     erp.wait_until_sent(5.0)
     first.control.do("slow", seconds=30.0)
     erp.report_result("A-1", "S-1", True)
-    first.control.wait_until(lambda t: len(t["results"]) == 2)  # done, and its answer will never come
+    first.control.wait_until(lambda t: len(t["results"]) == 2)  # stored, and its answer will never arrive
     first.process.kill()
     first.process.wait()
     erp.report_result("A-1", "S-2", False)

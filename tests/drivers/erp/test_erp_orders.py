@@ -72,8 +72,8 @@ def test_an_order_survives_a_lost_answer(fake: FakeProcess, erp: ErpService, mak
     fake.control.do("lose_answers", count=1)
     with pytest.raises(ConnectionLost, match="planning at http"):
         erp.next_order()
-    assert fake.truth()["orders"][0]["station"] == "cell", "the service has given it away"
-    erp.disconnect()  # the question is stored: another process asks it again
+    assert fake.truth()["orders"][0]["station"] == "cell", "the service has assigned the order"
+    erp.disconnect()  # the request is stored: another process repeats it
     again = make(fake.ready["url"])
     again.connect()
     assert again.next_order()[1] == "A-1"
@@ -101,7 +101,7 @@ def test_stop_ends_waiting_for_an_order(fake: FakeProcess, erp: ErpService) -> N
     assert isinstance(waiting.outcome(), Cancelled)
     before = len(posts(fake))
     time.sleep(0.4)
-    assert len(posts(fake)) == before, "it asks on after the stop"
+    assert len(posts(fake)) == before, "it continues asking after the stop"
     assert erp.next_order() == NONE
 
 

@@ -1,4 +1,4 @@
-"""Results: on disk before the action returns, at the service exactly once and in order, with any fault in between."""
+"""Results: on disk before the action returns, at the service exactly once and in order, despite faults in between."""
 
 import itertools
 import time

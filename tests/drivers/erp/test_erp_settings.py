@@ -66,7 +66,7 @@ def test_retry_after_is_parsed(text: str, seconds: float) -> None:
 
 
 class Authority:
-    """A certificate authority of a test."""
+    """A certificate authority for tests."""
 
     def __init__(self, folder: Path, name: str) -> None:
         self.folder = folder
@@ -90,7 +90,7 @@ class Authority:
         )
 
     def server(self) -> tuple[Path, Path]:
-        """Give certificate and key of a server on 127.0.0.1."""
+        """Return certificate and key of a server on 127.0.0.1."""
         key = ec.generate_private_key(ec.SECP256R1())
         name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "planning")])
         place = x509.SubjectAlternativeName([x509.IPAddress(ipaddress.ip_address("127.0.0.1"))])

@@ -1,4 +1,4 @@
-"""A fake tester in a process of its own, and the driver on its wire."""
+"""A fake tester in a separate process, and the driver connected to it."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -17,14 +17,14 @@ __all__ = ["relay", "start_fake", "wait_for"]
 @pytest.fixture(scope="module")
 def one_fake() -> Iterator[FakeProcess]:
     fake = FakeProcess("functional_tester", "--seed", "1", "--test-time", "6", "--time-scale", "20")
-    fake.truth()  # opens the control channel, which lives as long
+    fake.truth()  # opens the control channel
     yield fake
     fake.end()
 
 
 @pytest.fixture
 def fake(one_fake: FakeProcess) -> FakeProcess:
-    """A tester as delivered; one process serves the tests of a file."""
+    """Reset the tester to its factory state. One process serves all tests of a file."""
     one_fake.control.do("renew")
     return one_fake
 
@@ -39,14 +39,14 @@ def one_slow_fake() -> Iterator[FakeProcess]:
 
 @pytest.fixture
 def slow_fake(one_slow_fake: FakeProcess) -> FakeProcess:
-    """A test takes 4 s, all else is quick."""
+    """Reset a tester whose tests take 4 s; everything else is fast."""
     one_slow_fake.control.do("renew")
     return one_slow_fake
 
 
 @pytest.fixture
 def make() -> Iterator[Callable[..., FunctionalTester]]:
-    """Gives ``make("127.0.0.1:4000", watchdog_ms=500)``: a driver, not connected; it is disconnected in the end."""
+    """Return ``make("127.0.0.1:4000", watchdog_ms=500)``: an unconnected driver; the fixture disconnects it."""
     made: list[FunctionalTester] = []
 
     def build(address: str, **settings: Any) -> FunctionalTester:
@@ -77,7 +77,7 @@ def tester(observed: FunctionalTester) -> FunctionalTester:
 
 @pytest.fixture
 def loaded(fake: FakeProcess, tester: FunctionalTester) -> FunctionalTester:
-    """With a good board behind the closed door."""
+    """Put a good board into the tester and close the door."""
     tester.open_door()
     assert tester.shown_values == {"door": 1.0}
     fake.control.do("put_board", code="GOOD-1")

@@ -1,4 +1,4 @@
-"""The functional tester's driver on a working fake: observing, commands and refusals."""
+"""The functional tester's driver on a fake without faults: observing, commands and refusals."""
 
 import threading
 from collections.abc import Callable
@@ -13,16 +13,16 @@ from arcor2_hw.objects import MachineCommand, MachineState, UnitMode
 from tests.fakes.conftest import FakeProcess
 
 READS = {2, 3, 4, 43}
-"""Function codes that change nothing."""
+"""Function codes that only read."""
 
 
 def functions(fake: FakeProcess) -> set[int]:
-    """Give the function codes of the last requests, as they came over the wire."""
+    """Return the function codes of the last requests on the wire."""
     return {int(frame["hex"][14:16], 16) for frame in fake.truth()["frames"] if not frame["to_host"]}
 
 
 def in_background(call: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]:
-    """Run a call in a thread; the list holds what it gave or raised."""
+    """Run a call in a thread; the list gets its result or its exception."""
     outcome: list[Any] = []
 
     def run() -> None:
@@ -37,7 +37,7 @@ def in_background(call: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]
 
 
 def test_connecting_observes_and_writes_nothing(fake: FakeProcess, observed: FunctionalTester) -> None:
-    observed.connect()  # harmless when connected
+    observed.connect()  # has no effect when connected
     assert observed.connection is Connection.ONLINE
     assert observed.identify() == Identity("Fake Test Systems", "FT-100", "", "1.2")
     assert observed.machine_state() is MachineState.STOPPED
@@ -47,7 +47,7 @@ def test_connecting_observes_and_writes_nothing(fake: FakeProcess, observed: Fun
     assert observed.control_owner() is None
     with pytest.raises(NotInControl, match=f"tester at {fake.ready['modbus']}: open_door is refused in state Stopped"):
         observed.open_door()
-    observed.stop()  # not ours to stop: sends nothing
+    observed.stop()  # without control, stop sends nothing
     truth = fake.truth()
     assert functions(fake) <= READS
     assert (truth["watchdog_ms"], truth["last_command"], truth["door"]) == (0, None, "closed")
@@ -179,7 +179,7 @@ def test_stop_ends_a_test_without_result(
     thread.join(30.0)
     assert isinstance(outcome[0], Cancelled)
     assert fake.truth()["tested"] == 0
-    loaded.stop()  # harmless
+    loaded.stop()  # has no effect when stopped
     assert loaded.test() is True
 
 

@@ -40,7 +40,7 @@ QUICK: dict[str, Any] = {"request_timeout": 0.15, "watchdog_ms": 600}
 
 @pytest.fixture
 def quick(make: Callable[..., FunctionalTester], slow_fake: FakeProcess) -> FunctionalTester:
-    """A driver that gives up soon, in control of a tester with a board behind its door."""
+    """Return a driver with short time limits, in control of a tester with a board behind its closed door."""
     slow_fake.control.do("push_door", opening=True)
     slow_fake.control.do("put_board", code="B-1")
     slow_fake.control.do("push_door", opening=False)
@@ -49,7 +49,7 @@ def quick(make: Callable[..., FunctionalTester], slow_fake: FakeProcess) -> Func
 
 @contextmanager
 def running_test(fake: FakeProcess, tester: FunctionalTester) -> Iterator[list[Any]]:
-    """A test in a thread, seen to be in Execute; the list holds what it gave or raised, and when."""
+    """Start a test in a thread and wait for Execute; the list gets its result or exception, and the time."""
     outcome: list[Any] = []
 
     def run() -> None:
@@ -98,7 +98,7 @@ def test_a_silent_peer_is_named(make: Callable[..., FunctionalTester]) -> None:
             make(address).connect(0.5)
 
 
-# ------------------------------------------------------------------------------------------------ losses
+# ------------------------------------------------------------------------------------------------ connection losses
 @pytest.mark.parametrize(
     ("fault", "within"), [("reset", 0.3), ("silence", 1.0), ("half_frame", 1.0), ("garbage", 1.0), ("refuse", None)]
 )
@@ -108,12 +108,12 @@ def test_a_loss_during_a_test(
     with running_test(slow_fake, quick) as outcome:
         began = time.monotonic()
         slow_fake.control.do(fault)
-        if fault == "refuse":  # only new connections are refused: the test goes on until this one breaks too
+        if fault == "refuse":  # only new connections are refused: the test continues until this connection breaks too
             slow_fake.control.do("reset")
     assert isinstance(outcome[0], ConnectionLost)
     assert f"tester at {slow_fake.ready['modbus']}" in str(outcome[0])
     assert outcome[1] - began < (within or 0.3) + 0.3
-    # The station is left alone until it has ended the test by itself, and nothing begins again.
+    # The driver does not intervene until the tester has ended the test by itself, and nothing starts again.
     wait_for(slow_fake.truth, lambda truth: truth["fault"] == 105)
     slow_fake.control.do("heal")
     wait_for(lambda: quick.connection, lambda state: state is Connection.BACK)
@@ -140,7 +140,7 @@ def test_a_loss_during_a_door_motion(
 
 
 def test_a_late_answer_to_a_reading(relay: Relay, make: Callable[..., FunctionalTester]) -> None:
-    """The reading is repeated on a new connection; the late answer finds nobody; nothing counts as lost."""
+    """The reading is repeated on a new connection; the late answer is ignored; no connection loss is reported."""
     tester = in_control(make(relay.address, request_timeout=0.5))
     relay.delay_next(READ_INPUT_REGISTERS, 1.0)
     tester.open_door()
@@ -153,14 +153,14 @@ def test_a_late_answer_to_a_reading(relay: Relay, make: Callable[..., Functional
 def test_a_late_answer_to_a_write(
     relay: Relay, make: Callable[..., FunctionalTester], fake: FakeProcess, wait_for: Callable[..., Any]
 ) -> None:
-    """A write is sent once; what became of it is said to be unknown; its late answer answers nothing."""
+    """A write is sent once; its outcome is reported as unknown; its late answer is ignored."""
     tester = in_control(make(relay.address, request_timeout=0.5))
     relay.delay_next(WRITE_REGISTERS, 1.0)
     before = relay.requests[WRITE_REGISTERS]
     with pytest.raises(DeviceTimeout, match=f"^tester at {relay.address}: .* it may have been executed$"):
         tester.open_door()
     assert relay.requests[WRITE_REGISTERS] == before + 1
-    wait_for(lambda: fake.truth()["door"], lambda door: door == "open")  # it was
+    wait_for(lambda: fake.truth()["door"], lambda door: door == "open")  # it was executed
     tester.close_door()
     assert relay.connections >= 2
     assert fake.truth()["door"] == "closed"
@@ -187,7 +187,7 @@ def test_state_is_stale_before_the_connection_is_lost(
 
 
 def test_a_stopped_life_counter_makes_the_state_stale(relay: Relay, make: Callable[..., FunctionalTester]) -> None:
-    """A gateway that goes on answering for a tester that hangs behind it."""
+    """A gateway keeps answering although the tester behind it hangs."""
     tester = make(relay.address)
     tester.connect()
     assert tester.machine_state() is MachineState.STOPPED
@@ -236,14 +236,14 @@ def test_the_watchdog_trips_when_the_process_is_killed(slow_fake: FakeProcess, w
     slow_fake.control.do("push_door", opening=False)
     with host_process(HOST, slow_fake.ready["modbus"]) as process:
         wait_for(slow_fake.truth, lambda truth: truth["state"] == "Execute")
-        time.sleep(1.0)  # twice the watchdog's time: the driver feeds it
+        time.sleep(1.0)  # twice the watchdog's time: the driver triggers it
         assert slow_fake.truth()["state"] == "Execute"
         process.kill()
         truth = wait_for(slow_fake.truth, lambda truth: truth["state"] == "Aborted")
     assert (truth["fault"], truth["tested"]) == (105, 0)
 
 
-# ------------------------------------------------------------------------------------------------ odd peers
+# ----------------------------------------------------------------------------------- other hosts and devices
 def test_sequence_numbers_continue_those_of_another_host(fake: FakeProcess, tester: FunctionalTester) -> None:
     host, _, port = fake.ready["modbus"].rpartition(":")
     other = ModbusTcpClient(host, port=int(port))

@@ -1,4 +1,4 @@
-"""A fake label printer in a process of its own, and the driver on its line."""
+"""A fake label printer in a separate process, and the driver on its line."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -28,7 +28,7 @@ def make() -> Iterator[Callable[..., ZplPrinter]]:
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, FakeProcess]]:
-    """One fake per kind for a file's tests: starting one takes longer than most of them."""
+    """Start one fake per kind for all tests of a file, because starting one takes longer than most of them."""
     kinds = {
         "tcp": ("--tcp", "127.0.0.1:0"),
         "pty": ("--link", str(tmp_path_factory.mktemp("dev") / "ttyPRINTER")),
@@ -36,7 +36,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Fake
     }
     fakes = {kind: FakeProcess("label_printer", *options, "--duration", "0.15") for kind, options in kinds.items()}
     for fake in fakes.values():
-        fake.truth()  # opens the control channel, which lives as long
+        fake.truth()  # opens the control channel
     yield fakes
     for fake in fakes.values():
         fake.end()
@@ -44,7 +44,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Fake
 
 @pytest.fixture
 def fake(request: pytest.FixtureRequest, running: dict[str, FakeProcess]) -> FakeProcess:
-    """As delivered; on a pty and silent while it cannot print, or as a test is parametrized: on TCP, or with flags."""
+    """Reset the fake to its factory state: on a pty and silent while it cannot print, or as parametrized."""
     fake = running[getattr(request, "param", "pty")]
     for command in ("unplug", "heal", "plug", "renew"):
         fake.control.do(command)

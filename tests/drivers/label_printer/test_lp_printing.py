@@ -1,4 +1,4 @@
-"""The label printer's driver: each label is printed once and counted, faults are named, nothing is sent again."""
+"""The label printer's driver: labels are printed and counted once, faults are named, nothing is sent twice."""
 
 from collections.abc import Callable
 from typing import Any
@@ -32,14 +32,14 @@ def texts(fake: FakeProcess) -> list[list[str]]:
 
 @on_both
 def test_connecting_only_asks_and_labels_are_printed_once(fake: FakeProcess, printer: ZplPrinter) -> None:
-    printer.connect()  # harmless when connected
+    printer.connect()  # has no effect when connected
     assert printer.identify() == Identity("", "ZT411-203dpi", "99J204200001", "V92.21.39Z")
     assert (printer.status(), printer.counter(), printer.ready()) == ("ready", 0, True)
     assert fake.truth()["received"].count("format") == 0
     assert (printer.connection, printer.health, printer.alarms()) == (Connection.ONLINE, Health.NORMAL, [])
 
     assert printer.print_label("Board", "passed", "PCB-0001") == "printer-1"
-    assert texts(fake) == [["Board", "passed", "PCB-0001"]]  # it is out already when the call returns
+    assert texts(fake) == [["Board", "passed", "PCB-0001"]]  # the label is printed when the call returns
     assert printer.print(LABEL) == "printer-2"
     assert texts(fake)[1:] == [["by hand"]]
     assert printer.labels_printed() == 2
@@ -93,7 +93,7 @@ def test_no_reply_means_media_out_or_head_open(
 ) -> None:
     command, on, off = cause
     fake.control.do(command, **on)
-    for _ in range(2):  # in time, and when the line was given up for it
+    for _ in range(2):  # within the time limit, and after the line was given up
         with pytest.raises(DeviceFault, match="out of labels, its head is open, or the line is broken") as raised:
             printer.print(LABEL)
         assert raised.value.fault_code == "no_reply"
@@ -119,7 +119,7 @@ def test_a_fault_during_printing_leaves_the_label_unconfirmed(
         printer.print(LABEL)
     fake.control.do("media", labels=5)
 
-    # between the look at the status and the printing
+    # between reading the status and printing
     send = printer.line.send
 
     def send_and_pause(data: bytes) -> None:
@@ -178,7 +178,7 @@ def test_nothing_is_sent_again_after_a_loss(
     with pytest.raises(ConnectionLost, match=f"^printer at {fake.ready['port']}: the connection was lost"):
         printer.print(LABEL)
     printer.line.send = send  # type: ignore[method-assign]
-    fake.control.wait_until(lambda truth: truth["counter"] == 1)  # it finished what it had
+    fake.control.wait_until(lambda truth: truth["counter"] == 1)  # it completed the label that it had
     wait_for(lambda: printer.connection, lambda state: state is Connection.LOST)
     assert printer.health is Health.FAILURE
     fake.control.do("plug")

@@ -13,7 +13,7 @@ from tests.fakes.conftest import FakeProcess
 ABOVE = {"position": [0.0, 0.0, 0.8], "orientation": [1.0, 0.0, 0.0, 0.0]}
 BOARD = {"name": "board", "pose": {"position": [0.1, 0.05, 0.03]}, "size": [0.08, 0.05, 0.06], "color": [200, 30, 30]}
 PATIENCE = 40.0
-"""s for the first picture: the fake loads Open3D on a busy machine."""
+"""Time limit for the first picture, s: the fake loads Open3D on a busy machine."""
 
 
 @pytest.fixture(scope="module")

@@ -52,14 +52,14 @@ def test_a_frozen_picture_is_stale(fake: FakeProcess, camera: OakD) -> None:
     wait_for(lambda: camera.alarms())
     assert [alarm.code for alarm in camera.alarms()] == ["frozen"]
     assert camera.health is Health.FAILURE
-    assert camera.connection is Connection.ONLINE  # it sends, after all
+    assert camera.connection is Connection.ONLINE  # it does send pictures
     fake.control.do("heal")
     wait_for(lambda: not camera.alarms())
     wait_for(lambda: fresh(camera))
 
 
 def next_frame(camera: OakD) -> None:
-    """Wait for a frame that shows what was changed before the call."""
+    """Wait for a frame that shows changes made before the call."""
     with contextlib.suppress(DeviceFault):
         camera.trigger()
 
@@ -108,7 +108,7 @@ def test_the_exposure_is_restored_after_a_power_cycle(fake: FakeProcess, camera:
     fake.control.do("power_cycle")
     wait_for(lambda: camera.connection is Connection.BACK)
     assert fake.truth()["exposure"] == pytest.approx(0.005)
-    frame = camera.trigger()  # its clock has begun anew; ages are right all the same
+    frame = camera.trigger()  # its clock restarted; ages are correct nevertheless
     assert time.monotonic() - frame.monotonic < 30.0
 
 
@@ -133,7 +133,7 @@ def test_a_slow_stream_gives_stale_pictures(fake: FakeProcess, camera: OakD) -> 
 
 
 def test_another_protocol_is_refused(fake: FakeProcess, make: Callable[..., OakD]) -> None:
-    control = make(fake.ready["control"])  # it sends nothing before a request
+    control = make(fake.ready["control"])  # this server sends nothing before a request
     with pytest.raises(DeviceTimeout, match=f"^camera at {fake.ready['control']} sends nothing"):
         control.connect(0.5)
     fake.control.do("wrong_checksum")
@@ -154,7 +154,7 @@ kept = camera.trigger(), camera.newest(1.0)
 
 
 def test_a_program_that_does_not_disconnect_ends_cleanly(fake: FakeProcess) -> None:
-    """depthai takes the process down when a pipeline is still there at the interpreter's end."""
+    """depthai terminates the process if a pipeline still exists when the interpreter ends."""
     ended = subprocess.run(
         [sys.executable, "-c", FORGETFUL, fake.ready["stream"]], capture_output=True, text=True, timeout=60
     )
@@ -176,7 +176,7 @@ def test_a_missing_camera_is_reported_at_once(make: Callable[..., OakD], monkeyp
     import depthai as dai
 
     class NoDevice:
-        """Opening a missing device would take 11.5 s."""
+        """A missing device, whose opening would take 11.5 s."""
 
         getAllAvailableDevices = staticmethod(list)  # noqa: N815
 
@@ -218,7 +218,7 @@ def test_a_camera_that_starts_too_late_times_out(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(dai, "Device", Slow)
     with pytest.raises(DeviceTimeout, match=r"^camera at X did not start within 0\.1 s"):
         device_feed.boot("camera at X", dai.DeviceInfo("X"), 0.1)
-    assert Slow.closed.wait(30.0)  # the next driver can open it
+    assert Slow.closed.wait(30.0)  # another driver can open it
 
 
 def test_several_cameras_need_an_identifier(monkeypatch: pytest.MonkeyPatch) -> None:

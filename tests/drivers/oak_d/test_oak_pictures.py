@@ -22,13 +22,13 @@ from .conftest import PATIENCE
 
 
 def in_world(camera: OakD, frame: Frame) -> np.ndarray:
-    """Points of a frame in the world; the camera stands over the table and looks down."""
+    """Return the points of a frame in the world; the camera is above the table and points down."""
     points = camera.point_cloud(frame)
     return np.stack([points[..., 0], -points[..., 1], 0.8 - points[..., 2]], axis=-1)
 
 
 def test_connecting_sets_nothing_and_imports_late(fake: FakeProcess, camera: OakD) -> None:
-    camera.connect()  # harmless when connected
+    camera.connect()  # has no effect when connected
     assert camera.identify() == Identity("Luxonis", "OAK-D (fake)", "FAKE000000000001", "fake 1.0")
     assert (camera.connection, camera.health, camera.alarms()) == (Connection.ONLINE, Health.NORMAL, [])
     assert fake.truth()["received"] == []
@@ -44,12 +44,12 @@ def test_connecting_sets_nothing_and_imports_late(fake: FakeProcess, camera: Oak
         camera.capture()
     fake.control.wait_until(lambda truth: truth["clients"] == 0)
     sent = -1
-    for _ in range(10):  # what was being rendered is finished
+    for _ in range(10):  # pictures being rendered are completed
         before, sent = sent, fake.truth()["frames"]
         if before == sent:
             break
         time.sleep(0.3)
-    assert before == sent  # nobody watches: it does nothing
+    assert before == sent  # without a client it does nothing
     code = "import sys, arcor2_drivers.oak_d.oak_d; sys.exit('depthai' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
@@ -69,24 +69,24 @@ def test_points_match_the_scene(camera: OakD) -> None:
     assert np.nanmedian(table[:, 2]) == pytest.approx(0.0, abs=0.001)
     spread = np.nanstd(table[np.abs(table[:, 2]) < 0.01][:, 2])
     assert 0.0005 < spread < 0.003  # the noise of stereo at 0.8 m
-    # The corner of the picture is bent by the lens: without undistorting, it would be 6 mm elsewhere.
+    # The lens distorts the corner of the picture: without undistortion, it would be off by 6 mm.
     assert camera.color_camera_params is not None
     straight = (10 - camera.color_camera_params.cx) / camera.color_camera_params.fx
     assert abs(rays(camera.color_camera_params, 640, 360)[10, 10, 0] - straight) > 0.003
 
 
 def test_colour_and_depth_are_synchronous(fake: FakeProcess, camera: OakD) -> None:
-    """The board's red and its height are at the same place in every frame, while it wanders."""
+    """The board's red and its height are at the same place in every frame, while it moves."""
     stop = threading.Event()
 
-    def wander() -> None:
+    def move_board() -> None:
         step = 0
         while not stop.wait(0.02):
             step += 1
             x = 0.15 * np.sin(step / 5.0)
             fake.control.do("move", name="board", pose={"position": [float(x), 0.0, 0.03]})
 
-    thread = threading.Thread(target=wander)
+    thread = threading.Thread(target=move_board)
     thread.start()
     try:
         places = []

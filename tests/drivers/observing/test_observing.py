@@ -1,4 +1,4 @@
-"""The life of an observed connection: opened once, lost, restored, stopped at any moment."""
+"""The life cycle of an observed connection: opened once, lost, restored, stopped at any moment."""
 
 import logging
 import threading
@@ -14,7 +14,7 @@ from tests.waiting import wait_for
 
 
 class Line:
-    """A connection that the test breaks and mends."""
+    """A connection that the test breaks and restores."""
 
     def __init__(self) -> None:
         self.refuses = False

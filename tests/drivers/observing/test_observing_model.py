@@ -27,11 +27,11 @@ MAY_FOLLOW = {
     C.BACK: {C.ONLINE, C.LOST, C.OFFLINE},
 }
 PAUSES = (0.004, 0.016)
-"""s: the first and the longest, in these tests."""
+"""First and longest pause between attempts in these tests, s."""
 
 
 class Device:
-    """The other end: reachable or not, holding what the driver has set up at each opening."""
+    """The other end: reachable or not, with the configuration that the driver sends at each opening."""
 
     def __init__(self) -> None:
         self.reachable = True
@@ -83,8 +83,8 @@ DAY = st.lists(st.sampled_from(["start", "stop", "break", "unplug", "plug", "set
 def test_random_events_keep_the_state_machine_valid(day: list[str], quick: None) -> None:
     device = Device()
     life = device.life
-    told = Told()
-    with told:
+    logged = LogCounter()
+    with logged:
         try:
             for event in day:
                 live(device, event)
@@ -95,15 +95,15 @@ def test_random_events_keep_the_state_machine_valid(day: list[str], quick: None)
     for before, after in itertools.pairwise(steps):
         assert after in MAY_FOLLOW[before], f"{before} -> {after} in {device.path}, day {day}"
     count = Counter(device.path)
-    assert told.count == {"lost": count[C.LOST], "back": count[C.BACK]}, "a loss, and a return, is logged once"
-    assert len(device.losses) == count[C.LOST], "the driver is told of a loss once"
+    assert logged.count == {"lost": count[C.LOST], "back": count[C.BACK]}, "each loss and each return is logged once"
+    assert len(device.losses) == count[C.LOST], "the driver is notified of a loss once"
     assert life.state is C.OFFLINE
     assert not device.is_open
     assert not [t for t in threading.enumerate() if t.name == "observing line 7"]
 
 
 def live(device: Device, event: str) -> None:
-    """Let one thing happen, and wait for what has to follow."""
+    """Cause one event, and wait for its effect."""
     life = device.life
     reachable = device.reachable and device.fails_with is None
     match event:
@@ -135,7 +135,7 @@ def live(device: Device, event: str) -> None:
             if life.state is C.LOST:
                 device.until(lambda: life.state is C.BACK)
         case "settle":
-            device.until(lambda: not device.path or device.path[-1] is life.state)  # it is told after it is so
+            device.until(lambda: not device.path or device.path[-1] is life.state)  # it notifies after the change
             was = life.state
             life.settled()
             assert life.state is (C.ONLINE if was is C.BACK else was)
@@ -150,12 +150,12 @@ def live(device: Device, event: str) -> None:
 def check(device: Device) -> None:
     if device.life.online:
         assert device.is_open
-        assert device.recipe == "x, y at 100 Hz", "what was set up is there again whenever the connection is"
+        assert device.recipe == "x, y at 100 Hz", "the configuration is complete whenever the connection is up"
     assert bool(device.life.reason) <= (device.life.state in (C.LOST, C.FAILED))
 
 
-class Told(logging.Handler):
-    """Counts what the state machine logs of losses and returns."""
+class LogCounter(logging.Handler):
+    """Counts the losses and returns that the state machine logs."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""A fake PLC in a process of its own, and the drivers on its wire."""
+"""A fake PLC in a separate process, and the drivers connected to it."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -23,7 +23,7 @@ POINTS = (
 
 
 class BackgroundCall:
-    """A call on a thread of its own."""
+    """A call in its own thread."""
 
     def __init__(self, call: Callable[[], object]) -> None:
         self.result: object = None
@@ -45,14 +45,14 @@ class BackgroundCall:
 @pytest.fixture(scope="module")
 def one_fake() -> Iterator[FakeProcess]:
     fake = FakeProcess("opcua_plc", "--time-scale", "5")
-    fake.truth()  # opens the control channel, which lives as long
+    fake.truth()  # opens the control channel
     yield fake
     fake.end()
 
 
 @pytest.fixture
 def fake(one_fake: FakeProcess) -> FakeProcess:
-    """A PLC as switched on; one process serves a whole module, for it takes 2 s of a processor to start."""
+    """Reset a PLC that was just switched on. One process serves all tests of a file, because a start takes 2 s."""
     one_fake.control.do("heal")
     one_fake.control.do("restart")
     return one_fake
@@ -60,7 +60,7 @@ def fake(one_fake: FakeProcess) -> FakeProcess:
 
 @pytest.fixture
 def make() -> Iterator[Callable[..., OpcUaPlc]]:
-    """Gives ``make("opc.tcp://127.0.0.1:4000", host_number=2)``: a driver, not connected."""
+    """Return ``make("opc.tcp://127.0.0.1:4000", host_number=2)``: an unconnected driver."""
     made: list[OpcUaPlc] = []
 
     def build(url: str, **settings: Any) -> OpcUaPlc:

@@ -1,4 +1,4 @@
-"""Authentication, and a server that has lost a node."""
+"""Authentication, and a server that lost a node."""
 
 from collections.abc import Callable
 from pathlib import Path

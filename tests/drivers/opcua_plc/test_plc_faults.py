@@ -47,7 +47,7 @@ def test_a_loss_during_a_job(
     with pytest.raises(NotInControl, match="control ended when the connection was lost"):
         plc.write_digital("lamp", True)
     time.sleep(0.3)
-    assert not fake.truth()["moving"], "it went on by itself"
+    assert not fake.truth()["moving"], "it continued by itself"
     fake.control.do("set", name="PartPresent", value=True)
     wait_for(lambda: [edge.value for edge in edges], lambda values: values == [True])
     fake.control.wait_until(lambda t: t["owner"] == 0)
@@ -101,7 +101,7 @@ def test_outputs_and_job_end_with_the_life_sign(fake: FakeProcess) -> None:
 def test_the_life_sign_continues_during_a_long_job(fake: FakeProcess, plc: OpcUaPlc) -> None:
     running = BackgroundCall(lambda: plc.run_job(3))
     fake.control.wait_until(lambda t: t["moving"])
-    time.sleep(2.2)  # twice the PLC's patience
+    time.sleep(2.2)  # twice the PLC's time limit
     assert fake.truth()["moving"]
     assert plc.control_owner() == "us"
     plc.stop()
@@ -131,7 +131,7 @@ def test_a_stopped_plc_program_makes_values_stale(fake: FakeProcess, plc: OpcUaP
 
 
 def test_a_power_cycle_ends_control(fake: FakeProcess, plc: OpcUaPlc, wait_for: Any) -> None:
-    fake.control.do("restart")  # quicker than the connection notices
+    fake.control.do("restart")  # faster than the driver notices the loss
     wait_for(plc.control_owner, lambda owner: owner is None)
     with pytest.raises(NotInControl, match="taken control away"):
         plc.write_digital("lamp", True)

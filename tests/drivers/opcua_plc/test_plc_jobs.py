@@ -1,4 +1,4 @@
-"""Jobs and control: the handshake step by step, errors by their code, one owner at a time."""
+"""Jobs and control: the handshake step by step, errors with their code, one owner at a time."""
 
 import time
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from tests.fakes.conftest import FakeProcess
 
 
 def handshake(fake: FakeProcess) -> list[tuple[str, Any]]:
-    """Give what the host wrote of the handshake, but its life sign."""
+    """Return what the host wrote of the handshake, without its life sign."""
     written = [tuple(each) for each in fake.truth()["written"]]
     return [(name.removeprefix("Handshake."), value) for name, value in written if "HostLife" not in name]
 
@@ -65,7 +65,7 @@ def test_a_job_is_stopped(fake: FakeProcess, plc: OpcUaPlc) -> None:
     with pytest.raises(Refused, match=r"is busy \(job 3\): job 1 has to wait"):
         plc.run_job(1)
     plc.stop()
-    assert not fake.truth()["moving"], "stop returned before it stood"
+    assert not fake.truth()["moving"], "stop returned before standstill"
     assert isinstance(running.outcome(), Cancelled)
     assert fake.truth()["points"]["Valve"] is True, "a stop switched an output"
     plc.run_job(1)
@@ -117,7 +117,7 @@ def test_control_is_released(fake: FakeProcess, plc: OpcUaPlc) -> None:
     assert (truth["owner"], truth["points"]["Lamp"]) == (0, True)
     life = truth["host_life"]
     time.sleep(0.5)
-    assert fake.truth()["host_life"] == life, "it gives a life sign without control"
+    assert fake.truth()["host_life"] == life, "it sends a life sign without control"
     plc.take_control()
     plc.disconnect()
     assert fake.truth()["owner"] == 0

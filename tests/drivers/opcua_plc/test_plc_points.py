@@ -52,7 +52,7 @@ def test_values_carry_the_source_time(fake: FakeProcess, observed: OpcUaPlc) -> 
     time.sleep(3.0)
     reading = observed.read("level")
     assert before <= datetime.fromisoformat(reading.stamp) <= after
-    assert reading.age < 2.9, "its age is that of the question, not of the change"
+    assert reading.age < 2.9, "the age counts from the request, not from the change"
     assert reading.quality is Quality.GOOD
 
 
@@ -70,7 +70,7 @@ def test_quality_comes_from_the_status(
 ) -> None:
     fake.control.do("quality", name="Level", status=status)
     try:
-        if quality is Quality.BAD:  # a server tells no value then
+        if quality is Quality.BAD:  # a server sends no value then
             with pytest.raises(DeviceFault, match=f"plc at opc.tcp.*level has no value: {status}") as fault:
                 observed.read_analog("level")
             assert fault.value.fault_code == status

@@ -1,4 +1,4 @@
-"""A fake block in a process of its own, and the drivers on its wire."""
+"""A fake block in a separate process, and the drivers connected to it."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -21,21 +21,21 @@ POINTS = (
 @pytest.fixture(scope="module")
 def one_fake() -> Iterator[FakeProcess]:
     fake = FakeProcess("remote_io")
-    fake.truth()  # opens the control channel, which lives as long
+    fake.truth()  # opens the control channel
     yield fake
     fake.end()
 
 
 @pytest.fixture
 def fake(one_fake: FakeProcess) -> FakeProcess:
-    """A block as delivered; one process serves the tests of a file."""
+    """Reset the block to its factory state. One process serves all tests of a file."""
     one_fake.control.do("renew")
     return one_fake
 
 
 @pytest.fixture
 def make() -> Iterator[Callable[..., RemoteIO]]:
-    """Gives ``make("127.0.0.1:4000", watchdog_ms=500)``: a driver, not connected; it is disconnected in the end."""
+    """Return ``make("127.0.0.1:4000", watchdog_ms=500)``: an unconnected driver; the fixture disconnects it."""
     made: list[RemoteIO] = []
 
     def build(address: str, **settings: Any) -> RemoteIO:

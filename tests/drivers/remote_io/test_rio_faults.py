@@ -40,7 +40,7 @@ QUICK: dict[str, Any] = {"request_timeout": 0.1, "watchdog_ms": 400}
 
 @pytest.fixture
 def quick(fake: FakeProcess, make: Callable[..., RemoteIO]) -> RemoteIO:
-    """A driver that gives up soon, in control, with all three kinds of outputs other than on loss."""
+    """Return a driver with short time limits, in control, with all outputs different from their states after a loss."""
     block = in_control(make(fake.ready["modbus"], **QUICK))
     block.write_digital("lamp", True)
     block.write_digital("valve", True)
@@ -52,10 +52,10 @@ def expired(truth: dict[str, Any]) -> bool:
 
 
 # ------------------------------------------------------------------------------------------------ connecting
-def test_importing_pymodbus_is_no_time_of_the_block(
+def test_importing_pymodbus_does_not_count_as_response_time(
     fake: FakeProcess, make: Callable[..., RemoteIO], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The import takes seconds on a busy computer. Requests are limited to a quarter of the rest of the time."""
+    """The import takes seconds on a busy computer. Requests are limited to a quarter of the remaining time."""
     imports, limits = 0.0, []
 
     def load(_: ModbusLink) -> None:
@@ -99,7 +99,7 @@ def test_wrong_unit_is_refused_by_name(fake: FakeProcess, make: Callable[..., Re
         make(fake.ready["modbus"], unit_id=7).connect(1.0)
 
 
-# ------------------------------------------------------------------------------------------------ losses
+# ------------------------------------------------------------------------------------------------ connection losses
 @pytest.mark.parametrize("fault", ["reset", "silence", "half_frame", "garbage"])
 def test_a_loss_and_its_recovery(fake: FakeProcess, quick: RemoteIO, wait_for: Callable[..., Any], fault: str) -> None:
     edges: list[Any] = []
@@ -108,14 +108,14 @@ def test_a_loss_and_its_recovery(fake: FakeProcess, quick: RemoteIO, wait_for: C
     began = time.monotonic()
     fake.control.do(fault)
     if fault == "reset":
-        fake.control.do("refuse")  # what comes back at once is the next test's
+        fake.control.do("refuse")  # the next test covers a connection that returns at once
     thread.join(30.0)
     assert isinstance(outcome[0], ConnectionLost)
     assert fake.ready["modbus"] in str(outcome[0])
     assert outcome[1] - began < 1.5
     with pytest.raises(ConnectionLost):
         quick.write_digital("lamp", False)
-    # The block itself puts the outputs into their safe state, and nothing brings them back.
+    # The block itself sets the outputs to their safe state, and nothing restores them.
     truth = wait_for(fake.truth, expired)
     assert truth["outputs"][4:7] == [False, True, True]
     fake.control.do("heal")
@@ -128,7 +128,7 @@ def test_a_loss_and_its_recovery(fake: FakeProcess, quick: RemoteIO, wait_for: C
     assert fake.truth()["outputs"][4:7] == [False, True, True]
     quick.write_digital("lamp", True)
     fake.control.do("set_input", number=0, on=True)
-    wait_for(lambda: len(edges), lambda count: count == 1)  # subscriptions outlive a loss
+    wait_for(lambda: len(edges), lambda count: count == 1)  # subscriptions survive a connection loss
 
 
 def test_control_does_not_come_back_after_a_short_loss(
@@ -145,7 +145,7 @@ def test_control_does_not_come_back_after_a_short_loss(
 def test_a_power_cycle_of_the_block_ends_control(
     start_fake: Callable[..., FakeProcess], make: Callable[..., RemoteIO], wait_for: Callable[..., Any]
 ) -> None:
-    """On a serial line nothing breaks; the watchdog that is off tells it."""
+    """On a serial line nothing disconnects; the stopped watchdog reveals it."""
     fake = start_fake("remote_io", "--serial")
     block = make(fake.ready["modbus"], baudrate=115200)
     block.connect()
@@ -165,7 +165,7 @@ def test_a_power_cycle_of_the_block_ends_control(
 def test_a_block_whose_watchdog_does_not_start_is_not_controlled(
     fake: FakeProcess, make: Callable[..., RemoteIO], watchdog: int
 ) -> None:
-    """Nothing is switched on that the block would not switch off without us."""
+    """No output is switched on that the block could not switch off by itself."""
     block = make(fake.ready["modbus"], watchdog=watchdog)
     block.connect()
     fake.control.do("watchdogs_start", on=False)
@@ -195,7 +195,7 @@ def test_a_watchdog_that_stops_ends_control(fake: FakeProcess, quick: RemoteIO, 
 def test_a_pulse_ends_during_a_connection_loss(
     fake: FakeProcess, make: Callable[..., RemoteIO], wait_for: Callable[..., Any]
 ) -> None:
-    block = make(fake.ready["modbus"], watchdog_ms=5000)  # the pulse is over long before
+    block = make(fake.ready["modbus"], watchdog_ms=5000)  # the pulse ends long before the watchdog expires
     block.connect()
     block.take_control()
     thread, outcome = in_thread(lambda: block.pulse("valve", 2.0))
@@ -208,7 +208,7 @@ def test_a_pulse_ends_during_a_connection_loss(
 
 
 def test_a_late_answer_to_a_reading(relay: Relay, make: Callable[..., RemoteIO]) -> None:
-    """The reading is repeated on a new connection; the late answer finds nobody; nothing counts as lost."""
+    """The reading is repeated on a new connection; the late answer is ignored; no connection loss is reported."""
     block = in_control(make(relay.address, request_timeout=0.2))
     relay.delay_next(READ_IMAGE, 0.4)
     assert block.read_digital("part") is False
@@ -219,13 +219,13 @@ def test_a_late_answer_to_a_reading(relay: Relay, make: Callable[..., RemoteIO])
 
 
 def test_a_late_answer_to_a_write(relay: Relay, make: Callable[..., RemoteIO], fake: FakeProcess) -> None:
-    """A write is sent once; what became of it is said to be unknown; its late answer answers nothing."""
+    """A write is sent once; its outcome is reported as unknown; its late answer is ignored."""
     block = in_control(make(relay.address, request_timeout=0.2))
     relay.delay_next(WRITE_COIL, 0.4)
     with pytest.raises(DeviceTimeout, match=f"^block at {relay.address}: .*coil 4 on.* it may have been executed$"):
         block.write_digital("lamp", True)
     assert relay.requests[WRITE_COIL] == 1
-    assert fake.truth()["outputs"][4] is True  # it was
+    assert fake.truth()["outputs"][4] is True  # it was executed
     block.write_digital("lamp", False)
     assert fake.truth()["outputs"][4] is False
     assert block.control_owner() == "us"
@@ -237,7 +237,7 @@ def test_another_host_taking_the_watchdog_ends_control(
     host, _, port = fake.ready["modbus"].rpartition(":")
     client = ModbusTcpClient(host, port=int(port))
     try:
-        for number in itertools.count(1):  # as often as it takes to come between two triggers of ours
+        for number in itertools.count(1):  # repeat until a write falls between two triggers of the driver
             client.write_register(65, number, device_id=1)
             if quick.control_owner() != "us":
                 break
@@ -276,7 +276,7 @@ def test_outputs_become_safe_when_the_process_is_killed(
     watcher.connect()
     with host_process(HOST, fake.ready["modbus"], POINTS) as process:
         wait_for(fake.truth, lambda truth: truth["analog_outputs"][0] == 100)
-        time.sleep(1.0)  # more than twice the watchdog's time: the driver feeds it
+        time.sleep(1.0)  # more than twice the watchdog's time: the driver triggers it
         assert fake.truth()["outputs"][4:7] == [True, True, False]
         process.kill()
         truth = wait_for(fake.truth, expired)

@@ -1,4 +1,4 @@
-"""The remote I/O block on a working wire: points, edges, pulses, control; TCP and RTU."""
+"""The remote I/O block on an intact wire: points, edges, pulses, control; TCP and RTU."""
 
 import termios
 import threading
@@ -31,7 +31,7 @@ from tests.fakes.conftest import FakeProcess
 
 
 def in_thread(call: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]:
-    """Start the call; the list will hold what it gave or raised, and when."""
+    """Start the call in a thread; the list gets its result or exception, and the time."""
     outcome: list[Any] = []
 
     def run() -> None:
@@ -162,7 +162,7 @@ def test_edges_are_debounced_and_reported_in_order(
     edges: list[Edge] = []
 
     def broken(edge: Edge) -> None:
-        raise RuntimeError("a listener that fails harms nobody else")
+        raise RuntimeError("a failing listener does not affect the others")
 
     observed.subscribe("door", broken)
     end = observed.subscribe("door", edges.append)
@@ -186,7 +186,7 @@ def test_wait_for_returns_at_the_condition(fake: FakeProcess, observed: RemoteIO
     with pytest.raises(DeviceTimeout, match=r"part becoming off took longer than 0.05 s"):
         observed.wait_for("part", False, 0.05)
     thread, outcome = in_thread(lambda: observed.wait_for("part", False, 60.0))
-    while thread.is_alive():  # a stop from before it began to wait would not count
+    while thread.is_alive():  # a stop from before the wait has no effect
         observed.stop()
         time.sleep(0.01)
     assert isinstance(outcome[0], Cancelled)
@@ -226,7 +226,7 @@ def test_a_stopped_pulse_switches_off(fake: FakeProcess, block: RemoteIO, wait_f
     with pytest.raises(Refused, match=r"pulsing lamp is refused while it is being pulsed$"):
         block.pulse("lamp", 0.05)
     block.stop()
-    outputs = fake.truth()["outputs"]  # when stop returns it is off, whatever the other thread has come to
+    outputs = fake.truth()["outputs"]  # off when stop returns, at any progress of the other thread
     thread.join(30.0)
     assert isinstance(outcome[0], Cancelled)
     assert (outputs[4], outputs[5]) == (False, True)  # a stop switches nothing else

@@ -63,7 +63,7 @@ def test_colours_blink(fake: FakeProcess, tower: TowerLight, wait_for: Callable[
     count = len(fake.truth()["history"])
     tower.buzz(0.3)
     after = fake.truth()["history"][count:]
-    assert [(change["output"], change["on"]) for change in after] == [(3, True), (3, False)]  # nothing blinks any more
+    assert [(change["output"], change["on"]) for change in after] == [(3, True), (3, False)]  # no lamp blinks any more
 
 
 def test_patterns_follow_states(fake: FakeProcess, tower: TowerLight, wait_for: Callable[..., Any]) -> None:
@@ -73,7 +73,7 @@ def test_patterns_follow_states(fake: FakeProcess, tower: TowerLight, wait_for: 
     tower.show_state(MachineStateName.ABORTED)
     wait_for(lambda: lamps(fake), lambda lit: lit == [False, False, False])
     wait_for(lambda: lamps(fake), lambda lit: lit == [True, False, False])
-    with pytest.raises(OutOfRange, match="no pattern for the state idle"):  # it wants a white lamp
+    with pytest.raises(OutOfRange, match="no pattern for the state idle"):  # that pattern needs a white lamp
         tower.show_state(MachineStateName.IDLE)
     assert {state.value for state in MachineStateName} == {state.name.lower() for state in MachineState}
 
@@ -120,7 +120,7 @@ def test_a_tower_light_and_a_block_share_a_device(
 
 
 @pytest.mark.parametrize(
-    ("settings", "told"),
+    ("settings", "problem"),
     [
         ({}, "^one of red, amber, green, blue, white must be the output of a lamp"),
         ({"red": "DI0"}, "^red must be a digital output"),
@@ -134,6 +134,6 @@ def test_a_tower_light_and_a_block_share_a_device(
         ({"red": "DO1", "patterns": "idle=green blinking"}, "^patterns: 'green' for idle is not one of red, off"),
     ],
 )
-def test_tower_settings_name_the_parameter(settings: dict[str, Any], told: str) -> None:
-    with pytest.raises(OutOfRange, match=told):
+def test_tower_settings_name_the_parameter(settings: dict[str, Any], problem: str) -> None:
+    with pytest.raises(OutOfRange, match=problem):
         TowerLightSettings(host="127.0.0.1", **settings)

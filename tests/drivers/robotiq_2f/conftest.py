@@ -24,7 +24,7 @@ def running() -> Iterator[FakeProcess]:
 
 @pytest.fixture
 def fake(running: FakeProcess) -> FakeProcess:
-    """As if it had just been switched on."""
+    """Reset the fake as if it was just switched on."""
     running.control.do("heal")
     running.control.do("remove_part")
     running.control.do("block", on=False)
@@ -35,7 +35,7 @@ def fake(running: FakeProcess) -> FakeProcess:
 
 @pytest.fixture
 def make() -> Iterator[Callable[..., Robotiq2F]]:
-    """Gives ``make("127.0.0.1:4000", request_timeout=0.2)``: a driver, not connected; disconnected in the end."""
+    """Return ``make("127.0.0.1:4000", request_timeout=0.2)``: an unconnected driver; the fixture disconnects it."""
     made: list[Robotiq2F] = []
 
     def build(address: str, **settings: Any) -> Robotiq2F:
@@ -58,13 +58,13 @@ def observed(fake: FakeProcess, make: Callable[..., Robotiq2F]) -> Robotiq2F:
 
 @pytest.fixture
 def gripper(fake: FakeProcess, observed: Robotiq2F) -> Robotiq2F:
-    """In control and activated."""
+    """Take control and activate."""
     make_ready(fake, observed)
     return observed
 
 
 def make_ready(fake: FakeProcess, gripper: Robotiq2F) -> None:
-    """Take control and activate, quicker than anything after it."""
+    """Take control and activate, faster than the motions of the tests."""
     fake.control.do("pace", factor=100.0)
     gripper.take_control()
     gripper.activate()

@@ -1,6 +1,6 @@
-"""Modbus RTU against the frames of the 2F manual's own example (activate, grip, open), quoted byte for byte.
+"""Modbus RTU compared with the 2F manual's own example frames (activate, grip, open), byte for byte.
 
-The manual was not at hand: the frames are quoted from general knowledge of it, and their CRCs are right.
+The frames are quoted from general knowledge of the manual, which was not available; their CRCs are valid.
 """
 
 import os
@@ -95,6 +95,6 @@ def test_the_fake_answers_as_in_the_example_of_the_manual(fake: FakeProcess, wai
         assert ask(CLOSE, 8) == WRITTEN
         fake.control.wait_until(lambda truth: truth["registers"]["OBJ"] == 2)
         answer = bytes.fromhex(ask(ASK_STATUS, 11))
-        assert answer[:8].hex(" ").upper() == GRIPPED[:23], "gCU, the current, is the fake's own"
+        assert answer[:8].hex(" ").upper() == GRIPPED[:23], "gCU, the current, differs from the manual"
     finally:
         os.close(descriptor)

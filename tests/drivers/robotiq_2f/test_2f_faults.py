@@ -1,4 +1,4 @@
-"""Faults of the wire of the 2F gripper: absent, silent, reset, half a frame, garbage, slow; loss and recovery."""
+"""Faults of the 2F gripper's wire: absent, silent, reset, half a frame, garbage, slow; connection loss and recovery."""
 
 import socket
 from collections.abc import Callable
@@ -71,7 +71,7 @@ def test_a_wire_fault_during_a_grip_is_a_loss_and_recovers(
 
 
 def test_invalid_answers_are_typed_errors(make: Callable[..., Robotiq2F]) -> None:
-    """A listener that answers each question with the next of a row of wrong answers."""
+    """A listener that answers each request with the next wrong answer of a list."""
     for answer in (b"POS 3\n", b"ACT 999\n", b"?\n", b"\xff\xff\xff\n", b"A" * 200, b"ACT x\n", b"ACT"):
         with socket.create_server(("127.0.0.1", 0)) as server:
             server.settimeout(5.0)
@@ -82,7 +82,7 @@ def test_invalid_answers_are_typed_errors(make: Callable[..., Robotiq2F]) -> Non
                     client.settimeout(5.0)
                     client.recv(100)
                     client.sendall(answer)
-                    client.recv(100)  # until it is closed
+                    client.recv(100)  # until the driver closes it
 
             thread, _ = in_background(serve)
             gripper = make(f"127.0.0.1:{server.getsockname()[1]}", request_timeout=0.1)
@@ -99,4 +99,4 @@ def test_disconnecting_ends_a_waiting_call(fake: FakeProcess, gripper: Robotiq2F
     thread.join(30.0)
     assert isinstance(outcome[0], DeviceError)
     fake.control.do("pace", factor=50.0)
-    wait_for(lambda: fake.truth()["registers"]["OBJ"] == 3)  # it finishes, and holds
+    wait_for(lambda: fake.truth()["registers"]["OBJ"] == 3)  # it completes the motion and holds

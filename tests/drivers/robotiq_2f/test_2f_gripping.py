@@ -30,7 +30,7 @@ from tests.fakes.conftest import FakeProcess
 
 
 def in_background(call: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]:
-    """Run a call in a thread; the list holds what it gave or raised."""
+    """Run a call in a thread; the list gets its result or its exception."""
     outcome: list[Any] = []
 
     def run() -> None:
@@ -48,7 +48,7 @@ def test_connecting_and_taking_control_write_nothing(fake: FakeProcess, make: Ca
     commands = fake.truth()["count"]
     observed = make(fake.ready["ascii"])
     observed.connect()
-    observed.connect()  # harmless when connected
+    observed.connect()  # has no effect when connected
     assert observed.connection is Connection.ONLINE
     assert observed.state() is GripperState.INACTIVE
     assert observed.control_owner() is None
@@ -70,7 +70,7 @@ def test_connecting_and_taking_control_write_nothing(fake: FakeProcess, make: Ca
 def test_a_complete_cycle(fake: FakeProcess, gripper: Robotiq2F) -> None:
     assert gripper.state() is GripperState.AT_POSITION
     commands = fake.truth()["count"]
-    gripper.activate()  # harmless when activated
+    gripper.activate()  # has no effect when activated
     assert fake.truth()["count"] == commands
 
     fake.control.do("put_part", width=0.04)
@@ -122,7 +122,7 @@ def test_the_gripped_part_is_attached_to_the_robot(
     (part,) = robot.parts.values()
     assert part.name == "part of gripper"
     assert isinstance(part.model, Box)
-    assert part.model.size_x == pytest.approx(0.036, abs=1e-3)  # the width that was gripped
+    assert part.model.size_x == pytest.approx(0.036, abs=1e-3)  # the width at which it was gripped
     assert part.in_link.position.z + part.model.size_z / 2.0 <= 0.0, "between the fingers, not beyond"
     gripper.set_part(0.05, 0.06, 0.07)
     gripper.grip(0.0, speed=0.15)

@@ -56,7 +56,7 @@ def rtu(fake: FakeProcess, make_rtu: Callable[..., Robotiq2F]) -> Robotiq2F:
 
 
 def test_registers() -> None:
-    """The meaning of each bit, by the table in docs/devices/robotiq-2f.md."""
+    """The meaning of each bit, according to the table in docs/devices/robotiq-2f.md."""
     assert encode(Command(act=False, go_to=False), [0, 0, 0]) == [0x0000, 0x0000, 0x0000]
     assert encode(Command(go_to=False), [0, 0, 0]) == [0x0100, 0x0000, 0x0000]
     assert encode(Command(position=255, speed=255, force=255), [0, 0, 0]) == [0x0900, 0x00FF, 0xFFFF]
@@ -134,7 +134,7 @@ def test_disconnecting_from_a_silent_line_ends_the_request(make_rtu: Callable[..
     try:
         gripper = make_rtu(os.ttyname(hosts), request_timeout=5.0)
         thread, outcome = in_background(gripper.connect)
-        os.read(ours, 100)  # the question has come
+        os.read(ours, 100)  # the request has arrived
         gripper._gripper.close()
         thread.join(30.0)
         assert isinstance(outcome[0], DeviceError)
@@ -144,7 +144,7 @@ def test_disconnecting_from_a_silent_line_ends_the_request(make_rtu: Callable[..
 
 
 def test_fake_answers_byte_for_byte(fake: FakeProcess) -> None:
-    """Raw frames; their checksums are computed by the library's framer, in a process of its own from the fake."""
+    """Raw frames; their checksums are computed by the library's framer, in another process than the fake."""
     port = os.open(fake.ready["rtu"], os.O_RDWR | os.O_NOCTTY)
 
     def framed(body: bytes) -> bytes:

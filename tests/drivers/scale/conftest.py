@@ -1,4 +1,4 @@
-"""A fake scale in a process of its own, and the driver on its line."""
+"""A fake scale in a separate process, and the driver on its line."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -28,12 +28,12 @@ def make() -> Iterator[Callable[..., MtSicsScale]]:
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, FakeProcess]]:
-    """One fake per kind of line for a file's tests: starting one takes longer than most of them."""
+    """Start one fake per kind of line for all tests of a file, because starting one takes longer than most of them."""
     lines = {"pty": ("--link", str(tmp_path_factory.mktemp("dev") / "ttySCALE")), "tcp": ("--tcp", "127.0.0.1:0")}
     common = ("--settling", "0.2", "--stability-timeout", "0.6")
     fakes = {kind: FakeProcess("scale", *line, *common) for kind, line in lines.items()}
     for fake in fakes.values():
-        fake.truth()  # opens the control channel, which lives as long
+        fake.truth()  # opens the control channel
     yield fakes
     for fake in fakes.values():
         fake.end()
@@ -41,7 +41,7 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Fake
 
 @pytest.fixture
 def fake(request: pytest.FixtureRequest, running: dict[str, FakeProcess]) -> FakeProcess:
-    """As delivered, on a pty; on TCP for a test that is parametrized with it."""
+    """Reset the fake to its factory state, on a pty or (if parametrized) on TCP."""
     fake = running[getattr(request, "param", "pty")]
     for command in ("unplug", "heal", "plug", "renew"):
         fake.control.do(command)

@@ -29,7 +29,7 @@ from arcor2_drivers.scale.sics import LONGEST_LINE, Answer, answers
 )
 def test_a_line_is_read(line: bytes, meaning: Answer) -> None:
     assert answers(line + b"\r\n") == [meaning]
-    assert answers(b"noise\r\n" + line + b"\r\n" + line) == [meaning]  # the last one is not complete
+    assert answers(b"noise\r\n" + line + b"\r\n" + line) == [meaning]  # the last line is incomplete
 
 
 @pytest.mark.parametrize(

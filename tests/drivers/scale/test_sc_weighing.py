@@ -1,4 +1,4 @@
-"""The scale's driver on a fake: weighing at standstill, refusals by name, never a stale value, recovery."""
+"""The scale's driver on a fake: weighing at standstill, named refusals, no stale values, recovery."""
 
 import threading
 import time
@@ -32,7 +32,7 @@ on_both = pytest.mark.parametrize("fake", ["pty", "tcp"], indirect=True)
 def test_connecting_only_reads_and_a_cycle_weighs(
     fake: FakeProcess, scale: MtSicsScale, wait_for: Callable[..., Any]
 ) -> None:
-    scale.connect()  # harmless when connected
+    scale.connect()  # has no effect when connected
     assert scale.identify() == Identity("", "MS3002S 3.2 kg", "B021002593", "2.10 10.28.0.493.142")
     wait_for(lambda: "SI" in fake.truth()["received"])
     assert set(fake.truth()["received"]) <= {"I2", "I3", "I4", "SI", "TA"}
@@ -41,7 +41,7 @@ def test_connecting_only_reads_and_a_cycle_weighs(
     fake.control.do("put", kg=0.25)
     began = time.monotonic()
     reading = scale.weigh()
-    assert reading.value == 0.25  # and not what it showed on the way there
+    assert reading.value == 0.25  # and not an intermediate value
     assert reading.monotonic >= began
     scale.tare()
     assert fake.truth()["tare"] == pytest.approx(0.25)
@@ -138,7 +138,7 @@ def test_weights_out_of_range_are_errors(fake: FakeProcess, scale: MtSicsScale, 
 
 @pytest.mark.parametrize(("code", "words"), [("ES", "does not know"), ("ET", "damaged"), ("EL", "parameter")])
 def test_errors_of_the_scale_are_reported(fake: FakeProcess, scale: MtSicsScale, code: str, words: str) -> None:
-    with scale.line.held():  # else the look every 0.5 s could get the error
+    with scale.line.held():  # else the poll every 0.5 s could get the error
         fake.control.do("error", code=code)
         with pytest.raises(DeviceFault, match=words) as raised:
             scale.weigh()
@@ -194,7 +194,7 @@ def test_unplugging_and_reconnecting(fake: FakeProcess, scale: MtSicsScale, wait
         scale.weigh()
     fake.control.do("plug")
     wait_for(lambda: scale.connection, lambda state: state is Connection.BACK)
-    assert scale.weight() == 0.0  # the tare is still there
+    assert scale.weight() == 0.0  # the tare still applies
     assert [word for word in fake.truth()["received"] if word in ("T", "Z", "@")] == before
     assert scale.connection is Connection.ONLINE
 
@@ -224,7 +224,7 @@ def test_a_late_answer_is_discarded(fake: FakeProcess, scale: MtSicsScale, wait_
         fake.control.do("heal")
         fake.control.do("put", kg=0.7)
     wait_for(lambda: scale.connection, lambda state: state is Connection.BACK)
-    assert scale.weight() == 0.7  # the late zero was not taken for it
+    assert scale.weight() == 0.7  # the late zero was not used as its answer
 
 
 @pytest.mark.parametrize("port", ["/dev/does-not-exist", "socket://127.0.0.1:1"])

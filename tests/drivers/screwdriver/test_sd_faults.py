@@ -1,4 +1,4 @@
-"""The screwdriver's driver when controller and network misbehave: framing, lost messages, reboot, several clients."""
+"""The screwdriver's driver with faults of controller and network: framing, lost messages, reboot, several clients."""
 
 import socket
 import subprocess

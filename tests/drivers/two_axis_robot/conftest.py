@@ -16,12 +16,12 @@ __all__ = ["start_fake", "wait_for"]
 
 
 def moving(fake: FakeProcess) -> None:
-    """Return when both joints really move."""
+    """Wait until both joints really move."""
     fake.control.wait_until(lambda t: all(abs(servo["speed"]) > 0.1 for servo in t["servos"].values()))
 
 
 def standing(truth: Any) -> bool:
-    return all(abs(servo["velocity"]) <= 0.5 for servo in truth["servos"].values())  # as a servo tells 0
+    return all(abs(servo["velocity"]) <= 0.5 for servo in truth["servos"].values())  # a servo's resolution
 
 
 @pytest.fixture
@@ -46,7 +46,7 @@ def fake(start_fake: Callable[..., FakeProcess], tmp_path: Path) -> FakeProcess:
 
 @pytest.fixture
 def robot(fake: FakeProcess, make: Callable[..., TwoAxisRobot]) -> TwoAxisRobot:
-    """Connected, control not taken."""
+    """Connect without taking control."""
     robot = make(fake.ready["port"])
     robot.connect()
     return robot
@@ -54,6 +54,6 @@ def robot(fake: FakeProcess, make: Callable[..., TwoAxisRobot]) -> TwoAxisRobot:
 
 @pytest.fixture
 def ready(robot: TwoAxisRobot) -> TwoAxisRobot:
-    """Connected and controlled."""
+    """Connect and take control."""
     robot.take_control()
     return robot

@@ -22,7 +22,7 @@ from .test_two_axis_faults import FAR, KILLED
 
 @pytest.fixture
 def owner(fake: FakeProcess) -> Iterator["subprocess.Popen[bytes]"]:
-    """Another process that has a long move of the arm under way."""
+    """Start another process that moves the arm over a long distance."""
     command = [sys.executable, "-c", KILLED, fake.ready["port"]]
     with subprocess.Popen(command, cwd=Path(__file__).parents[3]) as process:
         fake.control.wait_until(lambda t: t["servos"]["1"]["speed"] > 0.5)
@@ -66,7 +66,7 @@ def test_a_killed_process_stops_the_servos(fake: FakeProcess, owner: "subprocess
 def test_a_tripped_watchdog_is_named(fake: FakeProcess, ready: TwoAxisRobot) -> None:
     keep_alive = ready._observer._keep_alive
     assert keep_alive is not None
-    os.kill(keep_alive.pid, signal.SIGKILL)  # as if this computer had not run it
+    os.kill(keep_alive.pid, signal.SIGKILL)  # as if this computer had not scheduled it
     doing = BackgroundCall(ready.move_to_joints, FAR, 0.15)
     moving(fake)
     stall(0.7)

@@ -112,7 +112,7 @@ def test_a_connection_loss_during_a_move(fake: FakeProcess, ready: TwoAxisRobot,
     fake.control.do("heal")
     fake.control.do("plug")
     wait_for(lambda: ready.connection is Connection.BACK)
-    with pytest.raises(NotInControl, match="lost"):  # only observation comes back by itself
+    with pytest.raises(NotInControl, match="lost"):  # only observation is restored by itself
         ready.move_to_joints(HOME, 0.5)
     assert fake.truth()["servos"]["1"]["angle"] == stood["angle"]
     ready.take_control()
@@ -162,7 +162,7 @@ def test_a_hardware_error_is_named_and_cleared_by_a_person(fake: FakeProcess, re
     assert ready.health is Health.FAILURE
     assert ready.control_owner() is None
     assert [alarm.code for alarm in ready.alarms()] == ["2:5"]
-    assert fake.control.wait_until(standing)["servos"]["1"]["angle"] < 1.9  # the other one does not go on alone
+    assert fake.control.wait_until(standing)["servos"]["1"]["angle"] < 1.9  # the other joint does not continue alone
     with pytest.raises(DeviceFault, match="overload"):
         ready.take_control()
     with pytest.raises(Refused, match="restart_safety"):
@@ -214,14 +214,14 @@ def test_a_late_answer_is_not_used_for_another_request(fake: FakeProcess, reques
     errors: list[str] = []
     try:
         fake.control.do("slow", seconds=1.0)
-        # The library discards what arrives between two requests: then the ping is repeated.
+        # The library discards data that arrive between two requests; then the ping is repeated.
         while len(errors) < 40 and not any("belongs to another instruction" in each for each in errors):
             if len(errors) % 8 == 0:
                 fake.control.do("absent", servo=1, on=False)
                 with pytest.raises(DeviceTimeout, match="servo 1"):
                     bus.ping(1)
                 fake.control.do("absent", servo=1)
-            # Whatever comes now is the late answer to the ping.
+            # The next answer is the late one to the ping.
             with pytest.raises(DeviceTimeout, match="servo 1") as caught:
                 bus.read(1, HOMING_OFFSET) if request_ == "read" else bus.write(1, TORQUE, 0)
             errors.append(str(caught.value))

@@ -161,7 +161,7 @@ def test_stop_overtakes_the_move(fake: FakeProcess, ready: TwoAxisRobot, phase: 
         doing.result()
     assert ready.last_move is not None
     assert ready.last_move.end is MoveEnd.STOPPED
-    ready.check_if_ready_to_move()  # a stop costs nobody control
+    ready.check_if_ready_to_move()  # a stop does not end control
 
 
 def test_bad_input_is_refused_before_anything_moves(fake: FakeProcess, ready: TwoAxisRobot) -> None:
@@ -267,7 +267,7 @@ def test_a_late_state_does_not_count_as_standstill(
         nonlocal calls
         calls += 1
         snapshot = fresh()
-        if calls == 3:  # the first state after the servos took their goals
+        if calls == 3:  # the first state after the servos accepted their goals
             time.sleep(1.5 * STANDING)
         return snapshot
 

@@ -26,7 +26,7 @@ class FakeUr(FakeProcess):
     def __init__(self, *arguments: str) -> None:
         self.host = own_loopback()
         super().__init__("ur", "--host", self.host, "--control", "127.0.0.1:0", *arguments)
-        self.truth()  # opens the control channel, which lives as long
+        self.truth()  # opens the control channel
 
     def do(self, command: str, **arguments: Any) -> Any:
         return self.control.do(command, **arguments)
@@ -69,7 +69,7 @@ def start_fake() -> Iterator[Callable[..., FakeUr]]:
 
 
 def make(host: str, pose: Pose | None = None, **settings: Any) -> UR5e:
-    """An arm brisker than as delivered, so that tests need not wait for it."""
+    """Return an arm with shorter times than in its factory state, so that tests are fast."""
     brisk = {"max_joint_speed": 2.0, "joint_acceleration": 8.0, "tcp_acceleration": 4.0}
     return UR5e(
         "obj_1", "ur", pose or Pose(), UrSettings(host, **{"payload_mass": 1.0, "tcp_z": 0.1, **brisk, **settings})
@@ -78,7 +78,7 @@ def make(host: str, pose: Pose | None = None, **settings: Any) -> UR5e:
 
 @pytest.fixture
 def robot(fake: FakeUr) -> Iterator[UR5e]:
-    """Connected, control not taken."""
+    """Connect without taking control."""
     robot = make(fake.host)
     robot.connect(30.0)
     yield robot
@@ -87,19 +87,19 @@ def robot(fake: FakeUr) -> Iterator[UR5e]:
 
 @pytest.fixture
 def ready(robot: UR5e) -> UR5e:
-    """Connected and controlled."""
+    """Connect and take control."""
     robot.take_control()
     return robot
 
 
 def moving(fake: FakeUr) -> None:
-    """Return when the arm really moves."""
+    """Wait until the arm really moves."""
     wait_for(lambda: max(map(abs, fake.truth()["qd"])) > 0.05)
 
 
 @pytest.fixture
 def owner(fake: FakeUr) -> Iterator[Callable[[], "subprocess.Popen[bytes]"]]:
-    """``owner()`` starts another process, and returns it when it has a long move of the arm under way."""
+    """Return ``owner()``, which starts another process and returns it once the arm is in a long move."""
     started: list[subprocess.Popen[bytes]] = []
     code = textwrap.dedent(
         f"""

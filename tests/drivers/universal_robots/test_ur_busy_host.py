@@ -87,7 +87,7 @@ def test_a_starved_control_process_reports_the_reason(ready: UR5e, fake: FakeUr)
 
 
 def test_a_command_that_outlasts_the_watchdog_reports_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The watchdog stops the control program meanwhile, and the library denies the command without a reason."""
+    """The watchdog stops the control program meanwhile, and the library rejects the command without a reason."""
     program = ControlProgram.__new__(ControlProgram)
     program._frequency, program._written, program._jog_ends = 10.0, time.monotonic(), math.inf
     program._commands = {"setPayload": lambda: bool(time.sleep(0.2))}

@@ -106,7 +106,7 @@ def test_the_computed_time_is_the_minimum_for_speed_and_acceleration(d: float, v
     took = timing.trapezoid(d, v, a)
     assert took >= d / v - 1e-9
     assert took >= 2.0 * math.sqrt(d / a) - 1e-9
-    # Accelerating and braking for half the time each, never above v, covers the distance exactly.
+    # Accelerating and braking for half of the time each, never above v, covers exactly the distance.
     top = min(v, a * took / 2.0)
     assert top * took - top * top / a == pytest.approx(d, abs=1e-6)
 

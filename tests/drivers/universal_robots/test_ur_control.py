@@ -1,4 +1,4 @@
-"""Control of a UR: moves, stops, nothing resumes by itself, the watchdog of the controller."""
+"""Control of a UR: moves, stops, no motion resumes by itself, the watchdog of the controller."""
 
 import math
 import signal
@@ -48,7 +48,7 @@ def shifted(robot: UR5e, y: float) -> Pose:
 
 
 def far_move(robot: UR5e, fake: FakeUr, speed: float = 0.5) -> BackgroundCall:
-    """A long joint move that is under way."""
+    """Start a long joint move and wait until the arm moves."""
     doing = BackgroundCall(robot.move_to_joints, turned(robot, 3.0), speed)
     moving(fake)
     return doing
@@ -68,7 +68,7 @@ def stays(fake: FakeUr, seconds: float = 0.6) -> None:
 
 # ------------------------------------------------------------------------------------------------ taking control
 def test_the_pose_is_that_of_our_tool_before_control_is_taken(fake: FakeUr) -> None:
-    """Otherwise a goal computed from the pose before the first motion is off by the tool's length."""
+    """Otherwise a target computed from the pose before the first motion is off by the tool's length."""
     robot = make(fake.host, tcp_z=0.25, tcp_x=0.02)
     robot.connect(30.0)
     try:
@@ -149,7 +149,7 @@ def test_control_is_taken_although_this_computer_was_busy_meanwhile(
 
 def test_registers_in_use_are_named(fake: FakeUr) -> None:
     fake.do("fieldbus", on=True)
-    robot = make(fake.host)  # this controller's version leaves ur_rtde only the lower registers
+    robot = make(fake.host)  # with this controller's version, ur_rtde can use only the lower registers
     robot.connect(30.0)
     try:
         with pytest.raises(NotInControl, match="0 to 23"):
@@ -227,11 +227,11 @@ def test_joint_moves_to_a_pose_use_the_controllers_kinematics(ready: UR5e) -> No
     assert ready.forward_kinematics("tcp", joints).position.distance_to(start.position) < 1e-6
     with pytest.raises(UR5e.KinematicsException, match="cannot reach"):
         ready.move_to_pose("tcp", Pose(Position(3.0, 0.0, 0.0)), 0.5)
-    ready.move_to_joints(turned(ready, 0.1), 0.8)  # an unreachable pose has not ended the control program
+    ready.move_to_joints(turned(ready, 0.1), 0.8)  # an unreachable pose does not end the control program
 
 
 def test_a_denial_of_the_library_is_checked_once_more(robot: UR5e, monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a busy computer it denies what the controller would accept. Commands that may be repeated are."""
+    """On a busy computer it rejects commands that the controller would accept. Repeatable commands are repeated."""
     denied = ["setTcp", "setPayload", "getInverseKinematicsHasSolution"]
     call = ControlSession.call
 
@@ -298,9 +298,7 @@ def test_a_low_speed_slider_extends_the_move_timeout(
 ) -> None:
     monkeypatch.setattr(timing, "GRACE", 0.2)
     fake.do("speed_slider", fraction=0.2)
-    ready.move_to_joints(
-        turned(ready, 0.15), 0.5
-    )  # five times as long as at full slider; half as much again is allowed
+    ready.move_to_joints(turned(ready, 0.15), 0.5)  # five times as long as at full speed; half as much again is allowed
     assert fake.truth()["q"][0] == pytest.approx(0.15, abs=1e-3)
 
 
@@ -332,13 +330,13 @@ def test_a_move_that_exceeds_its_time_is_stopped(ready: UR5e, fake: FakeUr, monk
 def test_stop_overtakes_the_move_and_reports_the_result(
     ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(timing, "STOP_REACTION", 10.0)  # on a busy machine the dashboard would stop it before
+    monkeypatch.setattr(timing, "STOP_REACTION", 10.0)  # on a busy machine the dashboard would stop the arm first
     for _ in range(5):
         doing = far_move(ready, fake)
         ready.stop()
         with pytest.raises(Cancelled, match="stopped"):
             doing.result()
-        assert not fake.truth()["moving"], "stop returns when the arm stands"
+        assert not fake.truth()["moving"], "stop returns at standstill"
         assert fake.do("stops")[-1]["code"] == 33, "the control program did not stop it"
         fake.do("place", q=[0.0, *fake.truth()["q"][1:]])
         time.sleep(0.05)
@@ -360,7 +358,7 @@ def test_the_dashboard_stops_when_the_control_process_hangs(ready: UR5e, fake: F
     await_standstill(fake)
     assert fake.do("stops")[-1]["via"] == "dashboard"
     fake.control.wait_until(lambda t: t["program"] is None)
-    ready.move_to_joints(turned(ready, 0.1), 0.5)  # a stop of ours costs nobody control
+    ready.move_to_joints(turned(ready, 0.1), 0.5)  # a stop by this client does not end control
 
 
 def test_a_stop_cancels_a_motion_that_waits(ready: UR5e, fake: FakeUr) -> None:
@@ -433,7 +431,7 @@ def test_a_protective_stop_is_acknowledged_only_on_request(ready: UR5e, fake: Fa
     with pytest.raises(InvalidData, match="confirmed_by"):
         ready.acknowledge_protective_stop(" ")
     with pytest.raises(Refused, match="5s"):
-        ready.acknowledge_protective_stop("Eva")  # too early: the controller's own words
+        ready.acknowledge_protective_stop("Eva")  # too early: the message of the controller
     with pytest.raises(Refused, match="acknowledge_protective_stop"):
         ready.acknowledge("protective_stop")
     assert fake.truth()["safety"] == "PROTECTIVE_STOP"
@@ -477,7 +475,7 @@ def test_a_jog_expires(ready: UR5e, fake: FakeUr) -> None:
     assert ready.control_owner() == "us"
 
 
-# ------------------------------------------------------------------------------------------------ losing each other
+# ------------------------------------------------------------------------------------------------ connection losses
 @pytest.mark.parametrize("fault", ["silence", "reset", "half_frame"])
 def test_a_cable_cut_during_a_move(ready: UR5e, fake: FakeUr, fault: str) -> None:
     doing = far_move(ready, fake)
@@ -491,8 +489,8 @@ def test_a_cable_cut_during_a_move(ready: UR5e, fake: FakeUr, fault: str) -> Non
     wait_for(lambda: ready.connection.value == "back")
     stays(fake)
     truth = fake.truth()
-    assert truth["program"] is None, "nothing of ours plays on"
-    if fault != "reset":  # within the instant of a reset the library may send its program once more; it was stopped
+    assert truth["program"] is None, "no program of this client continues"
+    if fault != "reset":  # while a reset is handled, the library may send its program once more; it was stopped
         assert truth["scripts_taken"] == scripts
     with pytest.raises(NotInControl):
         ready.move_to_joints(turned(ready, 0.1), 0.5)
@@ -502,19 +500,19 @@ def test_a_cable_cut_during_a_move(ready: UR5e, fake: FakeUr, fault: str) -> Non
 
 def test_a_silence_longer_than_the_timeout_of_the_library(ready: UR5e, fake: FakeUr) -> None:
     fake.do("silence")
-    time.sleep(2.8)  # it takes 2.5 to notice
+    time.sleep(2.8)  # the library notices after 2.5 s
     fake.do("heal")
     wait_for(lambda: ready.connection.value == "back")
     fake.do("foreign_program", on=True)
     time.sleep(0.5)
-    assert fake.truth()["program"] is not None, "nothing of ours came back and killed it"
+    assert fake.truth()["program"] is not None, "no later command of this client ended it"
 
 
 def test_the_watchdog_tolerates_a_slow_owner_for_a_limited_time(
     robot: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """From arming the watchdog on, the control process signals by itself; then the owner has to send pulses."""
-    monkeypatch.setattr(ControlSession, "_watch", lambda _: None)  # an owner whose guard does not run
+    """Once the watchdog is armed, the control process signals by itself; afterwards the owner must send pulses."""
+    monkeypatch.setattr(ControlSession, "_watch", lambda _: None)  # an owner without a running guard
     session = ControlSession(robot._observer, robot._control.uses_upper_registers(), 2.5)
     session.open(8.0, dashboard=False)
     try:

@@ -16,7 +16,7 @@ Answer = Callable[[socket.socket, bytes], None]
 
 @pytest.fixture
 def server() -> Iterator[Callable[[Answer], Dashboard]]:
-    """Gives ``server(answer)``: a client of a dashboard server that treats each line so."""
+    """Return ``server(answer)``: a client of a dashboard server that handles each line with that function."""
     made: list[tuple[socket.socket, Dashboard, threading.Thread]] = []
 
     def serve(listening: socket.socket, answer: Answer) -> None:

@@ -1,4 +1,4 @@
-"""What differs between the models of the e-series: the lengths of the links, the payload and the reach."""
+"""Differences between the models of the e-series: the lengths of the links, the payload and the reach."""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple

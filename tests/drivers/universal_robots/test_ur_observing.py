@@ -22,7 +22,7 @@ from .conftest import FakeUr, make
 
 @pytest.fixture
 def listener() -> Iterator[Callable[[Callable[[socket.socket], None]], str]]:
-    """Gives ``listener(behaviour)``: an address on whose RTDE port each client gets that behaviour."""
+    """Return ``listener(behaviour)``: an address at whose RTDE port each client gets that behaviour."""
     servers: list[socket.socket] = []
     clients: list[socket.socket] = []
     threads: list[threading.Thread] = []
@@ -152,7 +152,7 @@ def test_poses_are_in_the_world(fake: FakeUr) -> None:
     robot.connect(30.0)
     try:
         x, y, z = fake.truth()["tcp_pose"][:3]
-        # base -> base_link: (x, y) -> (-x, -y); a quarter turn: (x, y) -> (-y, x); then the place of the object
+        # base -> base_link: (x, y) -> (-x, -y); a quarter turn: (x, y) -> (-y, x); then the position of the object
         assert robot.get_end_effector_pose("tcp").position.distance_to(Position(1.0 + y, -x, 0.5 + z)) < 1e-9
         with pytest.raises(NotFound, match="gripper9"):
             robot.get_end_effector_pose("gripper9")
@@ -182,7 +182,7 @@ def test_observation_recovers_and_a_stale_state_is_an_error(robot: UR5e, fake: F
 
 
 def test_a_sample_is_available_as_soon_as_the_connection_is_back(robot: UR5e) -> None:
-    """The look at the newest sample and the look at the connection are two: in between everything may come back."""
+    """Reading the sample and reading the connection state are two steps; the connection may return in between."""
     observer = robot._observer
     fresh = observer._newest
 
@@ -231,7 +231,7 @@ def test_an_invalid_setting_of_the_model_is_refused() -> None:
 
 
 def test_the_driver_works_from_any_folder() -> None:
-    """It is copied into released packages under another name: only relative imports may lead inside it."""
+    """It is copied into released packages under another name, so all internal imports must be relative."""
     folder = Path(__file__).parents[3] / "drivers" / "arcor2_drivers" / "universal_robots"
     files = list(folder.glob("*.py"))
     assert folder / "ur5e.py" in files

@@ -27,7 +27,7 @@ def shifted(pose: Pose, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Pose:
 
 
 def followed(robot: UR5e, doing: BackgroundCall) -> list[Position]:
-    """Give where the TCP was while a motion ran."""
+    """Return the TCP poses during a motion."""
     seen = []
     while not doing.ended_at:
         seen.append(robot.get_end_effector_pose("tcp").position)
@@ -59,7 +59,7 @@ def test_a_path_rounds_its_corners_and_keeps_control(ready: UR5e, fake: FakeUr) 
     assert result.pose.position.distance_to(end.position) < 1e-3
     assert 0.001 < min(seen) <= 0.03
     truth = fake.truth()
-    assert truth["watchdog"], "the control program is back, and watched"
+    assert truth["watchdog"], "the control program runs again, with its watchdog"
     assert truth["payload"] == pytest.approx(1.0)
     assert ready.control_owner() == "us"
     ready.move_to_pose("tcp", start, 0.5)
@@ -174,7 +174,7 @@ def test_a_path_that_times_out_is_stopped(ready: UR5e, fake: FakeUr, monkeypatch
 
 # ------------------------------------------------------------------------------------------------ force
 def test_a_move_ends_at_contact_and_the_wrench_is_reported(fake: FakeUr) -> None:
-    """The scene turns base_link by a quarter about z: directions and forces are of the world."""
+    """The scene turns base_link by 90° about z; directions and forces are in the world frame."""
     turn = Orientation.from_rotation_vector(0.0, 0.0, 1.5707963267948966)
     robot = make(fake.host, Pose(Position(0.2, 0.0, 0.3), turn))
     robot.connect(30.0)
@@ -182,13 +182,13 @@ def test_a_move_ends_at_contact_and_the_wrench_is_reported(fake: FakeUr) -> None
         robot.take_control()
         start = robot.get_end_effector_pose("tcp")
         x, y, z = fake.truth()["tcp_pose"][:3]
-        fake.do("obstacle", point=[x, y + 0.03, z], normal=[0.0, -1.0, 0.0])  # in base; that is +x in this world
+        fake.do("obstacle", point=[x, y + 0.03, z], normal=[0.0, -1.0, 0.0])  # in base, which is +x in this world
         result = robot.move_until_contact((2.0, 0.0, 0.0), 12.0, 0.1, 0.03)
         way = result.pose.position - start.position
         assert way.x == pytest.approx(0.03 + 12.0 / 20_000.0, abs=5e-4)
         assert abs(way.y) < 1e-3
         wait_for(lambda: robot.wrench()[0] < -5.0)
-        assert robot.wrench()[0] == pytest.approx(-12.0, abs=6.0), "it pushes against the way"
+        assert robot.wrench()[0] == pytest.approx(-12.0, abs=6.0), "the force is opposite to the motion"
         assert abs(robot.wrench()[1]) < 1.0
         assert fake.truth()["safety"] == "NORMAL"
         with pytest.raises(DeviceFault, match="made no contact") as fault:
@@ -209,7 +209,7 @@ def test_a_careful_move_stops_at_a_lateral_force(ready: UR5e, fake: FakeUr) -> N
             ready.move_carefully(shifted(start, y=-0.1, z=-0.1), 20.0, 0.05)
         assert fault.value.fault_code == "force_limit"
         assert 15.0 < fake.truth()["tcp_force"][2] < 45.0
-        ready.move_carefully(start, 60.0, 0.1)  # away from it
+        ready.move_carefully(start, 60.0, 0.1)  # away from the obstacle
         with pytest.raises(DeviceFault, match="made no contact"):
             ready.move_to_contact(10.0, 0.02, 0.05)
         ready.move_to_contact(10.0, 0.1, 0.05)  # the tool points down
@@ -259,7 +259,7 @@ def test_the_inertia_is_sent_to_the_controller(ready: UR5e, fake: FakeUr) -> Non
     start = ready.get_end_effector_pose("tcp")
     ready.move_path([shifted(start, z=0.02)])
     truth = fake.truth()
-    assert truth["payload_inertia"] == pytest.approx(inertia), "a path keeps the tool that was set"
+    assert truth["payload_inertia"] == pytest.approx(inertia), "a path does not change the tool"
     assert truth["payload"] == pytest.approx(2.0)
     assert truth["tcp_offset"] == pytest.approx([0.0, 0.0, 0.1, 0.0, 0.0, 0.0])
     with pytest.raises(OutOfRange, match="six numbers"):

@@ -34,7 +34,7 @@ def joints(robot: UR5e, values: list[float]) -> list[Joint]:
 
 
 def between(robot: UR5e) -> Position:
-    """Give where the TCP would be halfway between HOME and BESIDE, by our model: straight there it passes it."""
+    """Return the TCP halfway between HOME and BESIDE, by our model: a straight move passes this position."""
     model = RobotModel.load(URDF, {"tcp_z": 0.1}).arm("tcp")
     return model.pose(np.array([0.8, *HOME[1:]])).position
 
@@ -57,7 +57,7 @@ def test_a_joint_move_follows_the_checked_path_around_an_obstacle(
     assert np.allclose(fake.truth()["q"], BESIDE, atol=1e-3)
     assert len(seen) > 20
     assert touches(around, *seen) == set()
-    # Straight, and unsafe, it goes through it.
+    # A straight, unchecked move goes through it.
     straight = [list(np.array(HOME) + share * (np.array(BESIDE) - HOME)) for share in np.linspace(0.0, 1.0, 200)]
     assert touches(around, *straight) == {"post"}
     ready.move_to_joints(joints(ready, HOME), 1.0, safe=False)
@@ -141,7 +141,7 @@ def test_the_arm_stops_before_an_obstacle_that_enters_its_path(
     stopped = fake.truth()
     assert not stopped["moving"]
     assert touches(around, stopped["q"]) == set()
-    # It is ready for what comes next.
+    # It accepts further commands.
     del around.boxes["post"]
     ready.move_to_joints(joints(ready, HOME), 1.0)
     assert np.allclose(fake.truth()["q"], HOME, atol=1e-3)

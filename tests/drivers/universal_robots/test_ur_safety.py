@@ -52,7 +52,7 @@ def switched_on(robot: UR5e) -> None:
 
 @pytest.fixture
 def whole(fake: FakeUr) -> Iterator[FakeUr]:
-    """A controller that is brought back to running, whatever the test did to it."""
+    """Return a controller that is set back to running after the test."""
     yield fake
     fake.do("emergency_stop", on=False)
     if fake.truth()["robot_mode"] != "RUNNING":
@@ -76,7 +76,7 @@ def test_an_emergency_stop_switches_power_off_until_a_person_restores_it(
     with pytest.raises(SafetyStop, match="emergency stop"):
         ready.take_control()
     with pytest.raises(Refused, match="safety mode"):
-        ready.power_on()  # the button is still in
+        ready.power_on()  # the button is still pressed
     with pytest.raises(Refused, match="neither a fault nor a violation"):
         ready.restart_safety("Eva")
     whole.do("emergency_stop", on=False)
@@ -172,7 +172,7 @@ def _acknowledged(robot: UR5e) -> bool:
 
 # ------------------------------------------------------------------------------------------------ jogging
 def test_a_late_jog_is_dropped(ready: UR5e, fake: FakeUr) -> None:
-    """A jog that waits longer than it is valid moves nothing; one that was stopped meanwhile neither."""
+    """A jog that waited longer than it is valid moves nothing, nor does one that was stopped meanwhile."""
     session = ready._control.session
     assert session is not None
     taken = len(fake.do("commands_taken"))
@@ -185,7 +185,7 @@ def test_a_late_jog_is_dropped(ready: UR5e, fake: FakeUr) -> None:
 
 
 def await_moved(fake: FakeUr, q: list[float]) -> None:
-    """Wait until the arm has left a joint configuration; it may be at standstill again."""
+    """Wait until the arm has left a joint configuration; it may have stopped again."""
     wait_for(lambda: math.dist(fake.truth()["q"], q) > 1e-3)
 
 
@@ -193,7 +193,7 @@ def test_a_long_jog_delays_neither_the_watchdog_nor_a_stop(ready: UR5e, fake: Fa
     trips = fake.truth()["watchdog_trips"]
     ready.jog(joint_velocities=[0.3, 0.0, 0.0, 0.0, 0.0, 0.0], valid_for=1.0)
     time.sleep(0.5)
-    assert fake.truth()["moving"], "five times the watchdog's patience"
+    assert fake.truth()["moving"], "longer than five watchdog times"
     ready.stop()
     assert not fake.truth()["moving"]
     assert fake.do("stops")[-1]["via"] == "rtde"

@@ -19,7 +19,7 @@ POINTS = "part=DI0; vacuum=DO0 on_loss=hold; blow=DO1; falls=DO2; pressure=AI0 u
 @pytest.fixture(scope="module")
 def one_fake() -> Iterator[FakeProcess]:
     fake = FakeProcess("remote_io")
-    fake.truth()  # opens the control channel, which lives as long
+    fake.truth()  # opens the control channel
     yield fake
     fake.end()
 
@@ -32,7 +32,7 @@ def fake(one_fake: FakeProcess) -> FakeProcess:
 
 @pytest.fixture
 def block(fake: FakeProcess) -> Iterator[RemoteIO]:
-    """The carrier, connected."""
+    """Return the connected carrier."""
     host, _, port = fake.ready["modbus"].rpartition(":")
     made = RemoteIO("block_id", "block", RemoteIOSettings(host=host, port=int(port), points=POINTS))
     made.connect()
@@ -45,7 +45,7 @@ Make = Callable[..., SuctionGripper]
 
 @pytest.fixture
 def make(block: RemoteIO) -> Iterator[Make]:
-    """Gives ``make(grip_time=1.0)``: a gripper on the block, not connected; disconnected in the end."""
+    """Return ``make(grip_time=1.0)``: an unconnected gripper on the block; the fixture disconnects it."""
     made: list[SuctionGripper] = []
 
     def find(name: str) -> Generic:
@@ -67,7 +67,7 @@ def make(block: RemoteIO) -> Iterator[Make]:
 
 @pytest.fixture
 def gripper(make: Make) -> SuctionGripper:
-    """Connected and controlled."""
+    """Connect and take control."""
     gripper = make()
     gripper.connect()
     gripper.take_control()

@@ -36,7 +36,7 @@ VACUUM, BLOW = 0, 1
 
 
 class BackgroundCall:
-    """A call on a thread of its own."""
+    """A call in its own thread."""
 
     def __init__(self, call: Callable[[], Any]) -> None:
         self.error: Arcor2Error | None = None
@@ -52,7 +52,7 @@ class BackgroundCall:
 
     def end(self, within: float = 30.0) -> Arcor2Error | None:
         self._thread.join(within)
-        assert not self._thread.is_alive(), "it is still at it"
+        assert not self._thread.is_alive(), "the call is still running"
         return self.error
 
 
@@ -66,7 +66,7 @@ def output(fake: FakeProcess, number: int) -> bool:
 
 @pytest.fixture
 def holding(gripper: SuctionGripper, fake: FakeProcess) -> SuctionGripper:
-    """With a part."""
+    """Grip a part."""
     part(fake, True)
     gripper.grip()
     return gripper
@@ -76,14 +76,14 @@ def test_a_part_is_gripped_and_released(gripper: SuctionGripper, fake: FakeProce
     doing = BackgroundCall(gripper.grip)
     wait_for(lambda: output(fake, VACUUM))
     time.sleep(0.1)
-    assert not gripper.part_held(), "it waits for the sensor"
+    assert not gripper.part_held(), "the sensor has not reported a part yet"
     part(fake, True)
     assert doing.end() is None
     assert gripper.is_part_held()
     gripper.check_part()
     doing = BackgroundCall(gripper.release)
     wait_for(lambda: output(fake, BLOW))
-    assert not output(fake, VACUUM), "no blast against the vacuum"
+    assert not output(fake, VACUUM), "no air is blown while the vacuum is on"
     part(fake, False)
     assert doing.end() is None
     assert not output(fake, BLOW)
@@ -114,7 +114,7 @@ def test_the_part_is_attached_to_the_robot_until_released_or_lost(make: Make, fa
     assert robot.parts["part of gripper"].in_link.position.z == pytest.approx(0.01), "it hangs below the cup"
     with pytest.raises(DeviceFault, match="sticks"):
         gripper.release()
-    assert robot.parts, "it sticks"
+    assert robot.parts, "the part sticks"
     gripper.blow_off()
     assert robot.parts == {}
     gripper.grip()
@@ -133,14 +133,14 @@ def test_a_stuck_part_is_an_error(make: Make, fake: FakeProcess) -> None:
     with pytest.raises(DeviceFault, match="sticks") as fault:
         gripper.release()
     assert fault.value.fault_code == "part_sticks"
-    assert not output(fake, BLOW), "the blast is over all the same"
+    assert not output(fake, BLOW), "blowing has ended nevertheless"
 
 
 def test_a_part_lost_during_transport_is_an_alarm_and_an_error(holding: SuctionGripper, fake: FakeProcess) -> None:
     part(fake, False)
     wait_for(lambda: [alarm.code for alarm in holding.alarms()] == ["part_lost"])
     assert holding.health is Health.CHECK_FUNCTION
-    part(fake, True)  # it hangs there again: that it was lost is not forgotten
+    part(fake, True)  # the sensor reports a part again, but the loss stays reported
     with pytest.raises(DeviceFault) as fault:
         holding.check_part()
     assert fault.value.fault_code == "part_lost"
@@ -148,7 +148,7 @@ def test_a_part_lost_during_transport_is_an_alarm_and_an_error(holding: SuctionG
     with pytest.raises(DeviceFault, match="lost its part before"):
         holding.release()
     assert not output(fake, VACUUM)
-    assert holding.alarms(), "until a person has looked"
+    assert holding.alarms(), "until a person acknowledges it"
     with pytest.raises(NotFound):
         holding.acknowledge("other")
     holding.acknowledge("part_lost")
@@ -169,7 +169,7 @@ def test_a_flicker_of_the_sensor_is_tolerated(make: Make, fake: FakeProcess) -> 
     gripper.off()
     part(fake, False)
     time.sleep(0.2)
-    assert gripper.alarms() == [], "what was let go is not lost"
+    assert gripper.alarms() == [], "a released part is not a lost one"
 
 
 def test_a_stop_ends_an_action_and_keeps_the_part(gripper: SuctionGripper, fake: FakeProcess) -> None:
@@ -245,11 +245,11 @@ def test_without_control_nothing_is_switched(make: Make, block: RemoteIO, fake: 
         gripper.on()
     assert not output(fake, VACUUM)
     gripper.take_control()
-    assert block.control_owner() == "us", "control is the carrier's"
+    assert block.control_owner() == "us", "the carrier has control"
     gripper.on()
     assert output(fake, VACUUM)
     gripper.disconnect()
-    assert output(fake, VACUUM), "letting go of the carrier lets no part fall"
+    assert output(fake, VACUUM), "releasing control of the carrier does not drop the part"
 
 
 def test_an_output_that_does_not_hold_on_loss_is_refused(make: Make) -> None:
@@ -327,7 +327,7 @@ def test_a_lost_carrier_returns_no_old_values(holding: SuctionGripper, fake: Fak
         assert holding.health is Health.FAILURE
         with pytest.raises((ConnectionLost, DeviceTimeout, Stale), match="gripper on block"):
             holding.part_held()
-        assert holding.alarms() == [], "who does not hear of a part does not say it is lost"
+        assert holding.alarms() == [], "without a sensor value no part is reported lost"
     finally:
         fake.control.do("heal")
     wait_for(lambda: holding.connection in (Connection.BACK, Connection.ONLINE))

@@ -64,7 +64,7 @@ def test_gripping_during_a_move_keeps_the_part_at_a_stop(robot: UR5e, gripper: S
     ur.control.wait_until(lambda t: t["digital_outputs"] >> 16 & 1)
     ur.do("set_input", bit=16, on=True)
     gripping.result()
-    assert ur.truth()["moving"], "neither waited for the other"
+    assert ur.truth()["moving"], "robot and gripper work at the same time"
     robot.stop()
     gripper.stop()
     with pytest.raises(Exception, match="stopped"):
