@@ -1,4 +1,4 @@
-"""Starts fakes as processes of their own and ends them, for tests on the wire."""
+"""Start and end fakes in separate processes, for tests on the wire."""
 
 import contextlib
 import select
@@ -16,7 +16,7 @@ from arcor2_fakes.control import BlockingControlClient
 from tests import waiting
 from tests.forking import Forked, Forker
 
-READY_WITHIN = 60.0  # s; imports on a busy machine, of OPC UA above all
+READY_WITHIN = 60.0  # s; imports take long on a busy machine, above all OPC UA
 ENDS_WITHIN = 30.0  # s
 
 
@@ -30,7 +30,7 @@ def start_forked_fake(module: str, arguments: Sequence[str], stderr: IO[Any] | i
 
 
 class FakeProcess:
-    """A running fake: `ready` holds what its ready line said, `control` speaks to its control channel."""
+    """A running fake: `ready` is its ready line, `control` is a client of its control channel."""
 
     def __init__(self, module: str | Path, *arguments: str) -> None:
         """Start a module of `arcor2_fakes`, or the file of another fake."""
@@ -65,7 +65,7 @@ class FakeProcess:
         return data
 
     def terminate(self) -> int:
-        """End it as an operator would; gives the exit status."""
+        """End it like an operator; return the exit status."""
         self.process.terminate()
         return self.process.wait(ENDS_WITHIN)
 
@@ -88,7 +88,7 @@ class FakeProcess:
 
 @pytest.fixture
 def start_fake() -> Iterator[Callable[..., FakeProcess]]:
-    """Gives ``start_fake("functional_tester", "--seed", "1")``; whatever was started is ended after the test."""
+    """Return ``start_fake("functional_tester", "--seed", "1")``; all started fakes are ended after the test."""
     with contextlib.ExitStack() as stack:
 
         def start(module: str, *arguments: str) -> FakeProcess:

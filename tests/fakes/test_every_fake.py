@@ -1,4 +1,4 @@
-"""What every installed fake offers: wire faults, a power cycle, and a faster pace."""
+"""Features of every installed fake: wire faults, a power cycle, and a faster pace."""
 
 import subprocess
 import sys
@@ -13,9 +13,9 @@ from tests.fakes.conftest import FakeProcess
 
 FAULTS = {"silence", "reset", "half_frame", "garbage", "slow", "refuse", "heal"}
 ARGUMENTS = {"ur": ("--host", "127.83.1.7"), "abb_yumi": ("--host", "127.83.1.8")}
-"""These controllers have ports of their own, so each gets an address of its own."""
+"""These controllers have fixed ports, so each gets its own address."""
 WORLD = "cell"
-"""The world is no device: it has a control channel and no wire."""
+"""The world is not a device: it has a control channel and no wire."""
 
 NO_CHECKSUM = {
     "abb_yumi": "HTTP and text over TCP",
@@ -32,10 +32,10 @@ NO_CHECKSUM = {
 }
 NO_PACE = {
     "barcode_reader": "reads within 0.15 s; its own time-out is --timeout",
-    "erp": "nothing in it takes time",
-    "label_printer": "--duration is all the time it takes",
-    "remote_io": "nothing in it moves; pulses and watchdogs are the host's times",
-    "scale": "--settling is all the time it takes",
+    "erp": "none of its operations takes time",
+    "label_printer": "--duration is its only time",
+    "remote_io": "it has no motion; the host sets pulses and watchdogs",
+    "scale": "--settling is its only time",
 }
 FOUND = [fake for fake in installed_fakes() if fake.module.startswith("arcor2_fakes.") and fake.name != WORLD]
 
@@ -44,7 +44,7 @@ FOUND = [fake for fake in installed_fakes() if fake.module.startswith("arcor2_fa
 def running(request: pytest.FixtureRequest) -> Iterator[tuple[InstalledFake, FakeProcess]]:
     fake: InstalledFake = request.param
     process = FakeProcess(fake.name, *ARGUMENTS.get(fake.name, ()))
-    process.truth()  # opens the control channel, which lives as long
+    process.truth()  # opens the control channel
     yield fake, process
     process.end()
 
@@ -89,7 +89,7 @@ def test_fakes_with_durations_can_run_faster() -> None:
 
 
 class Clock:
-    """A clock of the test's own, and how many times faster the servo's runs."""
+    """A clock controlled by the test, and the factor by which the servo's clock is faster."""
 
     def __init__(self, scale: float) -> None:
         self.now, self.scale = 100.0, scale

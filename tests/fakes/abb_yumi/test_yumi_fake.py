@@ -1,4 +1,4 @@
-"""The fake YuMi on its wires: HTTP with digest authentication, motion servers, kinematics, motion, faults."""
+"""The fake YuMi on the wire: HTTP with digest authentication, motion servers, kinematics, motion, faults."""
 
 import hashlib
 import math
@@ -37,7 +37,7 @@ def fake(module_fake: FakeProcess) -> FakeProcess:
 
 
 class Http:
-    """HTTP by hand: one request, one answer."""
+    """A minimal HTTP client: one request, one answer."""
 
     def __init__(self) -> None:
         self.socket = socket.create_connection((HOST, RWS), 2.0)
@@ -127,7 +127,7 @@ class Line:
 
 @pytest.fixture
 def lines(fake: FakeProcess, http: Http) -> Iterator[Callable[[int], tuple[Line, Line]]]:
-    """Starts RAPID, and gives the two sockets of an arm."""
+    """Start RAPID, and return the two sockets of an arm."""
     assert http.ask("POST", "/rw/mastership/rapid?action=request")[0] == 204
     assert http.ask("POST", "/rw/rapid/execution?action=resetpp")[0] == 204
     assert http.ask("POST", "/rw/rapid/execution?action=start")[0] == 204

@@ -49,7 +49,7 @@ def test_the_last_link_ends_at_the_flange_of_the_controllers_own_kinematics(mode
 
 @pytest.mark.parametrize("q", JOINTS)
 def test_neighbouring_links_touch(q: tuple[float, ...]) -> None:
-    """A wrong sign or offset in a frame would leave a gap between two links, in one joint state or another."""
+    """A wrong sign or offset in a frame would leave a gap between two links, in some joint state."""
     found = arm.things("ur5e", BASE.matrix(), q, TIP.matrix())
     names = ["foot", "shoulder", "upper arm", "elbow", "forearm", "wrist 1", "wrist 2", "wrist 3"]
     for one, other in itertools.pairwise(names):
@@ -69,7 +69,7 @@ def test_the_camera_receives_links_and_markers() -> None:
     assert marker.marker is not None
     assert (marker.marker.id, marker.marker.size) == (7, 0.06)
     assert marker.size is not None
-    # the marker's pose is that of its face: the paper lies below it
+    # the pose of the marker is that of its face: the paper is below it
     assert marker.pose.position[2] + marker.size[2] / 2.0 == pytest.approx(0.05)
 
 

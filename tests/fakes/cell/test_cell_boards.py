@@ -28,5 +28,5 @@ def test_seeds_differ_and_every_defect_occurs() -> None:
     assert {board.defect for boards in drawn for board in boards} == {None, "short", "open", "leakage"}
     bad = sum(board.defect is not None for boards in drawn for board in boards)
     assert 200 < bad < 500
-    for place in range(5):  # none of the places in the stack gives a board away
+    for place in range(5):  # no place in the stack predicts the quality of a board
         assert 20 < sum(boards[place].defect is not None for boards in drawn) < 120

@@ -1,4 +1,4 @@
-"""The cell layout: its content, and errors of invalid ones."""
+"""The cell layout: its content, and errors of invalid layouts."""
 
 import copy
 import math
@@ -77,7 +77,7 @@ QUARTER = math.sqrt(0.5)
 def test_tolerances_are_along_the_axes_of_the_place(
     offset: tuple[float, float, float], roll: float, yaw: float, there: bool
 ) -> None:
-    # A place on a wall: its z is the world's x.
+    # A place on a wall: its z axis is the x axis of the world.
     place = Place(Pose((1.0, 2.0, 3.0), (0.0, QUARTER, 0.0, QUARTER)), Tolerance(0.01, 0.05, 0.2, 0.3))
     board = place.pose.matrix() @ compose(offset, euler2mat(roll, 0.0, yaw), np.ones(3))
     assert place.holds(board) is there

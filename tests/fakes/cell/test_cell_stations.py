@@ -1,4 +1,4 @@
-"""The belt with its light barriers, and the place where labels are put on boards and pressed."""
+"""The belt with its light barriers, and the place where labels are applied to boards and pressed on."""
 
 import copy
 import itertools
@@ -46,7 +46,7 @@ TIP = 0.1
 
 
 class Devices:
-    """Remembers what it was told; the tester takes everything."""
+    """Records what it receives; the tester accepts everything."""
 
     def __init__(self) -> None:
         self.barriers: list[tuple[int, bool]] = []
@@ -69,7 +69,7 @@ class Devices:
 
 
 def joints(x: float, y: float) -> tuple[float, float]:
-    """The arm's angles for a point of the world, elbow on one side."""
+    """Return the arm's joint values for a point of the world, always with the same elbow side."""
     x, y = x - 0.65, y + 0.08
     cosine = (x * x + y * y - 0.15**2 - 0.1**2) / (2 * 0.15 * 0.1)
     elbow = math.acos(max(-1.0, min(1.0, cosine)))
@@ -77,7 +77,7 @@ def joints(x: float, y: float) -> tuple[float, float]:
 
 
 class Cell:
-    """A world with a robot that jumps, a belt that is pushed, and a printer."""
+    """A world with a robot that moves instantly, a belt moved by the test, and a printer."""
 
     def __init__(self, boards: list[Board] = BOARDS) -> None:
         self.devices = Devices()
@@ -119,7 +119,7 @@ class Cell:
         await self.wait()
 
     async def roll(self, *points: tuple[float, ...]) -> None:
-        """Bring the roller to one point after the other, on a straight way."""
+        """Move the roller from point to point in straight lines."""
         x, y, _ = self.world.truth()["roller"]
         for target in points:
             for part in range(1, 11):
@@ -151,7 +151,7 @@ async def test_boards_ride_interrupt_barriers_and_wait_at_the_stop() -> None:
     await cell.run(0.5)
     truth = cell.world.truth()
     assert truth["at_pick_place"] == cell.devices.shown == "A"
-    # The first stands at the stop, the others have run up against it; a board on the way cut the second beam twice.
+    # The first is at the stop, the others have run up against it; a board on the way interrupted the second beam twice.
     assert next(board["before_stop"] for board in truth["belt"]) == 0.0
     assert cell.devices.barriers.count((3, True)) >= 2
     assert (0, True) in cell.devices.barriers
@@ -161,7 +161,7 @@ async def test_boards_ride_interrupt_barriers_and_wait_at_the_stop() -> None:
     await cell.carry(STOP, (0.2, 0.5, 0.06))
     assert (0, False) in cell.devices.barriers
     assert cell.board("A")["place"] == "good"
-    assert cell.world.truth()["at_pick_place"] is None  # the belt stands: the next does not come
+    assert cell.world.truth()["at_pick_place"] is None  # the belt is stopped: the next board does not arrive
     await cell.run(0.08)
     assert cell.world.truth()["at_pick_place"] == "B"
 
@@ -263,7 +263,7 @@ async def test_a_label_that_was_not_pressed_falls_off() -> None:
         [BEGIN, (0.5, -0.08), END],
         [(0.46, -0.1 - 0.03), (0.5, -0.08)],
     ],
-    ids=["the wrong way round", "half", "off the label in between", "beside it"],
+    ids=["the wrong way round", "half", "off the label in between", "next to it"],
 )
 async def test_a_label_is_not_pressed_by_wrong_motions(way: list[tuple[float, ...]]) -> None:
     cell = Cell()
@@ -326,7 +326,7 @@ def test_a_layout_lists_its_devices() -> None:
     assert msgspec.convert(PLAIN, Layout).needs() == []
 
 
-# ---------------------------------------------------------------------------------------------------- sight
+# ---------------------------------------------------------------------------------------------------- camera
 CAMERA = {
     "pose": {"position": [0.4, -0.3, 0.7], "orientation": [1.0, 0.0, 0.0, 0.0]},
     "board": [0.08, 0.06, 0.002],

@@ -11,7 +11,7 @@ import arcor2_fakes.cell
 
 EXAMPLE = str(Path(arcor2_fakes.cell.__file__).with_name("example.json"))
 
-# In the controller's base: the world's x and y with the other sign, TCP at the tip of the example's gripper.
+# In the controller's base, x and y have the opposite sign of the world's; the TCP is the example gripper's tip.
 CARRY = """def carry():
   set_tcp(p[0, 0, {tcp}, 0, 0, 0])
   movej(p[-0.4, 0.3, {above}, 0, 3.14159265358979, 0], a=12, v=3.1)
@@ -28,7 +28,7 @@ end
 
 
 def play(ur: Any, tcp: float = 0.1, x: float = -0.5) -> None:
-    """Send the program; heights are of the tip, which the controller's TCP may or may not agree with."""
+    """Send the program; heights refer to the tip, which may differ from the controller's TCP."""
     lift = 0.1 - tcp
     program = CARRY.format(tcp=tcp, x=x, above=0.25 + lift, feeder=0.08 + lift, tester=0.1 + lift)
     host, port = ur.ready["script"].split(":")

@@ -22,7 +22,7 @@ SEED = 11
 
 
 class StandInRobot:
-    """The control channel of a robot controller whose arm jumps."""
+    """The control channel of a robot controller whose arm moves instantly."""
 
     def __init__(self) -> None:
         self.control = ControlServer()
@@ -39,12 +39,12 @@ class StandInRobot:
         self.inputs = self.inputs & ~(1 << bit) | int(on) << bit
 
     def at(self, x: float, y: float, z: float) -> None:
-        """The tip there, pointing down: the controller's base is base_link turned by half a turn."""
+        """Move the tip there, pointing down: the controller's base is base_link rotated by 180°."""
         self.tcp_pose = (-x, -y, z + TIP, 0.0, math.pi, 0.0)
 
 
 class Cell:
-    """All of it, and an asynchronous client for each control channel."""
+    """All fakes and the world, with an asynchronous client for each control channel."""
 
     def __init__(self, robot: StandInRobot, tester: ControlClient, reader: ControlClient, world: ControlClient) -> None:
         self.robot, self.tester, self.reader, self.world = robot, tester, reader, world
@@ -73,7 +73,7 @@ class Cell:
         await self.tester.do("push_door", opening=opening)
 
     async def test(self) -> str:
-        """Run the test of what lies in the fixture, as the buttons at the station do."""
+        """Test the board in the fixture, like the buttons at the station."""
         await self.door(False)
         for command, state in (("reset", "Idle"), ("start", "Complete")):
             assert await self.tester.do("command", name=command) == "accepted"
@@ -189,7 +189,7 @@ async def test_the_world_waits_for_starting_fakes(start_fake: Callable[..., Any]
     await late.control.start()
     world = await starting
     assert world.ready["boards"] == 5
-    # And it ends when one of them has gone.
+    # It ends when one of them ends.
     await asyncio.to_thread(reader.terminate)
     assert await asyncio.to_thread(world.process.wait, 30.0) == 3
     world.end()

@@ -23,7 +23,7 @@ TIP = 0.1
 
 
 class Devices:
-    """What a tester with a door does; remembers what the reader and the sensor were told."""
+    """A tester with a door; records what the reader and the sensor received."""
 
     def __init__(self) -> None:
         self.door_open = True
@@ -51,7 +51,7 @@ class Devices:
 
 
 class Cell:
-    """A world with a robot that jumps."""
+    """A world with a robot that moves instantly."""
 
     def __init__(self, boards: list[Board] = BOARDS, layout: Layout = LAYOUT, turned: float = 0.0) -> None:
         self.devices = Devices()
@@ -62,11 +62,11 @@ class Cell:
         self.pose = (*NOWHERE, 0.0, math.pi, 0.0)
 
     async def at(self, x: float, y: float, z: float, tilt: float = 0.0, wait: float = 0.5) -> None:
-        """Bring the tip to a point of the world, pointing down but for `tilt`."""
+        """Move the tip to a point of the world, pointing down except for `tilt`."""
         angle = math.pi - tilt
         c, s = math.cos(-self.turned), math.sin(-self.turned)
         link_x, link_y = c * x - s * y, s * x + c * y
-        # base_link to the controller's base: half a turn about z. The flange is TIP behind the tip.
+        # base_link to the controller's base: 180° about z. The flange is TIP behind the tip.
         self.pose = (
             -link_x - TIP * math.sin(angle),
             -link_y,
@@ -129,7 +129,7 @@ async def test_base_rotation_and_tcp_do_not_change_the_physics() -> None:
         robot=msgspec.structs.replace(
             LAYOUT.robot, base=Pose((0.0, 0.0, 0.0), (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)))
         ),
-        # With the base turned, the tool that points straight down in the base is turned as well.
+        # With the base rotated, the tool that points straight down in the base is rotated as well.
         tester=msgspec.structs.replace(
             LAYOUT.tester, tolerance=msgspec.structs.replace(LAYOUT.tester.tolerance, turn=None)
         ),
@@ -137,7 +137,7 @@ async def test_base_rotation_and_tcp_do_not_change_the_physics() -> None:
     cell = Cell(layout=layout, turned=yaw)
     await cell.carry(FEEDER, TESTER)
     assert cell.places == "tester feeder feeder"
-    # The same flange, told with a TCP of 0.3 m: the reported pose lies 0.3 m further down.
+    # The same flange, reported with a TCP of 0.3 m: the reported pose is 0.3 m lower.
     x, y, z, *rotation = cell.pose
     sample = Robot((x, y, z - 0.3, *rotation), (0.0, 0.0, 0.3, 0.0, 0.0, 0.0), 0)  # type: ignore[arg-type]
     before = cell.world.truth()["gripper"]["tip"]
@@ -255,7 +255,7 @@ async def test_jaws_need_time() -> None:
     await cell.at(*FEEDER)
     cell.bits = 1
     await cell.wait(0.06)
-    await cell.at(*NOWHERE)  # gone before they closed
+    await cell.at(*NOWHERE)  # it leaves before they closed
     assert cell.places == "feeder feeder feeder"
     assert cell.world.truth()["gripper"]["closed"]
 

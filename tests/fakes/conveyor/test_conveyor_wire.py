@@ -25,7 +25,7 @@ class Adapter:
             self.socket.sendall(command.encode() + b"\r")
 
     def token(self) -> bytes:
-        """The next thing up to CR, or a BEL."""
+        """Return the next token up to CR, or a BEL."""
         while True:
             for end in range(len(self.buffer)):
                 if self.buffer[end : end + 1] in (b"\r", b"\a"):
@@ -36,13 +36,13 @@ class Adapter:
             self.buffer += received
 
     def answer(self) -> bytes:
-        """The next token that is no frame."""
+        """Return the next token that is not a frame."""
         while (token := self.token()).startswith(b"t"):
             self.frames.append(token[:-1].decode())
         return token
 
     def frame(self, prefix: str) -> str:
-        """The next frame that begins so."""
+        """Return the next frame with this prefix."""
         while True:
             for frame in self.frames:
                 if frame.startswith(prefix):
@@ -120,7 +120,7 @@ def test_sdo_frames(adapter: Adapter) -> None:
     assert adapter.sdo("4018100900000000") == "8018100911000906"  # no such subindex
     assert adapter.sdo("2341600000000000") == "8041600002000106"  # read only
     assert adapter.sdo("23406000FF000000") == "8040600012000706"  # too long
-    assert adapter.sdo("2F60600002000000") == "8060600030000906"  # a mode it has not
+    assert adapter.sdo("2F60600002000000") == "8060600030000906"  # a mode that the drive does not have
     assert adapter.sdo("2F60600003000000") == "6060600000000000"
     assert adapter.sdo("4008100000000000") == "4108100010000000"  # 16 bytes, in segments
     text = b""
@@ -248,9 +248,9 @@ def test_segmented_download_and_its_aborts(fake: FakeProcess, adapter: Adapter) 
     assert adapter.sdo("4083600000000000") == "4383600020000300"
     assert adapter.sdo("2183600004000000") == "6083600000000000"
     assert adapter.sdo("1700000000000000") == "8083600000000305"  # the toggle bit is not alternated
-    assert adapter.sdo("0700000000000000") == "8083600001000405"  # no transfer is left
+    assert adapter.sdo("0700000000000000") == "8083600001000405"  # no transfer is active
     assert adapter.sdo("2183600003000000") == "6083600000000000"
-    assert adapter.sdo("0710270000000000") == "8083600010000706"  # not the length that was announced
+    assert adapter.sdo("0710270000000000") == "8083600010000706"  # not the announced length
     assert adapter.sdo("2183600008000000") == "6083600000000000"
     assert adapter.sdo("0010270000000000") == "2000000000000000"
     assert adapter.sdo("1D00000000000000") == "8083600012000706"  # too long for the object
@@ -361,7 +361,7 @@ def test_socketcand_and_slcan_share_a_bus(fake: FakeProcess, adapter: Adapter) -
     host, _, port = fake.ready["socketcand"].rpartition(":")
     with socket.create_connection((host, int(port)), 2.0) as client:
 
-        def hear(prefix: bytes) -> bytes:
+        def receive_frame(prefix: bytes) -> bytes:
             came = b""
             while True:
                 came += client.recv(1)
@@ -376,12 +376,12 @@ def test_socketcand_and_slcan_share_a_bus(fake: FakeProcess, adapter: Adapter) -
         client.sendall(b"< open can0 >")
         assert client.recv(100) == b"< ok >"
         client.sendall(b"< rawmode >")
-        assert hear(b"< ok") == b"< ok >"
+        assert receive_frame(b"< ok") == b"< ok >"
         client.sendall(b"< send 605 8 40 0 10 0 0 0 0 0 >")
-        assert hear(b"< frame 585 ").split()[-2] == b"4300100092010200"
-        assert adapter.frame("t605") == "t60584000100000000000"  # what one member sends reaches the others
+        assert receive_frame(b"< frame 585 ").split()[-2] == b"4300100092010200"
+        assert adapter.frame("t605") == "t60584000100000000000"  # a frame sent by one member reaches the others
         client.sendall(b"< send 605 3 40 0 >")
-        assert hear(b"< error") == b"< error could not send frame >"
+        assert receive_frame(b"< error") == b"< error could not send frame >"
 
 
 def test_python_can_reads_and_writes(fake: FakeProcess, adapter: Adapter) -> None:

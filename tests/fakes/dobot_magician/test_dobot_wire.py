@@ -1,4 +1,4 @@
-"""The fake Magician on its wire: raw bytes, their answers, and motion in time."""
+"""The fake Magician on the wire: raw bytes, their answers, and motion in time."""
 
 import itertools
 import struct
@@ -12,7 +12,7 @@ from tests.fakes.conftest import FakeProcess
 
 
 class Line:
-    """A host that counts its own checksums."""
+    """A host that computes its own checksums."""
 
     def __init__(self, port: str) -> None:
         self.serial = serial.Serial(port, 115200, timeout=30.0)
@@ -59,7 +59,7 @@ def test_frames_match_examples(line: Line) -> None:
     x, y, z, r, *angles = struct.unpack("<8f", line.ask(10, 0))
     assert (x, y, z, r) == pytest.approx((259.104, 0.0, -8.485, 0.0), abs=0.01)
     assert angles == pytest.approx([0, 45, 45, 0])
-    line.send(200, 0)  # an id that it does not know neither: the next answer is the next question's
+    line.send(200, 0)  # an unknown id gets no answer either: the next answer is for the next request
     assert line.ask(20, 0) == bytes(16)
 
 
@@ -79,7 +79,7 @@ def test_the_queue_has_indices_and_survives_a_forced_stop(fake: FakeProcess, lin
     assert stood["moving"] is False
     assert 2.0 < stood["joints"][0] < 40.0
     assert (stood["queued"], line.index()) == (1, 0)
-    line.ask(240, 1)  # without a clear the next one runs
+    line.ask(240, 1)  # without a clear the next motion runs
     fake.control.wait_until(lambda truth: truth["index"] == second)
     assert fake.truth()["joints"][0] == pytest.approx(-40.0)
     line.move(0, 45, 45, 0)
@@ -148,7 +148,7 @@ def test_homing_uses_the_stored_position(fake: FakeProcess, line: Line, reserved
     line.serial.write(b"\xaa\xaa" + bytes((len(payload),)) + payload + bytes((-sum(payload) & 255,)))
     assert line.serial.read(14) == bytes.fromhex("aa aa 0a 1f 03 01 00 00 00 00 00 00 00 dd")
     truth = fake.control.wait_until(lambda truth: truth["homed"])
-    assert truth["tool"] == pytest.approx([259.1, 0.0, -8.5, 0.0], abs=0.1)  # as delivered
+    assert truth["tool"] == pytest.approx([259.1, 0.0, -8.5, 0.0], abs=0.1)  # in its factory state
     line.ask(30, 3, "4f", 220.0, 40.0, 10.0, 0.0)
     second = struct.unpack("<Q", line.ask(31, 3))[0]
     truth = fake.control.wait_until(lambda truth: truth["index"] == second)
@@ -164,5 +164,5 @@ def test_outputs_and_parameters_are_stored(fake: FakeProcess, line: Line) -> Non
     line.ask(60, 1, "3f", 70.0, 0.0, -20.0)
     x, _, z, *_ = struct.unpack("<8f", line.ask(10, 0))
     assert (x, z) == pytest.approx((269.404, -28.485), abs=0.01)
-    line.send(60, 1, "2f", 1.0, 2.0)  # too short: no answer, nothing set
+    line.send(60, 1, "2f", 1.0, 2.0)  # too short: not answered, not stored
     assert struct.unpack("<3f", line.ask(60, 0)) == (70.0, 0.0, -20.0)

@@ -16,7 +16,7 @@ RESULT = {"order": "A-1", "serial": "S", "passed": True, "note": "", "finished":
 
 
 def ask(fake: FakeProcess, method: str, path: str, key: str = "", body: Any = None) -> tuple[int, Any, str]:
-    """Ask in bytes of our own making; gives status, body and head."""
+    """Send a raw request; return status, body and head."""
     data = b"" if body is None else msgspec.json.encode(body)
     head = f"{method} {path} HTTP/1.1\r\nHost: x\r\nContent-Length: {len(data)}\r\nIdempotency-Key: {key}\r\n\r\n"
     with socket.create_connection(parse_address(fake.ready["url"].removeprefix("http://")), 30.0) as line:

@@ -1,4 +1,4 @@
-"""Modbus fakes on the wire: raw requests, as no library sends them, and the answers that the standard prescribes."""
+"""Modbus fakes on the wire: raw requests that no library sends, and the answers that the standard prescribes."""
 
 import os
 import select
@@ -23,7 +23,7 @@ def crc(data: bytes) -> bytes:
 
 
 class Tcp:
-    """A host on Modbus TCP."""
+    """A Modbus TCP host."""
 
     def __init__(self, address: str) -> None:
         host, port = address.split(":")
@@ -54,7 +54,7 @@ class Tcp:
 
 
 class Rtu:
-    """A host on Modbus RTU."""
+    """A Modbus RTU host."""
 
     def __init__(self, path: str) -> None:
         self.port = os.open(path, os.O_RDWR | os.O_NOCTTY)
@@ -64,7 +64,7 @@ class Rtu:
         os.write(self.port, data + crc(data) if checksum else data)
 
     def receive(self, within: float = 5.0) -> str:
-        """Return a frame without its checksum; empty if none comes in time."""
+        """Return a frame without its checksum; empty if none arrives in time."""
         data, deadline = b"", time.monotonic() + within
         while len(data) < 4 or crc(data) != b"\0\0":
             if not select.select([self.port], [], [], max(deadline - time.monotonic(), 0.0))[0]:
@@ -171,7 +171,7 @@ def test_valid_requests(tcp: Tcp, block: FakeProcess) -> None:
     assert tcp.ask("16 0000 00f2 0025") == "16000000f20025"  # mask write
     assert tcp.ask("03 0000 0001") == "03020035"  # (1234h & 00f2h) | (0025h & ~00f2h)
     assert tcp.ask("17 0000 0002 0001 0001 02 8001") == "170400358001"  # writes before it reads
-    assert tcp.ask("06 0010 0032") == "0600100032"  # the echo of a pulse is what was written
+    assert tcp.ask("06 0010 0032") == "0600100032"  # the answer echoes the written value of a pulse
     assert tcp.ask("0f 0000 0003 01 fd") == "0f00000003"
     assert tcp.ask("01 0000 0003") == "010105"  # the other bits of the byte are ignored, and zero
     assert tcp.ask("01 0000 0010") == "01020500"
@@ -215,7 +215,7 @@ def test_requests_in_several_segments(tcp: Tcp, block: FakeProcess) -> None:
     data = bytes.fromhex(request)
     for end in range(1, len(data)):
         tcp.socket.sendall(data[:end])
-        block.truth()  # a whole exchange on another connection: the fake has most likely read the first segment
+        block.truth()  # a request on another connection; by then the fake has probably read the first segment
         tcp.socket.sendall(data[end:])
         assert tcp.receive() == "000100000006010600000007"
         assert tcp.receive() == "0002000000050103020007"
@@ -262,7 +262,7 @@ def test_frames_that_an_rtu_device_ignores(rtu: Rtu, serial_block: FakeProcess) 
     for other in (
         "02 05 0000 ff00",
         "02 03 0000 0001",
-        "02 03 02 0001",  # the answer of the other unit, which this one hears, too
+        "02 03 02 0001",  # the answer of the other unit, which this one receives, too
         "02 83 02",
         "02 63 00",
     ):

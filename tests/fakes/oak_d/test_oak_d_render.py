@@ -1,4 +1,4 @@
-"""Pictures of the fake camera against closed-form ray casting, and its caching between frames."""
+"""Pictures of the fake camera compared with closed-form ray casting, and caching between frames."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def test_depth_of_a_capsule_matches_the_closed_form() -> None:
     on = exact < 0.75
     assert np.count_nonzero(on) > 1000
     off = np.abs(view.depth - exact)[on]
-    assert np.median(off) < 2e-4  # of flat triangles for a round body
+    assert np.median(off) < 2e-4  # error of flat triangles for a round body
     assert np.count_nonzero(off > 2e-3) < 0.02 * np.count_nonzero(on)  # pixels at its rim
     np.testing.assert_allclose(view.depth[~on & (exact < 1.0)], exact[~on & (exact < 1.0)], atol=0.31)
 
@@ -41,7 +41,7 @@ def test_a_cylinder_has_flat_ends() -> None:
 
 
 def test_only_moved_bodies_are_rendered_again() -> None:
-    """A view after many others is the one that a new renderer gives: nothing old remains, nothing is missing."""
+    """A view after many others equals that of a new renderer: no old body remains, no body is missing."""
     renderer = Renderer(LENS)
     still = Thing("box", Pose((-0.2, 0.1, 0.05)), size=(0.1, 0.1, 0.1), color=(200, 30, 30))
     for x in (-0.1, 0.0, 0.1):

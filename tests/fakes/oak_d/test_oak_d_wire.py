@@ -20,7 +20,7 @@ __all__ = ["start_fake"]
 
 WIDTH, HEIGHT = 320, 180
 START_BGR = bytes.fromhex("4f414b53 01 02 001f 00000000 65f5c599") + b'{"client":"test","color":"bgr"}'
-"""A start, byte for byte: "OAKS", version 1, kind 2, 31 bytes of header, none of payload, checksum."""
+"""A start message: "OAKS", version 1, kind 2, 31 bytes of header, no payload, checksum."""
 
 
 class Client:
@@ -56,7 +56,7 @@ class Client:
                 color = np.frombuffer(payload[:size], np.uint8).reshape(HEIGHT, WIDTH, 3)
                 return header, color, np.frombuffer(payload[size:], "<u2").reshape(-1, WIDTH)
 
-    def say(self, kind: int, **header: Any) -> None:
+    def send(self, kind: int, **header: Any) -> None:
         text = json.dumps(header).encode()
         front = struct.pack(">4sBBHI", b"OAKS", 1, kind, len(text), 0)
         self.socket.sendall(front + struct.pack(">I", zlib.crc32(front + text)) + text)
@@ -106,12 +106,12 @@ def test_a_stream_starts_with_hello_and_frames(fake: FakeProcess, client: Client
     assert numbers[0] == before["frames"]  # none was made before the client asked
     assert np.diff(numbers).min() >= 1
     assert np.diff(stamps).min() > 0.0
-    assert stamps[-1] - stamps[0] > 8 / 30.0  # 9 periods, of which a held up camera makes up for one
+    assert stamps[-1] - stamps[0] > 8 / 30.0  # 9 periods; a delayed camera catches up one of them
     assert np.median(depth) == pytest.approx(800, abs=2)
     assert color.std() > 1.0  # noise
     assert fake.truth()["watching"] == ["test"]
-    assert fake.truth()["rendered"] <= before["rendered"] + 2  # the scene stands: it is not rendered again
-    client.say(4, asked=12.5)
+    assert fake.truth()["rendered"] <= before["rendered"] + 2  # the scene does not change, so it is not rendered again
+    client.send(4, asked=12.5)
     while (answer := client.message())[0] != 4:
         pass
     assert answer[1]["asked"] == 12.5
@@ -124,8 +124,8 @@ def test_the_scene_follows_the_world(fake: FakeProcess, client: Client) -> None:
     fake.control.do("scene", things=[box("a", 0.15, color=[250, 0, 0]), box("b", -0.15, color=[0, 0, 250])])
 
     def columns() -> tuple[float, float]:
-        """Where red and blue are across the picture."""
-        for _ in range(4):  # what was on its way
+        """Return the columns of red and blue in the picture."""
+        for _ in range(4):  # skip frames made before
             _, color, _ = client.frame()
         red = np.nonzero(color[..., 2].astype(int) - color[..., 0] > 100)[1]
         blue = np.nonzero(color[..., 0].astype(int) - color[..., 2] > 100)[1]

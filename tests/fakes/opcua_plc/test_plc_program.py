@@ -10,7 +10,7 @@ from tests.fakes.conftest import FakeProcess
 
 
 class Bench:
-    """A program, its host and a clock of our own."""
+    """A program, its host and a clock controlled by the test."""
 
     def __init__(self) -> None:
         self.program = Program({1: 1.0}, ramp=0.1, patience=0.5)
@@ -18,7 +18,7 @@ class Bench:
         self.time = 0.0
 
     def run(self, seconds: float, alive: bool = True) -> list[bool]:
-        """Scan every 10 ms; give whether the host was found lost."""
+        """Scan every 10 ms; return whether the host was found lost."""
         found = []
         for _ in range(round(seconds / 0.01)):
             self.time += 0.01
@@ -43,7 +43,7 @@ def test_a_job_needs_time_and_waits_for_its_request_to_end(plc: Bench) -> None:
     plc.run(0.2)
     assert (plc.program.step, plc.program.done) == (Step.DONE, [1])
     plc.run(1.0)
-    assert plc.program.step is Step.DONE, "a request that stays starts nothing again"
+    assert plc.program.step is Step.DONE, "a request that stays set does not start the job again"
     plc.host.request = False
     plc.run(0.02)
     assert plc.program.step is Step.IDLE
@@ -64,7 +64,7 @@ def test_a_stopped_life_counter_means_a_lost_host(plc: Bench) -> None:
     plc.run(0.3)
     assert not any(plc.run(0.45, alive=False))
     found = plc.run(0.3, alive=False)
-    assert found.count(True) == 1, "told once"
+    assert found.count(True) == 1, "reported once"
     assert (plc.program.code, plc.program.moving) == (HOST_GONE, False)
     assert plc.program.done == []
 
@@ -79,7 +79,7 @@ def test_invalid_commands_are_ignored(plc: Bench) -> None:
     plc.run(0.05)
     plc.host.number, plc.host.request = 1, True
     plc.run(0.2)
-    assert plc.program.step is Step.IDLE, "nobody has control, and a job began"
+    assert plc.program.step is Step.IDLE, "a job started without control"
 
 
 def test_the_plc_life_counter_runs_at_10_hz(plc: Bench) -> None:

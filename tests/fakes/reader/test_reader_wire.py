@@ -1,4 +1,4 @@
-"""The fake barcode reader as a host sees it: pyserial against the process, bytes as the device page says."""
+"""The fake barcode reader from the host's side: pyserial and the bytes of the device page."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -13,26 +13,26 @@ from tests.fakes.conftest import FakeProcess
 
 
 class Host:
-    """A minimal host, written from the page."""
+    """A minimal host, written from the device page."""
 
     def __init__(self, port: str, timeout: float = 2.0) -> None:
         self.serial = serial.serial_for_url(port, baudrate=9600, timeout=timeout)
 
-    def say(self, command: str) -> None:
+    def send(self, command: str) -> None:
         self.serial.write(command.encode() + b"\r")
 
-    def hear(self) -> bytes:
+    def receive(self) -> bytes:
         return self.serial.read_until(b"\r")
 
     def ask(self, command: str) -> bytes:
-        self.say(command)
-        return self.hear()
+        self.send(command)
+        return self.receive()
 
     def close(self) -> None:
         below = getattr(self.serial, "_socket", None)
         self.serial.close()
         if below is not None:
-            below.close()  # pyserial 3.5 forgets the socket unclosed when the other end has reset it
+            below.close()  # pyserial 3.5 does not close the socket if the other end has reset it
 
     def silent_for(self, seconds: float) -> bool:
         self.serial.timeout = seconds
@@ -42,7 +42,7 @@ class Host:
 @pytest.fixture(scope="module")
 def on_pty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeProcess]:
     fake = FakeProcess("barcode_reader", "--link", str(tmp_path_factory.mktemp("line") / "reader"))
-    fake.truth()  # opens the control channel, which lives as long
+    fake.truth()  # opens the control channel
     yield fake
     fake.end()
 
@@ -57,7 +57,7 @@ def on_tcp() -> Iterator[FakeProcess]:
 
 @pytest.fixture
 def reader(on_pty: FakeProcess) -> FakeProcess:
-    """As delivered, on a pty; one process serves the tests of this file."""
+    """Reset the reader to its factory state, on a pty. One process serves all tests of this file."""
     on_pty.control.do("renew")
     return on_pty
 
@@ -89,15 +89,15 @@ def test_the_code_in_front_is_read(any_reader: Any) -> None:
 
 
 def test_a_board_that_appears_during_reading_is_read(reader: Any, host: Host) -> None:
-    host.say("LON")
+    host.send("LON")
     reader.control.wait_until(lambda truth: truth["reading"])
     reader.control.do("present", code="LATE-1")
-    assert host.hear() == b"LATE-1\r"
-    host.say("LON")
+    assert host.receive() == b"LATE-1\r"
+    host.send("LON")
     reader.control.wait_until(lambda truth: truth["reading"])
     reader.control.do("present", code=None)
     reader.control.do("present", code="NEXT-2")
-    assert host.hear() == b"NEXT-2\r"
+    assert host.receive() == b"NEXT-2\r"
 
 
 def test_no_read_is_reported_after_the_readers_timeout(start_fake: Callable[..., Any]) -> None:
@@ -110,8 +110,8 @@ def test_no_read_is_reported_after_the_readers_timeout(start_fake: Callable[...,
 
 
 def test_loff_ends_reading_without_an_answer(reader: Any, host: Host) -> None:
-    host.say("LON")
-    host.say("LOFF")
+    host.send("LON")
+    host.send("LOFF")
     reader.control.wait_until(lambda truth: truth["received"] == ["LON", "LOFF"])
     reader.control.do("present", code="PCB-1")
     assert host.silent_for(1.2)
@@ -120,13 +120,13 @@ def test_loff_ends_reading_without_an_answer(reader: Any, host: Host) -> None:
 def test_a_code_decoded_before_loff_still_comes(reader: Any, host: Host) -> None:
     reader.control.do("present", code="PCB-1")
     reader.control.do("late", seconds=0.5)
-    host.say("LON")
+    host.send("LON")
     reader.control.wait_until(lambda truth: truth["received"] == ["LON"] and not truth["reading"])
-    host.say("LOFF")
+    host.send("LOFF")
     assert host.ask("STAT") == b"STAT,1,OK\r"
-    assert host.hear() == b"PCB-1\r"
+    assert host.receive() == b"PCB-1\r"
     reader.control.do("late", seconds=0.5)
-    host.say("LON")
+    host.send("LON")
     reader.control.wait_until(lambda truth: truth["received"][-1] == "LON" and not truth["reading"])
     assert host.ask("RST") == b"OK,RST\r"
     assert host.silent_for(0.8)  # a reset clears the buffer
@@ -145,7 +145,7 @@ def test_framing(start_fake: Callable[..., Any], options: list[str], answer: byt
     reader = start_fake("barcode_reader", *options)
     host = Host(reader.ready["port"])
     reader.control.do("present", code="A1")
-    host.say("LON")
+    host.send("LON")
     assert host.serial.read(len(answer)) == answer
     assert host.silent_for(0.1)
     host.close()
@@ -165,7 +165,7 @@ def test_identification_status_and_unknown_commands(reader: Any, host: Host) -> 
     assert host.ask("LON") == b"ERROR\r"
     assert host.ask("lon") == b"ERR,lon,00\r"
     host.serial.write(b"\r\n" + b"x" * 5000 + b"\rSTAT\r\n")
-    assert host.hear() == b"STAT,0,FAIL\r"
+    assert host.receive() == b"STAT,0,FAIL\r"
 
 
 def test_an_unreadable_code_is_refused(reader: Any) -> None:
@@ -281,7 +281,7 @@ def test_an_existing_file_at_the_link_path_is_kept(tmp_path: Path) -> None:
 
 def test_a_power_cycle_ends_reading(any_reader: Any) -> None:
     host = Host(any_reader.ready["port"])
-    host.say("LON")
+    host.send("LON")
     any_reader.control.wait_until(lambda truth: truth["reading"])
     any_reader.control.do("power_cycle")
     host.close()

@@ -57,7 +57,7 @@ def test_watchdog_expires_and_locks_what_it_guards(block: Block, clock: Clock) -
     block.check_unlocked(digital=0b1000)
     block.command(dog, ACKNOWLEDGE)
     block.check_unlocked(digital=0b111, analog=0b11)
-    assert after(block, clock, 60.0) == [False, True, True, True]  # nothing comes back by itself
+    assert after(block, clock, 60.0) == [False, True, True, True]  # no output returns by itself
 
 
 def test_release_is_the_safe_state_at_once(block: Block, clock: Clock) -> None:
@@ -79,7 +79,7 @@ def test_the_result_does_not_depend_on_the_time_step() -> None:
         dog.time_ms, dog.do_guarded, dog.do_switched, dog.do_safe = 500, 0b110, 0b110, 0b010
         block.trigger(dog, 1)
         block.pulse(0, 700)  # not guarded
-        block.pulse(1, 300)  # over before the watchdog, which switches it on
+        block.pulse(1, 300)  # ends before the watchdog, which switches it on
         block.pulse(2, 900)  # ended by the watchdog
         end = clock.now + 5.0
         while clock.now < end:

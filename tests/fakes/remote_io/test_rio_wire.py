@@ -1,4 +1,4 @@
-"""The fake block as a host sees it: raw frames and pymodbus against the process, as the device page says."""
+"""The fake block from the host's side: raw frames and pymodbus, as on the device page."""
 
 import logging
 import socket
@@ -66,7 +66,7 @@ def test_watchdog_over_the_wire(fake: Any, host: Any, wait_for: Callable[..., An
     assert not host.write_coil(0, True, device_id=1).isError()
     words = image(host)
     assert (words[1], words[10], words[14]) == (1, 1, 4711)
-    words = wait_for(lambda: image(host), lambda words: words[10] == EXPIRED)  # reading does not keep it quiet
+    words = wait_for(lambda: image(host), lambda words: words[10] == EXPIRED)  # reading does not trigger the watchdog
     assert words[1] == 0b10
     for refused in (host.write_coil(0, True, device_id=1), host.write_registers(16, [50], device_id=1)):
         assert refused.exception_code == 4

@@ -12,7 +12,7 @@ from tests.fakes.conftest import FakeProcess
 
 
 class Wire:
-    """One question, one answer."""
+    """A client: one request, one answer."""
 
     def __init__(self, address: str) -> None:
         self.socket = socket.create_connection(parse_address(address), 2.0)

@@ -1,4 +1,4 @@
-"""The fake scale as a host sees it: pyserial against the process, bytes as in the MT-SICS command set."""
+"""The fake scale from the host's side: pyserial and the bytes of the MT-SICS command set."""
 
 import time
 from collections.abc import Iterator
@@ -59,7 +59,7 @@ def test_commands_on_the_wire(fake: FakeProcess, line: Line) -> None:
     assert line.ask("I4") == 'I4 A "B021002593"'
     fake.control.do("put", kg=0.1)
     assert line.ask("SI").startswith("S D ")
-    assert line.ask("S") == "S S     100.00 g"  # waited for
+    assert line.ask("S") == "S S     100.00 g"  # once stable
     assert line.ask("T") == "T S     100.00 g"
     assert line.ask("SI") == "S S       0.00 g"
     assert line.ask("@") == 'I4 A "B021002593"'
@@ -168,7 +168,7 @@ def test_sir_repeats_until_another_weighing(fake: FakeProcess, line: Line) -> No
     while (answer := line.read()) != "S S     200.00 g":
         raise AssertionError(answer)
     line.serial.timeout = 0.3
-    assert line.serial.read_until(b"\r\n", 100).strip() in (b"", b"S S     200.00 g")  # one could be under way
+    assert line.serial.read_until(b"\r\n", 100).strip() in (b"", b"S S     200.00 g")  # one could be on its way
     assert line.serial.read(1) == b""
     line.serial.timeout = 30.0
     line.send("SIR")

@@ -1,4 +1,4 @@
-"""The fake tightening controller as a client sees it: a socket, and bytes at the positions of the specification."""
+"""The fake tightening controller from the client's side: a socket, and bytes at the positions of the specification."""
 
 import socket
 from collections.abc import Callable, Iterator
@@ -10,7 +10,7 @@ from tests.fakes.conftest import FakeProcess
 
 
 class Client:
-    """A client of its own, without a codec: it cuts telegrams by their lengths."""
+    """A client without the driver's codec: it splits telegrams by their lengths."""
 
     def __init__(self, fake: FakeProcess) -> None:
         host, _, port = str(fake.ready["open_protocol"]).rpartition(":")
@@ -43,7 +43,7 @@ class Client:
 
 @pytest.fixture(scope="module")
 def running() -> Iterator[FakeProcess]:
-    """One fake without options for a file, because starting one takes longer than most tests."""
+    """Start one fake without options for a file, because starting one takes longer than most tests."""
     fake = FakeProcess("screwdriver", "--duration", "0.1")
     fake.truth()  # opens the control channel
     yield fake

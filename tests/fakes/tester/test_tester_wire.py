@@ -1,4 +1,4 @@
-"""The fake tester as a host sees it: pymodbus against the process, registers as the device page says."""
+"""The fake tester from the host's side: pymodbus and the registers of the device page."""
 
 import logging
 import struct
@@ -17,7 +17,7 @@ STOPPED, IDLE, EXECUTE, ABORTED, HELD, COMPLETE = 2, 4, 6, 9, 11, 17
 
 
 class Host:
-    """A minimal host, written from the page."""
+    """A minimal host, written from the device page."""
 
     def __init__(self, address: str, timeout: float = 2.0) -> None:
         logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
@@ -63,14 +63,14 @@ class Host:
 @pytest.fixture(scope="module")
 def one_tester() -> Iterator[FakeProcess]:
     tester = FakeProcess("functional_tester", "--time-scale", "20", "--test-time", "2", "--seed", "7")
-    tester.truth()  # opens the control channel, which lives as long
+    tester.truth()  # opens the control channel
     yield tester
     tester.end()
 
 
 @pytest.fixture
 def tester(one_tester: FakeProcess) -> FakeProcess:
-    """A tester as delivered; one process serves the tests of this file."""
+    """Reset the tester to its factory state. One process serves all tests of this file."""
     one_tester.control.do("renew")
     return one_tester
 
@@ -274,7 +274,7 @@ def test_the_watchdog_detects_a_silent_host(start_fake: Callable[..., Any], wait
     host.command(START)
     end = time.monotonic() + 1.5
     while time.monotonic() < end:
-        assert host.state in (3, EXECUTE)  # each request keeps it alive
+        assert host.state in (3, EXECUTE)  # each request triggers the watchdog
     silent_since = time.monotonic()
     tester.control.wait_until(lambda truth: truth["state"] == "Aborted")
     assert time.monotonic() - silent_since > 0.9

@@ -1,6 +1,6 @@
 """The fake servos on the wire: frames of the manual, the vendor's library, motion in time.
 
-The e-Manual was not at hand: its frames are quoted from general knowledge of it. Their CRCs are right.
+The frames are quoted from general knowledge of the e-Manual, which was not available. Their CRCs are valid.
 """
 
 import contextlib
@@ -100,7 +100,7 @@ def test_a_servo_moves_under_its_profile_and_stops_when_the_bus_is_silent(second
         fastest = max(fastest, servo.speed)
     assert 2048 < servo.position < 3548
     assert fastest <= 100 * 0.229 * 4096 / 60 + 1
-    now[0] += 0.5  # nothing is heard: it stops 0.1 s in
+    now[0] += 0.5  # without a message it stops after 0.1 s
     servo.advance()
     assert servo.speed == 0.0
     assert servo["watchdog"] == 0xFF
@@ -127,7 +127,7 @@ def fake(start_fake: Callable[..., FakeProcess]) -> FakeProcess:
 
 
 class PatientPort(PortHandler):  # type: ignore[misc]
-    """Waits longer than the library's 34 ms: the fake's process may have to wait for a core."""
+    """Wait longer than the library's 34 ms: the fake's process may have to wait for a core."""
 
     def setPacketTimeout(self, _length: int) -> None:  # noqa: N802 - the library's name
         self.setPacketTimeoutMillis(500.0)
@@ -178,7 +178,7 @@ def test_half_a_frame_and_silence_on_the_line(fake: FakeProcess) -> None:
     line = os.open(fake.ready["port"], os.O_RDWR | os.O_NOCTTY)
     try:
 
-        def heard(within: float) -> bytes:
+        def received(within: float) -> bytes:
             found = b""
             while select.select([line], [], [], within)[0]:
                 found += os.read(line, 1024)
@@ -187,12 +187,12 @@ def test_half_a_frame_and_silence_on_the_line(fake: FakeProcess) -> None:
 
         fake.control.do("half_frame")
         os.write(line, packet(1, 0x01, b""))
-        assert heard(2.0) == status(1, 0, b"\xfc\x03\x2d")[:7]
+        assert received(2.0) == status(1, 0, b"\xfc\x03\x2d")[:7]
         os.write(line, packet(1, 0x01, b""))
-        assert heard(0.1) == b""
+        assert received(0.1) == b""
         fake.control.do("heal")
         os.write(line, b"\x00\xff\xff" + packet(1, 0x01, b""))
-        assert heard(2.0) == status(1, 0, b"\xfc\x03\x2d")
+        assert received(2.0) == status(1, 0, b"\xfc\x03\x2d")
     finally:
         os.close(line)
 

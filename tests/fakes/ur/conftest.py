@@ -1,4 +1,4 @@
-"""Fixtures: the fake controller in a process, and ur_rtde in another one with a time limit."""
+"""Fixtures: the fake controller in one process, and ur_rtde in another with a time limit."""
 
 import contextlib
 import json
@@ -38,7 +38,7 @@ def until(holds, within=20.0):
 
 
 class FakeUr(FakeProcess):
-    """A running fake controller on an address of its own."""
+    """A running fake controller on its own address."""
 
     def __init__(self, *options: str) -> None:
         super().__init__("ur", "--host", own_loopback(), *options)
@@ -52,7 +52,7 @@ class FakeUr(FakeProcess):
         return self.control.do(command, **arguments)
 
     def library(self, body: str, within: float = 120.0) -> dict[str, Any]:
-        """Runs `body` with ur_rtde in a process of its own; gives what it reports."""
+        """Run `body` with ur_rtde in a separate process; return its result."""
         run = subprocess.run(
             [sys.executable, "-c", _PRELUDE + body, self.host, self.ready["control"]],
             capture_output=True,
@@ -67,7 +67,7 @@ class FakeUr(FakeProcess):
 
     @contextmanager
     def library_running(self, body: str) -> Iterator[subprocess.Popen[bytes]]:
-        """Runs `body` beside the test, for faults in which the library may hang or crash."""
+        """Run `body` concurrently with the test, for faults in which the library may hang or crash."""
         run = subprocess.Popen(
             [sys.executable, "-c", _PRELUDE + body, self.host, self.ready["control"]],
             stdout=subprocess.DEVNULL,
@@ -95,5 +95,5 @@ def start_ur() -> Iterator[Callable[..., FakeUr]]:
 
 @pytest.fixture
 def ur(start_ur: Callable[..., FakeUr]) -> FakeUr:
-    """A fake UR5e, powered and ready, whose waits are ten times shorter."""
+    """Start a fake UR5e, powered and ready, whose waits are ten times shorter."""
     return start_ur("--time-scale", "0.1")

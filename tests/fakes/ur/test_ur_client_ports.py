@@ -10,7 +10,7 @@ from arcor2_fakes.control import parse_address
 
 
 class Client:
-    """A client of a port that sends messages which begin with their length."""
+    """A client of a port whose messages begin with their length."""
 
     def __init__(self, fake, port):
         self.socket = socket.create_connection(parse_address(fake.ready[port]), 5.0)
@@ -34,7 +34,7 @@ class Client:
         return head + self.read(struct.unpack(">I", head)[0] - 4)
 
     def state(self):
-        """Return the packages of the next robot state by type, without their heads."""
+        """Return the packages of the next robot state by type, without their headers."""
         while (message := self.message())[4] != 16:
             pass
         packages, at = {}, 5
@@ -46,7 +46,7 @@ class Client:
         return packages
 
     def robot_message(self, kind):
-        """Return the content of the next message of a type, behind time stamp, source and type."""
+        """Return the content of the next message of a type, after time stamp, source and type."""
         while True:
             message = self.message()
             if message[4] == 20 and message[14] == kind:

@@ -257,7 +257,7 @@ def control_script(c, offset=0, path=""):
 
 
 def command(c, code, doubles=(), ints=(), offset=0):
-    """As the library does it: the code, done, zero, ready."""
+    """Send a command like the library: the code, done, zero, ready."""
     c.input_doubles[offset : offset + len(doubles)] = doubles
     c.input_ints[offset + 1 : offset + 1 + len(ints)] = ints
     c.input_ints[offset] = code
@@ -282,7 +282,7 @@ def test_asynchronous_status_counts_operations(c, offset):
 
 
 def test_the_kind_of_stop_depends_on_earlier_stops(c):
-    """Synchronous stops run stopj at first; from the first asynchronous one on everything runs stopl."""
+    """Synchronous stops run stopj at first; after the first asynchronous stop all run stopl."""
     control_script(c)
     for code, asynchronous, kind in [(33, 0, "stopj"), (34, 0, "stopj"), (34, 1, "stopl"), (34, 0, "stopl")]:
         command(c, 1, [*(GOAL if c.arm.q[0] < 1.0 else HOME), 1.0, 3.0], [1])
@@ -374,7 +374,7 @@ def test_commands_that_are_not_modelled_end_the_program(c, code):
     wait(c, 0.01)
     assert c.program is None
     assert failed == [f"command {code} is not modelled"]
-    assert c.output_ints[0] == 1, "it was not done: the result of the previous command is not its own"
+    assert c.output_ints[0] == 1, "the command was not executed; the result is the previous command's"
 
 
 def test_programs_with_unknown_functions_end_in_an_error(c):

@@ -1,4 +1,4 @@
-"""Kinematics of the fake: against itself, against published numbers, and at singularities."""
+"""Kinematics of the fake: consistency, published numbers, and singularities."""
 
 import math
 

@@ -31,7 +31,7 @@ report(samples=samples, q=receive.getActualQ(), pose=receive.getActualTCPPose(),
     assert max((ticks[j] - ticks[i]) / (clocks[j] - clocks[i]) for i, j in stretches) > 450
     steps = [b - a for a, b in itertools.pairwise(ticks)]
     assert min(steps) > 0
-    assert steps.count(1) > 100  # the others were overwritten before this loop looked
+    assert steps.count(1) > 100  # the other samples were overwritten before this loop read them
     assert seen["q"] == pytest.approx(HOME)
     assert seen["mode"] == 7
     assert ur.do("truth")["samples_lost"] == 0
@@ -93,7 +93,7 @@ report(sent=sent, q=q, later=fake.do("truth")["q"],
     (stop,) = ur.do("stops")
     assert (stop["via"], stop["code"]) == ("rtde", 34)
     assert stop["t"] >= seen["sent"]
-    assert ur.do("commands_taken")[-1]["kind"] == "stopl"  # what the library's program really runs
+    assert ur.do("commands_taken")[-1]["kind"] == "stopl"  # the function that the library's program really calls
 
 
 def test_move_l_is_a_straight_line(ur):
@@ -110,7 +110,7 @@ while fake.do("truth")["moving"]:
 until(lambda: not any(receive.getActualTCPSpeed()))
 report(start=start, goal=goal, path=path, end=receive.getActualTCPPose())
 """)
-    shift, turn = difference(from_pose(seen["end"]), from_pose(seen["goal"]))  # a half turn has two vectors
+    shift, turn = difference(from_pose(seen["end"]), from_pose(seen["goal"]))  # a half turn has two rotation vectors
     assert max(map(abs, (*shift, *turn))) < 1e-6
     line = [g - s for g, s in zip(seen["goal"][:3], seen["start"][:3], strict=True)]
     assert len(seen["path"]) > 20
@@ -246,7 +246,7 @@ report(kicked=kicked["moving"], trips_before=kicked["watchdog_trips"])
 
 
 def test_a_killed_client_leaves_the_arm_at_standstill(ur):
-    """kill -9 in mid-move: no goodbye on the wire, the watchdog does it."""
+    """kill -9 during a move: nothing is sent any more, and the watchdog stops the arm."""
     with pytest.raises(AssertionError, match="status -9"):
         ur.library("""
 control = Control(host, 500.0)
@@ -263,7 +263,7 @@ os.kill(os.getpid(), 9)
 
 @pytest.mark.parametrize("fault", ["silence", "half_frame", "reset"])
 def test_a_cable_cut_during_a_move_ends_at_standstill(ur, fault):
-    """The library kicks on, reconnects by itself and sometimes crashes over it: nothing of that may move the arm."""
+    """The library keeps kicking, reconnects by itself and sometimes crashes: none of this may move the arm."""
     with ur.library_running("""
 control = Control(host, 500.0)
 control.setWatchdog(2.0)
@@ -274,7 +274,7 @@ while True:
 """):
         ur.control.wait_until(lambda t: t["q"][0] > 0.2)
         if fault == "reset":
-            ur.do("refuse", wire="rtde")  # else it may be back, and kick again, before the watchdog is due
+            ur.do("refuse", wire="rtde")  # else it may reconnect and kick again before the watchdog expires
         ur.do(fault, wire="rtde")
         resting = ur.control.wait_until(lambda t: not t["moving"])
         assert resting["q"][0] < 2.0

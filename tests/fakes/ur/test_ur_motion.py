@@ -21,7 +21,7 @@ def arm():
 
 
 def run(arm, seconds=30.0, each=lambda: None):
-    """Until the motion has ended; gives how long it took."""
+    """Run until the motion has ended; return its duration, s."""
     for n in range(round(seconds / DT)):
         if not arm.busy:
             return n * DT
@@ -59,7 +59,7 @@ def test_a_joint_move_stays_within_velocity_and_acceleration():
     assert a.q == pytest.approx(goal, abs=1e-12)
     assert peak == pytest.approx(0.8, rel=1e-3)
     assert jump <= 1.6 * 1.02
-    assert took == pytest.approx(1.0 / 0.8 + 0.8 / 1.6, abs=2 * DT)  # the longest way is 1 rad
+    assert took == pytest.approx(1.0 / 0.8 + 0.8 / 1.6, abs=2 * DT)  # the largest joint change is 1 rad
 
 
 def test_a_linear_move_is_straight_at_constant_speed():

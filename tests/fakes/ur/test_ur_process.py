@@ -16,7 +16,7 @@ from tests.waiting import wait_for
 
 
 class RtdeSocket:
-    """An RTDE client of the barest kind, with its own framing."""
+    """A minimal RTDE client with its own framing."""
 
     def __init__(self, fake):
         self.socket = socket.create_connection(parse_address(fake.ready["rtde"]), 2.0)
@@ -92,7 +92,7 @@ def test_unknown_and_occupied_variables(ur):
         assert first.outputs(b"timestamp,actual_coffee") == b"\x00DOUBLE,NOT_FOUND"
         assert first.ask(b"I", b"input_int_register_0,input_coffee") == b"\x00INT32,NOT_FOUND"
         assert first.ask(b"I", b"input_int_register_24,input_double_register_24") == b"\x01INT32,DOUBLE"
-        assert first.ask(b"I", b"input_int_register_24") == b"\x02INT32"  # its own
+        assert first.ask(b"I", b"input_int_register_24") == b"\x02INT32"  # the variable is its own
         assert second.ask(b"I", b"input_int_register_24") == b"\x00IN_USE"
         ur.do("fieldbus", on=True)
         assert second.ask(b"I", b"input_int_register_0") == b"\x00IN_USE"
@@ -228,7 +228,7 @@ def test_the_fake_ends_with_its_parent():
     parent.kill()
     parent.wait()
     parent.stdout.close()
-    # Without a process that reaps orphans, a process that has ended stays as a zombie.
+    # Without a process that reaps orphans, an ended process remains as a zombie.
     wait_for(lambda: not child.is_running() or child.status() == psutil.STATUS_ZOMBIE)
 
 

@@ -17,7 +17,7 @@ def c():
 
 
 def play(c, text, within=20.0):
-    """Run a program to its end; gives the TCP's places on the way."""
+    """Run a program to its end; return the TCP positions on its path."""
     c.start_program(WrittenProgram(c, "test", text))
     seen = []
     for _ in range(round(within * c.frequency)):
@@ -64,7 +64,7 @@ end
     assert c.output_ints[1] == 33
     assert (c.output_ints[4], c.output_ints[5]) == (40, 50)
     assert c.output_doubles[0] == pytest.approx(7.0)
-    assert c.output_ints[0] == 0, "a killed thread does nothing more"
+    assert c.output_ints[0] == 0, "a killed thread has no further effect"
     assert c.output_ints[2] in (6, 7)
 
 
@@ -94,7 +94,7 @@ def test_a_watchdog_started_by_a_program_stops_it(c):
 
 
 def corner(c, blend, kind="movel"):
-    """Run round a corner; gives the least distance to it, and the least TCP speed on the way between the ends."""
+    """Move around a corner; return the smallest distance to it, and the lowest TCP speed between the ends."""
     x, y, z, *turn = c.arm.pose
     places = [(x, y - 0.2, z), (x, y - 0.2, z + 0.2)]
     lines = [
