@@ -81,7 +81,7 @@ async def test_a_project_is_edited_by_methods_with_typed_events(server: ServerPr
             saved = await ann.get_project(project.id)
             assert [item.end for item in saved.logic] == [action.id]  # a dry run adds nothing
 
-            # Refusals say of which kind they are.
+            # Refusals state their kind.
             with pytest.raises(NothingThere, match="nowhere") as missing:
                 await ann.get_scene("nowhere")
             assert isinstance(missing.value, NotFound)
@@ -237,7 +237,7 @@ async def test_a_killed_server_loses_at_most_one_answer(tmp_path: Path) -> None:
             await server.start()
             await editing
             project = (await _opened_again(client)).data.project
-            # Nothing that was acknowledged is lost, nothing is there twice; what was unknown may be there.
+            # No acknowledged edit is lost or duplicated; edits of unknown outcome may exist.
             await client.save_project()
             names = [point.name for point in (await client.get_project(project.id)).action_points]
             assert len(names) == len(set(names))

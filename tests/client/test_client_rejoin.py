@@ -39,7 +39,7 @@ async def test_an_edit_without_an_answer_is_not_repeated() -> None:
         with pytest.raises(AnswerUnknown, match="may or may not have been executed") as unknown:
             await client.add_action_point(name="a", position=Position(0.0, 0.0, 0.0))
         assert unknown.value.request == "AddActionPoint"
-        await client.save_project()  # waits until it is back
+        await client.save_project()  # waits for the connection
         assert server.asked == [["RegisterUser", "AddActionPoint"], ["RegisterUser", "SaveProject"]]
 
 
@@ -161,7 +161,7 @@ async def test_time_limits_hold_for_late_answers_and_missing_servers() -> None:
         server.script["GetEndEffectors"] = [silent]
         with pytest.raises(AnswerLate, match=r"GetEndEffectors within 0\.1 s"):
             await client.get_end_effectors("r", timeout=0.1)
-        # The late answer answers nothing, and nobody else's question.
+        # The late answer is not used for another request.
         await server.answer(server.sockets[-1], requests[0])
         assert (await client.system_info()).version == "1"
     try:

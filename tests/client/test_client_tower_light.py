@@ -1,4 +1,4 @@
-"""The example docs/examples/tower_light_client.py between a real server and a simulated tower light."""
+"""The example docs/examples/tower_light_client.py with a real server and a simulated tower light."""
 
 import asyncio
 import signal
@@ -45,7 +45,7 @@ def block() -> Iterator[FakeProcess]:
 
 
 class Watched:
-    """The lamps at the simulated block."""
+    """The lamps of the simulated block."""
 
     def __init__(self, block: FakeProcess) -> None:
         self.block = block
@@ -116,7 +116,7 @@ async def test_the_tower_light_example_shows_the_state_of_the_server(tmp_path: P
             await client.resume_package()
             await lamps.shows(GREEN)
             await lamps.shows(RED, blinking=True)
-            # It stays red after the program has ended, until another one starts.
+            # The lamp stays red after the program has ended, until another program starts.
             await client.run_package(package, start_paused=True)
             await lamps.shows(AMBER)
             await client.stop_package()
@@ -125,7 +125,7 @@ async def test_the_tower_light_example_shows_the_state_of_the_server(tmp_path: P
         await lamps.shows(AMBER, blinking=True)
         await server.start()
         await lamps.shows(None)
-        # Killed, it cannot say anything any more: the block does, by its own watchdog.
+        # The killed client cannot switch the lamps; the block's own watchdog does.
         process.kill()
         await lamps.shows(RED)
     finally:

@@ -1,7 +1,7 @@
-"""Record what a version leaves behind, for test_former_version.py: `python -m tests.compatibility.record`.
+"""Record the data that a version writes, for test_former_version.py: `python -m tests.compatibility.record`.
 
-Run it once with a released version, before anything is changed: it writes the data directory of a killed server, a
-package, the demo's package, what the server answered, and the names that drivers import from the library.
+Run it once with a released version, before you change anything. It writes the data directory of a killed server, a
+package, the demo's package, the server's answers, and the names that drivers import from the library.
 """
 
 import ast
@@ -59,7 +59,7 @@ def write_json(name: str, content: Any) -> None:
 
 
 async def record(folder: Path) -> None:
-    """Make the workplace through a server, edit it, kill the server."""
+    """Create the workplace through a server, edit it, kill the server."""
     server = ServerProcess(folder / "data")
     await server.start()
     async with Client(server.url, "recorder", reconnect=False) as client:
@@ -71,7 +71,7 @@ async def record(folder: Path) -> None:
         project = await creation.open_project(scene, {})
         await client.rest.publish(project.id, RECORDED / "package.zip", "Fill the shelf")
         write_json("answers.json", await answers(client))
-        # Edits that nobody saves.
+        # Edits that are not saved.
         (point,) = [point for point in project.action_points if point.name == "slot"]
         await client.call("WriteLock", rpc.WriteLockArgs(point.id))
         await client.call("RenameActionPoint", rpc.RenameActionPointArgs(point.id, "upper_slot"))
@@ -86,7 +86,7 @@ async def record(folder: Path) -> None:
 
 
 async def record_demo(folder: Path) -> None:
-    """Run the demo once, and take the package that it built."""
+    """Run the demo once, and copy the package that it built."""
     command = (sys.executable, "-m", "arcor2_server.cli.main", "demo", "--fast", "--once", "--boards", "1")
     demo = await asyncio.create_subprocess_exec(*command, "--port", "0", "--data-dir", str(folder / "demo"))
     assert await demo.wait() == 0

@@ -1,4 +1,4 @@
-"""What the first version left behind still works: its data directory, its packages, its object types' imports."""
+"""Data of the first version still work: its data directory, its packages, and the imports of its object types."""
 
 import io
 import json
@@ -38,7 +38,7 @@ print(json.dumps(missing))
 
 
 def missing_from(new: Any, old: Any, where: str = "") -> list[str]:
-    """Return the places where `new` lacks or contradicts what `old` says; additions are allowed."""
+    """Return the places where `new` lacks or contradicts a value of `old`; additions are allowed."""
     if isinstance(old, dict) and isinstance(new, dict):
         return [
             problem for key, value in old.items() for problem in missing_from(new.get(key), value, f"{where}/{key}")
@@ -55,7 +55,7 @@ def missing_from(new: Any, old: Any, where: str = "") -> list[str]:
 
 @pytest.fixture
 async def client(tmp_path: Path) -> AsyncIterator[Client]:
-    """A client of a server that starts with the recorded data directory."""
+    """Connect a client to a server that starts with the recorded data directory."""
     data_dir = tmp_path / "data"
     with tarfile.open(fileobj=io.BytesIO((RECORDED / "data-directory.tar.gz").read_bytes())) as tar:
         tar.extractall(data_dir, filter="data")
@@ -64,7 +64,7 @@ async def client(tmp_path: Path) -> AsyncIterator[Client]:
 
 
 async def run_to_the_end(client: Client, package_id: str) -> list[str]:
-    """Run a package; return the names of its actions in the order in which they ended."""
+    """Run a package; return the names of its actions in the order of their ends."""
     await client.call("RunPackage", rpc.RunPackageArgs(package_id))
     names: dict[str, str] = {}
     ended: list[str] = []

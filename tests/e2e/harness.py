@@ -1,4 +1,4 @@
-"""The whole workplace for tests: fakes, small world and server, each a process, and hands on all of them."""
+"""The whole workplace for tests: fakes, small world and server as processes, and helpers to control them."""
 
 import asyncio
 import contextlib
@@ -28,7 +28,7 @@ WORKPLACE = Path(__file__).parent / "workplace" / "three_devices.toml"
 
 
 async def until(ask: Callable[[], Any], what: str, timeout: float = 30.0) -> Any:
-    """Ask again and again until the answer is true; fails naming what was waited for."""
+    """Poll until the result is true, and return it. Fail with the name of the condition."""
     began = own_time()
     while True:
         answer = ask()
@@ -42,7 +42,7 @@ async def until(ask: Callable[[], Any], what: str, timeout: float = 30.0) -> Any
 
 
 class Cell:
-    """Everything that runs. `tell` speaks to a fake, `client` connects to the server."""
+    """All processes. `tell` sends commands to a fake, `client` connects to the server."""
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
@@ -93,25 +93,25 @@ class Cell:
         )
 
     async def restart_server(self) -> None:
-        """Start the server again, which was killed, on the same port and data directory."""
+        """Restart the killed server on the same port and data directory."""
         with outliving_the_test():
             await self.start_server(urlsplit(self.url).port or 0)
 
     async def renew_server(self) -> None:
-        """End the server if it runs, and start it on an empty data directory."""
+        """Stop the server if it runs, and start it on an empty data directory."""
         await self.children["server"].stop()
         self.data_dir = self.directory / f"data-{len(list(self.directory.glob('data*')))}"
         with outliving_the_test():
             await self.start_server()
 
     async def renew_robot(self) -> None:
-        """Start the simulated robot again, at the same address."""
+        """Restart the simulated robot at the same address."""
         await self.children["robot"].stop()
         with outliving_the_test():
             await self.start_robot()
 
     async def kill(self, name: str) -> None:
-        """End a process as a power cut would."""
+        """Kill a process, as a power failure would."""
         process = self.children[name]._process
         assert process is not None
         process.kill()
@@ -119,7 +119,7 @@ class Cell:
         await self.children[name].stop()
 
     def hosts(self) -> list[psutil.Process]:
-        """The cell hosts below the server, youngest last."""
+        """Return the cell hosts of the server, the newest last."""
         server = self.children["server"]._process
         assert server is not None
         with contextlib.suppress(psutil.NoSuchProcess):
@@ -132,17 +132,17 @@ class Cell:
 
     async def stop(self) -> None:
         await self.close_clients()
-        # The server first, which holds the devices; the world before the fakes that it follows.
+        # End the server first, because it holds the devices, and the world before the fakes that it follows.
         for name in sorted(self.children, key=lambda name: {"server": 0, "world": 1}.get(name, 2)):
             await self.children[name].stop()
 
-    # ------------------------------------------------------------------------------------------------ hands
+    # -------------------------------------------------------------------------------------- clients and commands
     async def client(self, name: str) -> Client:
-        """A connected, registered client that is closed with the cell, or by `close_clients`."""
+        """Return a connected, registered client, which is closed with the cell or by `close_clients`."""
         return await self._exit.enter_async_context(Client(self.url, name, reconnect=False))
 
     async def tell(self, name: str, do: str, **arguments: Any) -> Any:
-        """Tell a fake over its control channel."""
+        """Send a command to a fake over its control channel."""
         host, _, port = self.at[name]["control"].rpartition(":")
         reader, writer = await asyncio.open_connection(host, int(port), limit=1 << 22)
         try:
@@ -165,13 +165,13 @@ class Cell:
         }
 
     async def open(self, client: Client, boards: int = 2, workplace: Workplace | None = None) -> tuple[Scene, Project]:
-        """Open the scene and project of the three devices, made where they are missing."""
+        """Open the scene and project of the three devices; create them if they are missing."""
         creation = Creation(client, workplace or load(WORKPLACE), self.addresses())
         scene = await creation.open_scene()
         return scene, await creation.open_project(scene, {"boards": boards})
 
     async def build(self, client: Client, project: Project) -> str:
-        """Build the open project and close it; gives the package's id."""
+        """Build the open project and close it; return the package's id."""
         built = await client.call("BuildProject", rpc.BuildProjectArgs(project.id, project.name))
         await client.call("CloseProject")
         package_id: str = built.package_id
@@ -179,7 +179,7 @@ class Cell:
 
 
 async def scene_state(client: Client, wanted: SceneStateEnum, timeout: float = 40.0) -> Event:
-    """The next SceneState with that state."""
+    """Wait for the next SceneState with this state."""
     while True:
         event = await client.next_event("SceneState", timeout=timeout)
         if event.data.state is wanted:
@@ -187,7 +187,7 @@ async def scene_state(client: Client, wanted: SceneStateEnum, timeout: float = 4
 
 
 def alive(pid: int) -> bool:
-    """Whether a process lives (a zombie does not)."""
+    """Return whether a process runs (a zombie does not)."""
     try:
         return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
     except psutil.NoSuchProcess:
@@ -200,7 +200,7 @@ def kill(pid: int) -> None:
 
 @contextlib.asynccontextmanager
 async def running_cell(directory: Path, *, boards: int = 0, seed: int = 0) -> AsyncIterator[Cell]:
-    """All fakes and the server; with boards also the small world."""
+    """Start all fakes and the server; with boards also the small world."""
     cell = Cell(directory)
     try:
         async with asyncio.TaskGroup() as tasks:

@@ -1,4 +1,4 @@
-"""A workplace as a camera sees it: markers on paper, an arm, and where all of it really is."""
+"""A workplace as seen by a camera: markers on paper, an arm, and their true poses."""
 
 import math
 from typing import Any
@@ -10,13 +10,13 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 
 Q = (0.4, -1.3, 1.5, -1.2, -1.2, 0.3)
 ROBOT = Pose(Position(0.10, 0.05, 0.0), Orientation.from_rotation_vector(0.0, 0.0, 0.35))
-"""Where the robot's base really stands."""
+"""True pose of the robot's base."""
 MARKERS = {10: (0.45, -0.35), 11: (0.75, -0.30), 12: (0.60, 0.35), 13: (0.35, 0.45)}
 SIZE = 0.15
 
 
 def looking_at(eye: tuple[float, float, float], target: tuple[float, float, float]) -> Pose:
-    """Give the pose of a camera's optical frame."""
+    """Return the pose of a camera's optical frame."""
     z = np.subtract(target, eye) / np.linalg.norm(np.subtract(target, eye))
     x = np.cross(z, (0.0, 0.0, 1.0))
     x /= np.linalg.norm(x)
@@ -27,7 +27,7 @@ def looking_at(eye: tuple[float, float, float], target: tuple[float, float, floa
 
 
 CAMERA = looking_at((1.2, -0.6, 0.85), (0.42, 0.03, 0.12))
-"""Where the camera really is."""
+"""True pose of the camera."""
 
 
 def pose(of: Pose) -> dict[str, Any]:
@@ -35,7 +35,7 @@ def pose(of: Pose) -> dict[str, Any]:
 
 
 def printed(number: int, x: float, y: float) -> dict[str, Any]:
-    """A marker on paper, as the fake camera is told of it: its face is the origin's plane."""
+    """Return a marker on paper in the fake camera's format. Its face is the plane of the origin."""
     return {
         "name": f"marker {number}",
         "pose": {"position": [x, y, -0.0005]},
@@ -50,12 +50,12 @@ def tilted(angle: float) -> Orientation:
 
 
 def off(found: Pose, truth: Pose) -> tuple[float, float]:
-    """Give by how much a pose is off, mm and degrees."""
+    """Return the difference of two poses, mm and degrees."""
     return 1e3 * found.position.distance_to(truth.position), math.degrees(found.orientation.angle_to(truth.orientation))
 
 
 def in_view(*, markers: bool = True, robot: bool = True) -> list[dict[str, Any]]:
-    """What stands there, as the fake camera is told of it."""
+    """Return the objects of the workplace in the fake camera's format."""
     things = [printed(number, *place) for number, place in MARKERS.items()] if markers else []
     if robot:
         things += arm.things("ur5e", ROBOT.matrix(), Q, np.eye(4)).values()

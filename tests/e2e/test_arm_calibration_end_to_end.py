@@ -30,11 +30,11 @@ NOMINAL_D = (0.1625, 0.0, 0.0, 0.1333, 0.0997, 0.0996)
 NOMINAL_A = (0.0, -0.425, -0.3922, 0.0, 0.0, 0.0)
 NOMINAL_ALPHA = (np.pi / 2, 0.0, 0.0, np.pi / 2, -np.pi / 2, 0.0)
 DELTAS = np.random.default_rng(7).uniform(-1e-3, 1e-3, (4, 6))
-"""What the calibration of the arm adds to theta, a, d and alpha."""
+"""Offsets that the calibration of the arm adds to theta, a, d and alpha."""
 
 
 def tip(deltas: Any = None) -> Position:
-    """Where the tip is with the joints Q: nominally, or of an arm that differs by so much."""
+    """Return the tip's position at the joints Q, nominal or with the given offsets."""
     model = MODEL
     if deltas is not None:
         theta, a, d, alpha = deltas
@@ -57,7 +57,7 @@ class Place:
             return found
 
     async def forward(self) -> Position:
-        """Where the tip is by what is computed offline."""
+        """Return the tip's position as computed offline."""
         names = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
         joints = [Joint(f"{name}_joint", value) for name, value in zip(names, Q, strict=True)]
         args = rpc.ForwardKinematicsArgs(self.robot, "tcp", joints)
@@ -65,7 +65,7 @@ class Place:
         return pose.position
 
     async def go_online(self) -> str:
-        """Start the scene and stop it again. Return the notification about the robot's kinematics."""
+        """Start and stop the scene. Return the notification about the robot's kinematics."""
         await self.client.call("StartScene")
         await scene_state(self.client, SceneStateEnum.STARTED)
         message: str = (await self.client.next_event("Notification", timeout=20)).data.message
@@ -85,7 +85,7 @@ class Place:
 
 @pytest_asyncio.fixture(loop_scope="module")
 async def place(tmp_path: Path) -> AsyncIterator[Place]:
-    """A server of each test's own, since one ends it."""
+    """Start a server for each test, because one test ends it."""
     cell = Cell(tmp_path)
     try:
         await cell.start_robot()
@@ -107,7 +107,7 @@ async def test_calibration_from_the_controller_is_used_offline_and_after_a_resta
     kinematics = await place.robot_kinematics()
     assert (kinematics["in_force"], "read" in kinematics) == ("nominal", False)
     assert (await place.forward()).distance_to(tip()) < 1e-6
-    assert tip().distance_to(tip(DELTAS)) > 1e-3, "else nothing would be tested"
+    assert tip().distance_to(tip(DELTAS)) > 1e-3, "the calibration must make a difference"
 
     message = await place.go_online()
     assert message.startswith("arm: The calibration in the controller is now used")
@@ -124,7 +124,7 @@ async def test_calibration_from_the_controller_is_used_offline_and_after_a_resta
     place.client = await place.cell.client("bob")
     assert (await place.forward()).distance_to(tip(DELTAS)) < 1e-6
 
-    # It is not that of whatever has another address.
+    # A robot with another address does not get the calibration.
     await place.set_host("127.99.0.7")
     assert (await place.robot_kinematics())["in_force"] == "nominal"
     assert (await place.forward()).distance_to(tip()) < 1e-6
@@ -141,7 +141,7 @@ async def test_safe_moves_avoid_bodies_added_by_rest_and_the_gripped_part(place:
     tip = await client.get_end_effector_pose(robot_id=robot, end_effector_id="tcp")
 
     async def line(by: Position) -> str:
-        """Move the tip in a line; gives why not."""
+        """Move the tip in a line; return the reason of a refusal."""
         await client.move_to_pose(
             robot_id=robot,
             end_effector_id="tcp",
@@ -166,7 +166,7 @@ async def test_safe_moves_avoid_bodies_added_by_rest_and_the_gripped_part(place:
         await put("crate", tip.position, 0.1, 0.1, 0.1)
         assert "crate" in await line(back)
         assert (await http.delete("/collisions/crate")).status_code == 200
-        # A rod that it holds meets a table, which the arm alone does not.
+        # The rod in its gripper would touch a table, which the arm alone does not.
         await put("table", tip.position - Position(0.0, 0.0, 0.27), 0.4, 0.4, 0.02)
         assert await line(back) == ""
         assert await line(up) == ""
@@ -176,7 +176,7 @@ async def test_safe_moves_avoid_bodies_added_by_rest_and_the_gripped_part(place:
         met = await line(back)
         assert "rod" in met
         assert "table" in met
-        assert await line(up + Position(0.0, 0.05, 0.0)) == "", "what it holds is no obstacle to itself"
+        assert await line(up + Position(0.0, 0.05, 0.0)) == "", "the gripped rod is not an obstacle for its own robot"
         assert (await http.delete("/collisions/rod")).status_code == 200
         assert await line(back) == ""
     await place.go_offline()

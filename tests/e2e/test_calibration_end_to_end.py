@@ -1,4 +1,4 @@
-"""A server with fakes of a camera and a robot calibrates their poses, and refuses what it cannot see."""
+"""A server with a fake camera and robot calibrates their poses, and refuses to if the markers or the arm are hidden."""
 
 import asyncio
 import contextlib
@@ -29,7 +29,7 @@ pytestmark = pytest.mark.asyncio(loop_scope="module")
 
 
 class World:
-    """The fakes, the server, and a client of it that holds the scene."""
+    """Fakes, server, and a client that has locked the scene."""
 
     def __init__(self, directory: Path) -> None:
         self.host = free_loopback_address()
@@ -75,12 +75,12 @@ class World:
         await client.subscribe_events({"TaskState"})
 
     def show(self, *, markers: bool = True, robot: bool = True) -> None:
-        """Put into the camera's view what stands there."""
+        """Send the objects of the workplace to the fake camera."""
         self.camera.control.do("scene", things=in_view(markers=markers, robot=robot))
         self.camera.control.do("camera", pose=pose(CAMERA))
 
     async def configure_markers(self) -> None:
-        """Set the poses of the markers at the server."""
+        """Store the poses of the markers on the server."""
         markers = [{"marker_id": n, "pose": {"position": {"x": x, "y": y}}} for n, (x, y) in MARKERS.items()]
         answer = await self.http.put("/api/calibration/markers", json={"marker_size": SIZE, "markers": markers})
         assert answer.status_code == 200, answer.text
@@ -90,7 +90,7 @@ class World:
 
     @contextlib.asynccontextmanager
     async def holding(self, name: str) -> AsyncIterator[None]:
-        """Hold the lock of an object meanwhile."""
+        """Hold the lock of an object in this context."""
         await self.client.write_lock(self.ids[name])
         try:
             yield
@@ -98,7 +98,7 @@ class World:
             await self.client.write_unlock(self.ids[name])
 
     async def calibrated(self, name: str, **more: Any) -> tuple[str, str]:
-        """Calibrate; gives the last state of the process and its message."""
+        """Calibrate; return the last state of the process and its message."""
         if name == "cam":
             await self.client.calibrate_camera(self.ids["cam"])
         else:
@@ -174,7 +174,7 @@ async def test_hidden_cameras_and_robots_are_refused(world: World) -> None:
             before = await world.placed(name)
             records = (await world.http.get("/api/calibrations")).json()
             world.show(**hidden)
-            await asyncio.sleep(0.5)  # a picture that was taken before is on its way
+            await asyncio.sleep(0.5)  # a picture taken earlier may still be on its way
             try:
                 state, message = await world.calibrated(name)
             finally:
@@ -201,7 +201,7 @@ async def test_a_killed_worker_fails_only_the_running_calibration(world: World) 
             pass
         assert event.data.state == "failed"
         assert "compute worker was killed by SIGKILL while it worked on the pose of a robot" in event.data.message
-    # The next one finds another worker.
+    # The next calibration uses another worker.
     async with world.holding("cam"):
         state, message = await world.calibrated("cam")
         assert state == "finished", message
@@ -226,7 +226,7 @@ async def test_a_gripped_part_is_an_obstacle_at_the_robots_pose(world: World) ->
     assert (await http.put("/collisions/part/attach", params=holder)).status_code == 409
     assert await met(tip.position) == {"safe": False, "object_id": "part"}
     world.robot.control.do("place", q=[joints[0].value + 0.6, *(joint.value for joint in joints[1:])])
-    moved = await until(lambda: _moved(world, tip), "the arm stands elsewhere")
+    moved = await until(lambda: _moved(world, tip), "the arm is at another position")
     assert await met(tip.position) == {"safe": True}
     assert await met(moved.position) == {"safe": False, "object_id": "part"}
     answer = await http.put("/collisions/part/detach")
@@ -234,7 +234,7 @@ async def test_a_gripped_part_is_an_obstacle_at_the_robots_pose(world: World) ->
     stays = msgspec.convert(answer.json(), Pose)
     assert stays.position.distance_to(moved.position) < 0.005
     world.robot.control.do("place", q=Q)
-    await until(lambda: _moved(world, moved), "the arm is back")
+    await until(lambda: _moved(world, moved), "the arm has returned")
     assert await met(moved.position) == {"safe": False, "object_id": "part"}
     assert (await http.put("/collisions/part/detach")).status_code == 409
     assert (await http.delete("/collisions/part")).status_code == 200

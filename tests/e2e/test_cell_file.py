@@ -1,4 +1,4 @@
-"""Lost devices as clients see them, online and in a program; and one project at another address."""
+"""Connection losses as clients see them, online and in a program; and one project with another device address."""
 
 import asyncio
 import contextlib
@@ -40,14 +40,14 @@ def whole(scale: FakeProcess) -> Iterator[None]:
 
 
 class Bench:
-    """A server, a scene with one scale, a project that weighs."""
+    """A server, a scene with one scale, and a project that weighs."""
 
     def __init__(self, client: Client, url: str) -> None:
         self.client = client
         self.url = url
         self.scale = self.weigh = self.project = ""
         self.states: list[ObjectStateData] = []
-        """Those that came while another event was waited for."""
+        """Events that arrived while the test waited for another one."""
 
     async def event(self, name: str) -> Any:
         async with asyncio.timeout(15):
@@ -80,7 +80,7 @@ class Bench:
         await call("SubscribeEvents", rpc.SubscribeEventsArgs({"ObjectState"}))
 
     async def start(self) -> str:
-        """Go online; gives why it went offline instead, empty when it did not."""
+        """Go online; return the reason of a failure, or an empty text."""
         await self.client.call("StartScene")
         while True:
             data = await self.event("SceneState")
@@ -95,7 +95,7 @@ class Bench:
             pass
 
     async def state(self, *wanted: Connection) -> ObjectStateData:
-        """The next ObjectState, which has to be one of these."""
+        """Return the next ObjectState, which must be one of these."""
         data: ObjectStateData = self.states.pop(0) if self.states else await self.event("ObjectState")
         assert data.object_id == self.scale
         assert data.state in wanted, data
@@ -146,7 +146,7 @@ async def test_a_device_lost_online_refuses_its_actions(tmp_path: Path, scale: F
 
         scale.control.do("heal")
         await on.state(C.BACK, C.ONLINE)  # the loss is reported only once
-        assert (await on.execute()).results, "the scene went on, and the device is there again"
+        assert (await on.execute()).results, "the scene continued, and the device is connected again"
         await on.stop()
         await on.state(C.ONLINE, C.OFFLINE)
         assert C.LOST not in [data.state for data in on.states]
@@ -176,7 +176,7 @@ async def test_a_program_stops_and_names_the_lost_device(tmp_path: Path, scale: 
         built = await call("BuildProject", rpc.BuildProjectArgs(on.project, "weighing"))
         await call("CloseProject")
         script = tmp_path / "data" / "packages" / built.package_id / "script.py"
-        # The device is lost while the program is busy with something else.
+        # The connection is lost while the program is busy with something else.
         script.write_text(
             script.read_text().replace("while True:", "import time\n    while True:\n        time.sleep(60)")
         )
@@ -208,7 +208,7 @@ async def test_a_project_runs_with_a_device_at_another_address(tmp_path: Path, s
     ]
     file.write_bytes(write_cell(Cell(devices)))
     async with bench(tmp_path, NOBODY, "--cell", str(file)) as on:
-        assert await on.start() == "", "the scene's own address leads nowhere"
+        assert await on.start() == "", "the address in the scene does not exist"
         assert (await on.state(*UP)).overlaid == ["port"]
         (status,) = await on.devices()
         assert status["overlaid"] == ["port"]
@@ -225,7 +225,7 @@ async def test_a_project_runs_with_a_device_at_another_address(tmp_path: Path, s
     log = (tmp_path / "data.log").read_text()
     assert "cell file overrides settings" in log
     assert scale.ready["port"] in log
-    assert "elsewhere" in log, "what is not in the scene may be misspelt"
+    assert "elsewhere" in log, "a name that is not in the scene may be misspelt"
 
 
 async def test_a_device_of_another_type_is_not_started(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from tests.e2e.harness import Cell, alive, kill, running_cell, scene_state, unti
 pytestmark = pytest.mark.alone
 
 REST_JOINT_SPEED = 1e-3
-"""rad/s below which a joint counts as standing."""
+"""Speed below which a joint counts as stopped, rad/s."""
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ async def cell(tmp_path: Path) -> AsyncIterator[Cell]:
 
 @pytest.fixture
 async def running(tmp_path: Path) -> AsyncIterator[Cell]:
-    """With the small world, so that programs can pick boards."""
+    """Start a cell with the small world, so that programs can pick boards."""
     async with running_cell(tmp_path, boards=3, seed=4) as cell:
         yield cell
 
@@ -46,12 +46,12 @@ async def moving(cell: Cell) -> bool:
     return max(abs(v) for v in (await arm(cell))["qd"]) > 0.2
 
 
-async def at_rest(cell: Cell) -> bool:
+async def is_stopped(cell: Cell) -> bool:
     return max(abs(v) for v in (await arm(cell))["qd"]) < REST_JOINT_SPEED
 
 
 async def assert_stays(cell: Cell, seconds: float) -> None:
-    """No joint moves for that long."""
+    """Assert that no joint moves for this time."""
     before = (await arm(cell))["q"]
     end = time.monotonic() + seconds
     while time.monotonic() < end:
@@ -72,20 +72,20 @@ def action_id(project: Project, name: str) -> str:
 
 
 async def start_moving(cell: Cell, client: Client, project: Project) -> None:
-    """Try the action that picks from the feeder; return in mid-move."""
+    """Execute the action that picks from the feeder; return while the arm moves."""
     await client.call("ExecuteAction", rpc.ExecuteActionArgs(action_id(project, "pick")))
-    await until(lambda: moving(cell), "the arm to move")
+    await until(lambda: moving(cell), "the arm moves")
 
 
 async def program_in_mid_move(cell: Cell, client: Client) -> None:
     _, project = await cell.open(client, boards=3)
     package = await cell.build(client, project)
     await client.call("RunPackage", rpc.RunPackageArgs(package))
-    await until(lambda: moving(cell), "the arm to move")
+    await until(lambda: moving(cell), "the arm moves")
 
 
 async def program_ends_with(client: Client) -> str:
-    """The text of the ProjectException that comes before PackageState stopped."""
+    """Return the text of the ProjectException that precedes PackageState stopped."""
     text = ""
     while True:
         event = await client.next_event("ProjectException", "PackageState", timeout=30)
@@ -95,7 +95,7 @@ async def program_ends_with(client: Client) -> str:
             return text
 
 
-# ---------------------------------------------------------------------------------------------------- start of a scene
+# ---------------------------------------------------------------------------------------------------- starting a scene
 async def test_robot_off_at_start_is_named_and_a_later_start_works(cell: Cell) -> None:
     client = await cell.client("technician")
     await cell.open(client)
@@ -126,12 +126,12 @@ async def test_joints_are_shown_and_control_is_refused_while_another_program_run
     await client.call("ExecuteAction", rpc.ExecuteActionArgs(action_id(project, "pick")))
     result = (await client.next_event("ActionResult", timeout=30)).data
     assert not isinstance(result.error, Unset)
-    assert playing in result.error  # who has control is named
+    assert playing in result.error  # the message names the owner of control
     assert (await arm(cell))["program"] == playing
     assert (await arm(cell))["programs_killed"] == truth["programs_killed"]
 
 
-# ---------------------------------------------------------------------------------------------------- in mid-move
+# ---------------------------------------------------------------------------------------------------- during a move
 @pytest.mark.parametrize("fault", ["silence", "reset", "half_frame"])
 async def test_a_cable_cut_during_a_move_fails_the_action_and_nothing_moves_again(running: Cell, fault: str) -> None:
     client = await running.client("operator")
@@ -139,7 +139,7 @@ async def test_a_cable_cut_during_a_move_fails_the_action_and_nothing_moves_agai
     await running.tell("robot", fault)
     text = await program_ends_with(client)
     assert "robot" in text, text
-    await until(lambda: at_rest(running), "the arm to rest")
+    await until(lambda: is_stopped(running), "standstill")
     await running.tell("robot", "heal")
     await assert_stays(running, 2.0)
     await client.call("SystemInfo")
@@ -151,7 +151,7 @@ async def test_a_protective_stop_is_named_and_stays_until_unlocked(running: Cell
     await running.tell("robot", "protective_stop")
     text = await program_ends_with(client)
     assert "protective stop" in text.lower(), text
-    await assert_stays(running, 6.0)  # the controller refuses to unlock for 5 s: nobody may have tried after that
+    await assert_stays(running, 6.0)  # the controller refuses to unlock for 5 s: no attempt may follow
     assert (await arm(running))["safety"] == "PROTECTIVE_STOP"
 
 
@@ -164,7 +164,7 @@ async def test_nothing_moves_after_a_safeguard_stop_until_a_new_command(cell: Ce
     assert not isinstance(result.error, Unset)
     assert "safeguard" in result.error.lower()
     await cell.tell("robot", "safeguard_stop", on=False)
-    await until(lambda: at_rest(cell), "the arm to rest, which may still have been slowing down")
+    await until(lambda: is_stopped(cell), "standstill")
     await assert_stays(cell, 2.0)
     await start_moving(cell, client, project)
 
@@ -177,7 +177,7 @@ async def test_the_arm_stops_when_the_cell_host_is_killed(cell: Cell) -> None:
     await start_moving(cell, client, project)
     kill(busy.pid)
     event = await scene_state(client, SceneStateEnum.STOPPED)
-    await until(lambda: at_rest(cell), "the arm to rest")
+    await until(lambda: is_stopped(cell), "standstill")
     assert not isinstance(event.data.message, Unset)
     await client.call("StartScene")
     await scene_state(client, SceneStateEnum.STARTED)
@@ -190,8 +190,8 @@ async def test_server_killed_while_a_program_runs_stops_the_motion_and_ends_the_
     hosts = [p.pid for p in running.hosts()]
     assert hosts
     await running.kill("server")
-    await until(lambda: at_rest(running), "the arm to rest")
-    await until(lambda: not any(alive(pid) for pid in hosts), "the hosts to end")
+    await until(lambda: is_stopped(running), "standstill")
+    await until(lambda: not any(alive(pid) for pid in hosts), "the hosts have ended")
     await assert_stays(running, 1.0)
 
 

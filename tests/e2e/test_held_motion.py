@@ -29,13 +29,13 @@ from tests.server.core.serving import ServerProcess, running
 pytestmark = pytest.mark.alone
 
 RESTS_WITHIN = 5.0
-"""Time limit for standstill, s. Without a limit the arm would move for some 20 s. Benchmarks measure the time."""
+"""Time limit for standstill, s. Without a stop the arm would move for about 20 s. Benchmarks measure the time."""
 ATTEMPTS = 5
 SLOWLY_UP = Position(0.0, 0.0, 0.05)
 LATE = re.compile("not renewed in time|ms late|had expired|has ended|is ending|still stopping")
-"""What a client is answered that renews too late."""
+"""Answers to a client that renews too late."""
 SETTLED = 0.4
-"""Seconds to look whether an arm stays at rest."""
+"""Time for which an arm must stay stopped, s."""
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def fake(module_fake: FakeUr) -> FakeUr:
 
 
 class Site:
-    """A server with the arm online, and who looks at the arm itself."""
+    """A server with the arm online, and a connection to the arm's control channel."""
 
     def __init__(self, fake: FakeUr, server: ServerProcess, client: Client) -> None:
         self.fake = fake
@@ -61,7 +61,7 @@ class Site:
         self.robot = ""
         self.hold = 0
         self.held: RobotHoldData | None = None
-        """The newest state of a hold."""
+        """Return the latest state of a hold."""
 
     async def start(self) -> None:
         await self.client.call("NewScene", rpc.NewSceneArgs("scene"))
@@ -82,7 +82,7 @@ class Site:
         return max(map(abs, self.fake.truth()["qd"])) > 1e-3
 
     async def rests(self, since: Instant) -> None:
-        """The arm comes to rest in time, and stays there."""
+        """Assert that the arm stops in time, and stays stopped."""
         while self.moving():
             late = own_time() - since
             assert late < RESTS_WITHIN, f"it still moves after {late:.2f} s"
@@ -98,13 +98,13 @@ class Site:
         assert self.fake.truth()["q"] == pytest.approx(at, abs=1e-4)
 
     async def is_refused(self, jogger: "Jogger", since: float) -> None:
-        """The client goes on, but whatever it has sent since a moment is refused, and nothing moves."""
-        await until(lambda: len(jogger.answers(since)) > 5, "the client goes on")
+        """Assert that the client continues, but everything it sends from a moment on is refused and moves nothing."""
+        await until(lambda: len(jogger.answers(since)) > 5, "the client continues")
         assert all("refused" in answer for answer in jogger.answers(since)), jogger.answers(since)
         await self.stays()
 
     def host(self) -> int:
-        """The cell host that holds the arm."""
+        """Return the cell host that holds the arm."""
         children = psutil.Process(self.server.process.pid).children()
         hosts = [one for one in children if "arcor2_hw.runtime.host" in " ".join(one.cmdline())]
         return min(hosts, key=lambda one: one.create_time()).pid
@@ -123,7 +123,7 @@ class Site:
 
     @contextlib.asynccontextmanager
     async def holding(self, renew: Callable[[], Awaitable[Any]]) -> AsyncIterator["Held"]:
-        """Hold the button in this context, then let go. When a busy machine renews too late, press again."""
+        """Hold the button in this context, then release it. If a busy machine renews too late, press again."""
         held = Held()
 
         async def renewed() -> None:
@@ -152,7 +152,7 @@ class Site:
 
 
 class Held:
-    """What the server answered while the button was held: the answers, or why the hold was refused."""
+    """Answers of the server while the button is held, and the reason if the hold is refused."""
 
     def __init__(self) -> None:
         self.over = False
@@ -175,7 +175,7 @@ async def site(fake: FakeUr, directory: Path) -> AsyncIterator[Site]:
 
 
 class Jogger:
-    """The client that holds the arm, a process of its own."""
+    """A client in a separate process that holds the arm."""
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
         self.process = process
@@ -193,7 +193,7 @@ class Jogger:
         return [answer for sent, answer in answers if float(sent) > since]
 
     async def answered(self, place: Site) -> None:
-        """The arm moves, or will not."""
+        """Return whether the arm moves or can no longer start."""
         await until(lambda: place.moving() or any("refused" in one for one in self.answers()), "an answer")
 
     async def end(self) -> None:
@@ -213,7 +213,7 @@ async def _jogger(place: Site) -> Jogger:
 
 @contextlib.asynccontextmanager
 async def jogging(place: Site) -> AsyncIterator[Jogger]:
-    """A client that holds the arm, which moves; on a machine so busy that it renews too late, another one."""
+    """Start a client that moves the arm; on a machine so busy that it renews too late, start another one."""
     for _ in range(ATTEMPTS):
         jogger = await _jogger(place)
         try:
@@ -228,7 +228,7 @@ async def jogging(place: Site) -> AsyncIterator[Jogger]:
 
 
 async def _freeze(pid: int) -> float:
-    """Suspend a process; give the moment from which on it does nothing."""
+    """Suspend a process; return the time from which on it is suspended."""
     os.kill(pid, signal.SIGSTOP)
     await until(lambda: psutil.Process(pid).status() == psutil.STATUS_STOPPED, "the process is suspended")
     return time.monotonic()
@@ -253,12 +253,12 @@ async def _a_client_that_freezes(place: Site) -> None:
         await until(lambda: place.held is not None and not place.held.held, "the end of the hold")
         assert place.held is not None
         assert "not renewed in time" in place.held.reason
-        jogger.process.send_signal(signal.SIGCONT)  # it goes on as if nothing had been
+        jogger.process.send_signal(signal.SIGCONT)  # it continues as if nothing had happened
         await place.is_refused(jogger, frozen)
 
 
 async def _a_server_that_freezes(place: Site) -> None:
-    """All that waited for it is served when it comes back, and moves nothing."""
+    """All waiting requests are handled after the suspension, and move nothing."""
     async with jogging(place) as jogger:
         began = own_time()
         frozen = await _freeze(place.server.process.pid)
@@ -270,7 +270,7 @@ async def _a_server_that_freezes(place: Site) -> None:
 
 
 async def _a_host_that_freezes(place: Site) -> None:
-    """Its controller's watchdog stops the arm meanwhile; what waited for the host moves nothing."""
+    """The controller's watchdog stops the arm meanwhile; requests that waited for the host move nothing."""
     async with jogging(place) as jogger:
         host = place.host()
         began = own_time()
@@ -283,9 +283,9 @@ async def _a_host_that_freezes(place: Site) -> None:
 
 
 async def _fastest(place: Site, seconds: float, **motion: Any) -> tuple[float, float]:
-    """Hold until the arm has moved for a while; give the highest speed of the TCP, m/s, and the lowest scale.
+    """Hold until the arm has moved for a while; return the highest speed of the TCP, m/s, and the lowest scale.
 
-    The speed is that of the arm itself, by its own clock.
+    The speed is measured by the arm itself, on its own clock.
     """
     poses: list[tuple[float, list[float]]] = []
     speeds: list[float] = []
@@ -303,7 +303,7 @@ async def _fastest(place: Site, seconds: float, **motion: Any) -> tuple[float, f
         return moved > seconds
 
     async with place.holding(lambda: place.jog(**motion)) as held:
-        await until(watched, "the arm moves long enough")
+        await until(watched, "the arm has moved long enough")
     await place.jog(valid_ms=0)
     assert not place.moving()
     assert not held.refusal
@@ -311,7 +311,7 @@ async def _fastest(place: Site, seconds: float, **motion: Any) -> tuple[float, f
 
 
 async def _teach(place: Site) -> None:
-    """The arm can be moved by hand as long as that is held, and is stiff again by itself."""
+    """The arm can be moved by hand while the button is held, and becomes stiff again by itself."""
     async with place.holding(place.teach):
         await until(lambda: place.fake.truth()["freedrive"], "the arm can be moved by hand")
     await until(lambda: not place.fake.truth()["freedrive"], "the arm is stiff again")
@@ -320,7 +320,7 @@ async def _teach(place: Site) -> None:
 
 
 async def _move(place: Site) -> None:
-    """Hold until the arm moves, then let go."""
+    """Hold until the arm moves, then release."""
     async with place.holding(lambda: place.jog(linear=SLOWLY_UP)) as held:
         await until(place.moving, "the arm moves")
     assert set(held.answers) == {1.0}
@@ -351,7 +351,7 @@ async def test_the_tcp_keeps_its_speed_and_protective_stops_are_acknowledged(fak
         await place.rests(own_time())
 
         async def acknowledged() -> bool:
-            with contextlib.suppress(RequestFailed):  # for its first seconds the controller does not let it be unlocked
+            with contextlib.suppress(RequestFailed):  # at first the controller refuses to unlock it
                 await client.call("AcknowledgeStop", rpc.AcknowledgeStopArgs(place.robot))
                 return True
             return False

@@ -83,7 +83,7 @@ class Around:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Folder of the driver, as in an installed distribution."""
+    """Driver folder, as in an installed distribution."""
     root = tmp_path_factory.mktemp("plain")
     package = root / "plain_driver"
     (package / "urdf" / "plain_arm").mkdir(parents=True)

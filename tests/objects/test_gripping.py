@@ -89,7 +89,7 @@ def test_a_gripped_part_is_considered_until_released(arm: Any, around: Around, c
     assert [pair for pair in arm.safe_moves.contacts(values_of(arm, target)) if "part of claw" in pair]
     claw.release()
     line(arm, target)
-    claw.release()  # nothing held: nothing happens
+    claw.release()  # no effect without a part
     assert arm.parts == {}
 
 

@@ -29,7 +29,7 @@ while True:
 
 @pytest.fixture
 def line() -> Iterator[tuple[int, int]]:
-    """Both ends of the line: the one that the child writes to and the one that the device reads."""
+    """Both ends of the line: the child writes to one, the device reads from the other."""
     reading, writing = os.pipe()
     yield writing, reading
     os.close(reading)
@@ -85,7 +85,7 @@ def test_messages_stop_at_once_when_the_parent_dies() -> None:
         owner.kill()
         os.read(owner.stdout.fileno(), 65536)
         messages = owner.stdout.read()  # to the end: the child has closed the line as well
-        assert messages.count(b"kick") < FROZEN_AFTER / 2.0 / 0.02, "it took the owner for frozen, not for ended"
+        assert messages.count(b"kick") < FROZEN_AFTER / 2.0 / 0.02, "it considered the owner frozen, not ended"
 
 
 def test_the_time_of_sending_a_pulse_counts() -> None:

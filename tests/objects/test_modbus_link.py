@@ -85,7 +85,7 @@ def adu(pdu: str, number: int = 1, unit: int = 1) -> bytes:
 
 BITS_20_TO_38 = "1011001111010110101"  # CDh, 6Bh, 05h, each from its lowest bit
 
-# Modbus application protocol 1.1b3: the section, request and answer of its example, what is called and what it gives.
+# Modbus application protocol 1.1b3: section, example request and answer, called method and its result.
 EXAMPLES: list[tuple[str, str, str, Callable[[ModbusLink], object], object]] = [
     (
         "6.1",
@@ -146,7 +146,7 @@ def test_exceptions_match_the_modbus_specification(peer: Peer, link: ModbusLink)
 
 
 def test_the_identification_is_read(peer: Peer, link: ModbusLink) -> None:
-    """Section 6.21, the basic objects, with texts of this test."""
+    """Section 6.21, the basic objects, with texts chosen by this test."""
     objects = b"".join(bytes([number, len(text)]) + text for number, text in enumerate((b"Maker", b"P-7", b"V2.11")))
     peer.script = lambda _: adu("2B 0E 01 01 00 00 03" + objects.hex())
     identity = link.identify()

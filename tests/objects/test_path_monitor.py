@@ -32,7 +32,7 @@ class Motion:
     def __init__(self, arm: Any, braking: float = 0.05) -> None:
         self.arm, self.braking = arm, braking
         self.at: tuple[float, Callable[[], None]] | None = None
-        """Value of the first joint from which on something is done, once."""
+        """Value of the first joint at which an action is executed once."""
         self.stops = 0
         self._stopped = threading.Event()
         self._stop = arm.stop
@@ -126,7 +126,7 @@ def test_an_obstacle_outside_the_rest_of_the_path_is_ignored(arm: Any, around: A
     def change() -> None:
         around.box("behind", tip_at(arm, 0.3), 0.1, 0.1, 0.1)
         around.box("above", tip_at(arm, 1.2) + Position(0.0, 0.0, 0.8), 0.1, 0.1, 0.1)
-        around.things = around.things[1:]  # one that was there is gone
+        around.things = around.things[1:]  # an obstacle that existed before is removed
 
     around.box("gone", tip_at(arm, -1.5), 0.1, 0.1, 0.1)
     motion.at = 1.0, change
@@ -148,7 +148,7 @@ def test_the_robot_stops_before_another_arm_that_enters_its_path(
     motion.at = 0.2, swing
     with pytest.raises(PathBlocked, match=r"second/\w+ came into its path"):
         arm.move_to_joints(joints((1.57, *READY[1:])), 0.5)
-    # One of which nothing is known any more stays where it was.
+    # An obstacle whose pose becomes unknown stays at its last pose.
     arm.now = joints(READY)
     around.others = [(second, away)]
 

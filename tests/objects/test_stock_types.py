@@ -64,12 +64,12 @@ def test_a_wait_ends_in_time_or_when_cancelled(obj: FlowActions | TimeActions, m
     thread = threading.Thread(target=run)
     thread.start()
     deadline = time.monotonic() + WITHIN
-    while thread.is_alive() and time.monotonic() < deadline:  # it may be cancelled before it waits: that does not count
+    while thread.is_alive() and time.monotonic() < deadline:  # a cancel before the wait has no effect
         getattr(obj, type(obj).CANCEL_MAPPING[method])()
         thread.join(0.001)
     assert not thread.is_alive()
     assert len(errors) == 1
-    wait(0.0, an="a")  # the cancelled wait leaves nothing behind
+    wait(0.0, an="a")  # the cancelled wait has no later effect
     with pytest.raises(AssertionError):
         wait(-1.0, an="a")
 

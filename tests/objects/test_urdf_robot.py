@@ -40,7 +40,7 @@ def assert_free(arm: Any, around: Around, way: list[list[Joint]]) -> None:
             assert world.is_free("arm", a + share * (b - a)), world.contacts("arm", a + share * (b - a))
 
 
-# ------------------------------------------------------------------------------------------------ what a type can do
+# ------------------------------------------------------------------------------------------------ features of a type
 def test_analysis_finds_features_of_the_urdf(folder: Path) -> None:
     path = folder / "plain_arm.py"
     library = Library([SourceFile("PlainArm", "plain_driver.plain_arm", path.read_text(), str(path))])
@@ -183,7 +183,7 @@ def test_a_held_part_moves_with_the_robot_and_avoids_obstacles(folder: Path, arm
     arm.move_to_joints(goal, 0.5)
     way = arm.ways[-1].waypoints
     assert len(way) > 2
-    # The rod by a world of the test's own.
+    # The rod, in a separate collision world of the test.
     world = CollisionWorld()
     world.add_robot("arm", RobotModel.load(URDF), BASE, np.array(READY))
     for name in ("rod", "bin"):
@@ -194,7 +194,7 @@ def test_a_held_part_moves_with_the_robot_and_avoids_obstacles(folder: Path, arm
     for a, b in itertools.pairwise(values(waypoint) for waypoint in way):
         for share in np.linspace(0.0, 1.0, 2 + int(np.abs(b - a).max() / 0.005)):
             assert world.is_free("arm", a + share * (b - a))
-    # What is held by another robot is in the way, where that has it now.
+    # A part held by another robot is an obstacle at the other robot's gripper.
     second = made(folder, around, "second", BASE * Pose(Position(0.0, 1.9, 0.0)))
     around.others = [(arm, arm.now)]
     rod = arm.safe_moves.forward("tcp", arm.now) * Pose(Position(0.0, 0.0, 0.15))
@@ -204,7 +204,7 @@ def test_a_held_part_moves_with_the_robot_and_avoids_obstacles(folder: Path, arm
     seen = second.safe_moves._snapshot().obstacles["rod"]
     assert seen.attachment is not None
     assert seen.attachment.robot == "plain"
-    # Let go, it is where it was let go.
+    # After its release, it stays where it was released.
     at = arm.safe_moves.release("rod", arm.now)
     assert at.position.distance_to(rod.position) < 0.01
     with pytest.raises(NotFound, match="does not hold rod"):
@@ -259,7 +259,7 @@ def test_a_missing_model_is_reported(folder: Path, around: Around) -> None:
         device.get_end_effectors_ids()
 
 
-# ------------------------------------------------------------------------------------------------ time, and stop
+# ------------------------------------------------------------------------------------------------ time limits and stops
 def test_a_path_can_be_sampled_over_time(arm: Any, around: Around) -> None:
     around.box("wall", *WALL)
     arm.move_to_joints(joints(ACROSS), 0.5)

@@ -23,7 +23,7 @@ from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.creation import module_name
 
 T = TypeVar("T")
-PATIENCE = 20.0  # s; the machine may be busy
+PATIENCE = 20.0  # time limit, s; the machine may be busy
 
 
 class HostProcess:

@@ -69,8 +69,8 @@ class Arm(Robot):
 """
 OBJ = "obj_arm"
 LONG = 2.0
-"""Validity of a lease that is to last until it is renewed or the button is released, s. Joints slow down so long before
-their limits."""
+"""Validity of a lease that lasts until it is renewed or the button is released, s. Joints slow down when a limit is
+closer than this time."""
 ALONG_X = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -220,7 +220,7 @@ def test_motion_starts_after_slow_control_only_if_the_hold_continues(holder: Hol
         time.sleep(0.1)
         numbers.append(holder.lease())
     assert all(holder.host.answer(number) == {"scale": 1.0} for number in numbers)
-    assert len(holder.calls("jog")) < len(numbers)  # the leases that came meanwhile are passed on as one
+    assert len(holder.calls("jog")) < len(numbers)  # leases that arrived meanwhile are merged into one
     holder.lease(0.0)
     holder.ended()
 
@@ -297,12 +297,12 @@ def test_a_twist_slows_down_before_a_joint_limit(holder: Holder) -> None:
     assert holder.granted(new=True) == 1.0
     time.sleep(0.1)
     holder.host.call(OBJ, "set", key="at", value=0.95)
-    assert holder.granted() < 0.9  # by the way that the joint has made since the last lease
+    assert holder.granted() < 0.9  # because of the distance moved since the last lease
     time.sleep(0.1)
     holder.host.call(OBJ, "set", key="at", value=0.999)
     assert "turn is at its upper limit" in holder.refused().message.text
     holder.ended()
-    assert holder.granted(new=True) < 0.1  # which way it leads is not known yet
+    assert holder.granted(new=True) < 0.1  # the direction is not known yet
     holder.host.call(OBJ, "set", key="at", value=0.9)
     holder.granted()
     holder.lease(0.0)

@@ -74,7 +74,7 @@ def test_a_scene_opens_without_failed_objects(host: HostProcess, tmp_path: Path)
         ((connection, text),) = changes(host, f"obj_{name}")
         assert connection is Connection.FAILED
         assert reason in text
-    # A failed object is closed on its own thread.
+    # A failed object is closed in its own thread.
     wait_for(lambda: Path(f"{away}.log").read_text().split(), lambda calls: calls == ["made", "closed"])
 
 
@@ -161,5 +161,5 @@ def test_streams_at_different_rates(host: HostProcess) -> None:
     assert all("time_ms" not in one for one in streamed(host, "RobotJoints", 0.0))
     host.seen.clear()
     fast, eef, _ = wait_for(all_streams, lambda streams: len(streams[2]) >= 4)
-    assert fast[1:] == []  # one may have been under way
+    assert fast[1:] == []  # one may have been on its way
     assert eef[1:] == []

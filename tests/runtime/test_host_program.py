@@ -471,7 +471,7 @@ def test_each_action_is_reported_with_time_and_result(run: Run) -> None:
 
 def test_a_program_waits_for_a_slow_server_without_losing_events(run: Run) -> None:
     run.start('for _ in range(6000):\n    arm.slow(0.0, an="a1")')
-    time.sleep(1.5)  # nothing is read meanwhile: more than what waits here and in the socket is never made
+    time.sleep(1.5)  # without reading: the program creates no more events than fit here and into the socket
     done = len([note for note in run.notes() if note == "slow"])
     assert done < 6000
     ended = run.host.expect_state("stopped", 120.0)
@@ -586,7 +586,7 @@ def test_a_syntax_error_of_the_script_is_reported(run: Run) -> None:
     assert run.host.events() == ["ProjectException", "stopped"]
 
 
-# ---------------------------------------------------------------------------------------------------- by hand
+# ------------------------------------------------------------------------------------------ control by the client
 def _by_hand(directory: Path, *arguments: str) -> "subprocess.Popen[str]":
     return subprocess.Popen(
         [sys.executable, str(directory / "script.py"), *arguments],

@@ -24,7 +24,7 @@ NAMES = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_
 READY = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
 ACROSS = (2.74, -1.57, 1.57, -1.57, -1.57, 0.0)
 MEETING = (1.04, -1.57, 1.57, -1.57, -1.57, 0.0)
-"""A pose of the tip that another arm reaches too."""
+"""A pose of the tip that another arm can reach too."""
 ARM = """
 from arcor2_hw.objects.safe_moves import Way
 from arcor2_hw.objects.urdf_robot import UrdfRobot
@@ -137,7 +137,7 @@ def go(host: HostProcess, values: tuple[float, ...], safe: bool = True) -> Any:
 def test_a_safe_move_avoids_the_current_obstacles(scene: HostProcess) -> None:
     assert go(scene, ACROSS) is None
     assert scene.call("obj_arm", "waypoints") > 2
-    # A wall that does not count, and one that was moved away, are no obstacle.
+    # A wall that is disabled, and one that was moved away, are not obstacles.
     assert scene.call("obj_wall", "set_enabled", state=False) is None
     assert go(scene, READY) is None
     assert scene.call("obj_arm", "waypoints") == 2
@@ -166,7 +166,7 @@ def test_a_move_is_refused_if_the_joints_of_another_robot_are_unknown(scene: Hos
     assert go(scene, READY, safe=False) is None
 
 
-# ---------------------------------------------------------------------------------------------------- what is put in
+# ---------------------------------------------------------------------------------------------------- added bodies
 TIP = Position(0.4922, 0.1334, 0.4878)
 """Position of the tip in READY, where the tool points down."""
 
@@ -200,7 +200,7 @@ def test_an_added_body_is_an_obstacle_until_it_is_removed(scene: HostProcess, tm
     scene.send(box("crate", TIP + Position(0.0, 9.0, 0.0), 0.1, 0.1, 0.1))
     assert line(scene, beside) is None, "it was moved"
 
-    # A mesh brings its file, and may be scaled; a body of an object's id stands for that object.
+    # A mesh brings its file and may be scaled; a body with an object's id replaces that object.
     mesh = tmp_path / "mesh"
     mesh.write_bytes(trimesh.creation.box((1.0, 1.0, 1.0)).export(file_type="stl"))
     model = object_type.ObjectModel.of(object_type.Mesh("lump", "lump.stl"))
@@ -213,7 +213,7 @@ def test_an_added_body_is_an_obstacle_until_it_is_removed(scene: HostProcess, tm
     assert go(scene, READY, safe=False) is None
     scene.send(box("wall", Position(0.0, 9.0, 0.0), 0.1, 0.1, 0.1))
     assert go(scene, ACROSS) is None
-    assert scene.call("obj_arm", "waypoints") > 2, "the wall is there, too, although something is called so"
+    assert scene.call("obj_arm", "waypoints") > 2, "a body named like the wall does not replace it"
     scene.send(box("obj_wall", Position(0.0, 9.0, 0.0), 0.1, 0.1, 0.1))
     assert go(scene, READY) is None
     assert scene.call("obj_arm", "waypoints") == 2
@@ -229,7 +229,7 @@ def test_a_move_stops_before_a_body_added_to_its_path(host: HostProcess) -> None
     types = [type_code("SlowArm", SLOW_ARM), type_code("Wall", WALL)]
     host.send(open_scene(types, *objects, models=MODELS, assets={"arm.urdf": str(URDF)}))
     host.expect(m.SceneOpened)
-    # Put in over REST, and moved by an edit of the scene.
+    # A body added over REST, and moved by an edit of the scene.
     box_put_in = box("crate", Position(-0.1334, 0.4922, 0.4878), 0.1, 0.1, 0.1)
     wall_moved = Pose(Position(0.0, 0.55, 0.5))
     for name, change in (
@@ -274,7 +274,7 @@ def test_a_held_body_collides_where_the_arm_does_not(scene: HostProcess) -> None
     rod = Position(0.0, 0.0, 0.16)
     scene.send(box("rod", rod, 0.03, 0.03, 0.3, robot="obj_arm", link="tcp"))
     collision(line(scene, beside), "rod", "table")
-    assert line(scene, Position(0.0, -0.1, 0.0)) is None, "it is no obstacle to who holds it"
+    assert line(scene, Position(0.0, -0.1, 0.0)) is None, "it is not an obstacle for the robot that holds it"
     scene.send(box("rod", rod, 0.03, 0.03, 0.3, robot="obj_arm", link="claw"))
     error = line(scene, beside)
     assert isinstance(error, m.ErrorData)
@@ -329,13 +329,13 @@ def test_another_arm_is_an_obstacle_at_its_current_joints(host: HostProcess) -> 
     assert go(host, READY) is None
     assert host.call("obj_arm", "waypoints") > 2
     collision(go(host, MEETING), "arm/", "other/")
-    # The other way round: neither is led into the other.
+    # The other way round: neither robot moves into the other.
     assert go(host, MEETING, safe=False) is None
     home = joints(READY)
     assert host.call("obj_other", "move_to_joints", target_joints=home, speed=0.5, safe=False) is None
     answer = host.call("obj_other", "move_to_joints", target_joints=reaching, speed=0.5)
     collision(answer, "arm/", "other/")
-    # What it holds is part of it.
+    # The gripped part counts as part of the robot.
     assert go(host, READY, safe=False) is None
     assert host.call("obj_other", "move_to_joints", target_joints=joints((1.57, *READY[1:])), speed=0.5) is None
     assert go(host, ACROSS) is None
@@ -388,7 +388,7 @@ def test_a_robot_with_several_arms_is_an_obstacle_if_all_joints_are_known(host: 
     assert "wrist_1_joint" in error.message.text
 
 
-# ---------------------------------------------------------------------------------------------------- the very arm
+# ---------------------------------------------------------------------------------------------------- calibration
 def calibration(longer: float) -> KinematicCalibration:
     """Return the calibration of an arm with a longer upper arm."""
     half = math.pi / 2
@@ -408,7 +408,7 @@ def test_the_kinematic_calibration_of_the_controller_is_used(host: HostProcess) 
     given = {"assets": {"arm.urdf": str(URDF)}, "calibrations": calibrated}
     host.send(open_scene([type_code("Arm", ARM)], *objects, **given))
     host.expect(m.SceneOpened)
-    # With the upper arm upright it is so much higher.
+    # With the upper arm upright it is higher by the extra length.
     assert tip(host).z - TIP.z == pytest.approx(0.002, abs=1e-4)
     host.send(m.Calibrate("obj_arm", None))
     assert tip(host).z - TIP.z == pytest.approx(0.0, abs=1e-4)

@@ -129,7 +129,7 @@ def test_a_hanging_call_fails_in_time_without_delaying_other_devices(host: HostP
     assert refused.code == "device_timeout"
     assert "still busy with hang" in refused.message.text
     (tmp_path / "hanging").unlink()
-    wait_for(lambda: host.call("obj_a", "quick") == "quick")  # the device answers again, and no answer is mixed up
+    wait_for(lambda: host.call("obj_a", "quick") == "quick")  # the device answers again, with the right answer
 
 
 def test_stop_reaches_the_device_during_an_action(host: HostProcess, tmp_path: Path) -> None:
@@ -145,7 +145,7 @@ def test_stop_reaches_the_device_during_an_action(host: HostProcess, tmp_path: P
 
 
 def test_a_command_that_arrives_after_the_stop_is_stopped_too(host: HostProcess, tmp_path: Path) -> None:
-    # This device forgets a stop that comes before its motion, as one does whose frames cross on the wire.
+    # This device forgets a stop that precedes its motion, like one whose frames cross on the wire.
     source = DEVICE.replace('self.note("move")', 'self.note("move"); time.sleep(0.03); self.stopped.clear()')
     host.send(open_scene([type_code("Device", source)], scene_object("a", "Device", file=str(tmp_path / "notes"))))
     host.expect(m.SceneOpened)
@@ -157,7 +157,7 @@ def test_a_command_that_arrives_after_the_stop_is_stopped_too(host: HostProcess,
 
 
 def test_a_stop_while_control_is_taken_prevents_the_action(host: HostProcess, tmp_path: Path) -> None:
-    # Longer than a second stop would wait; and this device knows of no stop from before its motion.
+    # Longer than a second stop would wait; this device also ignores stops from before its motion.
     taking = """
     def control_owner(self):
         return None
@@ -182,7 +182,7 @@ def test_a_stop_while_control_is_taken_prevents_the_action(host: HostProcess, tm
 
 
 def test_twenty_devices_connect_concurrently(host: HostProcess, tmp_path: Path) -> None:
-    """Each waits until all have started to connect."""
+    """Each device waits until all have started to connect."""
     waiting = """self.note("connecting")
         while Path(self.settings.file).read_text().count("connecting") < 20:
             time.sleep(0.01)
@@ -299,7 +299,7 @@ def test_the_host_stops_devices_and_exits_when_the_server_ends(host: HostProcess
     lines = notes.read_text().splitlines()
     assert lines.index("a stop") < lines.index("a disconnected")
     assert "b stop" in lines
-    assert "b disconnected" in lines  # past its hung lane
+    assert "b disconnected" in lines  # despite its hung lane
 
 
 def test_the_host_stops_devices_and_exits_on_sigterm(host: HostProcess, tmp_path: Path) -> None:
@@ -316,7 +316,7 @@ def test_prints_and_warnings_of_drivers_do_not_break_the_host(host: HostProcess)
     _open(host, "a")
     left = host.call("obj_a", "leave")
     assert "SystemExit" in left.message.text
-    # More than a pipe holds, so that the test has to read meanwhile; no newline at the end of the second one.
+    # More than a pipe holds, so that the test must read meanwhile; no newline at the end of the second one.
     number = host.begin("obj_a", "shout", size=300_000)
     text = ""
 

@@ -26,7 +26,7 @@ def test_calls_run_in_order_on_one_thread(lane: Lane) -> None:
     def number(n: int) -> int:
         threads.add(threading.get_ident())
         assert on_any_lane()
-        return lane.call("inner", lambda: n)  # on the lane itself a call does not wait for the lane
+        return lane.call("inner", lambda: n)  # in the lane's own thread a call does not wait for the lane
 
     jobs = [Job("number", number, (n,)) for n in range(100)]
     for job in jobs:
@@ -53,7 +53,7 @@ def test_a_late_result_is_dropped_and_the_lane_is_usable_again(lane: Lane) -> No
         lane.call("slow", gate.wait, deadline=0.5)
     assert lane.hung
     with pytest.raises(DeviceTimeout, match="still busy with slow"):
-        lane.call("next", lambda: 1)  # without a deadline: it would wait for the gate
+        lane.call("next", lambda: 1)  # without a deadline it would wait for the gate
     gate.set()
     wait_for(lambda: not lane.hung)
     assert lane.call("next", lambda: 2, deadline=WITHIN) == 2
@@ -136,7 +136,7 @@ def test_no_call_from_before_a_stop_runs_after_it(lane: Lane) -> None:
         assert all(isinstance(jobs[n].error, Cancelled) for n in late)
         assert all(isinstance(job.error, Cancelled) for n, job in enumerate(jobs) if n not in began)
         cut += len(began) < len(jobs)
-    assert cut  # the moments did hit
+    assert cut  # some cuts hit the right moment
     assert lane.call("next", lambda: 1) == 1
 
 
@@ -161,7 +161,7 @@ def test_a_call_ends_exactly_once() -> None:
 
 
 def test_a_driver_can_check_whether_its_call_is_still_wanted(lane: Lane) -> None:
-    lane.check_wanted()  # outside of a call it has nothing to check
+    lane.check_wanted()  # outside of a call there is nothing to check
     begun, gate = threading.Event(), threading.Event()
 
     def act(*, wait: bool) -> str:

@@ -122,7 +122,7 @@ def test_results_as_lists_scalars_bytes_and_classes(service: Service, url: str) 
     found = rest.call(rest.Method.POST, url, body=[Own(3)], list_return_type=Own)
     assert [one.value for one in found] == [1, 2]
     assert service.received_requests[-1][2] == b'[{"ownValue":3}]'
-    assert service.connections == 1  # kept open from call to call
+    assert service.connections == 1  # kept open between calls
 
 
 def test_a_picture_is_fetched(service: Service, url: str) -> None:

@@ -27,7 +27,7 @@ from .conftest import HostProcess, Package, open_scene, scene_object
 from .older_sources import ACTION_POINTS, SCRIPT, SOURCES
 
 
-# ---------------------------------------------------------------------------------------------- what they talk to
+# ---------------------------------------------------------------------------------------------- services that they use
 class ArmService(ThreadingHTTPServer):
     """A REST service of a robot: camelCase, 204 for success, WebApiError for errors."""
 
@@ -135,7 +135,7 @@ def codes(*names: str) -> list[m.TypeCode]:
     return [m.TypeCode(name, module=module_name(name), source=SOURCES[name]) for name in names or SOURCES]
 
 
-# ---------------------------------------------------------------------------------------------- as they are read
+# ---------------------------------------------------------------------------------------------- analysis
 def test_older_sources_are_analysed() -> None:
     library = Library(SourceFile(name, module_name(name), source) for name, source in SOURCES.items())
     for name in SOURCES:
@@ -227,7 +227,7 @@ class Odd(Generic):
     host.expect(m.SceneOpened)
 
 
-# ---------------------------------------------------------------------------------------------- in a scene
+# ---------------------------------------------------------------------------------------------- scene
 def test_an_older_robot_behind_a_rest_service(host: HostProcess, arm_service: ArmService) -> None:
     arm = SceneObject(
         "arm", "ArmM1", Pose(Position(10, 0, 0)), scene_object("arm", "x", url=arm_service.url).parameters, "obj_arm"
@@ -313,7 +313,7 @@ def test_an_older_camera_and_collision_object(host: HostProcess) -> None:
     assert host.call("obj_camera", "brightness", image=picture) == 76
 
 
-# ---------------------------------------------------------------------------------------------- in a package
+# ---------------------------------------------------------------------------------------------- package
 def test_a_package_built_by_arcor2_runs(
     host: HostProcess, package: Package, arm_service: ArmService, bench_service: BenchService
 ) -> None:
@@ -385,7 +385,7 @@ with Resources() as res:
     assert events[3]["data"] == {"action_id": "act_a1", "results": ["true", "4.5"]}
 
 
-# ---------------------------------------------------------------------------------------------- the finder itself
+# ---------------------------------------------------------------------------------------------- the import finder
 def run_python(code: str, path: Path | None = None) -> str:
     prefix = "" if path is None else f"import sys; sys.path.insert(0, {str(path)!r})\n"
     done = subprocess.run([sys.executable, "-P", "-c", prefix + code], capture_output=True, text=True, timeout=60)

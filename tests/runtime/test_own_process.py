@@ -217,7 +217,7 @@ def test_a_type_that_blocks_the_interpreter_does_not_delay_other_devices(
     _wait_noted(notes, "w2 moving")
     _wait_noted(notes, "p moving")
     with _kept_interpreter(host, notes, tmp_path) as kept:
-        # Each is answered although nothing of w1 can run: its C call ends only after this block.
+        # Each is answered although w1 cannot run anything: its C call ends only after this block.
         host.send(m.StopMotion(98, "obj_w2"))
         host.send(m.StopMotion(99, "obj_p"))
         assert [host.answer(number) for number in (98, 99)] == [None, None]
@@ -240,7 +240,7 @@ def test_a_stop_interrupts_an_action_that_computes(host: HostProcess, notes: Pat
 
 
 def test_a_stop_cancels_a_call_that_has_not_started(host: HostProcess, notes: Path, tmp_path: Path) -> None:
-    # The call has left the lane of the cell host, but the process cannot start it while its interpreter is kept.
+    # The call has left the lane of the cell host, but the process cannot start it while its interpreter is blocked.
     _open(host, notes, "w1", "w2", "p", other="w1")
     with _kept_interpreter(host, notes, tmp_path, "obj_w2", "let_other_keep"):
         move = host.begin("obj_w1", "move")
