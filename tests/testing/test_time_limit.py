@@ -1,4 +1,4 @@
-"""A driver that does not return fails its case by name, and the suite goes on or ends."""
+"""A driver that does not return fails its case by name, and the suite continues or ends."""
 
 import threading
 from pathlib import Path

@@ -16,7 +16,7 @@ from arcor2_hw.testing.life import wait_until
 from arcor2_hw.testing.serial_wire import SerialWire
 from arcor2_hw.testing.tcp_wire import TcpWire
 
-QUIET = 0.2  # s in which nothing may come
+QUIET = 0.2  # s without a message
 
 
 # ------------------------------------------------------------------------------------------------ TCP
@@ -112,7 +112,7 @@ def test_a_connection_opened_during_a_cut_is_reset(wire: TcpWire, device: socket
     with dial(wire) as driver:
         driver.sendall(b"hello")
         assert is_quiet(driver)
-        assert not select.select([device], [], [], QUIET)[0], "the device heard of a connection over a cut cable"
+        assert not select.select([device], [], [], QUIET)[0], "the device noticed a connection over a cut cable"
         wire.heal()
         with pytest.raises(ConnectionResetError):
             driver.recv(9)
@@ -196,13 +196,13 @@ def test_a_serial_wire_forwards_cuts_and_unplugs(port: tuple[int, str]) -> None:
         os.write(driver, b"lost")
         assert not select.select([device, driver], [], [], QUIET)[0]
         wire.heal()
-        assert not select.select([device, driver], [], [], QUIET)[0], "a line keeps nothing"
+        assert not select.select([device, driver], [], [], QUIET)[0], "a line does not store data"
         wire.half_frame()
         os.write(device, b"12345678")
         assert os.read(driver, 9) == b"1234"
         wire.heal()
         wire.reset()
-        with contextlib.suppress(OSError):  # a port that was pulled out gives its end, or an error
+        with contextlib.suppress(OSError):  # reading from an unplugged port returns no data or fails
             assert os.read(driver, 9) == b""
         again = os.open(wire.address, os.O_RDWR | os.O_NOCTTY)
         os.write(again, b"again")

@@ -1,4 +1,4 @@
-"""Runs of the conformance suite on the press of `broken`, in a process of its own."""
+"""Runs of the conformance suite on the press of `broken`, in a separate process."""
 
 import os
 import shutil
@@ -46,7 +46,7 @@ def run(
     conftest: str = "",
     cases: Sequence[str] = (),
 ) -> str:
-    """Run the suite on the press in its own process and return the output of pytest."""
+    """Run the suite on the press in a separate process and return pytest's output."""
     shutil.copytree(PACKAGE, folder / "broken", dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
     for name, text in {
         "test_of_toy.py": "def test_connecting_observes():\n    pass\n",
@@ -58,8 +58,8 @@ def run(
         (folder / name).write_text(text)
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "arcor2_hw.testing.plugin"]
     command += ["-rA", *arguments, *(["-k", selected] if selected else [])]
-    # What the run around this one tells its own processes is not meant for this one. Of the plugins that happen to be
-    # installed none is loaded: the one of dash, which Open3D brings along, warns with every pytest, others take time.
+    # Environment variables of the surrounding run must not affect this one. None of the installed plugins is
+    # loaded: that of dash, a dependency of Open3D, warns with every pytest, and others take time.
     environment = {key: value for key, value in os.environ.items() if not key.startswith(("PYTEST_", "COV_"))}
     environment["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
     ended = subprocess.run(

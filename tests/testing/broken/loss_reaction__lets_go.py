@@ -1,4 +1,4 @@
-"""The press lets go of its part without its driver, but is declared to hold."""
+"""The press releases its part without its driver, but is declared to hold."""
 
 from .toy_device import WATCHDOG
 from .toy_reactions import HoldingBench, HoldingPress

@@ -38,7 +38,7 @@ class Press:
         self.silent_since, self.torn = math.inf, False
 
     def scrap(self) -> None:
-        """End the threads that a broken driver has left behind."""
+        """End the threads that a broken driver did not end."""
         self.scrapped, self.until = True, 0.0
 
     def ask(self, write: str = "", link: int | None = None) -> None:

@@ -1,4 +1,4 @@
-"""A driver of a simulated press that keeps all rules, and its bench. The other modules each break one rule."""
+"""A driver of a simulated press that obeys all rules, and its bench. Each other module breaks one rule."""
 
 import math
 import sys
@@ -245,7 +245,7 @@ class ToyPress(Machine, Generic):
             self._acting.release()
 
     def _stopped_since(self, stops: int) -> bool:
-        with self._stopping:  # what is seen as stopped has been halted
+        with self._stopping:  # a press that is reported as stopped has been halted
             return self._stops != stops
 
     def _stopped(self) -> Exception:
@@ -323,7 +323,7 @@ class ToyBench(Bench):
         return self.press.running() or time.time() - self.heard_last() < self.watchdog
 
     def heard_last(self) -> float:
-        """Return when the process of `orphan` gave its last sign of life, s; if it gave none, the distant past."""
+        """Return when the process of `orphan` last gave a sign of life, s; if never, a time far in the past."""
         try:
             return float(self.sign_of_life.read_text())
         except (FileNotFoundError, ValueError):

@@ -1,4 +1,4 @@
-"""Presses that hold and that continue when their driver dies, and their benches."""
+"""Presses that hold, or continue, when their driver is killed, and their benches."""
 
 import math
 import time
@@ -17,7 +17,7 @@ class HoldingPress(ToyPress):
 
 
 class HoldingBench(ToyBench):
-    """The process to be killed clamps a part; its last sign of life is the last thing that the press hears of it."""
+    """The process to be killed clamps a part; this is the last request that reaches the press."""
 
     object_type = HoldingPress
     lets_go_after: ClassVar[float] = math.inf

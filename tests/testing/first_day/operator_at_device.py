@@ -1,4 +1,4 @@
-"""A person at a terminal: runs the command line on a pseudo terminal, reads what it shows, and types."""
+"""A simulated person at a terminal: runs the command line on a pseudo terminal, reads its output, and types."""
 
 import fcntl
 import os
@@ -27,7 +27,7 @@ class Operator:
         self.shown = ""
         """Everything that was shown."""
         self.reactions: dict[str, Callable[[], object]] = {}
-        """What the person does each time when a text is shown."""
+        """Actions of the person for each text that is shown."""
         self._read = self._reacted = 0
         self._ours, theirs = pty.openpty()
         fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 60, 220, 0, 0))
@@ -45,7 +45,7 @@ class Operator:
         os.close(theirs)
 
     def _more(self, until: float) -> bool:
-        """Read what is shown; return False at the end of the command."""
+        """Read the output; return False at the end of the command."""
         ready, _, _ = select.select([self._ours], [], [], max(0.0, until - time.monotonic()))
         assert ready, f"nothing more was shown within {SHOWN_WITHIN} s:\n{self.shown[-3000:]}"
         try:

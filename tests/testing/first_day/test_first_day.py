@@ -82,7 +82,7 @@ def recorded(folder: Path) -> list[dict[str, Any]]:
 
 
 class Pendant:
-    """What the person does at the pendant of the arm when the terminal asks for it. Everything else is confirmed."""
+    """Actions of the person at the arm's pendant when the terminal requests them. Everything else is confirmed."""
 
     def __init__(self, arm: FakeUr, by_hand: bool = False) -> None:
         self.arm, self.by_hand, self.lists = arm, by_hand, 0

@@ -1,4 +1,4 @@
-"""The motions that first_day.yaml declares move the simulated device, and are seen and stopped."""
+"""The motions declared by first_day.yaml move the simulated device, and are detected and stopped."""
 
 import dataclasses
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The press with a translation in the folder of its own."""
+"""The press with a translation in its own folder."""
 
 from arcor2_hw.exceptions import Refused
 
