@@ -1,1 +1,1 @@
-"""One device on the wire per module, each a process of its own. Nothing here knows anything of ours but the wire."""
+"""Fakes of devices, one per module and process. They share nothing with the product except the wire protocols."""

@@ -1,4 +1,4 @@
-"""MapFake: a device that does what its map says, for first steps with the driver that was written from the same map.
+"""MapFake: a device that behaves as its map states, for first steps with a driver generated from the same map.
 
 It is not independent of the driver: an error of the map is in both. Not modelled: everything that is not in the map.
 """
@@ -61,7 +61,7 @@ class MapFake(MappedDevice):
             vars(self.registers).update(end)
 
     def _command(self, command: dict[str, Any]) -> tuple[str, dict[str, Any], dict[str, Any], dict[str, Any]]:
-        """Return what is written last to start a command, all that is written, and what it shows: first, at its end."""
+        """Return for a command the last written point, all writes, and the values at its start and at its end."""
         busy, start = self._content.get("busy", {}), command.get("write", {})
         last = [*command.get("parameters", []), *start][-1]
         done = command.get("done", {}).get("when", {})
@@ -72,7 +72,7 @@ class MapFake(MappedDevice):
         return last, self._numbers(start), self._numbers(begin), self._numbers(end)
 
     def _numbers(self, values: dict[str, Any]) -> dict[str, Any]:
-        """Return what is in the registers for values."""
+        """Return the register contents for values."""
         points = self._content["points"]
         return {
             name: self._texts[name].get(value, value / points[name]["scale"] if "scale" in points[name] else value)
@@ -85,7 +85,7 @@ class MapFake(MappedDevice):
         return self._end is not None
 
     def last(self, seconds: float) -> None:
-        """Let commands take that time, s."""
+        """Set the duration of commands, s."""
         self.seconds = seconds
 
     def rest(self) -> None:

@@ -293,7 +293,7 @@ class RtuFrames:
         self._timer = self._loop.call_later(SILENCE, self._silent) if self._buffer else None
 
     def _silent(self) -> None:
-        """End the frame that began."""
+        """End the current frame."""
         frame = bytes(self._buffer)
         self._buffer.clear()
         self._timer = None

@@ -13,7 +13,7 @@ import msgspec
 import uvloop
 
 _PARENT_WATCH_PERIOD = 0.2  # s
-_AHEAD = -10  # requested niceness, because a real device has its own processor
+_AHEAD = -10  # requested niceness: like a real device, the fake should not wait for a processor
 _TICK = 0.02  # s, period of `OwnTime`
 _HELD_UP = 0.1  # s, longest step of `OwnTime`
 _PARENT = os.getppid()
@@ -21,7 +21,7 @@ _end: ContextVar[asyncio.Event] = ContextVar("end")
 
 
 class OwnTime:
-    """A clock that stops while this process is not scheduled, because a real device has its own processor.
+    """A clock that stops while this process is not scheduled: a real device would not have to wait for a processor.
 
     Data received meanwhile, such as a watchdog signal, is handled before a watchdog counts the time.
     """

@@ -35,7 +35,7 @@ class Refusal(Exception):
 
 
 class Place(NamedTuple):
-    """Where a value is. With `bit` it is one bit of a register; with `low_first` the low word comes first."""
+    """The place of a value. With `bit` it is one bit of a register; with `low_first` the low word comes first."""
 
     table: str
     address: int
@@ -192,7 +192,7 @@ class MapTables(ModbusTables):
 
 
 class _Cells:
-    """A table, whose parts are read when they are asked for."""
+    """A table whose values are read on request."""
 
     def __init__(self, device: Mapped, table: str) -> None:
         self._device, self._table = device, table

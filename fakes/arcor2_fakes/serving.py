@@ -81,7 +81,7 @@ class Fake:
         self.at_end(end)
 
     def wires(self, checked: tuple[str, ...] = (), /, **wires: Wire) -> None:
-        """Serve on wires and register their faults; `checked` names those whose frames end in a checksum."""
+        """Serve on wires and register their faults; `checked` names the wires whose frames end in a checksum."""
         self._wires |= wires
         register_faults(self.channel, dict(wires), checked)
 

@@ -42,7 +42,7 @@ def register_commands(fake: Fake, controller: Controller, http: HttpPort) -> Non
         controller.speed_ratio = within("percent", percent, 0, 100)
 
     def renew() -> None:
-        """Reset to the state as delivered: motors on, automatic, no sessions, both arms at home."""
+        """Reset to the factory state: motors on, automatic, no sessions, both arms at home."""
         http.end_all()
         controller.stop()
         controller.foreign_program(False)
@@ -88,7 +88,7 @@ async def main(
     left_port: int = 6101,
     right_port: int = 6111,
     user: str = "Default User",
-    password: str = "robotics",  # noqa: S107 - what ABB delivers
+    password: str = "robotics",  # noqa: S107 - ABB's factory setting
     time_scale: Annotated[float, Parameter(validator=validators.Number(gt=0, lte=100))] = 1.0,
 ) -> None:
     """Start the fake; it prints one line `ready {json}` with its addresses, and exits on SIGTERM.

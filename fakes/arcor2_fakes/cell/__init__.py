@@ -1,4 +1,4 @@
-"""The simulated cell: boards, their poses, and what the devices do to them.
+"""The simulated cell: boards, their poses, and the effects of the devices on them.
 
 ``python -m arcor2_fakes.cell --layout FILE --robot H:P --tester H:P --reader H:P --conveyor H:P --io H:P --printer H:P
 --arm H:P --boards N --seed S``, where H:P is the address of the control channel of a fake. Omit devices that the

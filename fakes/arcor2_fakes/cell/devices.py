@@ -1,4 +1,4 @@
-"""Clients of the control channels of the fakes: what the world reads from them and sends to them."""
+"""Clients of the fakes' control channels: the values that the world reads and the commands that it sends."""
 
 from __future__ import annotations
 

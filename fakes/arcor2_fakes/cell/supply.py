@@ -92,7 +92,7 @@ class Magazine:
     def put(self, thing: Thing, world_from_board: Matrix) -> str | None:  # noqa: ARG002 - it slides to the pick place
         """Put a board back."""
         if self.top() is not None:
-            return "over the feeder, where the next board lies already"
+            return "over the feeder, where there is already a board"
         self._things.insert(0, thing)
         self._refilled_at = self._now
         return None

@@ -183,7 +183,7 @@ class World:
                 self._nest.thing = thing
                 self._move(thing, "label", why)
                 return
-            why = f"{why} under the label printer, where a board lies already"
+            why = f"{why} under the label printer, where there is already a board"
         elif self._supply.accepts(world_from_board):
             refused = self._supply.put(thing, world_from_board)
             if refused is None:
@@ -233,7 +233,7 @@ class World:
             self._shown = code
             await self._devices.present(code)
 
-    # ------------------------------------------------------------------------------------------------ told by a test
+    # ------------------------------------------------------------------------------------------------ commands of tests
 
     async def drop(self) -> None:
         """Let the gripped board slip out of the jaws.

@@ -82,7 +82,7 @@ class Drive:
         self._reached = False
         self._homing = ""  # "", running, attained, error
 
-    # -------------------------------------------------------------------------------- what the dictionary shows
+    # -------------------------------------------------------------------------------- values in the object dictionary
     @property
     def position(self) -> int:
         """Return the position actual value (6064h)."""

@@ -123,7 +123,7 @@ class Tpdo(Pdo):
         if not changed and not (self._period_ms and now >= self._due):
             return
         period = self._period_ms / 1000.0
-        # After a stall, missed transmissions are not made up for.
+        # After a stall, missed transmissions are not sent later.
         self._due = self._due + period if now - self._due < period else now + period
         self._last = data
         self.sent += 1

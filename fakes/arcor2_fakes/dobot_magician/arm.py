@@ -46,7 +46,7 @@ class Arm:
         self.as_delivered()
 
     def as_delivered(self) -> None:
-        """Reset to the state as delivered: folded, not homed, default parameters."""
+        """Reset to the factory state: folded, not homed, default parameters."""
         self.homed = False
         self.joints: Four = FOLDED
         self.alarms: set[int] = set()

@@ -47,7 +47,7 @@ class RtuRegisters(ModbusTables):
 
     @staticmethod
     def _place(address: int, count: int) -> int:
-        """Return the place of the first of some requests."""
+        """Return the position of the first of some requests."""
         if not _REQUESTS <= address <= address + count <= _REQUESTS + _COUNT:
             raise ModbusRefusal(ExceptionCode.ILLEGAL_ADDRESS)
         return address - _REQUESTS

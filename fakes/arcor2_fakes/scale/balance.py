@@ -77,7 +77,7 @@ class Balance:
         self.busy = False
         self.unit = "g"
         self.display: str | None = None
-        """A text in place of the weight."""
+        """A text shown instead of the weight."""
         self.keys = KEYS_ACT
         self.next_error: str | None = None
         self.received: deque[str] = deque(maxlen=200)

@@ -1,4 +1,4 @@
-"""The controller: its clients, what it refuses, and the data of its telegrams."""
+"""The controller: its clients, its refusals, and the data of its telegrams."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Controller:
         self.sessions.add(Session(self, connection))
 
     def left(self, session: Session, was_started: bool) -> None:
-        """Forget a session whose connection is closed."""
+        """Remove a session whose connection is closed."""
         self.sessions.discard(session)
         if was_started and self.options.lock_on_loss:
             self.tool.enable(False)
@@ -126,7 +126,7 @@ class Controller:
         return blocked if self.tool.running else 0
 
     def execute(self, session: Session, message: Message) -> None:
-        """Do what an accepted message says, after it was answered."""
+        """Execute an accepted message, after it was answered."""
         match message.mid:
             case 3:
                 session.close()

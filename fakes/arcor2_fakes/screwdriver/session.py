@@ -28,7 +28,7 @@ class Event(msgspec.Struct, frozen=True):
 
 
 class Session:
-    """A TCP connection of a client. Nothing but MID 0001 is answered before the communication has started."""
+    """A TCP connection of a client. Only MID 0001 is answered before the communication has started."""
 
     def __init__(self, controller: Controller, connection: Connection) -> None:
         self._controller, self._connection = controller, connection

@@ -1,4 +1,4 @@
-"""Telegrams of Open Protocol as the controller sees them: a header of 20 bytes, a data field, and NUL."""
+"""Telegrams of Open Protocol from the controller's side: a header of 20 bytes, a data field, and NUL."""
 
 from __future__ import annotations
 

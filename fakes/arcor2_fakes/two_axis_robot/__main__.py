@@ -19,7 +19,7 @@ from arcor2_fakes.two_axis_robot.servo import TICKS, VELOCITY_UNIT, Servo
 
 
 def truth(bus: Bus, line: PtyLine) -> dict[str, Any]:
-    """Return the true state, whatever the faults of the line; angles in rad from the middle."""
+    """Return the true state, regardless of line faults; angles in rad from the middle."""
     found = {}
     for number, servo in bus.servos.items():
         servo.advance()

@@ -120,7 +120,7 @@ class ControlScript(Program):
         self._handler(command)()
 
     def _handler(self, command: int) -> Callable[[], Steps | None]:
-        """Return what executes a command: nothing, for one that is not in the program."""
+        """Return the function for a command; one that does nothing if the program lacks the command."""
         if command in _NOT_MODELLED:
             raise ValueError(f"command {command} is not modelled")
         return self._handlers.get(command, lambda: None)

@@ -43,7 +43,7 @@ class Program(abc.ABC):
         """Return the program's main thread; it ends when this does."""
 
     def ended(self) -> None:  # noqa: B027
-        """Handle the end of the program, whatever ended it."""
+        """Handle the end of the program, for any reason."""
 
 
 class Controller:
@@ -87,7 +87,7 @@ class Controller:
         self._suspended = False  # held without reporting it
         self._watchdog: tuple[int, float] | None = None  # input register and timeout, s
         self._written = [0] * 48  # cycle of the last write of each integer register
-        self._due: list[tuple[int, Callable[[], None]]] = []  # (cycle, what)
+        self._due: list[tuple[int, Callable[[], None]]] = []  # (cycle, function)
 
     # ------------------------------------------------------------------------------------------------ control cycle
     def tick(self) -> None:
@@ -208,7 +208,7 @@ class Controller:
         self._condition(SafetyMode.PROTECTIVE_STOP, False)
 
     def safeguard_stop(self, on: bool, reports_paused: bool = False) -> None:
-        """Open or close the door. It holds a playing program, which continues when it closes: there is no reset input.
+        """Open or close the door. An open door holds a playing program, which continues when it closes.
 
         RTDE reports "playing" by default, because ur_rtde waits through a safeguard stop, but fails at once when
         "paused" is reported; `reports_paused` selects the other interpretation of the manual.
@@ -389,7 +389,7 @@ class Controller:
             self.watchdog_trips += 1
             self.stop_program("watchdog")
 
-    # --------------------------------------------------------------------------------------------------- what happened
+    # --------------------------------------------------------------------------------------------------- reports
     def note_command(self, kind: str, **details: Any) -> None:
         """Record a motion command for the truth."""
         self.commands.append({"t": time.monotonic(), "kind": kind, **details})

@@ -155,7 +155,7 @@ class Arm:
         """The length of the current cycle."""
         self.motion: Motion | None = None
         self.rate = 1.0
-        """How fast path time runs now: the speed slider, or on its way to or from zero in a pause."""
+        """Return the current speed of path time: the speed slider, or a transition to or from zero in a pause."""
         self.slider = 1.0
         self.held = False
         """Whether path time is stopped, by a pause or by the safety system."""
@@ -229,7 +229,7 @@ class Arm:
             self.halt()
 
     def go_on(self) -> None:
-        """Let path time run again."""
+        """Continue path time."""
         self.held, self._ramp = False, _PAUSE_TIME
 
     def teleport(self, q: Joints) -> None:

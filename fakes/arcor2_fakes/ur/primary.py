@@ -52,7 +52,7 @@ class StatePorts:
         controller.failed = self._report_error
 
     def calibrate(self, deltas: list[list[float]], reported: bool = True) -> None:
-        """Set what a calibration adds to theta, a, d and alpha; `reported`: whether the ports report it."""
+        """Set the offsets of the calibration for theta, a, d and alpha; `reported`: whether the ports report it."""
         if [len(row) for row in deltas] != [6] * 4:
             raise ValueError("four rows of six numbers")
         self._deltas, self._reported = deltas, reported

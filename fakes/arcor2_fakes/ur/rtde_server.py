@@ -154,7 +154,7 @@ class Session:
             (frequency,) = struct.unpack_from(">d", payload)
             self._answer(kind, self._set_up_outputs(frequency, split_names(payload[8:])))
         elif kind == Kind.START:
-            # The answer must be first: a client takes the next package for it.
+            # The answer must be first, because a client interprets the next package as the answer.
             self._answer(kind, bytes((self._outputs is not None,)))
             self.recipe = self._outputs
         elif kind == Kind.PAUSE:

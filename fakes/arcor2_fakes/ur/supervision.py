@@ -147,7 +147,7 @@ def register(control: ControlServer, c: Controller, rtde: RtdeServer, script: Sc
         rtde.claims.update(dict.fromkeys(names, c))
 
     def fieldbus(on: bool) -> None:
-        """Let a fieldbus own the lower half of the registers."""
+        """Assign the lower half of the registers to a fieldbus."""
         lower = [f"input_{kind}_register_{i}" for kind in ("int", "double") for i in range(24)]
         if on:
             in_use(lower)
