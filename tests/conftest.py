@@ -38,7 +38,7 @@ APART = (
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Sort the tests of a parallel run for a queue with two ends, in whose middle the short tests are left to the end.
+    """Sort the tests of a parallel run for a queue that is read from both ends, so that short tests run last.
 
     At the beginning of the queue are tests that wait for devices, at its end browser tests and before them long ones.
     """

@@ -22,11 +22,11 @@ from typing import IO, Any
 from tests import forking_process, leaks
 
 BOUND_TO_THE_INTERPRETER = ("PYTHON", "LD_", "MALLOC_", "OPENBLAS_")
-"""Environment variables that take effect only when an interpreter starts begin with these."""
+"""Prefixes of environment variables that take effect only when an interpreter starts."""
 
 
 class Forked:
-    """A started program: what tests use of `subprocess.Popen`."""
+    """A started program, with the part of `subprocess.Popen` that tests use."""
 
     def __init__(self, pid: int, status: int, stdout: int) -> None:
         self.pid = pid
@@ -116,7 +116,7 @@ class Forker:
 
 
 async def ended(process: "Forked | subprocess.Popen[bytes]") -> int:
-    """Wait for the end of a process without blocking the event loop; give its exit status."""
+    """Wait for the end of a process without blocking the event loop; return its exit status."""
     with contextlib.suppress(ProcessLookupError):
         fd = os.pidfd_open(process.pid)
         try:

@@ -1,4 +1,4 @@
-"""The process that `tests.forking` forks programs from. It imports nothing but what they import."""
+"""The process from which `tests.forking` forks programs. It imports only what they import."""
 
 import atexit
 import gc
@@ -80,7 +80,7 @@ def become(module: str, arguments: list[str], environment: dict[str, str], direc
     except BaseException:  # shown as by the interpreter
         traceback.print_exc()
         status = 1
-    # The end of the interpreter, without taking apart what was imported.
+    # End the interpreter without cleaning up the imported modules.
     threading._shutdown()  # type: ignore[attr-defined]
     atexit._run_exitfuncs()
     sys.stdout.flush()

@@ -1,7 +1,7 @@
 """Fails a test that leaves a task, a thread, a process or a socket behind.
 
-What a fixture of wider scope than one test brings up is allowed to live on, and may start processes of its own
-meanwhile; everything else must be gone, at the latest GRACE seconds after the test's own fixtures are torn down.
+Resources of fixtures with a wider scope than one test may stay, and may start processes of their own meanwhile.
+Everything else must be gone GRACE seconds after the test's own fixtures are torn down, at the latest.
 """
 
 import asyncio
@@ -24,7 +24,7 @@ GRACE = 20.0
 
 @dataclass
 class Holdings:
-    """What this process holds: threads by ident, children by pid and start, sockets by inode."""
+    """Resources of this process: threads by ident, children by pid and start time, sockets by inode."""
 
     threads: dict[int, str] = field(default_factory=dict)
     children: dict[tuple[int, float], str] = field(default_factory=dict)
@@ -50,7 +50,7 @@ class Holdings:
         return cls({t.ident or 0: t.name for t in threading.enumerate()}, children, sockets)
 
     def beyond(self, other: "Holdings") -> list[str]:
-        """Name what is here and not in `other`."""
+        """Name the resources that are here and not in `other`."""
         found = [f"thread {name}" for ident, name in self.threads.items() if ident not in other.threads]
         started = {pid for pid, _ in other.children} - forking
         for key, cmd in self.children.items():
@@ -75,14 +75,14 @@ def _ancestors(pid: int) -> set[int]:
 _before = pytest.StashKey[Holdings]()
 _allowed = Holdings()
 forking: set[int] = set()
-"""Processes that fork programs for tests (`tests.forking`). They may live on, but not what they start."""
+"""Processes that fork programs for tests (`tests.forking`). They may stay, but not the programs that they start."""
 _after: list[Holdings] = []
-"""What this process held after the previous test."""
+"""Resources of this process after the previous test."""
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_fixture_setup(fixturedef: Any) -> Generator[None, object, object]:
-    """Allow what a fixture of module, class, package or session scope brings up."""
+    """Allow the resources of fixtures with module, class, package or session scope."""
     if fixturedef.scope == "function":
         return (yield)
     with outliving_the_test():
@@ -91,7 +91,7 @@ def pytest_fixture_setup(fixturedef: Any) -> Generator[None, object, object]:
 
 @contextlib.contextmanager
 def outliving_the_test() -> Iterator[None]:
-    """Allow what is started inside to outlive the test: a part of a fixture of wider scope that is started again."""
+    """Allow resources created in this context to outlive the test: part of a wider fixture that is restarted."""
     before = Holdings.now()
     yield
     after = Holdings.now()

@@ -13,7 +13,7 @@ SOURCE = "\n".join(f"x{number} = [{number}, {{}}]" for number in range(2000))
 
 @pytest.fixture
 def nested() -> Iterator[list[str]]:
-    """A finalizer that parses once, in the middle of parsing, as another thread may. Yields what it has parsed."""
+    """A finalizer that parses once, in the middle of parsing, as another thread may. Yields its result."""
     parsed: list[str] = []
 
     def finalize(phase: str, _: dict[str, int]) -> None:

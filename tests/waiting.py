@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 WITHIN: Final = 30.0
-"""Time limit for what happens at once on an idle computer, s. It is that long for busy ones."""
+"""Time limit for events that are immediate on an idle computer, s. It is that long for busy ones."""
 
 
 def wait_for(read: Callable[[], Any], holds: Callable[[Any], bool] = bool, within: float = WITHIN) -> Any:

@@ -1,4 +1,4 @@
-"""Any source: the analysis answers, reports problems with their place, and its result can be sent."""
+"""For any source the analysis returns a result, names the place of each problem, and its result can be sent."""
 
 import string
 import tokenize
@@ -129,7 +129,7 @@ EXPRESSION = st.recursive(st.sampled_from(ATOMS), shapes, max_leaves=4)
 
 @st.composite
 def modules(draw: st.DrawFn) -> str:
-    """Make a module whose statements are sound and whose expressions are anything."""
+    """Create a module with valid statements and arbitrary expressions."""
 
     def some(count: int = 2) -> list[str]:
         return draw(st.lists(EXPRESSION, max_size=count))

@@ -82,13 +82,13 @@ def test_a_driver_of_several_files_is_read_without_importing(distribution: Path)
     library = Library([arm.file])
     analysis = library.analyse("Arm")
     assert analysis.problem is None, analysis.problem
-    assert analysis.meta.base == "Robot"  # Base is no type of its own for clients
+    assert analysis.meta.base == "Robot"  # Base is not a type for clients
     assert [s.name for s in analysis.meta.settings] == ["host", "port"]
     grip = analysis.actions[0]
     assert (grip.name, grip.origins, grip.disabled) == ("grip", UNSET, False)
     assert [p.default_value for p in grip.parameters] == ['"soft"', "0.25"]
     assert analysis.implemented == {"stop"}
-    # Each file stands after those that it needs itself.
+    # Each file comes after the files that it imports.
     assert [each.module for each in analysis.modules] == [
         "vendor_cell.common.limits",
         "vendor_cell.common",

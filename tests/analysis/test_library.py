@@ -33,7 +33,7 @@ def analyse(source: str, name: str = "T", **others: str) -> TypeAnalysis:
 
 
 def the_action(body: str, head: str = "", attributes: str = "") -> ObjectAction:
-    """Give the one action of a type whose class has this body."""
+    """Return the only action of a type whose class has this body."""
     source = f"{textwrap.dedent(head)}\nclass T(Generic):\n    _ABSTRACT = False\n"
     source += textwrap.indent(textwrap.dedent(attributes) + "\n" + textwrap.dedent(body), "    ")
     found = analyse(source)
@@ -65,7 +65,7 @@ def test_module_names(name: str, module: str) -> None:
 
 
 def without_texts(value: object) -> object:
-    """Leave out texts, and what we tell beside the protocol."""
+    """Remove texts, and the fields that we add to the protocol."""
     if isinstance(value, dict):
         left_out = ("description", "category", "icon")
         return {key: without_texts(each) for key, each in value.items() if key not in left_out}
@@ -248,7 +248,7 @@ DOBOT = {
 
 
 def recorded() -> dict[str, list]:
-    """Give the data of the answers in the first recorded session."""
+    """Return the data of the answers in the first recorded session."""
     answers = {}
     for line in session("01_connect_register"):
         message = line["msg"]
@@ -269,7 +269,7 @@ def test_types_of_a_recorded_session_are_analysed_as_recorded() -> None:
         assert without_texts(json.loads(msgspec.json.encode(found.meta))) == without_texts(wanted)
     actions = json.loads(msgspec.json.encode(lib.analyse("DobotMagician").actions))
     assert without_texts(actions) == without_texts(answers["GetActions"])
-    # Every text that the recording has is there, and no other.
+    # All texts of the recording exist, and no others.
     for ours, theirs in zip(actions, answers["GetActions"], strict=True):
         assert ("description" in ours) == ("description" in theirs)
         for a, b in zip(ours["parameters"], theirs["parameters"], strict=True):

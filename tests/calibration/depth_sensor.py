@@ -1,4 +1,4 @@
-"""A synthetic depth sensor for robot pose: a ray per pixel, met with shapes in closed form, and what a sensor adds.
+"""A synthetic depth sensor for the robot pose: one ray per pixel, intersected with shapes in closed form, and noise.
 
 Shares no code with the solver: shapes are capsules and boxes met analytically, not triangles; the lens is inverted by
 iteration; the arm is a Denavit-Hartenberg chain of its own (UR5e's published lengths). Noise grows with the square of
@@ -89,7 +89,7 @@ def arm(joints: list[float]) -> list[Capsule]:
 
 
 def tool(joints: list[float]) -> list[Shape]:
-    """What hangs on the arm and is in no model: a gripper and a cable along the forearm."""
+    """Objects attached to the arm that no model contains: a gripper and a cable along the forearm."""
     last = arm(joints)[-1]
     z = (last.end - last.begin) / np.linalg.norm(last.end - last.begin)
     x = np.cross(z, [0.3, 0.5, 0.8])
@@ -160,7 +160,7 @@ class Sensor:
         return np.stack([x, y, np.ones_like(x)], axis=-1)
 
     def exact(self, world_from_camera: Floats) -> Floats:
-        """Depth along the optical axis, m; infinite where nothing is met."""
+        """Return the depth along the optical axis, m; infinite where the ray hits nothing."""
         rays = self.rays() @ world_from_camera[:3, :3].T
         origin = world_from_camera[:3, 3]
         depth = np.full(rays.shape[:2], np.inf)
@@ -179,7 +179,7 @@ class Sensor:
         return depth
 
     def take(self, world_from_camera: Floats, rng: np.random.Generator) -> npt.NDArray[np.uint16]:
-        """The mean of several noisy pictures, in mm, 0 where there is none."""
+        """Return the mean of several noisy pictures, mm; 0 where there is no depth."""
         z = self.exact(world_from_camera)
         z = np.where(z < 6.0, z, 0.0).astype(np.float32)
         smooth = cv2.GaussianBlur(rng.standard_normal(z.shape).astype(np.float32), (0, 0), 3.0)

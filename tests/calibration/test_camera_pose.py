@@ -40,7 +40,7 @@ def flat(x: float, y: float, turn: float = 0.0) -> Array:
     return pose
 
 
-# One of them leans against a wall, facing -y.
+# One of the boards leans against a wall, facing -y.
 WALL = np.array([[1.0, 0, 0, 0.0], [0, 0, -1.0, 0.2], [0, 1.0, 0, 0.08], [0, 0, 0, 1.0]])
 PLACES = {3: flat(-0.12, -0.02, 0.4), 17: flat(0.12, -0.05, -1.0), 42: flat(0.0, 0.08, 2.5), 9: WALL}
 ASLANT = rendering.looking_at(np.array([0.25, -0.6, 0.5]), ORIGIN, 0.2)
@@ -124,7 +124,7 @@ def test_inverse_gives_the_origin_in_camera_coordinates() -> None:
     there, back = found.estimated(), found.estimated(inverse=True)
     assert there.quality == back.quality == found.quality
     assert (there.pose * back.pose).position.distance_to(Position()) < 1e-12
-    # The origin lies in front of the camera, in the middle of the picture.
+    # The origin is in front of the camera, in the middle of the picture.
     assert back.pose.position.z == pytest.approx(math.hypot(0.25, 0.6, 0.5), abs=0.002)
 
 
@@ -235,7 +235,7 @@ def test_corners_are_returned_by_marker_id() -> None:
     camera = rendering.looking_at(np.array([0.0, -1e-9, 0.6]), ORIGIN, 0.0)
     found = find_marker_corners(picture(camera, places), GIVEN)
     assert [each.marker_id for each in found] == [3, 7]
-    # Seen from above with y up in the picture: the first corner is the upper left one, then clockwise.
+    # Viewed from above with y up in the picture: the first corner is the upper left one, then clockwise.
     upper_left, upper_right, lower_right, lower_left = found[0].corners
     assert upper_left.x == pytest.approx(LENS.cx + 0.05 / 0.6 * 600, abs=1.0)
     assert upper_left.y == pytest.approx(LENS.cy - 0.05 / 0.6 * 599, abs=1.0)

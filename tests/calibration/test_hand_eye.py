@@ -47,7 +47,7 @@ def eyes(count: int = COUNT) -> list[Array]:
 
 @functools.cache
 def pictures() -> list[bytes]:
-    """Of a board that lies in the origin of the picture's world."""
+    """Settings of a board at the origin of the picture's world."""
     result = []
     for index, camera in enumerate(eyes()):
         random = np.random.default_rng([3, index])
@@ -232,7 +232,7 @@ def test_a_focal_length_off_is_refused() -> None:
 
 
 def test_the_verdict_states_the_effect_of_a_size_that_is_not_confirmed() -> None:
-    """A robot that is off by 0.5 mm hides a target that is 1 % too large; the verdict says how far the camera moves."""
+    """A robot error of 0.5 mm hides that a target is 1 % too large; the verdict states how far the camera moves."""
     noisy = samples("eye_in_hand", 1.7e-3)
     right, larger = (
         find_hand_eye(noisy, GIVEN, Layout(boards=[CharucoBoard(7, 5, 0.04 * size, 0.03 * size)]), "eye_in_hand")

@@ -70,7 +70,7 @@ def test_intrinsics_match_ground_truth() -> None:
 
 
 def test_rays_match_ground_truth_where_the_board_was_seen() -> None:
-    """Coefficients may compensate each other; what matters is the ray of each pixel."""
+    """Coefficients may compensate each other; the relevant result is the ray of each pixel."""
     p = found().parameters
     matrix = np.array([[p.fx, 0, p.cx], [0, p.fy, p.cy], [0, 0, 1.0]])
     x, y = np.meshgrid(np.linspace(-0.4, 0.4, 9), np.linspace(-0.3, 0.3, 7))
@@ -78,7 +78,7 @@ def test_rays_match_ground_truth_where_the_board_was_seen() -> None:
     got = cv2.projectPoints(points, np.zeros(3), np.zeros(3), matrix, np.array(p.dist_coefs))[0].reshape(-1, 2)
     u, v = rendering.bent(x.ravel(), y.ravel(), LENS.coefficients)
     true = np.column_stack((u * LENS.fx + LENS.cx, v * LENS.fy + LENS.cy))
-    # A shift of the middle is a turn of the camera, and says nothing of the lens.
+    # A shift of the middle is equivalent to a rotation of the camera, not a property of the lens.
     left = (got - true) - (got - true).mean(axis=0)
     assert np.abs(left).max() < 0.6
 

@@ -134,7 +134,7 @@ def test_rotation_of_a_round_body_is_undetermined() -> None:
 
 
 @pytest.mark.parametrize(
-    "shapes", [[], [Block(shift(0, 0, 0.3), (0.3, 0.3, 0.6))]], ids=["nobody", "a cupboard in its place"]
+    "shapes", [[], [Block(shift(0, 0, 0.3), (0.3, 0.3, 0.6))]], ids=["nothing", "a cupboard in its place"]
 )
 def test_a_view_without_the_robot_is_refused(shapes: list[Block | Capsule]) -> None:
     assert refused(seen(shapes)).reason in (Reason.NOT_CONVERGED, Reason.NO_OVERLAP)

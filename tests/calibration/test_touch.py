@@ -56,7 +56,7 @@ def test_more_points_of_the_plane_reduce_and_measure_the_error() -> None:
         assert found.checked
         assert found.grade is Grade.GOOD
         assert found.residual < 0.001
-    assert 0.3 < np.median(tilts) < 2.0  # the stated deviation is that of what happens
+    assert 0.3 < np.median(tilts) < 2.0  # the stated deviation matches the actual one
 
 
 @pytest.mark.parametrize("by", ["axes", "points"])

@@ -18,7 +18,7 @@ INTRINSICS_OFF = 0.0005
 
 @dataclass(frozen=True)
 class View:
-    """What a solver is given, and the truth."""
+    """Inputs of a solver, and the true result."""
 
     surface: RobotSurface
     depth: npt.NDArray[np.uint16]
@@ -50,7 +50,7 @@ def off_by(true: Floats, distance: float, angle: float, rng: np.random.Generator
 
 
 def drawn(seed: int, distance: float = 0.05, angle: float = math.radians(5.0), large: bool = False) -> View:
-    """An arm with a gripper and a cable somewhere on a table, seen from 1.0 to 1.8 m, 15 to 60° above."""
+    """Create an arm with a gripper and a cable somewhere on a table, seen from 1.0 to 1.8 m, 15 to 60° above."""
     rng = np.random.default_rng(seed)
     joints = joints_above_the_table(rng)
     true = shift(*rng.uniform(-0.1, 0.1, 2), 0.0) @ turn(np.array([0.0, 0.0, 1.0]), rng.uniform(-3, 3))

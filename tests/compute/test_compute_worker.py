@@ -31,7 +31,7 @@ KNOWN = [Position(0, 0, 0), Position(1, 0, 0), Position(0, 1, 0), Position(1, 1,
 
 
 def question(offset: float = 0.25) -> t.FrameByPoints:
-    """Ask for a frame whose origin is at (offset, 0, 0)."""
+    """Compute a frame whose origin is at (offset, 0, 0)."""
     return t.FrameByPoints(KNOWN, [point + Position(offset, 0, 0) for point in KNOWN])
 
 
@@ -75,7 +75,7 @@ async def test_a_killed_worker_fails_only_the_running_task(compute: Compute) -> 
     await compute.run(question())
     pid = compute.pid(WorkerKind.CALIBRATION)
     assert pid is not None
-    os.kill(pid, signal.SIGSTOP)  # it will be in the middle of whatever comes
+    os.kill(pid, signal.SIGSTOP)  # it will be in the middle of the next task
     hit = asyncio.create_task(compute.run(question(1.0)))
     waiting = [asyncio.create_task(compute.run(question(float(each)))) for each in (2, 3)]
     await asyncio.sleep(0.1)

@@ -72,7 +72,7 @@ async def test_forward_and_inverse_kinematics_agree(compute: Compute) -> None:
     there = await forward(compute, joints, base)
     assert there.position.distance_to(target.position) < 1e-6
     assert there.orientation.angle_to(target.orientation) < 1e-5
-    # Near to where one begins: other joints that lead there too.
+    # Close to the start there are other joint values that reach the same pose.
     start = [Joint(joint.name, joint.value + 0.05) for joint in joints]
     near = await compute.run(t.SolveInverse("arm", "tcp", target, start), world=world(robot(base)))
     assert [joint.value for joint in near] == pytest.approx([joint.value for joint in joints], abs=1e-5)
@@ -89,7 +89,7 @@ async def test_an_unreachable_pose_is_refused_with_the_reason(compute: Compute) 
         await compute.run(t.SolveInverse("arm", "tcp", target), world=world(robot(), around))
     assert raised.value.code == "in_collision"
     await compute.run(t.SolveInverse("arm", "tcp", target, avoid_collisions=False), world=world(robot(), around))
-    # The name of the only end effector may be the driver's own.
+    # The only end effector may have a driver-specific name.
     joints = await joints_of(compute)
     assert await compute.run(t.SolveForward(RobotSource(UR5E), "gripper", joints)) == await forward(compute, joints)
 
@@ -251,7 +251,7 @@ async def test_a_gripped_part_moves_with_the_robot(compute: Compute) -> None:
     assert await met(joints) == "part"
     moved = [Joint(joint.name, joint.value + 0.4) for joint in joints]
     assert await met(moved) == "part"
-    # The robot is made anew with another tool: what it holds is in the same place of the same link.
+    # The robot is recreated with another tool: its gripped part is at the same pose on the same link.
     longer = WorldRobot("arm", RobotSource(UR5E, settings={"tcp_z": 0.2}), joints)
     check = t.CheckLines([t.Line(part.position + Position(0, 0.04, 0), part.position)], ignore=["arm"])
     assert await compute.run(check, world=world(longer, held)) == [None]

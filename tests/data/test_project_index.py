@@ -36,8 +36,8 @@ def index() -> ProjectIndex:
 
 
 def test_chain_of_parents(index: ProjectIndex) -> None:
-    # a stands 1 m along the table's x, which is the world's y; b's 1 m along y is the world's -x: the orientation of
-    # the action point a turns nothing.
+    # a is 1 m along the table's x, which is the world's y. b is 1 m along a's y, which is the world's -x, because the
+    # orientation of the action point a rotates nothing.
     point, orientation = index.orientation("ori_b")
     pose = global_pose(index, point, orientation.orientation)
     assert tuple(pose.position) == pytest.approx((0, 1, 0))

@@ -1,4 +1,4 @@
-"""What the trace of a run says about its time, and the comparison of two runs."""
+"""Times in the trace of a run, and the comparison of two runs."""
 
 import pytest
 

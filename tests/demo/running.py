@@ -36,12 +36,12 @@ class Run:
         return await ask(at[name]["control"], do, **arguments)
 
     async def command(self, *words: str) -> tuple[int, str]:
-        """Run `arcor2-hw` with these words and the demo's data directory; gives status and output."""
+        """Run `arcor2-hw` with these arguments and the demo's data directory; return status and output."""
         return await arcor2_hw(*words, "--data-dir", str(self.data_dir))
 
 
 async def arcor2_hw(*words: str) -> tuple[int, str]:
-    """Run `arcor2-hw`; gives status and output."""
+    """Run `arcor2-hw`; return status and output."""
     process = await asyncio.create_subprocess_exec(
         *(sys.executable, "-m", "arcor2_server.cli.main", *words),
         stdout=asyncio.subprocess.PIPE,

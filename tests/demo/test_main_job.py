@@ -31,7 +31,7 @@ FIRST_VERSION = Path(__file__).parents[1] / "compatibility" / "recorded" / "demo
 
 
 class Cell:
-    """A demo that has run its order and goes on serving, and what an observer saw of that run."""
+    """A demo that has completed its order and keeps running, and an observer's record of that run."""
 
     def __init__(self, run: Run, script: list[bool]) -> None:
         self.run, self.script = run, script
@@ -43,7 +43,7 @@ class Cell:
         return str(at["url"])
 
     async def renew(self, boards: int = 1) -> None:
-        """What an operator does before a new start: everything is taken away, new boards are laid in."""
+        """Prepare a new start like an operator: remove everything and insert new boards."""
         await self.run.tell("world", "renew", boards=boards, seed=GOOD)
 
     async def program(
@@ -51,7 +51,7 @@ class Cell:
     ) -> str:
         """Run a package, by default the newest; return its error, empty for none.
 
-        at: what to do when the action of that name starts.
+        at: actions of the test when the program action of that name starts.
         """
         if not package_id:
             package_id = (await client.call("ListPackages"))[-1].id
@@ -73,7 +73,7 @@ class Cell:
 
 
 async def watch(url: str, results: list[bool]) -> None:
-    """An observer that registers nobody and only listens: collects what the script found."""
+    """Observe the server without registering a user; collect the events of the script."""
     async with Client(url, reconnect=False) as client:
         tests: set[str] = set()
         async for event in client.events():
@@ -89,7 +89,7 @@ async def watch(url: str, results: list[bool]) -> None:
 async def cell(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Cell]:
     print(f"seed {SEED}")  # noqa: T201
     async with demo(tmp_path_factory.mktemp("demo"), "--boards", str(BOARDS), "--seed", str(SEED)) as run:
-        at = await until(run.at, "the demo to say where everything is", 40)
+        at = await until(run.at, "the demo prints its addresses", 40)
         script: list[bool] = []
         observer = asyncio.create_task(watch(at["url"], script))
         await until(
@@ -173,7 +173,7 @@ async def test_each_fault_is_reported_and_the_cell_restarts(cell: Cell) -> None:
         assert "io" in problem
         assert "board_at_stop" in problem
 
-        # The gripper has no air; the barrier is mended.
+        # The gripper has no air; the light barrier is repaired.
         await cell.renew()
         await tell("world", "gripper", works=False)
         problem = await cell.program(client)
@@ -198,7 +198,7 @@ async def test_each_fault_is_reported_and_the_cell_restarts(cell: Cell) -> None:
         assert (board["place"], board["label"]) == ("label", None)
         assert [result for result in (await tell("erp", "truth"))["results"] if result["order"] == "AGAIN"] == []
 
-        # After all that the cell starts again. The planning service goes down meanwhile: production goes on.
+        # After all that the cell starts again. The planning service stops meanwhile: production continues.
         await cell.renew()
         missing: list[int] = []
 
@@ -237,7 +237,7 @@ async def test_a_package_of_the_first_version_runs_with_its_own_drivers(cell: Ce
 
 
 def with_the_settings_of(package: Path, other: Path) -> bytes:
-    """Return a package whose objects have the settings, thus the addresses, that those of another package have."""
+    """Return a package whose objects have the settings, and thus the addresses, of those in another package."""
     with zipfile.ZipFile(other) as archive:
         scene = json.loads(archive.read("data/scene.json"))
     settings = {each["name"]: each["parameters"] for each in scene["objects"]}
@@ -261,7 +261,7 @@ async def _state(run: Run, wanted: str) -> bool:
 
 async def test_once_prints_one_line_when_a_fault_ends_the_program(tmp_path: Path) -> None:
     async with demo(tmp_path, "--once", "--boards", "1", "--seed", str(GOOD)) as run:
-        await until(run.at, "the demo to say where everything is", 40)
+        await until(run.at, "the demo prints its addresses", 40)
         # No call of the belt is running: the message must name it nevertheless.
         await until(lambda: "  board_there" in run.output, "the board to be waited for", 60)
         await run.tell("belt", "emergency", code=0x2310)

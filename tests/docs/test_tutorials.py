@@ -18,7 +18,7 @@ TIMEOUT = 150  # s, of a command; one runs the conformance suite, on a busy mach
 
 
 def expected(lines: list[str]) -> re.Pattern[str]:
-    """A pattern that the output must contain: `...` stands for anything."""
+    """A pattern that the output must contain: `...` matches anything."""
     return re.compile(".*?".join(".*?".join(map(re.escape, line.split("..."))) for line in lines), re.DOTALL)
 
 
@@ -36,7 +36,7 @@ def commands(text: str) -> Iterator[tuple[str, list[str]]]:
 
 
 class Background:
-    """A command that stays; its output is read until the lines that say it is ready."""
+    """A command that keeps running; its output is read until it reports that it is ready."""
 
     def __init__(self, command: str, wanted: list[str], directory: Path, environment: dict[str, str]) -> None:
         self.process = subprocess.Popen(
@@ -111,7 +111,7 @@ def test_tutorial(tutorial: Path, tmp_path: Path) -> None:
     finally:
         for started in reversed(background):
             started.stop()
-    assert ran > 0, "the tutorial runs nothing"
+    assert ran > 0, "the tutorial runs no command"
 
 
 def test_the_how_to_states_the_length_of_its_example() -> None:

@@ -34,7 +34,7 @@ def packed(**files: bytes) -> bytes:
 
 
 def stl(vertices: list[list[float]]) -> bytes:
-    """Write a binary STL by hand, of triangles as they come."""
+    """Write a binary STL of the given triangles, valid or not."""
     out = bytes(80) + struct.pack("<I", len(vertices) // 3)
     for at in range(0, len(vertices), 3):
         out += struct.pack("<12fH", 0, 0, 0, *vertices[at], *vertices[at + 1], *vertices[at + 2], 0)
@@ -54,7 +54,7 @@ REFUSED = {
     "nothing moves": (urdf(links("base")), ModelError, "no joint that moves"),
     "a link twice": (urdf(GOOD + links("arm")), ModelError, "link arm is defined twice"),
     "a joint twice": (urdf(GOOD + links("b") + joint("j", "arm", "b")), ModelError, "joint j is defined twice"),
-    "a link that is not there": (urdf(GOOD + joint("k", "arm", "nose")), ModelError, "k refers to the link nose"),
+    "a link that does not exist": (urdf(GOOD + joint("k", "arm", "nose")), ModelError, "k refers to the link nose"),
     "two roots": (urdf(GOOD + links("lost")), ModelError, "multiple root links: base, lost"),
     "two parents": (urdf(GOOD + links("b") + joint("k", "base", "b") + joint("l", "arm", "b")), JointLoop, "k and l"),
     "a ring": (
@@ -124,7 +124,7 @@ REFUSED = {
         "is outside of",
     ),
     "a mesh at the root": (with_shape('<mesh filename="file:///etc/passwd"/>'), UnsafeDescription, "passwd"),
-    "an end effector that is no link": (
+    "an end effector that is not a link": (
         urdf(GOOD + '<arcor2_hw><end_effector link="nose"/></arcor2_hw>'),
         ModelError,
         "end effector nose",

@@ -112,7 +112,7 @@ def test_poses_at_and_near_singularities_are_reached() -> None:
 
 
 def test_poses_slightly_out_of_reach_are_reached_within_the_tolerance() -> None:
-    """Near a singularity, an error of a pose changes a joint by its square root, and with it what the others reach."""
+    """Near a singularity, a pose error changes a joint by its square root, and so what the others can reach."""
     arm = ur().arm("tcp")
     inverse, chance = InverseKinematics(arm), np.random.default_rng(1)
     for _ in range(200):
@@ -150,7 +150,7 @@ def test_all_turns_are_given_on_request_and_the_nearest_otherwise() -> None:
     assert distances == sorted(distances)
     far = q + (2.0 * math.pi) * np.array((-1, 0, -1, 1, 0, 0))
     assert np.allclose(inverse.solve(arm.forward(q), far), far, atol=1e-6)
-    # Beyond the limit there is no turn, however near the seed is.
+    # Beyond the limit there is no other turn, however close the seed is.
     beyond = q + 2.0 * math.pi * np.array((2, 0, 0, 0, 0, 0))
     found = inverse.solutions(arm.forward(q), beyond)
     assert len(found) == 8
@@ -161,7 +161,7 @@ def test_all_turns_are_given_on_request_and_the_nearest_otherwise() -> None:
 def test_joint_limits_remove_configurations() -> None:
     arm = ur().arm("tcp")
     q = np.array((0.5, -1.2, 1.4, -0.4, 1.3, 0.7))
-    arm.lower[2], arm.upper[2] = -3.0, 0.0  # an elbow that bends one way only
+    arm.lower[2], arm.upper[2] = -3.0, 0.0  # an elbow that bends only in one direction
     found = InverseKinematics(arm).solutions(arm.forward(q), q)
     assert len(found) == 4
     assert all(each[2] <= 0.0 for each in found)
@@ -239,7 +239,7 @@ def test_closed_form_and_numerical_solutions_agree() -> None:
     assert is_among(flipped, computed)
     assert len(searched) == len(computed) >= 4
     assert all(is_among(each, computed) for each in searched)
-    # A straight wrist: joints 4 and 6 turn about one axis, and the seed's share is kept.
+    # A straight wrist: joints 4 and 6 turn about one axis, and the share of the seed is used.
     straight = np.array((0.4, 0.5, -0.6, 0.8, 0.0, -0.3))
     assert np.allclose(computing.solve(arm.forward(straight), straight), straight, atol=1e-6)
 
@@ -254,7 +254,7 @@ def test_dobot_joints_match_its_driver(q: tuple[float, float, float, float]) -> 
     except dobot_kinematics.Unreachable:
         assume(False)
     out = math.hypot(tool.x, tool.y)
-    assume(out > 0.08)  # over its foot the arm may as well look backwards
+    assume(out > 0.08)  # above its foot the arm may also face backwards
     found = InverseKinematics(arm).solutions(target, np.array(q))
     assert np.allclose(found[0], q, atol=1e-4)
     # Nearly stretched, the elbow may point down as well; the driver's is above.

@@ -62,7 +62,7 @@ def test_an_impossible_line_is_refused_with_the_point_where_it_fails() -> None:
     here = arm.pose(READY)
     with pytest.raises(OutOfReach):
         straight_line(arm, READY, moved(here, 1.5, 0.0, 0.0).matrix())
-    # Past the axis of the foot, where there is no room for a tool that points down.
+    # Past the axis of the foot, where a tool that points down has no space.
     near = Pose(Position(-0.45, 0.12, here.position.z), here.orientation)
     with pytest.raises(NoStraightLine, match=r"arm cannot go straight: after 0\.\d+ m"):
         straight_line(arm, READY, near.matrix(), "arm")
@@ -101,7 +101,7 @@ def test_a_colliding_line_is_refused_with_the_point_of_collision() -> None:
 
 # ------------------------------------------------------------------------------------------------ timing
 def rates(timed: Trajectory, period: float = 0.002) -> tuple[Array, Array, Array]:
-    """Give values, and velocities and accelerations by differences."""
+    """Return values, and velocities and accelerations computed from differences."""
     q = np.array([values for _, values, _ in timed.sampled(period)][:-1])
     v = np.diff(q, axis=0) / period
     return q, v, np.diff(v, axis=0) / period

@@ -34,7 +34,7 @@ def planner(world: CollisionWorld, resolution: float = 0.01) -> Planner:
 
 
 def assert_free(world: CollisionWorld, way: list[Array], step: float = 0.004) -> None:
-    """Look at every 4 mrad of the fastest joint: finer than the planner, and by other steps."""
+    """Check every 4 mrad of the fastest joint: finer than the planner, and at other positions."""
     for a, b in itertools.pairwise(way):
         count = max(2, int(np.ceil(np.abs(b - a).max() / step)))
         for share in np.linspace(0.0, 1.0, count):

@@ -75,11 +75,11 @@ def test_only_changed_poses_are_computed_again(world: CollisionWorld, reach: Rea
     assert (reach.computed, reach.checked) == (60, 60)
     assert reach.judge(poses) == first
     assert (reach.computed, reach.checked) == (60, 60)
-    # Far away: nothing is asked again.
+    # Far away: nothing is computed again.
     world.put("far", Box(0.5, 0.5, 0.5), down_at(5.0, 0.0, 0.0))
     assert reach.judge(poses) == first
     assert (reach.computed, reach.checked) == (60, 60)
-    # In the way of some: these are asked again, and no joints are searched for.
+    # In the way of some points: these are checked again, without a new search for joint values.
     world.put("near", Box(0.05, 0.05, 0.05), poses[0])
     again = reach.judge(poses)
     assert again[0].reach is Reach.IN_COLLISION

@@ -65,7 +65,7 @@ def test_a_colliding_body_is_named_until_moved_or_deleted(world: CollisionWorld)
     assert 0.0 < contact.depth < 0.05
     world.move("box", at(tip.x, tip.y, tip.z - 0.5))
     assert world.is_free("arm", HOME)
-    world.put("box", Box(0.04, 0.04, 1.0), at(tip.x, tip.y, tip.z - 0.5))  # upsert: a larger one in its place
+    world.put("box", Box(0.04, 0.04, 1.0), at(tip.x, tip.y, tip.z - 0.5))  # upsert: a larger one replaces it
     assert pairs(world) == {("arm/wrist_3_link", "box")}
     world.delete("box")
     assert world.is_free("arm", HOME)
@@ -108,7 +108,7 @@ def test_a_margin_adds_distance() -> None:
     assert pairs(world) == {("arm/wrist_3_link", "body")}
     assert not world.is_free("arm", HOME)
     world.move("body", where("flange") * at(0.0, 0.0, 0.16))
-    assert pairs(world) == set()  # its own links may come nearer to each other
+    assert pairs(world) == set()  # its own links may come closer to each other
     assert world.is_free("arm", HOME)
     with pytest.raises(InvalidData, match="margin"):
         CollisionWorld(margin=-0.1)
@@ -246,7 +246,7 @@ def test_fingers_may_touch_the_gripped_part() -> None:
 def test_gripped_parts_can_be_deleted_replaced_and_removed(world: CollisionWorld) -> None:
     world.put("part", Sphere(0.05), where("flange"))
     world.attach("part", "arm", "flange")
-    world.put("part", Sphere(0.01), at(0.0, 0.0, 2.0))  # put anew it is no longer held
+    world.put("part", Sphere(0.01), at(0.0, 0.0, 2.0))  # after another put it is no longer gripped
     assert world.pose("part") == at(0.0, 0.0, 2.0)
     world.move("part", where("flange"))
     world.attach("part", "arm", "flange")
@@ -258,7 +258,7 @@ def test_gripped_parts_can_be_deleted_replaced_and_removed(world: CollisionWorld
 
 # ------------------------------------------------------------------------------------------------ lines
 def depths(shape: Shape, points: np.ndarray) -> np.ndarray:
-    """Give how deep points are below the nearest face of a convex shape's triangles, negative outside."""
+    """Return the depth of points below the nearest face of a convex shape's triangles, negative outside."""
     mesh = triangles_of(shape)
     first, second, third = (mesh.vertices[mesh.triangles[:, corner]] for corner in range(3))
     normals = np.cross(second - first, third - first)
@@ -286,7 +286,7 @@ def test_a_line_hits_a_shape_at_its_triangles(
     points = np.array(start) + np.linspace(0.0, 1.0, 401)[:, None] * (np.array(end) - np.array(start))
     step = float(np.linalg.norm(points[1] - points[0]))
     inside = depths(shape, points)
-    round_off = 0.002  # what 24 sides lack to a circle
+    round_off = 0.002  # difference between 24 sides and a circle
     if hit is None:
         assert inside.max() < step + round_off or isinstance(shape, TriangleMesh)
         return
