@@ -69,7 +69,7 @@ class Link:
         read: Take a reading.
         mark: Change the state of the device and return a check for that state; `n` differs at each call.
         serial: The link is a port that can be unplugged.
-        beside: Other objects that have to be connected.
+        others: Other objects that have to be connected.
     """
 
     name: str
@@ -78,11 +78,11 @@ class Link:
     read: Callable[[], Any]
     mark: Callable[[int], Fresh]
     serial: bool = False
-    beside: tuple[Generic, ...] = ()
+    others: tuple[Generic, ...] = ()
 
     @property
     def objects(self) -> tuple[Generic, ...]:
-        return (*self.beside, self.device)
+        return (*self.others, self.device)
 
     def interrupt(self, kind: Kind) -> None:
         """Interrupt the link.
@@ -208,7 +208,7 @@ class Links:
         gripper = SuctionGripper("suction", "suction", VacuumGripperSettings("valves", "vacuum", "blow", "part"))
         gripper.attach(lambda _: block)
         name = "SuctionGripper, Modbus TCP of its block"
-        return Link(name, fake, gripper, gripper.part_held, self._input(fake), beside=(block,))
+        return Link(name, fake, gripper, gripper.part_held, self._input(fake), others=(block,))
 
     def _robotiq(self, transport: str) -> Link:
         fake = self._start("robotiq_2f", "--link", str(self._folder / f"tty_2f_{transport[:3]}"))

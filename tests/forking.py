@@ -1,4 +1,4 @@
-"""Starts fakes and servers by forking a process that has already imported them: imports are most of a start.
+"""Start fakes and servers by forking a process that has already imported them: imports are most of a start.
 
 The program runs as after `python -m`, with its own arguments, environment, directory, output and signals. Tests of the
 command line itself start the real command.

@@ -3,7 +3,7 @@
 Shares no code with the solver: shapes are capsules and boxes met analytically, not triangles; the lens is inverted by
 iteration; the arm is a Denavit-Hartenberg chain of its own (UR5e's published lengths). Noise grows with the square of
 the distance, part of it fixed in the picture and smooth; depths are whole millimetres; edges have flying pixels; there
-are holes, a table, a wall, and beside the arm a gripper and a cable of which the model knows nothing.
+are holes, a table and a wall, and next to the arm a gripper and a cable that the model does not contain.
 """
 
 import itertools

@@ -144,8 +144,8 @@ def test_tone_curves_do_not_change_the_marker_size(srgb: bool) -> None:
 
 
 def test_a_moved_marker_is_excluded_and_named() -> None:
-    said = PLACES | {42: flat(0.0, 0.09, 2.5)}
-    found = find_camera_pose([all_seen()], GIVEN, layout(said))
+    listed = PLACES | {42: flat(0.0, 0.09, 2.5)}
+    found = find_camera_pose([all_seen()], GIVEN, layout(listed))
     assert off(found, ASLANT)[0] < 1.0
     assert [error.name for error in found.markers if not error.used] == ["marker 42"]
     assert found.grade == Grade.USABLE
@@ -196,10 +196,10 @@ def test_a_view_that_does_not_check_the_lens_is_not_good(factor: float) -> None:
 
 
 def test_markers_off_their_poses_are_not_good() -> None:
-    said = {number: place.copy() for number, place in PLACES.items()}
-    said[3][0, 3] += 0.0006
-    said[42][1, 3] -= 0.0006
-    found = find_camera_pose([all_seen()], GIVEN, layout(said))
+    listed = {number: place.copy() for number, place in PLACES.items()}
+    listed[3][0, 3] += 0.0006
+    listed[42][1, 3] -= 0.0006
+    found = find_camera_pose([all_seen()], GIVEN, layout(listed))
     assert found.residual < 0.5
     assert found.grade == Grade.USABLE
     assert "check the poses and sizes" in found.verdict
@@ -266,8 +266,8 @@ def test_a_single_frontal_marker_is_refused_with_working_advice() -> None:
 
 
 def test_contradicting_markers_are_refused() -> None:
-    said = {3: PLACES[3], 17: flat(0.12, 0.1)}
-    error = refused(lambda: find_camera_pose([all_seen()], GIVEN, layout(said)))
+    listed = {3: PLACES[3], 17: flat(0.12, 0.1)}
+    error = refused(lambda: find_camera_pose([all_seen()], GIVEN, layout(listed)))
     assert error.reason == Reason.IMPLAUSIBLE
     assert "marker 17, marker 3" in str(error)
 
@@ -362,7 +362,7 @@ def spots(grey: Grey, radius: int, level: int) -> Grey:
 
 
 @pytest.mark.parametrize(
-    ("change", "reason", "said"),
+    ("change", "reason", "problem"),
     [
         (lambda grey: spots(grey, 30, 90), Reason.NO_MARKER, "not covered"),
         (lambda grey: spots(grey, 30, 255), Reason.OVEREXPOSED, "glare"),
@@ -373,10 +373,10 @@ def spots(grey: Grey, radius: int, level: int) -> Grey:
     ],
     ids=["covered markers", "glare", "mirrored", "covered lens", "dark", "too much light"],
 )
-def test_a_refusal_names_the_reason(change: Callable[[Grey], Grey], reason: Reason, said: str) -> None:
+def test_a_refusal_names_the_reason(change: Callable[[Grey], Grey], reason: Reason, problem: str) -> None:
     error = refused(lambda: find_camera_pose([change(all_seen())], GIVEN, layout(PLACES)))
     assert error.reason == reason
-    assert said in str(error)
+    assert problem in str(error)
 
 
 def test_a_camera_below_the_markers_is_refused() -> None:
@@ -390,7 +390,7 @@ def with_parameters(**changes: object) -> CameraParameters:
 
 
 @pytest.mark.parametrize(
-    ("parameters", "said"),
+    ("parameters", "problem"),
     [
         (with_parameters(fx=0.0), "fx"),
         (with_parameters(fy=-1.0), "fy"),
@@ -401,8 +401,8 @@ def with_parameters(**changes: object) -> CameraParameters:
         (with_parameters(dist_coefs=[-5.0, 8.0, 0.0, 0.0, 0.0]), "distortion"),
     ],
 )
-def test_invalid_camera_parameters_are_named(parameters: CameraParameters, said: str) -> None:
-    with pytest.raises(InvalidData, match=said):
+def test_invalid_camera_parameters_are_named(parameters: CameraParameters, problem: str) -> None:
+    with pytest.raises(InvalidData, match=problem):
         find_camera_pose([all_seen()], parameters, layout(PLACES))
 
 
@@ -445,7 +445,7 @@ NOWHERE = Pose(Position(math.nan, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(
-    ("wrong", "error", "said"),
+    ("wrong", "error", "problem"),
     [
         (Layout([Marker(3, HERE), Marker(4, HERE), Marker(3, HERE)]), Conflict, "marker 3 is listed twice"),
         (Layout([Marker(50, HERE)]), InvalidData, "marker 50 is not in"),
@@ -458,6 +458,6 @@ NOWHERE = Pose(Position(math.nan, 0.0, 0.0))
         (Layout(boards=[CharucoBoard(1, 5, 0.04, 0.03)]), InvalidData, "1 × 5"),
     ],
 )
-def test_an_invalid_marker_layout_is_named(wrong: Layout, error: type[Arcor2Error], said: str) -> None:
-    with pytest.raises(error, match=said):
+def test_an_invalid_marker_layout_is_named(wrong: Layout, error: type[Arcor2Error], problem: str) -> None:
+    with pytest.raises(error, match=problem):
         find_camera_pose([all_seen()], GIVEN, wrong)

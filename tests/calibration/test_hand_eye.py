@@ -125,9 +125,9 @@ def test_eye_to_hand_matches_ground_truth() -> None:
 
 
 def test_an_inexact_robot_increases_residual_and_deviation() -> None:
-    told: list[tuple[int, int]] = []
+    steps: list[tuple[int, int]] = []
     found = find_hand_eye(
-        samples("eye_in_hand", 0.001), GIVEN, TARGET, "eye_in_hand", progress=lambda done, of: told.append((done, of))
+        samples("eye_in_hand", 0.001), GIVEN, TARGET, "eye_in_hand", progress=lambda done, of: steps.append((done, of))
     )
     distance, angle = off(found.pose, FLANGE_FROM_CAMERA)
     assert found.residual > 2 * in_hand().residual
@@ -138,7 +138,7 @@ def test_an_inexact_robot_increases_residual_and_deviation() -> None:
     assert distance < 0.001
     assert distance < 4 * found.position_deviation
     assert angle < 4 * found.orientation_deviation
-    assert told == [(i + 1, COUNT) for i in range(COUNT)]
+    assert steps == [(i + 1, COUNT) for i in range(COUNT)]
 
 
 def test_a_sample_taken_during_motion_is_excluded() -> None:

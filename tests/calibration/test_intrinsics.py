@@ -91,10 +91,10 @@ def test_other_distortion_models_are_fitted(coefficients: int) -> None:
 
 
 def test_the_result_lists_views_and_picture_size() -> None:
-    told: list[tuple[int, int]] = []
+    steps: list[tuple[int, int]] = []
     blank = np.full((480, 640), 90, np.uint8)
-    result = find_intrinsics([blank, *tilted()], BOARD, progress=lambda done, of: told.append((done, of)))
-    assert told[-1] == (COUNT + 1, COUNT + 1)
+    result = find_intrinsics([blank, *tilted()], BOARD, progress=lambda done, of: steps.append((done, of)))
+    assert steps[-1] == (COUNT + 1, COUNT + 1)
     assert not result.views[0].used
     assert "not visible" in result.views[0].problem
     assert all(view.corners >= 6 and view.residual < 0.3 for view in result.views[1:])

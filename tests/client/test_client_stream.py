@@ -17,77 +17,77 @@ async def taken(from_stream: EventStream[Event]) -> list[str]:
 
 
 async def test_events_arrive_in_order_before_the_end() -> None:
-    told = stream()
+    events = stream()
     for name in "abc":
-        told.put(Event(name))
-    told.end()
-    told.put(Event("late"))
-    assert await taken(told) == ["a", "b", "c"]
-    assert await taken(told) == []
+        events.put(Event(name))
+    events.end()
+    events.put(Event("late"))
+    assert await taken(events) == ["a", "b", "c"]
+    assert await taken(events) == []
 
 
 async def test_only_followed_events_are_queued() -> None:
-    told = stream("a", limit=2)
+    events = stream("a", limit=2)
     for name in "bababb":
-        told.put(Event(name))
-    told.end()
-    assert await taken(told) == ["a", "a"]
+        events.put(Event(name))
+    events.end()
+    assert await taken(events) == ["a", "a"]
 
 
 async def test_dropped_events_are_counted_before_the_remaining_ones() -> None:
-    told = stream(limit=3)
+    events = stream(limit=3)
     for number in range(8):
-        told.put(Event(str(number)))
-    told.end()
+        events.put(Event(str(number)))
+    events.end()
     with pytest.raises(EventsMissed) as missed:
-        await anext(told)
+        await anext(events)
     assert (missed.value.dropped, missed.value.rejoined) == (5, False)
-    assert await taken(told) == ["5", "6", "7"]
+    assert await taken(events) == ["5", "6", "7"]
 
 
 async def test_consecutive_gaps_are_merged_at_their_position() -> None:
-    told = stream(limit=5)
-    told.put(Event("before"))
-    told.put(EventsMissed(rejoined=True, seconds=1.0, not_resumed=("joints of r",)))
-    told.put(EventsMissed(rejoined=True, seconds=2.0))
-    told.put(Event("after"))
-    assert (await anext(told)).event == "before"
+    events = stream(limit=5)
+    events.put(Event("before"))
+    events.put(EventsMissed(rejoined=True, seconds=1.0, not_resumed=("joints of r",)))
+    events.put(EventsMissed(rejoined=True, seconds=2.0))
+    events.put(Event("after"))
+    assert (await anext(events)).event == "before"
     with pytest.raises(EventsMissed, match=r"lost for 3\.0 s") as missed:
-        await anext(told)
+        await anext(events)
     assert missed.value.not_resumed == ()
-    assert (await anext(told)).event == "after"
+    assert (await anext(events)).event == "after"
 
 
 async def test_a_dropped_gap_is_still_reported() -> None:
-    told = stream(limit=2)
-    told.put(Event("1"))
-    told.put(EventsMissed(rejoined=True, seconds=1.5))
+    events = stream(limit=2)
+    events.put(Event("1"))
+    events.put(EventsMissed(rejoined=True, seconds=1.5))
     for name in "23":
-        told.put(Event(name))
+        events.put(Event(name))
     with pytest.raises(EventsMissed) as missed:
-        await anext(told)
+        await anext(events)
     assert (missed.value.dropped, missed.value.rejoined, missed.value.seconds) == (1, True, 1.5)
-    assert (await anext(told)).event == "2"
+    assert (await anext(events)).event == "2"
 
 
 async def test_a_reader_that_times_out_loses_no_event() -> None:
-    told = stream()
+    events = stream()
     for _ in range(3):
         with pytest.raises(TimeoutError):
             async with asyncio.timeout(0.01):
-                await anext(told)
-    told.put(Event("a"))
-    assert (await anext(told)).event == "a"
+                await anext(events)
+    events.put(Event("a"))
+    assert (await anext(events)).event == "a"
 
 
 async def test_the_final_error_is_raised_after_the_queued_events() -> None:
-    told = stream()
-    told.put(Event("a"))
-    told.end(NotAdmitted("no"))
-    assert (await anext(told)).event == "a"
+    events = stream()
+    events.put(Event("a"))
+    events.end(NotAdmitted("no"))
+    assert (await anext(events)).event == "a"
     for _ in range(2):
         with pytest.raises(NotAdmitted):
-            await anext(told)
+            await anext(events)
 
 
 def test_a_stream_needs_a_positive_limit() -> None:

@@ -59,10 +59,10 @@ class Glb:
 
 
 def prepare(tmp_path: Path, content: bytes | str, name: str) -> tuple[PreparedAsset, list[str]]:
-    told: list[str] = []
+    steps: list[str] = []
     (tmp_path / "content").write_bytes(content if isinstance(content, bytes) else content.encode())
     task = PrepareAsset(StoredFile(str(tmp_path / "content"), name))
-    return prepared(task, WorkerState(lambda share, text: told.append(f"{share:.1f} {text}"))), told
+    return prepared(task, WorkerState(lambda share, text: steps.append(f"{share:.1f} {text}"))), steps
 
 
 def exported(mesh: trimesh.Trimesh, kind: str) -> bytes:
@@ -73,7 +73,7 @@ def exported(mesh: trimesh.Trimesh, kind: str) -> bytes:
 # ------------------------------------------------------------------------------------------------ one mesh
 @pytest.mark.parametrize("kind", ["stl", "obj", "ply", "off", "dae", "glb"])
 def test_a_fine_sphere_is_simplified_in_every_file_format(kind: str, tmp_path: Path) -> None:
-    made, told = prepare(tmp_path, exported(BALL, kind), f"ball.{kind}")
+    made, steps = prepare(tmp_path, exported(BALL, kind), f"ball.{kind}")
     assert (made.before, made.triangles) == (TRIANGLES_OF_BALL, MOST_OF_BALL)
     ball = Glb(made.content).meshes["mesh"]
     assert len(ball["indices"]) == 3 * made.triangles
@@ -84,7 +84,7 @@ def test_a_fine_sphere_is_simplified_in_every_file_format(kind: str, tmp_path: P
     off = np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", ball["NORMAL"], ball["POSITION"]) / lengths, -1, 1)))
     assert off.max() < 3.0
     assert "COLOR_0" not in ball
-    assert len(told) >= 3
+    assert len(steps) >= 3
 
 
 def test_a_box_keeps_its_twelve_triangles_and_its_edges(tmp_path: Path) -> None:

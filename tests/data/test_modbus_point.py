@@ -44,7 +44,7 @@ def test_bits_are_bool() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "value", "said"),
+    ("options", "value", "problem"),
     [
         ({}, 65536, "must be 0 to 65535"),
         ({}, -1, "must be 0 to 65535"),
@@ -59,8 +59,8 @@ def test_bits_are_bool() -> None:
         ({"values": {1: "soft", 2: "hard"}}, 1, "must be one of soft, hard"),
     ],
 )
-def test_values_that_cannot_be_written_are_refused(options: dict[str, Any], value: Any, said: str) -> None:
-    with pytest.raises(ValueError, match=said):
+def test_values_that_cannot_be_written_are_refused(options: dict[str, Any], value: Any, problem: str) -> None:
+    with pytest.raises(ValueError, match=problem):
         Point("holding_register", 0, **options).words(value)
 
 
@@ -84,7 +84,7 @@ def test_the_limits_of_a_type_can_be_written(type_: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("table", "options", "said"),
+    ("table", "options", "problem"),
     [
         ("coil", {"type": "float32"}, "need a number"),
         ("coil", {"scale": 0.1}, "need a number"),
@@ -111,8 +111,8 @@ def test_the_limits_of_a_type_can_be_written(type_: str) -> None:
         ("holding_register", {"bit": 2, "access": "read_write"}, "a bit of a register cannot be written"),
     ],
 )
-def test_contradictions_are_refused(table: Any, options: dict[str, Any], said: str) -> None:
-    with pytest.raises(ValueError, match=said):
+def test_contradictions_are_refused(table: Any, options: dict[str, Any], problem: str) -> None:
+    with pytest.raises(ValueError, match=problem):
         Point(table, **{"address": 0, **options})
 
 

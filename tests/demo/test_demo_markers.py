@@ -10,9 +10,9 @@ from arcor2_server.demo.workplace import layout_file, markers_file
 def test_the_server_knows_the_markers_of_the_demo() -> None:
     camera = msgspec.json.decode(layout_file().read_bytes(), type=Layout).camera
     assert camera is not None
-    told = read_configuration(markers_file())
-    assert {(one.marker_id, tuple(one.pose.position), told.marker_size) for one in told.markers} == {
+    configuration = read_configuration(markers_file())
+    assert {(one.marker_id, tuple(one.pose.position), configuration.marker_size) for one in configuration.markers} == {
         (one.id, one.pose.position, one.size) for one in camera.markers
     }
     assert all(one.pose.orientation == (0.0, 0.0, 0.0, 1.0) for one in camera.markers)
-    assert len(told.markers) >= 3
+    assert len(configuration.markers) >= 3

@@ -248,10 +248,10 @@ async def _moved(world: World, before: Pose) -> Pose | None:
 async def test_the_command_line_shows_the_progress(world: World, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["calibrate", "online", "camera", "cam", "--url", world.server.url]
     status = await asyncio.to_thread(app, arguments)
-    told = capsys.readouterr()
-    assert status == 0, told
-    assert "known to" in told.out
-    assert "position" in told.out
+    printed = capsys.readouterr()
+    assert status == 0, printed
+    assert "known to" in printed.out
+    assert "position" in printed.out
     await asyncio.to_thread(app, ["calibrate", "online", "records", "cam", "--url", world.server.url])
     assert "camera_pose" in capsys.readouterr().out
     with pytest.raises(RequestFailed):

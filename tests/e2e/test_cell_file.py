@@ -237,7 +237,7 @@ async def test_a_device_of_another_type_is_not_started(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "status", "said"),
+    ("text", "status", "problem"),
     [
         (None, 9, "cell.yaml does not exist"),
         ("devices: [", 11, "cell.yaml"),
@@ -246,7 +246,7 @@ async def test_a_device_of_another_type_is_not_started(tmp_path: Path) -> None:
     ],
 )
 async def test_an_invalid_cell_file_is_reported_in_one_line(
-    tmp_path: Path, text: str | None, status: int, said: str
+    tmp_path: Path, text: str | None, status: int, problem: str
 ) -> None:
     import sys
 
@@ -261,4 +261,4 @@ async def test_an_invalid_cell_file_is_reported_in_one_line(
     assert process.returncode == status, error
     lines = error.decode().splitlines()
     assert len(lines) == 1
-    assert said in lines[0]
+    assert problem in lines[0]

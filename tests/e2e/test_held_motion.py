@@ -179,17 +179,17 @@ class Jogger:
 
     def __init__(self, process: asyncio.subprocess.Process) -> None:
         self.process = process
-        self.said: list[str] = []
+        self.lines: list[str] = []
         self._listening = asyncio.create_task(self._listen())
 
     async def _listen(self) -> None:
         assert self.process.stdout is not None
         while line := (await self.process.stdout.readline()).decode().strip():
-            self.said.append(line)
+            self.lines.append(line)
 
     def answers(self, since: float = 0.0) -> list[str]:
         """Return the answers to the requests sent after `since`."""
-        answers = [line.split(maxsplit=1) for line in self.said]
+        answers = [line.split(maxsplit=1) for line in self.lines]
         return [answer for sent, answer in answers if float(sent) > since]
 
     async def answered(self, place: Site) -> None:

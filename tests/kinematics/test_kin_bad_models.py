@@ -218,8 +218,8 @@ def test_the_unit_of_a_collada_file_is_applied() -> None:
 def test_the_up_axis_of_a_collada_file_is_applied(up: str, size: tuple[int, int, int]) -> None:
     exported = CUBE.export(file_type="dae").decode()
     assert "<up_axis>Y_UP</up_axis>" in exported
-    said = exported.replace("<up_axis>Y_UP</up_axis>", f"<up_axis>{up}_UP</up_axis>" if up else "")
-    mesh = read_mesh(said.encode(), "cube.dae")
+    changed = exported.replace("<up_axis>Y_UP</up_axis>", f"<up_axis>{up}_UP</up_axis>" if up else "")
+    mesh = read_mesh(changed.encode(), "cube.dae")
     assert np.allclose(np.ptp(mesh.vertices, axis=0), size)
     assert trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False).volume == pytest.approx(6.0)
 

@@ -38,7 +38,7 @@ class PlainArm(UrdfRobot):
     urdf_package_name = "plain_arm.zip"
 
     def robot_joints(self, include_gripper: bool = False) -> list[Joint]:
-        """Give the present joint values."""
+        """Return the present joint values."""
         gripper = [Joint("finger", 0.01)] if include_gripper else []
         return [*self.now, *gripper]
 

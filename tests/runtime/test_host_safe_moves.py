@@ -41,7 +41,7 @@ class Arm(UrdfRobot):
 
     def robot_joints(self, include_gripper: bool = False) -> list[Joint]:
         if self.silent:
-            raise Stale(f"{self.name} has told nothing")
+            raise Stale(f"{self.name} has reported nothing")
         return self.now
 
     def follow(self, way: Way) -> None:
@@ -193,12 +193,12 @@ def collision(answer: Any, *names: str) -> None:
 
 
 def test_an_added_body_is_an_obstacle_until_it_is_removed(scene: HostProcess, tmp_path: Path) -> None:
-    up, beside = Position(0.0, 0.0, 0.2), Position(0.0, 0.25, 0.0)
-    assert line(scene, beside) is None
+    up, aside = Position(0.0, 0.0, 0.2), Position(0.0, 0.25, 0.0)
+    assert line(scene, aside) is None
     scene.send(box("crate", TIP + Position(0.0, 0.25, 0.0), 0.1, 0.1, 0.1))
-    collision(line(scene, beside), "arm/", "crate")
+    collision(line(scene, aside), "arm/", "crate")
     scene.send(box("crate", TIP + Position(0.0, 9.0, 0.0), 0.1, 0.1, 0.1))
-    assert line(scene, beside) is None, "it was moved"
+    assert line(scene, aside) is None, "it was moved"
 
     # A mesh brings its file and may be scaled; a body with an object's id replaces that object.
     mesh = tmp_path / "mesh"
@@ -206,9 +206,9 @@ def test_an_added_body_is_an_obstacle_until_it_is_removed(scene: HostProcess, tm
     model = object_type.ObjectModel.of(object_type.Mesh("lump", "lump.stl"))
     there = Pose(TIP + Position(0.0, 0.25, 0.0))
     scene.send(m.AddBody(m.AddedBody("lump", model, there, (0.1, 0.1, 0.1), str(mesh))))
-    collision(line(scene, beside), "lump")
+    collision(line(scene, aside), "lump")
     scene.send(m.AddBody(m.AddedBody("lump", model, Pose(TIP + Position(0.0, 0.0, 0.3)), (0.1, 0.1, 0.1), str(mesh))))
-    assert line(scene, beside) is None
+    assert line(scene, aside) is None
     scene.send(m.RemoveBodies(["lump"]))
     assert go(scene, READY, safe=False) is None
     scene.send(box("wall", Position(0.0, 9.0, 0.0), 0.1, 0.1, 0.1))
@@ -268,21 +268,21 @@ def test_a_move_of_a_program_stops_before_an_added_body(host: HostProcess, packa
 
 
 def test_a_held_body_collides_where_the_arm_does_not(scene: HostProcess) -> None:
-    beside = Position(0.0, 0.25, 0.0)
+    aside = Position(0.0, 0.25, 0.0)
     scene.send(box("table", TIP + Position(0.0, 0.25, -0.2), 0.1, 0.1, 0.02))
-    assert line(scene, beside) is None
+    assert line(scene, aside) is None
     rod = Position(0.0, 0.0, 0.16)
     scene.send(box("rod", rod, 0.03, 0.03, 0.3, robot="obj_arm", link="tcp"))
-    collision(line(scene, beside), "rod", "table")
+    collision(line(scene, aside), "rod", "table")
     assert line(scene, Position(0.0, -0.1, 0.0)) is None, "it is not an obstacle for the robot that holds it"
     scene.send(box("rod", rod, 0.03, 0.03, 0.3, robot="obj_arm", link="claw"))
-    error = line(scene, beside)
+    error = line(scene, aside)
     assert isinstance(error, m.ErrorData)
     assert "claw, which is not a link of arm" in error.message.text
     scene.send(box("rod", rod, 0.03, 0.03, 0.3, robot="obj_of_another_scene", link="tcp"))
-    assert line(scene, beside) is None
-    scene.send(box("rod", TIP + beside, 0.03, 0.03, 0.3))
-    collision(line(scene, beside), "rod")
+    assert line(scene, aside) is None
+    scene.send(box("rod", TIP + aside, 0.03, 0.03, 0.3))
+    collision(line(scene, aside), "rod")
 
 
 def held(host: HostProcess) -> list[tuple[str, str]]:
@@ -304,18 +304,18 @@ def test_a_gripped_part_collides_where_the_arm_does_not(host: HostProcess, alone
     types = [type_code("Arm", ARM), type_code("Wall", WALL), type_code("Claw", CLAW)]
     host.send(open_scene(types, *objects, models=MODELS, assets={"arm.urdf": str(URDF)}))
     host.expect(m.SceneOpened)
-    beside = Position(0.0, 0.25, 0.0)
-    host.send(box("table", TIP + beside + Position(0.0, 0.0, -0.2), 0.1, 0.1, 0.02))
+    aside = Position(0.0, 0.25, 0.0)
+    host.send(box("table", TIP + aside + Position(0.0, 0.0, -0.2), 0.1, 0.1, 0.02))
     assert go(host, READY) is None
     assert host.call("obj_claw", "set_part", size_x=0.05, size_y=0.05, size_z=0.3, offset_z=0.16) is None
-    assert line(host, beside) is None
+    assert line(host, aside) is None
     assert go(host, READY) is None
     assert host.call("obj_claw", "grip", width=0.0, force=1.0, speed=1.0)[0]
     assert held(host) == [("part of claw", "tcp")]
-    collision(line(host, beside), "part of claw", "table")
+    collision(line(host, aside), "part of claw", "table")
     assert host.call("obj_claw", "release") is None
     assert held(host) == []
-    assert line(host, beside) is None
+    assert line(host, aside) is None
 
 
 def test_another_arm_is_an_obstacle_at_its_current_joints(host: HostProcess) -> None:
@@ -350,7 +350,7 @@ from arcor2_hw.objects import MultiArmRobot
 class Pair(MultiArmRobot):
     _ABSTRACT = False
     urdf_package_name = "arm.urdf"
-    told = 6
+    joint_count = 6
 
     def get_arm_ids(self) -> set[str]:
         return {"left"}
@@ -362,7 +362,7 @@ class Pair(MultiArmRobot):
         return Pose()
 
     def robot_joints(self, include_gripper: bool = False, arm_id: str | None = None) -> list[Joint]:
-        return [Joint(f"{n}_joint", v) for n, v in START][: self.told]
+        return [Joint(f"{n}_joint", v) for n, v in START][: self.joint_count]
 
     def grippers(self, arm_id: str | None = None) -> set[str]:
         return set()
@@ -371,7 +371,7 @@ class Pair(MultiArmRobot):
         return set()
 
     def tell(self, count: int) -> None:
-        self.told = count
+        self.joint_count = count
 """.replace("START", repr(list(zip(NAMES, (-1.57, *READY[1:]), strict=True))))
 
 

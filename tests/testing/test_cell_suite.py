@@ -124,7 +124,7 @@ def test_a_missing_cell_file_is_an_error(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "problem"),
     [
         ({"type": "Nonsense"}, "far: object type Nonsense is not installed and was not uploaded"),
         ({"settings": {"hots": "127.0.0.1"}}, "far: Functional tester has no setting hots"),
@@ -136,9 +136,9 @@ def test_a_missing_cell_file_is_an_error(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_an_error_in_a_cell_names_the_device(changes: dict[str, object], told: str) -> None:
+def test_an_error_in_a_cell_names_the_device(changes: dict[str, object], problem: str) -> None:
     entry = {"name": "far", "type": "FunctionalTester", "settings": {"host": "127.0.0.1"}} | changes
-    with pytest.raises(Arcor2Error, match=told):
+    with pytest.raises(Arcor2Error, match=problem):
         bench_of(msgspec.convert(entry, CellDevice))
 
 

@@ -21,7 +21,7 @@ TYPE = "FunctionalTester"
 
 # ------------------------------------------------------------------------------------------------ cases
 @pytest.mark.parametrize(
-    ("case", "outcome", "level", "told"),
+    ("case", "outcome", "level", "problem"),
     [
         ("stop_passes", (Kind.FAILED, "boom"), Level.NONE, "stop_passes failed"),
         ("stop_passes", (Kind.NOT_RUN, "nothing moves"), Level.GOLD, ""),
@@ -30,11 +30,11 @@ TYPE = "FunctionalTester"
     ],
 )
 def test_failed_and_skipped_cases_lower_the_level(
-    case: str, outcome: tuple[Kind, str], level: Level, told: str
+    case: str, outcome: tuple[Kind, str], level: Level, problem: str
 ) -> None:
     reached, missing = judge(ALL_PASSED | {case: outcome}, [], [])
     assert reached is level
-    assert told in "; ".join(missing)
+    assert problem in "; ".join(missing)
 
 
 def test_silver_requires_tests_and_gold_a_report() -> None:
@@ -45,10 +45,10 @@ def test_silver_requires_tests_and_gold_a_report() -> None:
 
 def test_a_failure_in_teardown_counts() -> None:
     outcomes = Outcomes()
-    told = [("arcor2_case", {"bench": "press", "type": "Press", "real": False, "case": "stop_passes"})]
-    outcomes.add(told, True, False, "call", "")
+    properties = [("arcor2_case", {"bench": "press", "type": "Press", "real": False, "case": "stop_passes"})]
+    outcomes.add(properties, True, False, "call", "")
     assert outcomes["press"].outcomes["stop_passes"] == (Kind.PASSED, "")
-    outcomes.add(told, False, True, "teardown", "a thread was left")
+    outcomes.add(properties, False, True, "teardown", "a thread was left")
     assert outcomes["press"].outcomes["stop_passes"] == (Kind.FAILED, "a thread was left")
     outcomes.add([("other", 1)], True, False, "call", "")
     assert list(outcomes) == ["press"]
@@ -56,7 +56,7 @@ def test_a_failure_in_teardown_counts() -> None:
 
 # ------------------------------------------------------------------------------------------------ tests of rules
 @pytest.mark.parametrize(
-    ("named", "told"),
+    ("named", "problem"),
     [
         ("test_press.py::test_stops", ""),
         ("test_press.py::TestPress::test_holds", ""),
@@ -75,7 +75,7 @@ def test_a_failure_in_teardown_counts() -> None:
         ("test_press.py::test_stop_passes", "does not exist"),
     ],
 )
-def test_the_test_of_a_rule_must_exist_and_run(tmp_path: Path, named: str, told: str) -> None:
+def test_the_test_of_a_rule_must_exist_and_run(tmp_path: Path, named: str, problem: str) -> None:
     folder = tmp_path / "press"
     folder.mkdir()
     file = folder / "test_press.py"
@@ -91,8 +91,8 @@ def test_the_test_of_a_rule_must_exist_and_run(tmp_path: Path, named: str, told:
     collected = {str(file): frozenset({"test_stops", "test_holds", "test_later", "test_gives_up", "test_heats"})}
     cases = {"stop_passes": True, "loss_reaction": False}
     found = rules.missing_tests({"5 stop": [named]}, [tmp_path], "press", collected, cases)
-    assert bool(found) == bool(told)
-    assert told in "".join(found)
+    assert bool(found) == bool(problem)
+    assert problem in "".join(found)
 
 
 def test_missing_rules_are_reported(tmp_path: Path) -> None:
@@ -100,7 +100,7 @@ def test_missing_rules_are_reported(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("not_run", "instead", "told"),
+    ("not_run", "instead", "problem"),
     [
         ({"stop_passes": "stop() is tested elsewhere"}, {}, "not_run: stop_passes needs the tests that show it"),
         ({"stop_passes": "see test_press.py for this"}, {}, "not_run: stop_passes needs the tests that show it"),
@@ -108,8 +108,10 @@ def test_missing_rules_are_reported(tmp_path: Path) -> None:
         ({}, {"stop_passes": ["test_press.py::test_stops"]}, "instead: not_run has no stop_passes"),
     ],
 )
-def test_a_claim_without_a_test_is_refused(not_run: dict[str, str], instead: dict[str, list[str]], told: str) -> None:
-    with pytest.raises(ValueError, match=told):
+def test_a_claim_without_a_test_is_refused(
+    not_run: dict[str, str], instead: dict[str, list[str]], problem: str
+) -> None:
+    with pytest.raises(ValueError, match=problem):
         claims(not_run=not_run, instead=instead)
 
 
@@ -163,7 +165,7 @@ def test_a_matching_report_reaches_gold(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "problem"),
     [
         ({"real": False}, "no run on a real FunctionalTester"),
         ({"type": "Other"}, "no run on a real FunctionalTester"),
@@ -177,9 +179,9 @@ def test_a_matching_report_reaches_gold(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_differences_of_a_report_are_named(tmp_path: Path, changes: dict[str, Any], told: str) -> None:
+def test_differences_of_a_report_are_named(tmp_path: Path, changes: dict[str, Any], problem: str) -> None:
     written(tmp_path, **changes)
-    assert told in "; ".join(report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED))
+    assert problem in "; ".join(report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED))
 
 
 def test_a_report_is_of_the_very_files_of_the_driver(tmp_path: Path) -> None:
@@ -206,9 +208,9 @@ def test_a_recording_belongs_to_its_report(tmp_path: Path) -> None:
     written(tmp_path, recording=recording)
     missing = report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED)
     assert missing == ["the recording wire.jsonl.gz cannot be read: No such file or directory"]
-    for content, told in ((b"bytes", []), (b"Bytes", ["the recording wire.jsonl.gz is not the one of the report"])):
+    for content, problem in ((b"bytes", []), (b"Bytes", ["the recording wire.jsonl.gz is not the one of the report"])):
         (tmp_path / "evidence" / "wire.jsonl.gz").write_bytes(content)
-        assert report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED) == told
+        assert report.unmatched(tmp_path, claims(), TYPE, ALL_PASSED) == problem
 
 
 def test_a_case_that_the_real_device_could_not_show_needs_a_reason(tmp_path: Path) -> None:

@@ -60,7 +60,7 @@ def test_a_reason_for_a_case_that_can_run_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "problem"),
     [
         ("outputs_on_loss: off", "outputs_on_loss: maybe", "outputs_on_loss"),
         ("limits: []", "limit: []", "unknown field `limit`"),
@@ -72,14 +72,14 @@ def test_a_reason_for_a_case_that_can_run_is_refused(tmp_path: Path) -> None:
         ("stroke, weigh]", "stroke, weigh, jump]", "has no action jump"),
     ],
 )
-def test_an_invalid_quality_file_is_named(tmp_path: Path, old: str, new: str, told: str) -> None:
+def test_an_invalid_quality_file_is_named(tmp_path: Path, old: str, new: str, problem: str) -> None:
     assert old in QUALITY
     folder = shutil.copytree(PACKAGE, tmp_path / PACKAGE.name)
     (folder / "quality.yaml").write_text(QUALITY.replace(old, new))
     path = folder / "toy_press.py"
     wrong = declarations.faults(SourceFile("ToyPress", "broken.toy_press", path.read_bytes(), str(path)))
     assert len(wrong) == 1
-    assert told in wrong[0]
+    assert problem in wrong[0]
 
 
 def test_a_real_device_is_used_only_if_named(tmp_path: Path) -> None:

@@ -181,15 +181,15 @@ class DeviceFeed:
             if (fake := fakes.get(role)) is None:
                 continue
 
-            def heard(truth: Any, take: Any = take, fake: Fake = fake) -> None:
+            def update(truth: Any, take: Any = take, fake: Fake = fake) -> None:
                 try:
                     take(msgspec.convert(truth, _Truth))
                 except (msgspec.ValidationError, KeyError) as e:
                     self._problem = DeviceGone(f"the {fake.name} at {fake.address} tells something else: {e}")
 
             try:
-                heard(await fake.client.do(source))
-                await fake.client.subscribe(heard, source, rate)
+                update(await fake.client.do(source))
+                await fake.client.subscribe(update, source, rate)
             except ControlError as e:
                 raise DeviceGone(f"the {fake.name} at {fake.address}: {e}") from e
 

@@ -177,13 +177,13 @@ class Camera:
             due = max(due + 1.0 / self.fps, time.monotonic() - 1.0 / self.fps)
             await asyncio.sleep(max(0.0, due - time.monotonic()))
 
-    def _send(self, told: dict[str, Any], color: Callable[[str], bytes], depth: bytes) -> None:
+    def _send(self, common: dict[str, Any], color: Callable[[str], bytes], depth: bytes) -> None:
         messages: dict[str, bytes] = {}
         for client in self.watchers:
             form = str(client.color)
             if form not in messages:
                 picture = color(form)
-                header = {**told, "color": form, "color_bytes": len(picture), "depth_bytes": len(depth)}
+                header = {**common, "color": form, "color_bytes": len(picture), "depth_bytes": len(depth)}
                 messages[form] = encode(Kind.FRAME, header, picture + depth, wrong_checksum=self.wrong_checksum)
             client.connection.send(messages[form])
         self.frames += 1

@@ -30,7 +30,7 @@ def connect(mesh: str) -> Bin:
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "said"),
+    ("name", "text", "problem"),
     [
         ("part.stl", STL.format(80, 40), "80 m long, at most 1 m are allowed: is it in millimetres"),
         ("part.stl", STL.format(0.08, 0.001), "3 m|0.08 m long; two sides must be at least 0.003 m"),
@@ -40,10 +40,10 @@ def connect(mesh: str) -> Bin:
         ("part.obj", "v 0 0 0\nv nan 0 0\nv 0 0.1 0\nf 1 2 3\n", "vertices that are not finite|has no triangles"),
     ],
 )
-def test_invalid_meshes_are_refused(tmp_path: Path, name: str, text: str, said: str) -> None:
+def test_invalid_meshes_are_refused(tmp_path: Path, name: str, text: str, problem: str) -> None:
     file = tmp_path / name
     file.write_text(text)
-    with pytest.raises(NotConnected, match=f"^crate: part_mesh .*({said})"):
+    with pytest.raises(NotConnected, match=f"^crate: part_mesh .*({problem})"):
         connect(str(file))
 
 

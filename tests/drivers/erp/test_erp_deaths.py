@@ -95,10 +95,10 @@ def test_many_kills_lose_and_duplicate_nothing(
     erp = make(fake.ready["url"])
     erp.connect()
     erp.wait_until_sent(20.0)
-    came = [int(serial.removeprefix("S-")) for serial in serials(fake)]
-    assert came == sorted(set(came)), "out of order, or twice"
-    assert set(stored) <= set(came), "a stored result did not arrive"
-    assert len(set(came) - set(stored)) <= 4, "each process may store one result that it did not print"
+    arrived = [int(serial.removeprefix("S-")) for serial in serials(fake)]
+    assert arrived == sorted(set(arrived)), "out of order, or twice"
+    assert set(stored) <= set(arrived), "a stored result did not arrive"
+    assert len(set(arrived) - set(stored)) <= 4, "each process may store one result that it did not print"
 
 
 def test_a_restarted_service_loses_and_duplicates_nothing(

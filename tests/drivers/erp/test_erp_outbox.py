@@ -122,5 +122,5 @@ def test_a_rejected_message_blocks_only_its_order(fake: FakeProcess, erp: ErpSer
     erp.report_result(order, "S-2", True)
     erp.report_result("B-1", "S-3", True)
     erp.wait_until_sent(30.0)
-    came = [result["serial"] for result in fake.truth()["results"]]
-    assert came == ["S-3", "S-1", "S-2"]
+    arrived = [result["serial"] for result in fake.truth()["results"]]
+    assert arrived == ["S-3", "S-1", "S-2"]

@@ -75,7 +75,7 @@ def test_messages_of_the_driver(data: bytes, kind: Kind, header: dict[str, objec
 
 
 @pytest.mark.parametrize(
-    ("data", "said"),
+    ("data", "problem"),
     [
         (b"HTTP" + FRAME[4:], "not this protocol: a message starts with b'HTTP'"),
         (FRAME[:4] + b"\x02" + FRAME[5:], "version 2 of the protocol, not 1"),
@@ -84,8 +84,8 @@ def test_messages_of_the_driver(data: bytes, kind: Kind, header: dict[str, objec
         (FRAME[:8] + b"\x04\x00\x00\x01" + FRAME[12:], "a message of 86 and 67108865 bytes is too long"),
     ],
 )
-def test_invalid_messages_are_refused(data: bytes, said: str) -> None:
-    with pytest.raises(BadStream, match=f"^{said}"):
+def test_invalid_messages_are_refused(data: bytes, problem: str) -> None:
+    with pytest.raises(BadStream, match=f"^{problem}"):
         stream.read_prefix(data[:16])
 
 

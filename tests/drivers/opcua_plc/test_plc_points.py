@@ -142,7 +142,7 @@ def test_a_read_only_variable_is_named(fake: FakeProcess, make: Callable[..., Op
 
 
 @pytest.mark.parametrize(
-    ("points", "said"),
+    ("points", "problem"),
     [
         ("lamp=DO ns=2;s=Cell.Lamb", r"lamp \(ns=2;s=Cell.Lamb\) does not exist: BadNodeIdUnknown"),
         ("level=DI ns=2;s=Cell.Level", r"level \(ns=2;s=Cell.Level\) is Int16, not Boolean"),
@@ -150,10 +150,10 @@ def test_a_read_only_variable_is_named(fake: FakeProcess, make: Callable[..., Op
     ],
 )
 def test_a_node_that_is_missing_or_of_another_type_is_named(
-    fake: FakeProcess, make: Callable[..., OpcUaPlc], points: str, said: str
+    fake: FakeProcess, make: Callable[..., OpcUaPlc], points: str, problem: str
 ) -> None:
     plc = make(fake.ready["url"], points=points)
-    with pytest.raises(DeviceFault, match=f"plc at opc.tcp.*{said}"):
+    with pytest.raises(DeviceFault, match=f"plc at opc.tcp.*{problem}"):
         plc.connect()
     assert plc.connection is Connection.FAILED
 

@@ -63,8 +63,8 @@ def test_neighbouring_links_touch(q: tuple[float, ...]) -> None:
 
 def test_the_camera_receives_links_and_markers() -> None:
     camera = Camera(BASE, (0.08, 0.06, 0.002), markers=[Marker(7, Pose((0.1, 0.2, 0.05)), 0.06)])
-    told = [*arm.things("ur5e", BASE.matrix(), JOINTS[0], TIP.matrix()).values(), *sight.fixed(camera)]
-    things = [msgspec.convert(msgspec.to_builtins(each), Thing) for each in told]
+    encoded = [*arm.things("ur5e", BASE.matrix(), JOINTS[0], TIP.matrix()).values(), *sight.fixed(camera)]
+    things = [msgspec.convert(msgspec.to_builtins(each), Thing) for each in encoded]
     marker = things[-1]
     assert marker.marker is not None
     assert (marker.marker.id, marker.marker.size) == (7, 0.06)

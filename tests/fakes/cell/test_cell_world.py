@@ -28,7 +28,7 @@ class Devices:
     def __init__(self) -> None:
         self.door_open = True
         self.board: str | None = None
-        self.shown: str | None = "not told yet"
+        self.shown: str | None = "nothing shown yet"
         self.sensor: bool | None = None
 
     async def put_into_tester(self, board: Board) -> str | None:

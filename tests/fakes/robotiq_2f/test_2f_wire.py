@@ -91,9 +91,9 @@ def test_fingers_move_in_time(fingers: Gripper, clock: list[float]) -> None:
     clock[0] += 0.005
     assert fingers.registers()["PRE"] == 0
     clock[0] += 0.005 + 2.125
-    told = fingers.registers()
-    assert (told["PRE"], told["OBJ"]) == (230, 0)
-    assert told["POS"] == pytest.approx(116.5, abs=1.0)
+    registers = fingers.registers()
+    assert (registers["PRE"], registers["OBJ"]) == (230, 0)
+    assert registers["POS"] == pytest.approx(116.5, abs=1.0)
     clock[0] += 2.0
     assert fingers.registers()["OBJ"] == 0
     clock[0] += 0.2

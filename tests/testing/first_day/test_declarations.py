@@ -49,7 +49,7 @@ def test_the_declaration_of_a_driver_fits_its_type(driver: InstalledType) -> Non
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "problem"),
     [
         ("Press: {small: {joint: 1, by: 0.5, speed: 0.1}, full: {joint: 1, by: 0.9, speed: 0.1}}", "twice as long"),
         ("Press: {small: {joint: 0, by: 0.5, speed: 0.1}}", "joint from 1 on"),
@@ -59,9 +59,9 @@ def test_the_declaration_of_a_driver_fits_its_type(driver: InstalledType) -> Non
         ("Press: {limit: [force]}", "unknown field `limit`"),
     ],
 )
-def test_an_invalid_declaration_is_named(tmp_path: Path, text: str, told: str) -> None:
+def test_an_invalid_declaration_is_named(tmp_path: Path, text: str, problem: str) -> None:
     (tmp_path / FILE).write_text(text)
-    with pytest.raises(InvalidData, match=rf"{tmp_path.name}/{FILE}: .*{told}"):
+    with pytest.raises(InvalidData, match=rf"{tmp_path.name}/{FILE}: .*{problem}"):
         read(tmp_path)
 
 

@@ -309,7 +309,7 @@ def test_the_whole_day_with_a_scale_on_a_serial_port(tmp_path: Path) -> None:
 
 # ------------------------------------------------------------------------------------------------ the command
 @pytest.mark.parametrize(
-    ("arguments", "status", "told"),
+    ("arguments", "status", "expected"),
     [
         (["--real", "arm"], 2, "--real needs a terminal, because a person at the device confirms what moves."),
         (["--plan"], 2, "--plan and --report need --real NAME"),
@@ -317,13 +317,13 @@ def test_the_whole_day_with_a_scale_on_a_serial_port(tmp_path: Path) -> None:
         (["--real", "leg", "--plan"], 11, "cell.yaml has no device leg"),
     ],
 )
-def test_the_command_without_a_terminal(tmp_path: Path, arguments: list[str], status: int, told: str) -> None:
+def test_the_command_without_a_terminal(tmp_path: Path, arguments: list[str], status: int, expected: str) -> None:
     settings = {"host": "192.0.2.7", "payload_mass": 1.0}
     cell = {"devices": [{"name": "arm", "type": "UR5e", "settings": settings}]}
     (tmp_path / "cell.yaml").write_bytes(msgspec.yaml.encode(cell))
     command = [sys.executable, "-m", "arcor2_server.cli.main", "device", "check", "cell.yaml", *arguments]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, input="y\n" * 50, timeout=100)
-    assert (done.returncode, told in done.stdout + done.stderr) == (status, True), done.stdout + done.stderr
+    assert (done.returncode, expected in done.stdout + done.stderr) == (status, True), done.stdout + done.stderr
     assert [each.name for each in tmp_path.iterdir()] == ["cell.yaml"]
 
 
