@@ -144,7 +144,7 @@ def test_streams_at_different_rates(host: HostProcess) -> None:
     host.send(m.Stream("obj_arm", [30.0, 5.0], [20.0]))
 
     def all_streams() -> list[list[dict[str, Any]]]:
-        host.call("obj_arm", "grippers")  # reads what the host has sent
+        host.call("obj_arm", "grippers")  # processes all earlier messages of the host
         return [
             streamed(host, event, rate)
             for event, rate in (("RobotJoints", 30.0), ("RobotEef", 20.0), ("RobotJoints", 5.0))

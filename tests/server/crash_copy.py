@@ -6,10 +6,10 @@ from pathlib import Path
 
 
 def copy_at_one_moment(source: Path, target: Path) -> None:
-    """Copy files while nothing is written to them: the journal's thread tidies up after what it acknowledged."""
+    """Copy files while nothing is written to them: after an acknowledgement the journal's thread may still write."""
     while True:
         before = _written(source)
-        if before[1] < time.time() - 0.02:  # a file system tells times apart by a few milliseconds
+        if before[1] < time.time() - 0.02:  # the resolution of a file system's times is a few milliseconds
             shutil.copytree(source, target)
             if _written(source) == before:
                 return
@@ -18,6 +18,6 @@ def copy_at_one_moment(source: Path, target: Path) -> None:
 
 
 def _written(directory: Path) -> tuple[list[tuple[str, int, int]], float]:
-    """Give the files with sizes and times, and when the last of them was written, s."""
+    """Return the files with sizes and times, and the time of the last write, s."""
     stats = [(file.name, file.stat()) for file in sorted(directory.rglob("*")) if file.is_file()]
     return [(name, s.st_size, s.st_mtime_ns) for name, s in stats], max(s.st_mtime for _, s in stats)

@@ -1,4 +1,4 @@
-"""What a client knows of the open document from the events alone, kept as strictly as the protocol says."""
+"""A client's state of the open document, derived only from events, and checked as strictly as the protocol requires."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ _TIMES = ("created", "modified", "int_modified")
 
 
 class Picture:
-    """Things by id. An event that does not fit (an add of what is there, an update of what is not) fails the test."""
+    """Items by id. An event that does not fit (adding an existing item, updating a missing one) fails the test."""
 
     def __init__(self) -> None:
         self.locks: dict[str, str] = {}
@@ -31,14 +31,14 @@ class Picture:
 
     @classmethod
     def of(cls, scene: Scene | None, project: Project | None) -> "Picture":
-        """What somebody knows who has just connected."""
+        """Return the state of a client that has just connected."""
         picture = cls()
         if scene is not None:
             picture._load(msgspec.to_builtins(scene), None if project is None else msgspec.to_builtins(project))
         return picture
 
     def shown(self) -> dict[str, Any]:
-        """Everything but the locks, for comparison."""
+        """Return everything except the locks, for comparison."""
         return {"scene": self.scene, "project": self.project, "owners": self.owners, **self.things}
 
     def see(self, event: dict[str, Any]) -> None:
@@ -92,7 +92,7 @@ class Picture:
             return  # of a saved one
         mine.update(_untimed(data))
         if name == "ProjectChanged" and not data["has_logic"]:
-            self.things["logic"].clear()  # no events of its own
+            self.things["logic"].clear()  # these have no events of their own
 
     # ------------------------------------------------------------------------------------------ single things
     @staticmethod

@@ -100,7 +100,7 @@ def test_a_close_during_a_cut_is_not_forwarded(wire: TcpWire, ends: tuple[socket
     wire.cut()
     driver.sendall(b"start")
     driver.close()
-    wait_until(lambda: len(wire.record()) == 1, 2.0, "the wire seeing what was sent")
+    wait_until(lambda: len(wire.record()) == 1, 2.0, "the recording of the sent data")
     assert is_quiet(device)
     wire.heal()
     with pytest.raises(ConnectionResetError):

@@ -52,7 +52,7 @@ class DobotMagicianBench(FakeBench):
         return written, truth["suction"], truth["gripper"], truth["steppers"]
 
     def heal(self) -> None:
-        # A started motion is completed, as declared; only then must nothing start any more.
+        # A started motion is completed, as declared. After that, no motion may start.
         wait_until(lambda: not self.running(), 15.0, "the end of a started motion")
         super().heal()
 

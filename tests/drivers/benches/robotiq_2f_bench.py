@@ -60,7 +60,7 @@ class Robotiq2FBench(FakeBench):
         return self.fake.truth()["count"], self.fake.truth()["sets"]
 
     def heal(self) -> None:
-        # A started motion is completed, as declared; only then must nothing start any more.
+        # A started motion is completed, as declared. After that, no motion may start.
         wait_until(lambda: not self.running(), 10.0, "the end of a started motion")
         super().heal()
 

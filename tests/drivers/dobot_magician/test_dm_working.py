@@ -159,7 +159,7 @@ def test_pick_and_place_switch_the_suction_at_the_part(fake: FakeProcess, arm: D
     assert truth["tool"][2] == pytest.approx(20.0, abs=0.1)
     assert truth["motions"] == 3
     assert list(arm.parts) == ["part of arm"]
-    assert arm.parts["part of arm"].in_link.position.z == pytest.approx(0.01), "it hangs below the cup"
+    assert arm.parts["part of arm"].in_link.position.z == pytest.approx(0.01), "the part is below the cup"
     arm.stop()
     assert fake.truth()["suction"] == [1, 1]  # a stop does not drop the part
     arm.place(at(0.22, -0.05, -0.02), approach=0.04, speed=1.0, slow_speed=0.5)

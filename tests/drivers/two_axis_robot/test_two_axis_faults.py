@@ -102,9 +102,9 @@ def test_a_connection_loss_during_a_move(fake: FakeProcess, ready: TwoAxisRobot,
     fake.control.do(fault)
     with pytest.raises((ConnectionLost, NotInControl, DeviceTimeout), match="arm"):
         doing.result()
-    stood = fake.control.wait_until(standing)["servos"]["1"]
-    assert stood["watchdog"] == 0xFF  # the servo itself stopped
-    assert 0.0 < stood["angle"] < 2.0
+    stopped = fake.control.wait_until(standing)["servos"]["1"]
+    assert stopped["watchdog"] == 0xFF  # the servo itself stopped
+    assert 0.0 < stopped["angle"] < 2.0
     wait_for(lambda: ready.connection is Connection.LOST)
     assert ready.health is Health.FAILURE
     with pytest.raises((ConnectionLost, Stale)):
@@ -114,9 +114,9 @@ def test_a_connection_loss_during_a_move(fake: FakeProcess, ready: TwoAxisRobot,
     wait_for(lambda: ready.connection is Connection.BACK)
     with pytest.raises(NotInControl, match="lost"):  # only observation is restored by itself
         ready.move_to_joints(HOME, 0.5)
-    assert fake.truth()["servos"]["1"]["angle"] == stood["angle"]
+    assert fake.truth()["servos"]["1"]["angle"] == stopped["angle"]
     ready.take_control()
-    assert fake.truth()["servos"]["1"]["angle"] == pytest.approx(stood["angle"], abs=0.002)
+    assert fake.truth()["servos"]["1"]["angle"] == pytest.approx(stopped["angle"], abs=0.002)
     ready.check_if_ready_to_move()
 
 

@@ -111,7 +111,7 @@ def test_the_part_is_attached_to_the_robot_until_released_or_lost(make: Make, fa
     part(fake, True)
     gripper.grip()
     assert [held.name for held in robot.parts.values()] == ["part of gripper"]
-    assert robot.parts["part of gripper"].in_link.position.z == pytest.approx(0.01), "it hangs below the cup"
+    assert robot.parts["part of gripper"].in_link.position.z == pytest.approx(0.01), "the part is below the cup"
     with pytest.raises(DeviceFault, match="sticks"):
         gripper.release()
     assert robot.parts, "the part sticks"

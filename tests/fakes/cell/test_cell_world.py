@@ -23,7 +23,7 @@ TIP = 0.1
 
 
 class Devices:
-    """A tester with a door; records what the reader and the sensor received."""
+    """A tester with a door. It records the values sent to the reader and the sensor."""
 
     def __init__(self) -> None:
         self.door_open = True

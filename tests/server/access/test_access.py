@@ -35,7 +35,7 @@ def bearer(secret: str) -> dict[str, str]:
 
 @pytest.fixture
 async def server(tmp_path: Path) -> AsyncIterator[ServerProcess]:
-    """A server that asks for a token; `secret` of an operator and of a programmer are in its data directory."""
+    """Start a server that requires a token, with `secret` of an operator and of a programmer in its data directory."""
     TokenFile(tmp_path / "data").add("first", Role.TECHNICIAN)
     async with running(tmp_path / "data") as process:
         yield process
@@ -50,7 +50,7 @@ def rest(server: ServerProcess, **options: Any) -> httpx.AsyncClient:
 
 
 async def closed_with(socket: ClientConnection) -> int | None:
-    """Give the code with which the server closes."""
+    """Return the code with which the server closes the connection."""
     async with asyncio.timeout(60):
         with contextlib.suppress(ConnectionClosedError):
             async for _ in socket:
@@ -77,14 +77,14 @@ def test_a_token_expires(tmp_path: Path) -> None:
         tokens.add("tablet", Role.OPERATOR)
     with pytest.raises(NotFound, match="nobody"):
         tokens.revoke("nobody")
-    assert TokenFile(tmp_path).revoke("tablet") == [made]  # as by another process
+    assert TokenFile(tmp_path).revoke("tablet") == [made]  # as another process would
     assert tokens.find(secret) is None
     _, secret = tokens.add("tablet", Role.OPERATOR, days=1)
     stored = json.loads((tmp_path / FILE).read_text())
     stored[0]["expires"] = "2020-01-01T00:00:00+00:00"
     (tmp_path / FILE).write_text(json.dumps(stored))
     assert tokens.find(secret) is None
-    tokens.add("tablet", Role.OPERATOR)  # the one whose time is over is in nobody's way
+    tokens.add("tablet", Role.OPERATOR)  # the expired token does not block the name
 
 
 @pytest.mark.parametrize("name", ["", "  ", "x" * 101, "line\nbreak"])
@@ -97,7 +97,7 @@ def test_a_damaged_file_is_repaired_from_its_copy(tmp_path: Path) -> None:
     tokens = TokenFile(tmp_path)
     made, secret = tokens.add("tablet", Role.OPERATOR)
     (tmp_path / FILE).write_text("{")
-    assert tokens.find(secret) == made  # by a server that runs
+    assert tokens.find(secret) == made  # by a running server
     assert TokenFile(tmp_path).find(secret) == made
     damage = TokenFile(tmp_path).repair()
     assert FILE in damage
@@ -143,7 +143,7 @@ async def test_the_server_starts_with_damaged_token_files(tmp_path: Path) -> Non
                     missing = {name: path for name, path in missing.items() if path not in event["data"]["message"]}
                     if not missing:
                         break
-        assert not missing, f"no notification names {', '.join(missing)}"
+        assert not missing, f"no notification mentions {', '.join(missing)}"
         printed = (tmp_path / "data.log").read_text()
     for name in damaged:
         assert list(data.glob(name.replace(".", ".damaged-*."))), name
@@ -241,7 +241,7 @@ async def test_without_tokens_local_clients_have_all_rights(tmp_path: Path) -> N
     async with running(tmp_path / "data") as server:
         async with talking(server.url, "anybody") as talker:
             await talker.granted("NewScene", {"name": "scene"})
-        TokenFile(server.data_dir).add("somebody", Role.OPERATOR)  # from now on a token is needed
+        TokenFile(server.data_dir).add("operator", Role.OPERATOR)  # from now on a token is needed
         async with connect(server.url) as socket:
             assert "token" in await Talker(socket).refused("ListScenes")
 
@@ -323,7 +323,7 @@ async def test_tls_with_a_generated_certificate(tmp_path: Path) -> None:
             assert (await http.get("/api/devices", headers=bearer(secret))).status_code == 200
         made = file.read_bytes()
     async with running(tmp_path / "data", "--self-signed"):
-        assert file.read_bytes() == made  # whoever has trusted it goes on doing so
+        assert file.read_bytes() == made  # clients that trust it can keep it
 
 
 async def test_legacy_clients_have_a_separate_port(tmp_path: Path) -> None:

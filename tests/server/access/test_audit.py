@@ -55,6 +55,6 @@ async def test_commands_and_refusals_are_logged_once(tmp_path: Path) -> None:
 
 
 def test_requests_excluded_from_the_audit_log_exist() -> None:
-    """A request that is renamed must not become a silent one."""
+    """Otherwise a renamed request would silently be excluded or logged."""
     assert {*RPCS, "Version"} >= audit.READING | audit.CLIENT_STATE
     assert {name for name, rpc in RPCS.items() if rpc.dry_run and not audit.is_command(rpc)} == set()

@@ -57,7 +57,7 @@ class VaultSettings(Settings):
 
 class Vault(Generic):
     """A vault that opens for the right code."""
-
+The passwords in `clear_secrets.zip`: of the saved scene and package, of overrides, of the open scene.
     _ABSTRACT = False
 
     def __init__(self, obj_id: str, name: str, settings: VaultSettings) -> None:
@@ -76,12 +76,12 @@ def setting(name: str, value: str) -> Parameter:
 
 
 def digest(code: str) -> Parameter:
-    """The vault's settings say by a digest which code it takes."""
+    """Return the digest by which the vault's settings identify the correct code."""
     return setting("digest", hashlib.sha256(code.encode()).hexdigest())
 
 
 def leaks(directory: Path, *secrets: str, besides: str = "secrets.json") -> list[str]:
-    """Return the files that hold one of the secrets."""
+    """Return the files that contain one of the secrets."""
     return [
         str(path.relative_to(directory))
         for path in directory.rglob("*")
@@ -90,14 +90,14 @@ def leaks(directory: Path, *secrets: str, besides: str = "secrets.json") -> list
 
 
 def open_to_others(directory: Path) -> list[str]:
-    """Return what in the directory others than its owner may read, the directory itself too."""
+    """Return the paths that others than the owner may read, including the directory itself."""
     found = [path for path in (directory, *directory.iterdir()) if path.stat().st_mode & 0o077]
     return [f"{path.name} {stat.S_IMODE(path.stat().st_mode):o}" for path in found]
 
 
 @contextlib.asynccontextmanager
 async def listening(server: ServerProcess) -> AsyncIterator[list[str]]:
-    """Collect whatever another client is sent."""
+    """Collect every message that is sent to another client."""
     received: list[str] = []
     async with connect(server.url) as socket:
         yield received
@@ -130,7 +130,7 @@ async def test_a_secret_reaches_the_device_and_nobody_else(tmp_path: Path) -> No
         obj = (await client.next_event("SceneObjectChanged")).data
         reference = msgspec.json.decode(obj.parameters[1].value)
         assert is_reference(reference)
-        # What a client got, it sends back: the secret stays. So does `***`.
+        # A client sends back what it received: the secret does not change. The same holds for `***`.
         await call("WriteLock", rpc.WriteLockArgs(obj.id))
         for kept in (reference, HIDDEN):
             again = [digest(CODE), setting("code", kept)]
@@ -144,7 +144,7 @@ async def test_a_secret_reaches_the_device_and_nobody_else(tmp_path: Path) -> No
         await call("StopScene")
         assert await state(client) == "stopped"
 
-        # Over REST the same holds.
+        # The same holds for REST.
         scene = (await call("ListScenes"))[0]
         stored = (await http.get(f"/scenes/{scene.id}")).json()
         assert stored["objects"][0]["parameters"][1]["value"] == f'"{reference}"'
@@ -154,7 +154,7 @@ async def test_a_secret_reaches_the_device_and_nobody_else(tmp_path: Path) -> No
         stored = (await http.get(f"/scenes/{scene.id}")).json()
         assert stored["objects"][0]["parameters"][1]["value"] == f'"{reference}"'
 
-        # An override of a project, and a package, which gets it from the server.
+        # An override in a project, and a package, which gets the secret from the server.
         await call("NewProject", rpc.NewProjectArgs(scene.id, "ringing"))
         project = (await client.next_event("OpenProject")).data.project
         await call("WriteLock", rpc.WriteLockArgs(obj.id))
@@ -185,7 +185,7 @@ async def test_a_secret_reaches_the_device_and_nobody_else(tmp_path: Path) -> No
         while (await client.next_event("PackageState")).data.state is not PackageStateEnum.STOPPED:
             pass
 
-        # A package that comes with a secret in clear loses it.
+        # A package that contains a secret in clear loses it on upload.
         files = {"executionPackage": clear(package)}
         assert (await http.post(f"/packages/{built.package_id}", files=files)).is_success
         package = (await http.get(f"/packages/{built.package_id}")).content
@@ -217,7 +217,7 @@ def overridden(object_id: str) -> list[dict[str, Any]]:
 
 
 def clear(package: bytes) -> bytes:
-    """Put a secret in clear into a package."""
+    """Replace a secret in a package with its clear text."""
     target = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(package)) as files, zipfile.ZipFile(target, "w") as changed:
         for name in files.namelist():
@@ -231,7 +231,7 @@ def clear(package: bytes) -> bytes:
 
 
 async def test_data_with_secrets_in_clear_is_migrated(tmp_path: Path) -> None:
-    """The directory was made by version 0.1 before it stored secrets apart; its server was killed with a scene open."""
+    """Version 0.1 wrote the directory, with secrets in clear, and was killed while a scene was open."""
     with zipfile.ZipFile(Path(__file__).parent / "clear_secrets.zip") as files:
         files.extractall(tmp_path)
     for path in tmp_path.iterdir():
@@ -255,7 +255,7 @@ async def test_data_with_secrets_in_clear_is_migrated(tmp_path: Path) -> None:
             assert packaged == ObjectSecrets({"password": CLEAR[1]})
             references.append((opened, kept, override))
             assert services.session.has_changes
-            # What undo goes back to is the saved password: it is one secret, not two.
+            # Undo returns to the saved password: it is one secret, not two.
             await services.session.commit(
                 "ann", [change.inverse() for edit in reversed(services.session.history) for change in edit.changes]
             )
@@ -286,7 +286,7 @@ async def test_a_secret_reference_is_resolved_only_for_its_setting(tmp_path: Pat
         # A secret cannot be sent to another device.
         with pytest.raises(InvalidData, match="another setting"):
             secrets.hide("Other", [msgspec.structs.replace(first, name="api_key")])
-        # A reference of another server is stored and reveals nothing.
+        # A reference from another server is stored and reveals nothing.
         away = setting("password", HIDDEN + "0123456789abcdef")
         assert secrets.hide("YuMi", [away]) == [away]
         assert secrets.values_for(scene_with(setting("host", "yumi1"), away)) == {}
@@ -308,7 +308,7 @@ async def test_a_secret_is_not_sent_to_another_host(tmp_path: Path) -> None:
         call = client.call
         await http.put("/object-types", json={"id": "Vault", "name": "Vault", "source": VAULT})
         await call("NewScene", rpc.NewSceneArgs("bank"))
-        given = [digest(CODE), setting("code", CODE)]  # for the host that is the default
+        given = [digest(CODE), setting("code", CODE)]  # for the default host
         await call("AddObjectToScene", rpc.AddObjectToSceneArgs("vault", "Vault", parameters=given))
         obj = (await client.next_event("SceneObjectChanged")).data
         code = obj.parameters[1]
@@ -338,7 +338,7 @@ async def test_a_secret_is_not_sent_to_another_host(tmp_path: Path) -> None:
         assert answer.is_client_error
         assert AGAIN in answer.text
 
-        # Overrides are entered one by one: the device is refused when the scene starts.
+        # Overrides are entered one by one: a mismatch is refused when the scene starts.
         await call("NewProject", rpc.NewProjectArgs(scene.id, "ringing"))
         await call("WriteLock", rpc.WriteLockArgs(obj.id))
         await call("AddOverride", rpc.AddOverrideArgs(obj.id, setting("host", "evil")))
@@ -379,18 +379,18 @@ async def test_the_cell_host_gets_only_the_secrets_it_needs(tmp_path: Path) -> N
             project = Project("ringing", "scn_1", id="pro_1", object_overrides=overrides)
             (package / "data" / "project.json").write_bytes(msgspec.json.encode(project))
             assert secrets.values_for_package(package) == expected
-        # The cell file moves the device; a password that is entered then is for the new address.
+        # The cell file changes the device's address. A password entered afterwards is for the new address.
         cell = Cell([CellDevice("yumi", "YuMi", {"host": "yumi2"})])
         here = SettingSecrets(services.types, secrets.store, cell)
         laid = overlay(cell, scene_with(host, password))
         assert here.values_for(scene_with(host, password), laid)["obj_1"].problem.text == moved.format("yumi2")
         (_, again) = here.hide("YuMi", [host, setting("password", CODE)], [host, password], name="yumi")
         assert here.values_for(scene_with(host, again), laid) == found
-        # Only the setting that it was entered for gets it, and only an object with an id of its own.
+        # Only the setting for which it was entered gets it, and only an object with an id of its own.
         assert secrets.values_for(scene_with(host, msgspec.structs.replace(password, name="user"))) == {}
         twin = scene_with(setting("host", "evil")).objects + scene_with(host, password).objects
         assert secrets.values_for(Scene("bank", id="scn_1", objects=twin)) == {}
-        # A secret without an address is for the one that it is used with first.
+        # A secret without an address belongs to the first address with which it is used.
         (unbound,) = [setting("password", secrets.store.add(Secret("YuMi", "password", OTHER)))]
         with pytest.raises(AddressChanged, match=moved.format("evil")):
             secrets.hide("YuMi", [setting("host", "evil"), unbound], [host, unbound], name="yumi", check=True)

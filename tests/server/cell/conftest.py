@@ -1,4 +1,4 @@
-"""The server's parts around a real cell host, with object types that the test writes; no network."""
+"""The server's parts with a real cell host and object types from the test; no network."""
 
 import asyncio
 import contextlib
@@ -59,7 +59,7 @@ PATIENCE = 40.0
 
 
 class Recorder:
-    """A client that keeps what it gets."""
+    """A client that stores the messages that it gets."""
 
     def __init__(self, user: str | None) -> None:
         self.user = user
@@ -77,7 +77,7 @@ class Recorder:
         self.put(message)
 
     async def event(self, name: str, where: Callable[[dict[str, Any]], bool] = lambda _: True) -> dict[str, Any]:
-        """Wait for an event, from the beginning of what was received and not yet taken."""
+        """Wait for an event with this name, starting with the received events that were not taken yet."""
         async with asyncio.timeout(PATIENCE):
             while True:
                 for index, event in enumerate(self.got):
@@ -93,7 +93,7 @@ class Recorder:
 
 
 class Types:
-    """Object types as the server knows them, told by the test instead of read by analysis."""
+    """Object types as the server knows them, declared by the test instead of analysed."""
 
     def __init__(self) -> None:
         self.codes: dict[str, TypeCode] = {}
@@ -135,7 +135,7 @@ class Server:
         services.hub.add(self.client)  # type: ignore[arg-type]
 
     async def ask(self, name: str, args: Any = None, client: Recorder | None = None, codes: bool = False) -> Any:
-        """Send a request as the endpoint does: the response takes its place among the events."""
+        """Send a request like the endpoint: the response gets its place among the events."""
         client = client or self.client
         context = Context(client, codes=codes)  # type: ignore[arg-type]
         if isinstance(args, dict):
@@ -238,7 +238,7 @@ Prepare = Callable[[Server], Awaitable[None]]
 
 
 def serving(prepare: Prepare | None = None) -> Callable[[Test], Callable[[Path], Awaitable[None]]]:
-    """Run a test with a server inside its own body: the tasks of hosts must end with the test, before fixtures do."""
+    """Run a test with a server inside its own body: the tasks of hosts must end before fixtures do."""
 
     def wrap(test: Test) -> Callable[[Path], Awaitable[None]]:
         async def run(tmp_path: Path) -> None:

@@ -63,7 +63,7 @@ def states(events: list[dict[str, Any]]) -> list[str]:
 
 
 async def until_stopped(server: Server, client: Recorder | None = None) -> list[str]:
-    """Wait for the end. Return all states and other events, in order."""
+    """Wait for the end. Return all states, and the other events, in order."""
     client = client or server.client
     await until(lambda: client.got and client.got[-1]["event"] == "ShowMainScreen")
     return states(client.got)
@@ -86,7 +86,7 @@ async def test_clients_see_each_state_of_a_run(server: Server) -> None:
     assert server.client.got[0]["data"] == {"state": "started", "package_id": "pkg_1"}
     assert server.client.got[5]["data"] == {"action_id": "act_a", "results": ["2"]}
     assert server.client.got[-1]["data"] == {"what": "PackagesList", "highlight": "pkg_1"}
-    async with asyncio.timeout(PATIENCE):  # it is stored concurrently with the run
+    async with asyncio.timeout(PATIENCE):  # the run is stored concurrently
         while not isinstance((await server.ask("ListPackages"))[0].package_meta.executed, str):
             await asyncio.sleep(0.02)
     [summary] = await server.ask("ListPackages")
@@ -141,7 +141,7 @@ async def test_a_killed_host_ends_the_run(server: Server) -> None:
 @serving()
 async def test_a_program_that_holds_the_interpreter_is_killed(server: Server) -> None:
     server.services.execution.stop_within = 0.3
-    write(server, 'lamp.hold_all(0.2, an="a")')  # the event is sent before
+    write(server, 'lamp.hold_all(0.2, an="a")')  # the event is sent first
     await server.ask("RunPackage", {"id": "pkg_1"})
     await server.client.event("ActionStateBefore")
     await asyncio.sleep(0.3)

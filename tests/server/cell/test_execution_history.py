@@ -50,7 +50,7 @@ async def test_a_run_is_recorded_from_start_to_end(server: Server) -> None:
     write(server, 'for n in ("a", "b"): lamp.blink(2, an=n)')
     await server.ask("RunPackage", {"id": "pkg_1"})
     await until_stopped(server)
-    async with asyncio.timeout(30):  # names are added beside the run
+    async with asyncio.timeout(30):  # names are added concurrently
         while (await newest(server)).package_name != "demo":
             await asyncio.sleep(0.01)
     run = await newest(server)
@@ -153,7 +153,7 @@ async def test_an_exception_names_its_action(server: Server) -> None:
 
 # ---------------------------------------------------------------------------------------------- shared breakpoints
 class Shared:
-    """What users set on a project, in place of the database."""
+    """Breakpoints that users set on a project, in place of the database."""
 
     def __init__(self, *ids: str) -> None:
         self.stored = (set(ids), "alice")
@@ -185,7 +185,7 @@ async def test_shared_breakpoints_apply_on_request_and_can_change(server: Server
     await server.client.state("paused", "PackageState")
     await server.ask("ResumePackage")
     await server.client.state("stopped", "PackageState")
-    await server.services.breakpoints.change(PROJECT.id, set(), {"act_a"}, "bob")  # nobody runs whom it would concern
+    await server.services.breakpoints.change(PROJECT.id, set(), {"act_a"}, "bob")  # no run is affected
 
 
 # ---------------------------------------------------------------------------------------------- stored runs
@@ -227,7 +227,7 @@ async def test_the_newest_runs_and_actions_are_stored(tmp_path: Any, monkeypatch
             0.1,
             7,
         )
-        for missing in (3, 8, 9):  # too old, lost, none
+        for missing in (3, 8, 9):  # too old, lost, never existed
             with pytest.raises(NotFound):
                 await again.run_trace(missing)
         failed = again.find(ListRunsArgs(limit=100))[1]

@@ -1,4 +1,4 @@
-"""Searching for devices that a type could be connected to; the bus is that of a fake drive in its own process."""
+"""Searching for devices to which a type could connect; the bus belongs to a fake drive in its own process."""
 
 import json
 from typing import Any
@@ -73,7 +73,7 @@ async def test_a_search_that_cannot_work_says_why(server: Server) -> None:
         await server.ask("FindDevices", _search(["/dev/ttyUSB0"]))
     with pytest.raises(RequestRefused, match="cannot be opened") as refused:
         await server.ask("FindDevices", _search("/dev/missing"))
-    assert refused.value.message.key == "{named} cannot be opened: {reason}", "it can be translated"
+    assert refused.value.message.key == "{named} cannot be opened: {reason}", "the message can be translated"
     with pytest.raises(RequestRefused, match="channel must be"):  # this adapter of pyserial would write a file
         await server.ask("FindDevices", _search("spy:///dev/null?file=/tmp/x"))
     await server.open(Scene("scene", id="scn_1"))

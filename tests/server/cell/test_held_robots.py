@@ -115,7 +115,7 @@ async def with_arm(server: Server) -> None:
 
 
 class Hand:
-    """A hand at a button, of one client."""
+    """A client that presses a jog or hand-teaching button."""
 
     def __init__(self, server: Server, client: Recorder | None = None) -> None:
         self.server = server
@@ -180,7 +180,7 @@ async def test_a_jog_runs_from_press_to_release(arm: Server) -> None:
     assert stops == 1
     with pytest.raises(RequestRefused, match="press it again"):
         await hand.jog()
-    await hand.jog(0)  # letting go twice does no harm
+    await hand.jog(0)  # a second release has no effect
     await arm.ask("ExecuteAction", {"action_id": "act_wave"})
 
 
@@ -234,7 +234,7 @@ async def test_a_closed_connection_stops_the_motion(arm: Server) -> None:
 
 @serving(with_arm)
 async def test_late_requests_are_ignored(arm: Server) -> None:
-    """By the sender's clock, which is another one than ours."""
+    """The sender's clock differs from ours."""
     hand = Hand(arm)
 
     def theirs(late: float = 0.0) -> float:
@@ -270,7 +270,7 @@ async def test_renewals_need_not_wait_for_answers_and_a_press_may_follow_at_once
     await do(arm, "be_slow", slow=0.1)
     going = asyncio.create_task(hand.jog(0))
     await asyncio.sleep(0)
-    assert (await hand.jog(new=True)).scale == 1.0  # once it stands
+    assert (await hand.jog(new=True)).scale == 1.0  # once it has stopped
     assert (await going).scale == 0.0
     await hand.jog(0)
 
@@ -419,7 +419,7 @@ async def test_a_protective_stop_is_acknowledged_by_name(arm: Server) -> None:
     await acknowledge(arm, operator)
     assert (await report(arm))[3] == [["protective stop", "olga"]]
     with pytest.raises(Arcor2Error, match="press it again"):
-        await hand.jog()  # the button that is still pressed moves nothing
+        await hand.jog()  # the button that is still pressed does not move the arm
     await hand.jog(new=True)
     with pytest.raises(RequestRefused, match="arm is held by alice"):
         await acknowledge(arm, operator)

@@ -49,7 +49,7 @@ class Box(Generic):
 
 
 class Boxes:
-    """A scene of two boxes, of which one is there."""
+    """A scene of two boxes, only one of which is connected."""
 
     def __init__(self, server: Server) -> None:
         self.server = server
@@ -109,7 +109,7 @@ async def test_objects_are_added_to_the_online_scene(server: Server) -> None:
     missing.touch()
     await server.ask("RetryObject", {"object_id": failed["object_id"]})
     assert await server.services.online.call(failed["object_id"], "open", deadline=5.0) == b"true"
-    # The types of the devices that were online before can still be loaded.
+    # The types of the devices that were already online can still be loaded.
     assert [state.state for state in server.services.online.board.states()] == ["online"] * 4
 
 
@@ -176,7 +176,7 @@ async def test_other_errors_still_prevent_the_start_of_a_scene(server: Server) -
     await boxes.open()
     boxes.away.touch()
     await server.ask("StartSceneKeepGoing")
-    assert "message" not in await server.client.state("started")  # all is there
+    assert "message" not in await server.client.state("started")  # every device is connected
     await server.ask("StopScene")
     await server.client.state("stopped")
     boxes.away.unlink()
@@ -199,7 +199,7 @@ async def test_health_and_alarms_are_announced(server: Server) -> None:
 
 
 @serving()
-async def test_what_one_can_see_is_announced(server: Server) -> None:
+async def test_visible_states_are_announced(server: Server) -> None:
     boxes, client = Boxes(server), subscribed(server, "ObjectValues")
     await boxes.open()
     boxes.away.touch()
@@ -222,7 +222,7 @@ class Arm(Robot):
 
 
 class Slow(Recorder):
-    """A client that takes nothing, of which only the newest of each stream waits."""
+    """A client that does not read; only the newest message of each stream waits for it."""
 
     def __init__(self, user: str) -> None:
         super().__init__(user)
@@ -256,7 +256,7 @@ async def test_each_client_chooses_its_streaming_rate(arm: Server) -> None:
     quick.got.clear()
     await until(lambda: len(joints(quick)) >= 20 and joints(other) and slow.newest)
     seen = joints(quick)
-    assert all("time_ms" in data for data in seen), "it gets the ordinary events too"
+    assert all("time_ms" in data for data in seen), "the client also gets the ordinary events"
     steps = [after["time_ms"] - before["time_ms"] for before, after in itertools.pairwise(seen)]
     assert all(step > 0.0 for step in steps)
     assert sum(steps) >= (len(steps) - 2) * 33.3, "faster than requested"

@@ -62,7 +62,7 @@ async def test_observations_are_streamed_while_an_action_runs(server: Server) ->
     steps = [after["time_ms"] - before["time_ms"] for before, after in itertools.pairwise(seen)]
     assert sum(steps) >= (len(steps) - 1) * 100.0, "faster than requested"
 
-    # A device that cannot be read reports why.
+    # A device that cannot be read reports the reason.
     held.cancel()
     await host.call("obj_other", "lose")
     await until(lambda: "reason" in observed(server)[-1])
@@ -88,7 +88,7 @@ async def test_invalid_streams_are_refused(server: Server) -> None:
 
 
 class Block(IOBlock):
-    """Points, of which one is broken and one stale."""
+    """An I/O block, of which one point is broken and one is stale."""
 
     def points(self) -> list[IOPoint]:
         names = ["level", "broken", "stale", *(f"p{n}" for n in range(MOST_POINTS))]

@@ -363,7 +363,7 @@ async def test_move_to_action_point(arm: Server) -> None:
     name = "RobotMoveToActionPointOrientation"
     assert (await arm.client.event(name, lambda d: d["move_event_type"] == "end"))["orientation_id"] == "ori_1"
     pose = await arm.ask("GetEndEffectorPose", {"robot_id": OBJ, "end_effector_id": "tool"})
-    assert pose.position == Position(2, 0, 0)  # the point hangs on the arm, which stands at x = 1
+    assert pose.position == Position(2, 0, 0)  # the parent of the point is the arm at x = 1
     await arm.ask("MoveToActionPoint", {"robot_id": OBJ, "speed": 0.5, "joints_id": "joi_1"})
     await arm.client.event("RobotMoveToActionPointJoints", lambda d: d["move_event_type"] == "end")
 

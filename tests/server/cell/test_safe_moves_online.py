@@ -97,13 +97,13 @@ def box(key: str, at: Position, x: float, y: float, z: float, attachment: Attach
 
 
 async def line(server: Server, to: Position) -> str:
-    """Lead the tip to where it is in READY, and from there in a line; gives why not, empty when it went."""
+    """Move the tip to its pose in READY, and from there in a line; return the reason of a refusal, or an empty text."""
     assert (await move(server, READY, safe=False))["move_event_type"] == "end"
     target = {"position": msgspec.to_builtins(to), "orientation": msgspec.to_builtins(UPSIDE_DOWN)}
     args = {"robot_id": OBJ, "end_effector_id": "tcp", "speed": 0.5, "safe": True, "linear": True} | target
     await server.ask("MoveToPose", args)
-    told = await server.client.event("RobotMoveToPose", lambda data: data["move_event_type"] != "start")
-    return str(told.get("message", ""))
+    event = await server.client.event("RobotMoveToPose", lambda data: data["move_event_type"] != "start")
+    return str(event.get("message", ""))
 
 
 async def height(server: Server) -> float:
@@ -112,26 +112,26 @@ async def height(server: Server) -> float:
 
 @serving(with_arm_alone)
 async def test_added_and_gripped_bodies_are_obstacles_online_and_in_programs(server: Server) -> None:
-    world, beside = server.services.collisions, TIP + Position(0.0, 0.25, 0.0)
+    world, aside = server.services.collisions, TIP + Position(0.0, 0.25, 0.0)
     try:
-        world.put(box("table", beside + Position(0.0, 0.0, -0.2), 0.1, 0.1, 0.02))  # it was there before
+        world.put(box("table", aside + Position(0.0, 0.0, -0.2), 0.1, 0.1, 0.02))  # it was in the scene before
         await server.start()
-        assert await line(server, beside) == ""
-        world.put(box("crate", beside, 0.1, 0.1, 0.1))
-        assert "crate" in await line(server, beside)
+        assert await line(server, aside) == ""
+        world.put(box("crate", aside, 0.1, 0.1, 0.1))
+        assert "crate" in await line(server, aside)
         world.remove("crate")
-        assert await line(server, beside) == ""
+        assert await line(server, aside) == ""
         world.put(box("rod", Position(0.0, 0.0, 0.16), 0.03, 0.03, 0.3, Attachment(OBJ, "tcp")))
-        met = await line(server, beside)
+        met = await line(server, aside)
         assert "rod" in met
         assert "table" in met
         world.stop()
-        assert await line(server, beside) == ""
+        assert await line(server, aside) == ""
         await server.ask("StopScene")
         await server.client.state("stopped")
 
-        # A program meets what was there before it, and what comes while it runs.
-        world.put(box("table", beside + Position(0.0, 0.0, -0.2), 0.1, 0.1, 0.02))
+        # A program avoids objects that existed before its start, and objects added while it runs.
+        world.put(box("table", aside + Position(0.0, 0.0, -0.2), 0.1, 0.1, 0.02))
         world.put(box("rod", Position(0.0, 0.0, 0.16), 0.03, 0.03, 0.3, Attachment(OBJ, "tcp")))
         write(server)
         await server.ask("RunPackage", {"id": "pkg_1"})
@@ -141,11 +141,11 @@ async def test_added_and_gripped_bodies_are_obstacles_online_and_in_programs(ser
         await server.client.state("stopped", "PackageState")
         world.remove("rod")
         await server.ask("RunPackage", {"id": "pkg_1"})
-        (tip,) = (await server.client.event("RobotEef", lambda data: _at(data).distance_to(beside) < 1e-3))[
+        (tip,) = (await server.client.event("RobotEef", lambda data: _at(data).distance_to(aside) < 1e-3))[
             "end_effectors"
         ]
         assert tip["end_effector_id"] == "tcp"
-        world.put(box("crate", beside, 0.1, 0.1, 0.1))
+        world.put(box("crate", aside, 0.1, 0.1, 0.1))
         assert "crate" in (await server.client.event("ProjectException"))["message"]
         await server.client.state("stopped", "PackageState")
     finally:
@@ -158,7 +158,7 @@ def _at(data: dict[str, Any]) -> Position:
 
 
 def write(server: Server) -> None:
-    """A package that leads the tip to the side in a line, again and again."""
+    """Write a package that moves the tip to the side in a line, again and again."""
     target = msgspec.json.encode(Pose(TIP + Position(0.0, 0.25, 0.0), UPSIDE_DOWN)).decode()
     ready = [(joint.name, joint.value) for joint in joints(READY)]
     body = f"""
@@ -185,7 +185,7 @@ async def test_the_controllers_calibration_is_used_online_and_in_programs(server
         assert await height(server) == pytest.approx(TIP.z + LONGER, abs=1e-4)
         await server.ask("StopScene")
         await server.client.state("stopped")
-        await server.start()  # and from the start, the next time
+        await server.start()  # the calibration also applies from the next start
         assert await height(server) == pytest.approx(TIP.z + LONGER, abs=1e-4)
         await server.ask("StopScene")
         await server.client.state("stopped")
@@ -193,7 +193,7 @@ async def test_the_controllers_calibration_is_used_online_and_in_programs(server
         server.client.got.clear()
         await server.ask("RunPackage", {"id": "pkg_1"})
         await server.client.state("running", "PackageState")
-        # Where it was led to the tip is as it should; in READY it is as the arm is.
+        # At the taught pose the tip is where it should be; in READY it deviates by the calibration.
         ready = await server.client.event("RobotEef", lambda data: abs(_at(data).y - TIP.y) < 0.01)
         assert _at(ready).z == pytest.approx(TIP.z + LONGER, abs=1e-4)
         await server.ask("StopPackage")

@@ -115,8 +115,8 @@ def devices(*names: str) -> Callable[[Server], Awaitable[None]]:
     return prepare
 
 
-async def begun(server: Server) -> None:
-    """Wait until the device runs its action."""
+async def until_running(server: Server) -> None:
+    """Wait until the device executes its action."""
     path = server.services.settings.data_dir / "began"
     await until(path.exists)
     path.unlink()
@@ -125,7 +125,7 @@ async def begun(server: Server) -> None:
 async def trying(server: Server, name: str) -> None:
     await server.ask("ExecuteAction", {"action_id": f"act_{name}"})
     await server.client.event("ActionExecution")
-    await begun(server)
+    await until_running(server)
 
 
 async def stop_all(server: Server, codes: bool = False) -> StopAllData:
@@ -205,7 +205,7 @@ async def test_stop_all_works_while_the_scene_starts_and_stops(server: Server) -
 async def test_requests_from_before_a_stop_do_not_start_after_it(server: Server) -> None:
     await server.start()
     await server.ask("ExecuteAction", {"action_id": "act_press"})
-    await stop_all(server)  # before the call has gone to the device
+    await stop_all(server)  # before the call has reached the device
     await server.client.event("ActionCancelled")
     await ended(server)
 
@@ -238,7 +238,7 @@ def write(server: Server, script: str, name: str) -> None:
 async def test_a_program_is_stopped_with_its_devices(server: Server) -> None:
     write(server, "device.run(an='screwdriver_1')", "screwdriver")
     await server.ask("RunPackage", {"id": "pkg_1"})
-    await begun(server)
+    await until_running(server)
     data = await stop_all(server)
     assert {(outcome.kind, outcome.name, outcome.stopped) for outcome in data.outcomes} == {
         (StopKind.PROGRAM, "pkg_1", True),
@@ -263,7 +263,7 @@ async def test_a_starting_program_is_stopped_before_it_begins(server: Server) ->
 async def test_a_program_whose_device_cannot_be_stopped_ends_and_names_it(server: Server) -> None:
     write(server, "device.run(an='press_1')", "press")
     await server.ask("RunPackage", {"id": "pkg_1"})
-    await begun(server)
+    await until_running(server)
     data = await stop_all(server)
     assert set(missed(data)) == {"press"}
     await server.client.state("stopped", "PackageState")

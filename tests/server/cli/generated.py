@@ -1,4 +1,4 @@
-"""Runs the tests of a generated driver."""
+"""Run the tests of a generated driver."""
 
 import os
 import subprocess
@@ -7,9 +7,9 @@ from pathlib import Path
 
 
 def run_tests(root: Path, *arguments: str) -> str:
-    """Run them in a process of its own. They have to pass; return the output.
+    """Run the tests in a separate process. They must pass; return the output.
 
-    Of the installed plugins of pytest, only ours is loaded: the others need several seconds.
+    Of pytest's installed plugins, only ours is loaded: the others take several seconds.
     """
     command = [sys.executable, "-m", "pytest", "-q", "-p", "arcor2_hw.testing.plugin", "-p", "no:cacheprovider", "-rs"]
     environment = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}

@@ -60,7 +60,7 @@ def calibrate(capsys: pytest.CaptureFixture[str]) -> Cli:
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A picture of two markers, one of none, the lens, and where the markers are."""
+    """Return a picture of two markers, an empty picture, the lens, and the marker poses."""
     folder = tmp_path_factory.mktemp("calibrate")
     background = rendering.table(np.random.default_rng(1), side=3.0)
     plates = [rendering.marker(number, 0.1, place) for number, place in PLACES.items()]
@@ -78,8 +78,8 @@ def write(path: Path, content: Any) -> Path:
 
 
 def test_a_camera_pose_is_calibrated(files: Path, tmp_path: Path, calibrate: Cli) -> None:
-    told = ("--lens", files / "lens.yaml", "--markers", files / "markers.yaml")
-    ran = calibrate("camera", files / "markers.png", *told, "--save", tmp_path / "out", "-o", tmp_path / "pose.json")
+    inputs = ("--lens", files / "lens.yaml", "--markers", files / "markers.yaml")
+    ran = calibrate("camera", files / "markers.png", *inputs, "--save", tmp_path / "out", "-o", tmp_path / "pose.json")
     assert ran.status == ExitStatus.OK, ran
     assert "marker 17" in ran.out
     assert "standard deviation" in ran.out
@@ -87,7 +87,7 @@ def test_a_camera_pose_is_calibrated(files: Path, tmp_path: Path, calibrate: Cli
     truth = Pose.from_matrix(CAMERA)
     assert found.position.distance_to(truth.position) < 0.003
     assert cv2.imread(str(tmp_path / "out" / "markers-markers.png")).shape[1] > 640
-    ran = calibrate("camera", files / "markers.png", *told, "--json", "--method", "averaged")
+    ran = calibrate("camera", files / "markers.png", *inputs, "--json", "--method", "averaged")
     whole = msgspec.json.decode(ran.out, type=CameraPose)
     assert whole.method == "averaged"
     assert len(whole.markers) == 2
@@ -99,32 +99,32 @@ def test_a_lens_is_checked(files: Path, tmp_path: Path, calibrate: Cli) -> None:
     assert ran.status == ExitStatus.OK, ran
     assert "of the given focal length" in ran.out
     long = write(tmp_path / "long.yaml", msgspec.structs.replace(PARAMETERS, fx=660.0, fy=658.9))
-    told = ("--lens", long, *markers, "-o", tmp_path / "fitting.json")
-    ran = calibrate("check-lens", files / "markers.png", *told)
+    inputs = ("--lens", long, *markers, "-o", tmp_path / "fitting.json")
+    ran = calibrate("check-lens", files / "markers.png", *inputs)
     assert ran.status == ExitStatus.CALIBRATION_REFUSED, ran
     assert "smaller" in ran.out
     fitting = msgspec.json.decode((tmp_path / "fitting.json").read_bytes(), type=CameraParameters)
     assert fitting.fx == pytest.approx(600.0, rel=0.02)
-    ran = calibrate("check-lens", files / "markers.png", *told, "--json")
+    ran = calibrate("check-lens", files / "markers.png", *inputs, "--json")
     assert msgspec.json.decode(ran.out, type=LensCheck).state == "contradicted"
-    ran = calibrate("check-lens", files / "empty.png", *told)
+    ran = calibrate("check-lens", files / "empty.png", *inputs)
     assert (ran.status, ran.out) == (ExitStatus.CALIBRATION_REFUSED, "")
 
 
 def test_errors_have_an_exit_status_and_one_line(files: Path, tmp_path: Path, calibrate: Cli) -> None:
-    told = ("--lens", files / "lens.yaml", "--markers", files / "markers.yaml")
+    inputs = ("--lens", files / "lens.yaml", "--markers", files / "markers.yaml")
     twice = tmp_path / "twice.yaml"
     twice.write_text("markers:\n  3: {pose: {}}\n  3: {pose: {}}\n")
     lens = write(tmp_path / "lens.yaml", {"fx": 1})
     others = write(tmp_path / "others.yaml", {"markers": [{"marker_id": 44, "pose": Pose()}]})
     cases: list[tuple[list[str | Path], ExitStatus, str]] = [
-        (["camera", files / "empty.png", *told], ExitStatus.CALIBRATION_REFUSED, "No configured marker"),
-        (["camera", files / "markers.png", *told[:2], "--markers", others], ExitStatus.CALIBRATION_REFUSED, "marker"),
-        (["camera", files / "none.png", *told], ExitStatus.NOT_FOUND, "none.png"),
-        (["camera", files / "lens.yaml", *told], ExitStatus.DOCUMENT_PROBLEMS, "picture"),
-        (["camera", files / "markers.png", *told[:2], "--markers", twice], ExitStatus.DOCUMENT_PROBLEMS, "marker 3"),
-        (["camera", files / "markers.png", "--lens", lens, *told[2:]], ExitStatus.DOCUMENT_PROBLEMS, "fy"),
-        (["camera", *told], ExitStatus.DOCUMENT_PROBLEMS, "picture"),
+        (["camera", files / "empty.png", *inputs], ExitStatus.CALIBRATION_REFUSED, "No configured marker"),
+        (["camera", files / "markers.png", *inputs[:2], "--markers", others], ExitStatus.CALIBRATION_REFUSED, "marker"),
+        (["camera", files / "none.png", *inputs], ExitStatus.NOT_FOUND, "none.png"),
+        (["camera", files / "lens.yaml", *inputs], ExitStatus.DOCUMENT_PROBLEMS, "picture"),
+        (["camera", files / "markers.png", *inputs[:2], "--markers", twice], ExitStatus.DOCUMENT_PROBLEMS, "marker 3"),
+        (["camera", files / "markers.png", "--lens", lens, *inputs[2:]], ExitStatus.DOCUMENT_PROBLEMS, "fy"),
+        (["camera", *inputs], ExitStatus.DOCUMENT_PROBLEMS, "picture"),
     ]
     for arguments, status, words in cases:
         ran = calibrate(*arguments)
@@ -161,7 +161,7 @@ def test_touched_points(tmp_path: Path, calibrate: Cli) -> None:
 
 
 def test_intrinsics_and_hand_eye_read_and_write_files(files: Path, tmp_path: Path, calibrate: Cli) -> None:
-    """What they compute has tests of its own; here, that the files come together and refusals come out."""
+    """Other tests check the results. This one checks that the files are read, and that refusals are reported."""
     board = write(tmp_path / "board.yaml", {"columns": 7, "rows": 5, "square": 0.03, "marker": 0.0225})
     ran = calibrate("intrinsics", files / "markers.png", "--board", board)
     assert (ran.status, ran.out) == (ExitStatus.CALIBRATION_REFUSED, ""), ran

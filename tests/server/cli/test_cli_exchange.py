@@ -53,7 +53,7 @@ class Ran(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Two servers: what is built on the first goes to the second."""
+    """Two servers: documents from the first are imported into the second."""
 
     first: str
     second: str
@@ -91,7 +91,7 @@ async def _stopped(*servers: ServerProcess) -> None:
 
 
 async def _filled(url: str) -> None:
-    """A scene with a mesh, a virtual box, types that lean on each other; a project with logic and one by hand."""
+    """Create a scene with a mesh, a virtual box and dependent types, and projects with logic and with a script."""
     async with Client(url, "author") as author:
         rest = author.rest
         for name in ("KinematicsMixin", "AbstractArm", "ArmM1"):
@@ -155,9 +155,9 @@ def cli(place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: p
     def run(*words: str, at: str = "") -> Ran:
         capsys.readouterr()
         status = app([*words, "--url", at] if at else list(words))
-        told = capsys.readouterr()
-        assert status == 0 or told.err.startswith(f"arcor2-hw {words[0]} {words[1]}: "), told.err
-        return Ran(status, told.out, told.err)
+        printed = capsys.readouterr()
+        assert status == 0 or printed.err.startswith(f"arcor2-hw {words[0]} {words[1]}: "), printed.err
+        return Ran(status, printed.out, printed.err)
 
     return run
 
@@ -198,7 +198,7 @@ def test_an_exported_project_is_imported_and_builds_on_an_empty_server(cli: Any,
             f"object_types/{module_name(name)}.py"
             for name in ("ArmM1", "AbstractArm", "KinematicsMixin", "Crate", "Wall")
         }
-    # The same content is the same file, and none is overwritten by accident.
+    # The same content results in the same file, and no file is overwritten by accident.
     first = Path("open_it.zip").read_bytes()
     again = cli("project", "export", "open it", at=place.first)
     assert (again.status, "--force" in again.err) == (ExitStatus.CONFLICT, True)
@@ -220,7 +220,7 @@ def test_an_exported_project_is_imported_and_builds_on_an_empty_server(cli: Any,
         return built.package_id
 
     assert place.ask(place.second, build).startswith("pkg_")
-    # Once more: nothing is left to do. Nothing differs.
+    # Once more: there is nothing left to do, and no difference.
     once_more = cli("project", "import", "open_it.zip", at=place.second)
     assert {line.partition(": ")[2] for line in once_more.out.splitlines()} == {"same"}
     same = cli("project", "diff", "open_it.zip", "open it", at=place.second)
@@ -228,7 +228,7 @@ def test_an_exported_project_is_imported_and_builds_on_an_empty_server(cli: Any,
 
 
 async def _picture(client: Client) -> Any:
-    """All that belongs to the project, but for the times."""
+    """Return everything that belongs to the project, except for the times."""
     rest = client.rest
     listed = {one.name: one.id for one in await rest.projects()}
     project = await rest.project(listed["open it"])
@@ -279,7 +279,7 @@ def test_differences_are_named_and_replaced_only_on_request(cli: Any, place: Pla
     assert cli("project", "diff", "other.zip", "open it", at=place.second).status == 0
     cli("project", "import", "out.zip", "--overwrite", "all", at=place.second)
 
-    # What somebody has open is not changed under him.
+    # A document that another user has open is not changed.
     ann = Client(place.second, "ann")
 
     async def open_it() -> None:
@@ -328,11 +328,11 @@ def test_a_failed_import_is_reverted(cli: Any, place: Place, tmp_path: Path, mon
     real = Rest.put_kept_overrides
 
     async def fails(rest: Rest, key: str, overrides: Any) -> None:
-        """The last thing that an import does."""
+        """Fail in the last step of an import."""
         monkeypatch.setattr(Rest, "put_kept_overrides", real)
         async with Client(place.second) as client:
             names = {one.name for one in await client.rest.projects()}
-            assert "copy" in names or await _whole(client, tmp_path) != before, "all else is done by now"
+            assert "copy" in names or await _whole(client, tmp_path) != before, "all other steps are done by now"
         raise full
 
     monkeypatch.setattr(Rest, "put_kept_overrides", fails)
@@ -342,7 +342,7 @@ def test_a_failed_import_is_reverted(cli: Any, place: Place, tmp_path: Path, mon
     assert f"The disk is full. Undone: {taken}." in failed.err
     assert picture() == before
 
-    # What was new goes.
+    # New documents are removed again.
     monkeypatch.setattr(Rest, "put_kept_overrides", fails)
     failed = cli("project", "import", "out.zip", "--name", "copy", at=place.second)
     assert "Undone: project copy." in failed.err
@@ -373,7 +373,7 @@ def test_a_copy_gets_its_own_name_and_id(cli: Any, place: Place) -> None:
     cli("scene", "import", "bench.zip", "--overwrite", "all", at=place.second)
     assert cli("scene", "import", "bench.zip", "--name", "bench two", at=place.second).status == 0
     listed = {one["name"]: one["id"] for one in json.loads(cli("scene", "list", "--json", at=place.second).out)}
-    # A project's file holds its scene, too.
+    # The file of a project contains its scene, too.
     cli("project", "export", "open it", at=place.first)
     assert cli("scene", "diff", "open_it.zip", "bench.zip") == (0, "No differences.\n", "")
     assert listed.keys() >= {"bench", "bench two"}
@@ -448,22 +448,22 @@ BROKEN: dict[str, tuple[str, Callable[[Any], None], str]] = {
         lambda scene: scene["objects"][0]["pose"]["position"].update(x="far"),
         "data/scene.json: Expected `float`, got `str` - at `$.objects[0].pose.position.x`",
     ),
-    "a type that is nowhere": (
+    "a type that does not exist": (
         "data/scene.json",
         lambda scene: scene["objects"][0].update(type="Barrel"),
         "data/scene.json: objects[0] (crate): crate: the object type Barrel does not exist",
     ),
-    "a setting that is missing": (
+    "a missing setting": (
         "data/scene.json",
         lambda scene: scene["objects"][2].update(parameters=[]),
         "data/scene.json: objects[2] (arm): arm: the setting url is missing",
     ),
-    "an action of nothing": (
+    "an action of a missing object": (
         "data/project.json",
         lambda project: project["action_points"][0]["actions"][1].update(type="obj_1/sleep"),
         "data/project.json: action_points[0].actions[1] (wait): ",
     ),
-    "a parameter that is missing": (
+    "a missing parameter": (
         "data/project.json",
         lambda project: project["action_points"][0]["actions"][0].update(parameters=[]),
         "data/project.json: action_points[0].actions[0] (open_the_lid): open_the_lid: the parameter angle is missing",
@@ -494,7 +494,7 @@ BROKEN: dict[str, tuple[str, Callable[[Any], None], str]] = {
         lambda head: head.update(format=2),
         "export.json: format 2 is not supported",
     ),
-    "an asset that is not there": (
+    "a missing asset": (
         "export.json",
         lambda head: head.update(assets=[]),
         "data/models of Crate: The mesh needs the asset 'crate_mesh', which is missing",
@@ -527,15 +527,15 @@ def exported(place: Place) -> Path:
 
 @pytest.mark.parametrize("case", BROKEN)
 def test_an_invalid_entry_is_named_and_nothing_is_imported(cli: Any, exported: Path, place: Place, case: str) -> None:
-    path, change, told = BROKEN[case]
+    path, change, expected = BROKEN[case]
     repacked(exported, Path("broken.zip"), changed(path, change))
     checked = cli("project", "validate", "broken.zip")
     assert checked.status == ExitStatus.DOCUMENT_PROBLEMS
-    assert told in checked.err
+    assert expected in checked.err
     (first, *_) = json.loads(cli("project", "validate", "--json", "broken.zip").out)
     assert (first["file"], first["level"]) == ("broken.zip", "error")
     assert first["entry"] or "id " in first["text"]
-    if case not in ("an asset that is not there",):  # it may be on the server
+    if case not in ("a missing asset",):  # it may be on the server
         brought = cli("project", "import", "broken.zip", "--overwrite", "all", at=place.second)
         assert brought.status == ExitStatus.DOCUMENT_PROBLEMS
 
@@ -551,7 +551,7 @@ def _link(archive: zipfile.ZipFile) -> None:
 
 
 @pytest.mark.parametrize(
-    ("spoil", "told"),
+    ("spoil", "expected"),
     [
         (lambda archive: archive.writestr("../evil.py", "x"), "outside of it"),
         (lambda archive: archive.writestr("/evil.py", "x"), "outside of it"),
@@ -561,14 +561,14 @@ def _link(archive: zipfile.ZipFile) -> None:
     ],
 )
 def test_a_foreign_file_is_not_trusted(
-    cli: Any, exported: Path, spoil: Any, told: str, monkeypatch: pytest.MonkeyPatch
+    cli: Any, exported: Path, spoil: Any, expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("arcor2_server.exchange.archive.MAX_SIZE", 2 << 20)
     Path("evil.zip").write_bytes(exported.read_bytes())
     with zipfile.ZipFile("evil.zip", "a") as archive:
         spoil(archive)
     checked = cli("project", "validate", "evil.zip")
-    assert (checked.status, told in checked.err) == (ExitStatus.DOCUMENT_PROBLEMS, True), checked.err
+    assert (checked.status, expected in checked.err) == (ExitStatus.DOCUMENT_PROBLEMS, True), checked.err
     assert {path.name for path in Path().iterdir()} == {"evil.zip"}
 
 
@@ -594,7 +594,7 @@ def test_failures_have_an_exit_status(cli: Any, place: Place, exported: Path, tm
     Path("none.zip").write_text("no zip")
     half = Path("half.zip")
     half.write_bytes(exported.read_bytes()[:2000])
-    for words, status, told in (
+    for words, status, expected in (
         (("scene", "list", "--url", "ws://127.0.0.1:9"), ExitStatus.NO_SERVER, "127.0.0.1:9"),
         (("scene", "export", "nowhere", "--url", place.first), ExitStatus.NOT_FOUND, "has no scene nowhere"),
         (("project", "import", "missing.zip", "--url", place.first), ExitStatus.NOT_FOUND, "missing.zip"),
@@ -605,7 +605,7 @@ def test_failures_have_an_exit_status(cli: Any, place: Place, exported: Path, tm
         (("scene", "export", "bench", "-o", "no/where.zip", "--url", place.first), ExitStatus.FAILED, "written"),
     ):
         ran = cli(*words)
-        assert (ran.status, told in ran.err, ran.err.count("\n")) == (status, True, 1), ran.err
+        assert (ran.status, expected in ran.err, ran.err.count("\n")) == (status, True, 1), ran.err
 
 
 def test_an_unfinished_program_is_valid_with_a_note(cli: Any, exported: Path) -> None:

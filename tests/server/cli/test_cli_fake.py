@@ -23,12 +23,12 @@ def arcor2_hw_fake(*words: str) -> subprocess.CompletedProcess[str]:
 
 
 class Running:
-    """`arcor2-hw fake run` in the foreground of nobody."""
+    """A process that runs `arcor2-hw fake run`."""
 
     def __init__(self, *words: str) -> None:
         self.process = subprocess.Popen([*CLI, "run", *words], stdout=subprocess.PIPE, text=True)
         assert self.process.stdout is not None
-        self.said = self.process.stdout.readline()
+        self.greeting = self.process.stdout.readline()
         self.at: dict[str, str] = {}
         while "control" not in self.at:
             key, value = self.process.stdout.readline().split(maxsplit=1)
@@ -65,7 +65,7 @@ def test_every_fake_in_the_tree_is_listed_with_wire_and_text() -> None:
 
 
 def _committed(main: Path) -> bool:
-    """Whether a fake is part of the tree, not one that somebody is writing."""
+    """Return whether a fake is committed, unlike one that is just being written."""
     return (main.parent / "__init__.py").exists() and "WIRE" in (main.parent / "__init__.py").read_text()
 
 
@@ -114,7 +114,7 @@ def test_a_fake_of_another_distribution_is_listed(
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_fake_in_the_foreground_prints_its_address_and_ends_cleanly(number: signal.Signals) -> None:
     running = Running("conveyor", "--", "--node", "7")
-    assert running.said == "conveyor is ready; press Ctrl-C to stop it\n"
+    assert running.greeting == "conveyor is ready; press Ctrl-C to stop it\n"
     assert running.at["node"] == "7"
     assert re.fullmatch(r"127\.0\.0\.1:\d+", running.at["can"])
     assert running.end(number) == 0

@@ -82,7 +82,7 @@ def test_related_types_are_uploaded_together_and_separately(
     known = loop.run(types(server.url))
     assert known["ArmM1"] == (False, "AbstractArm")
     assert "gains" not in known
-    # What it needs is there already.
+    # Its dependencies are uploaded already.
     arm.write_text(arm.read_text().replace("arm-m1.zip", "arm-m2.zip"))
     assert object_type(server, "add", arm).returncode == 0
     listed = object_type(server, "list").stdout
@@ -92,7 +92,7 @@ def test_related_types_are_uploaded_together_and_separately(
     again = object_type(server, "add", arm)
     assert again.returncode == ExitStatus.ANALYSIS_PROBLEMS
     assert "gains" in again.stderr
-    # The name of an installed type: the user is told, and how to undo it.
+    # The name of an installed type: a notice says so, and how to undo it.
     flow = sources / "flow_actions.py"
     flow.write_text(
         "from arcor2_hw.objects import Generic\n\n\n"

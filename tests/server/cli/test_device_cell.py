@@ -59,7 +59,7 @@ def test_a_reachable_device_is_checked(tmp_path: Path, scale: FakeProcess) -> No
     for word in ("balance", "MtSicsScale", port, "online", "MS3002S", "normal"):
         assert word in row
     asked = set(scale.truth()["received"][received:])
-    assert asked, "it was asked"
+    assert asked, "the device received requests"
     assert not [line for line in asked if line.split()[0] in ("T", "Z", "TI", "ZI", "TA", "TAC", "@")], asked
 
 
@@ -191,7 +191,7 @@ class Device:
 
 @pytest.fixture
 def libraries(tmp_path: Path) -> str:
-    """Vendors' libraries with something connected: what is tested is ours."""
+    """Install vendor libraries with connected devices; the code under test is ours."""
     (tmp_path / "serial" / "tools").mkdir(parents=True)
     for empty in ("serial/__init__.py", "serial/tools/__init__.py"):
         (tmp_path / empty).touch()
@@ -221,23 +221,23 @@ def test_scan_lists_the_nodes_of_a_can_bus(belt: FakeProcess, adapter: str) -> N
     assert "profile 402" in node["description"]
     assert node["serial"]
     after = belt.truth()
-    assert after["state"] == before["state"], "it was only read"
+    assert after["state"] == before["state"], "the scan only reads"
 
 
 @pytest.mark.parametrize(
-    ("bus", "said"),
+    ("bus", "expected"),
     [
         ("can0", "is not a CAN bus"),
         ("slcan:/dev/ttyX@fast", "is not a bit rate"),
         ("slcan:/dev/does-not-exist", "cannot be opened"),
     ],
 )
-def test_an_unusable_bus_is_reported(bus: str, said: str) -> None:
+def test_an_unusable_bus_is_reported(bus: str, expected: str) -> None:
     done = arcor2_hw("device", "scan", "--no-oak", "--can", bus)
     assert done.returncode == 1
     (line,) = done.stderr.splitlines()
     assert bus in line
-    assert said in line
+    assert expected in line
 
 
 def test_a_crashing_library_does_not_hide_other_results(libraries: str) -> None:

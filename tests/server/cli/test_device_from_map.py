@@ -75,7 +75,7 @@ def registers(fake: FakeProcess) -> dict[str, Any]:
 
 @pytest.fixture
 def make(tmp_path: Path, fake: FakeProcess, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Screwdriver]]:
-    """Gives ``make(map)``: the generated driver of a map, connected to the independent fake and in control."""
+    """Return ``make(map)``: the generated driver of a map, connected to the independent fake and in control."""
     made: list[MappedDevice] = []
 
     def build(text: str = "") -> Screwdriver:
@@ -251,12 +251,12 @@ def test_values_that_are_not_allowed_are_refused_before_anything_is_written(
     device: Screwdriver, fake: FakeProcess
 ) -> None:
     before = fake.truth()["written"]
-    for call, said in (
+    for call, expected in (
         (lambda: device.tighten("medium", 5.0), "driver at .*: program must be one of soft, hard, not 'medium'"),
         (lambda: device.put("a test", {"program": "soft", "limit": 13.0}), "limit must be 0.1 to 12 N m, not 13.0"),
         (lambda: device.put("a test", {"program": "soft", "start": 1}), "start must be true or false, not 1"),
     ):
-        with pytest.raises(OutOfRange, match=said):
+        with pytest.raises(OutOfRange, match=expected):
             call()
     assert fake.truth()["written"] == before
 
@@ -320,7 +320,7 @@ def test_a_command_that_ends_without_success(
     wait, accepted = device.wait, threading.Event()
 
     def noted(holds: Any, timeout: float, what: str, *options: Any) -> Any:
-        if what == "tighten":  # the wait before is for accepting it
+        if what == "tighten":  # the wait before is for its acknowledgement
             accepted.set()
         return wait(holds, timeout, what, *options)
 
@@ -350,7 +350,7 @@ def test_stop_ends_a_command_and_the_device(device: Screwdriver, fake: FakeProce
     assert device.tighten("hard", 2.0)[0] == 2.0
 
 
-# ------------------------------------------------------------------------------------------------ loss and control
+# ----------------------------------------------------------------------------------- connection loss and control
 def test_without_the_heartbeat_the_device_stops(device: Screwdriver, fake: FakeProcess) -> None:
     thread, outcome = run_in_thread(lambda: device.tighten("soft", 10.0))
     fake.control.wait_until(lambda truth: truth["busy"])

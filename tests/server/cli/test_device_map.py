@@ -50,7 +50,7 @@ def test_the_examples_are_valid(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "expected"),
     [
         # points
         ("address: 1,", "address: 65536,", ", line 6: points.mode: address must be 0 to 65535, not 65536"),
@@ -116,8 +116,8 @@ def test_the_examples_are_valid(name: str) -> None:
         (MAP, "", ", line 1: the map: it must be a mapping"),
     ],
 )  # fmt: skip
-def test_mistakes_are_named(tmp_path: Path, old: str, new: str, said: str) -> None:
-    assert wrong(tmp_path, old, new).startswith(said)
+def test_mistakes_are_named(tmp_path: Path, old: str, new: str, expected: str) -> None:
+    assert wrong(tmp_path, old, new).startswith(expected)
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
@@ -143,7 +143,7 @@ def test_the_word_order_of_the_map_is_that_of_its_points(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "expected"),
     [
         (["press", "--from-map", "MAP", "--base", "machine", "--bus", "modbus"], "either --base and --bus, or"),
         (["press", "--from-map", "MAP", "--bus", "modbus"], "either --base and --bus, or"),
@@ -154,13 +154,13 @@ def test_the_word_order_of_the_map_is_that_of_its_points(tmp_path: Path) -> None
         (["press", "--from-map", "BAD"], "bad.yaml, line 6: points.mode: address must be 0 to 65535"),
     ],
 )
-def test_the_command_refuses_mistakes_in_one_line(tmp_path: Path, arguments: list[str], said: str) -> None:
+def test_the_command_refuses_mistakes_in_one_line(tmp_path: Path, arguments: list[str], expected: str) -> None:
     (tmp_path / "press.yaml").write_text(MAP)
     (tmp_path / "bad.yaml").write_text(MAP.replace("address: 1,", "address: -1,"))
     files = {"MAP": "press.yaml", "BAD": "bad.yaml"}
     command = [*COMMAND, *(files.get(each, each) for each in arguments)]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert said in done.stderr
+    assert expected in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.yaml", "press.yaml"]

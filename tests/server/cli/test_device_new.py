@@ -15,11 +15,11 @@ from tests.server.cli.generated import run_tests
 COMMAND = [sys.executable, "-m", "arcor2_server.cli.main"]
 ROOT = Path(__file__).parents[3]
 RUN = list(zip(KINDS, [*WIRES, *WIRES], strict=True))
-"""What is run here in full: each base, each bus twice. Every other combination is linted and analysed."""
+"""The combinations whose tests run completely: each base, each bus twice. All others are linted and analysed."""
 ALL = [(base, bus) for base in KINDS for bus in WIRES]
 
 
-def written(directory: Path, base: Base, bus: Bus, name: str = "dough-mixer") -> Path:
+def generate(directory: Path, base: Base, bus: Bus, name: str = "dough-mixer") -> Path:
     done = subprocess.run(
         [*COMMAND, "device", "new", name, "--base", base, "--bus", bus, "--directory", str(directory)],
         capture_output=True,
@@ -32,7 +32,7 @@ def written(directory: Path, base: Base, bus: Bus, name: str = "dough-mixer") ->
 
 @pytest.mark.parametrize(("base", "bus"), RUN, ids=lambda each: each.value)
 def test_the_generated_driver_reaches_silver(tmp_path: Path, base: Base, bus: Bus) -> None:
-    output = run_tests(written(tmp_path, base, bus))
+    output = run_tests(generate(tmp_path, base, bus))
     assert "DoughMixer: silver (claimed silver)" in output
     for line in output.splitlines():
         if line.startswith("SKIPPED"):
@@ -61,19 +61,19 @@ def test_generated_code_is_clean_with_any_name(tmp_path: Path) -> None:
 
 
 def pass_tests(root: Path, selected: str, count: int) -> None:
-    """Run selected tests of a generated driver; as many have to pass."""
+    """Run selected tests of a generated driver; this number of them must pass."""
     assert f"{count} passed" in run_tests(root, "-k", selected)
 
 
 def test_a_generated_modbus_driver_also_works_over_rtu(tmp_path: Path) -> None:
-    root = written(tmp_path, Base.GENERIC, Bus.MODBUS, "press")
+    root = generate(tmp_path, Base.GENERIC, Bus.MODBUS, "press")
     test = root / "tests" / "test_press.py"
     test.write_text(test.read_text().replace("    fake = ", '    arguments = ("--rtu",)\n    fake = '))
     pass_tests(root, "amount or half_a_frame or loss_reaction or reset_and_back", 4)
 
 
 def test_lines_of_text_may_end_in_another_way(tmp_path: Path) -> None:
-    root = written(tmp_path, Base.GENERIC, Bus.TCP, "press")
+    root = generate(tmp_path, Base.GENERIC, Bus.TCP, "press")
     link, fake = root / "press" / "link.py", root / "press" / "press_fake.py"
     link.write_text(link.read_text().replace('END = b"\\r"', 'END = b"\\r\\n"'))
     fake.write_text(fake.read_text().replace('"tcp")', '"tcp", end=b"\\r\\n")'))
@@ -82,8 +82,8 @@ def test_lines_of_text_may_end_in_another_way(tmp_path: Path) -> None:
 
 
 def test_the_drivers_are_typed(tmp_path: Path, pytestconfig: pytest.Config) -> None:
-    kept = getattr(pytestconfig, "cache", None)  # of the library, which need not be read each time
-    known = kept.mkdir("typed-starters") if kept is not None else tmp_path / "mypy"
+    cache = getattr(pytestconfig, "cache", None)  # mypy's cache of the library
+    known = cache.mkdir("typed-starters") if cache is not None else tmp_path / "mypy"
     for base, bus in RUN:
         for path, text in texts(f"{base}-of-mine", base, bus).items():
             (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
@@ -101,7 +101,7 @@ def test_the_drivers_are_typed(tmp_path: Path, pytestconfig: pytest.Config) -> N
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "expected"),
     [
         (["arm", "--base", "robot", "--bus", "modbus"], "robots have no template"),
         (["eye", "--base", "camera", "--bus", "serial"], "cameras have no template"),
@@ -112,7 +112,7 @@ def test_the_drivers_are_typed(tmp_path: Path, pytestconfig: pytest.Config) -> N
         (["press", "--base", "lamp", "--bus", "modbus"], "lamp"),
     ],
 )
-def test_invalid_options_are_refused_in_one_sentence(tmp_path: Path, arguments: list[str], said: str) -> None:
+def test_invalid_options_are_refused_in_one_sentence(tmp_path: Path, arguments: list[str], expected: str) -> None:
     done = subprocess.run(
         [*COMMAND, "device", "new", *arguments, "--directory", str(tmp_path)],
         capture_output=True,
@@ -120,13 +120,13 @@ def test_invalid_options_are_refused_in_one_sentence(tmp_path: Path, arguments: 
         check=False,
     )
     assert done.returncode == 2
-    assert said in done.stderr
+    assert expected in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
 
 
 def test_nothing_is_overwritten(tmp_path: Path) -> None:
-    written(tmp_path, Base.GENERIC, Bus.HTTP, "scanner")
+    generate(tmp_path, Base.GENERIC, Bus.HTTP, "scanner")
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     again = [*COMMAND, "device", "new", "scanner", "--base", "machine", "--bus", "tcp", "--directory", str(tmp_path)]
     done = subprocess.run(again, capture_output=True, text=True, check=False)

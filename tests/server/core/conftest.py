@@ -12,7 +12,7 @@ from tests.server.core.serving import ServerProcess, until
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
-    """A server with short time-outs of locks."""
+    """Start a server with short time-outs of locks."""
     directory: Path = tmp_path_factory.mktemp("server") / "data"
     process = ServerProcess(
         directory,
@@ -22,7 +22,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
     )
     with asyncio.Runner() as runner:
         runner.run(process.start())
-        # The spare host comes up after `ready`; it belongs to the server, not to the test that happens to run then.
+        # The spare host starts after `ready`. Wait for it, so that no test pays for its start.
         runner.run(until(lambda: psutil.Process(process.process.pid).children()))
         yield process
         assert runner.run(process.stop()) == 0

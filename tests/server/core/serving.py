@@ -19,7 +19,7 @@ from tests.forking import Forked, Forker, ended, readable
 COMMAND = [sys.executable, "-m", "arcor2_server.cli.main"]
 READY_WITHIN = 60.0
 WITHIN = 30.0
-"""Time in s for which a test waits for what must come; long, as it passes only when a test fails."""
+"""Time limit for expected messages, s. Long, because only a failing test waits for all of it."""
 
 
 _forker = Forker()
@@ -36,7 +36,7 @@ class ServerProcess:
     """`arcor2-hw serve` as a child, forked from a process that has imported it."""
 
     forked = True
-    """False: the real command is started."""
+    """Whether to fork a process that has imported the server. False starts the real command."""
 
     def __init__(self, data_dir: Path, *arguments: str, **environment: str) -> None:
         self.data_dir = data_dir
@@ -54,7 +54,7 @@ class ServerProcess:
     async def start(self) -> None:
         stored = self.data_dir / "analysis.msgpack"
         fresh = self.forked and not self.data_dir.exists()
-        if fresh and _analyses:  # it takes a third of a start; the server checks that it is valid
+        if fresh and _analyses:  # the analysis takes a third of a start; the server checks that it is valid
             self.data_dir.mkdir(0o700, parents=True)
             stored.write_bytes(_analyses[0])
         serve = ("serve", "--port", "0", "--data-dir", str(self.data_dir), *self._arguments)
@@ -66,7 +66,7 @@ class ServerProcess:
                 self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, env=self._environment)
         try:
             self.url = await self._ready()
-        except BaseException:  # nobody will stop what has not started
+        except BaseException:  # nobody will stop a server that has not started
             self._process.kill()
             await self.ended()
             raise
@@ -89,7 +89,7 @@ class ServerProcess:
         return line.decode().split()[1]
 
     async def ended(self) -> int:
-        """Wait until it has ended."""
+        """Wait until the process has ended."""
         status = await ended(self.process)
         assert self.process.stdout is not None
         self.process.stdout.close()
@@ -125,7 +125,7 @@ class Talker:
         return message
 
     async def raw(self, text: str | bytes) -> dict[str, Any]:
-        """Send as it is and give the answer."""
+        """Send a message unchanged and return the answer."""
         await self.socket.send(text)
         while "event" in (message := await self.receive()):
             self.events.append(message)
@@ -151,20 +151,20 @@ class Talker:
         return str(message)
 
     async def event(self, name: str, within: float = WITHIN) -> dict[str, Any]:
-        """Give the next event, which must be of that name."""
+        """Return the next event, which must have this name."""
         message = self.events.pop(0) if self.events else await self.receive(within)
         assert message.get("event") == name, message
         return message
 
     async def nothing_more(self) -> None:
-        """Make sure that no event is under way: all that was sent before comes before this answer."""
+        """Assert that no event is on its way: everything sent earlier arrives before this answer."""
         await self.request("SystemInfo")
         assert self.events == []
 
 
 @contextlib.asynccontextmanager
 async def talking(url: str, user: str | None = None, **options: Any) -> AsyncIterator[Talker]:
-    """Connect, take the greeting, log in."""
+    """Connect, read the first messages, register a user."""
     async with connect(url, compression=None, max_size=None, **options) as socket:
         talker = Talker(socket)
         await talker.event("ShowMainScreen")
@@ -174,7 +174,7 @@ async def talking(url: str, user: str | None = None, **options: Any) -> AsyncIte
 
 
 async def until(condition: Any, within: float = WITHIN) -> None:
-    """Poll with a deadline."""
+    """Wait until the condition holds, or fail after a time limit."""
     deadline = time.monotonic() + within
     while not condition():
         assert time.monotonic() < deadline, "it did not happen"

@@ -60,7 +60,7 @@ async def test_only_upsert_replaces(store: AssetStore, tmp_path: Path) -> None:
     assert store.revision > revision
     assert (second.created, await read(store, "a")) == (first.created, b"two")
     assert second.modified > first.modified
-    assert contents(tmp_path) == [b"two"]  # what nobody refers to is gone
+    assert contents(tmp_path) == [b"two"]  # unreferenced content is removed
 
 
 async def test_equal_content_is_stored_once_until_its_last_asset_is_deleted(store: AssetStore, tmp_path: Path) -> None:
@@ -101,7 +101,7 @@ async def test_an_oversized_upload_is_refused_and_leaves_nothing(store: AssetSto
 
     with pytest.raises(TooLarge, match="1000000 bytes"):
         await store.put(endless(), "a")
-    assert taken == 1_100_000  # not read any further
+    assert taken == 1_100_000  # reading stopped there
     assert not store.exists("a")
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
     assert (await store.put(chunks(b"x" * 1_000_000), "a")).size == 1_000_000
@@ -180,7 +180,7 @@ async def test_driver_assets_are_read_but_not_listed_and_uploads_take_precedence
     assert await read(store, "arm.zip") == b"mine"
     await store.delete("arm.zip")
     assert await read(store, "arm.zip") == b"the driver's"
-    # The same bytes, put in and deleted, leave what is offered.
+    # Uploading and deleting the same bytes leaves the driver's assets available.
     await store.put(chunks(b"the driver's"), "copy")
     await store.delete("copy")
     assert await read(store, "arm.zip") == b"the driver's"

@@ -11,7 +11,7 @@ from tests.server.core.serving import until
 
 
 class ValveWire(Wire):
-    """A connection that can be shut."""
+    """A connection whose sending can be blocked."""
 
     def __init__(self) -> None:
         self.sent: list[bytes] = []

@@ -30,7 +30,7 @@ HEAD = b"GET / HTTP/1.1\r\nHost: localhost\r\n"
 
 
 def on_uvloop(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:
-    """Run a test on the event loop that the server has."""
+    """Run a test on the event loop that the server uses."""
 
     @functools.wraps(test)
     def run(**fixtures: Any) -> None:
@@ -61,7 +61,7 @@ def test_the_oldest_connection_of_an_address_is_closed_first() -> None:
     assert opened.dropped == []
     third = opened.open()
     assert opened.dropped == [first]
-    second.wait()  # it has been used: now it is the newest
+    second.wait()  # it has been used: now it counts as the latest
     opened.open()
     assert opened.dropped == [first, third]
     other.close()
@@ -115,7 +115,7 @@ def test_limits_follow_the_file_descriptors_of_the_system(tmp_path: Path, monkey
 
 # ------------------------------------------------------------------------------------------------ a real listener
 async def answer(scope: Any, receive: Any, send: Any) -> None:
-    """Answer a request with how many bytes its body has, or with many; admit a websocket, and echo."""
+    """Answer with the size of the request's body, or with many bytes; accept a websocket, and echo its messages."""
     if scope["type"] == "websocket":
         await receive()
         await send({"type": "websocket.accept"})
@@ -302,7 +302,7 @@ async def test_connections_are_counted_before_tls(tmp_path: Path) -> None:
 
 
 class NoFiles(socket.socket):
-    """A listener that finds no file descriptor for its first connections."""
+    """A listener that fails with EMFILE for its first connections."""
 
     tries = 0
 

@@ -22,7 +22,7 @@ from arcor2_server.websocket.request import Context, Handler
 
 
 class Protocol:
-    """What the endpoint uses of WireProtocol."""
+    """The part of WireProtocol that the endpoint uses."""
 
     def __init__(self) -> None:
         self.sent: list[dict[str, Any]] = []
@@ -42,7 +42,7 @@ class Protocol:
 
 
 class Socket:
-    """What the endpoint uses of a websocket; messages come from a queue."""
+    """The part of a websocket that the endpoint uses; messages come from a queue."""
 
     def __init__(self) -> None:
         self.protocol = Protocol()
@@ -59,10 +59,10 @@ class Socket:
 
     async def send(self, message: dict[str, Any]) -> None: ...
 
-    def say(self, **message: Any) -> None:
+    def send_in(self, **message: Any) -> None:
         self.incoming.put_nowait({"type": "websocket.receive", "text": json.dumps(message)})
 
-    def hang_up(self) -> None:
+    def disconnect(self) -> None:
         self.incoming.put_nowait({"type": "websocket.disconnect"})
 
     async def received(self, count: int) -> list[dict[str, Any]]:
@@ -80,7 +80,7 @@ async def services(tmp_path: Path) -> AsyncIterator[Server]:
 
 @asynccontextmanager
 async def connecting(services: Server) -> AsyncIterator[Callable[[], Socket]]:
-    """Connect to an endpoint whose routes a test may change by `handle`."""
+    """Connect to an endpoint whose routes a test may change with `handle`."""
     tasks: list[asyncio.Task[None]] = []
     sockets: list[Socket] = []
     endpoint = endpoints(services)[0]
@@ -94,7 +94,7 @@ async def connecting(services: Server) -> AsyncIterator[Callable[[], Socket]]:
     make.routes = endpoint.service.routes  # type: ignore[attr-defined]
     yield make
     for socket in sockets:
-        socket.hang_up()
+        socket.disconnect()
     await asyncio.gather(*tasks)
     await endpoint.close()
 
@@ -119,7 +119,7 @@ async def test_events_are_sent_before_or_after_the_answer_as_declared(
         handle(connect, "SaveScene", handler)
         ann, bob = connect(), connect()
         await bob.received(1)
-        ann.say(id=1, request="SaveScene")
+        ann.send_in(id=1, request="SaveScene")
         received = await ann.received(4)
         assert [one.get("event") or one["response"] for one in received[1:]] == [
             "ProjectSaved",
@@ -146,9 +146,9 @@ async def test_a_refusal_drops_events_unless_something_was_done(
         handle(connect, "SaveScene", refused)
         handle(connect, "SaveProject", partly)
         ann = connect()
-        ann.say(id=1, request="SaveScene")
+        ann.send_in(id=1, request="SaveScene")
         await ann.received(2)
-        ann.say(id=2, request="SaveProject")
+        ann.send_in(id=2, request="SaveProject")
         assert (await ann.received(4))[1:] == [
             {"id": 1, "response": "SaveScene", "result": False, "messages": ["not now"]},
             {"event": "ProjectSaved"},
@@ -164,7 +164,7 @@ async def test_typed_errors_become_the_message(services: Server, monkeypatch: py
 
         handle(connect, "SaveScene", handler)
         ann = connect()
-        ann.say(id=1, request="SaveScene")
+        ann.send_in(id=1, request="SaveScene")
         assert (await ann.received(2))[1]["messages"] == ["robot at 10.0.0.1 did not answer"]
 
 
@@ -187,7 +187,7 @@ async def test_unexpected_errors_refer_to_the_log(services: Server, monkeypatch:
         with structlog.testing.capture_logs() as logged:
             monkeypatch.setattr("arcor2_server.websocket.dispatch.log", structlog.get_logger())
             for number, name in enumerate(("SaveScene", "SaveProject", "SystemInfo"), 1):
-                ann.say(id=number, request=name)
+                ann.send_in(id=number, request=name)
             answers = {one["id"]: one for one in (await ann.received(4))[1:]}
         references = {entry["request"]: entry["reference"] for entry in logged if entry["event"] == "request failed"}
         assert set(references) == {"SaveScene", "SaveProject"}
@@ -209,13 +209,13 @@ async def test_bounded_number_in_flight(services: Server, monkeypatch: pytest.Mo
         handle(connect, "SaveScene", handler)
         ann = connect()
         for number in range(10):
-            ann.say(id=number, request="SaveScene")
+            ann.send_in(id=number, request="SaveScene")
         await ann.received(1)
         await asyncio.sleep(0.02)
         assert len(started) == 2
-        # Another client is not held up by it.
+        # Another client is not delayed by it.
         bob = connect()
-        bob.say(id=1, request="SystemInfo")
+        bob.send_in(id=1, request="SystemInfo")
         await bob.received(2)
         go_on.set()
         assert len(await ann.received(11)) == 11
@@ -233,9 +233,9 @@ async def test_a_request_is_completed_after_its_client_left(services: Server, mo
 
         handle(connect, "SaveScene", handler)
         ann = connect()
-        ann.say(id=1, request="SaveScene")
+        ann.send_in(id=1, request="SaveScene")
         await entered.wait()
-        ann.hang_up()
+        ann.disconnect()
         go_on.set()
         async with asyncio.timeout(30):
             await done.wait()
@@ -245,11 +245,11 @@ async def test_an_oversized_name_is_refused_without_events(services: Server) -> 
     async with connecting(services) as connect:
         ann, bob = connect(), connect()
         await bob.received(1)
-        ann.say(id=1, request="RegisterUser", args={"user_name": "x" * 15_000_000}, codes=True)
+        ann.send_in(id=1, request="RegisterUser", args={"user_name": "x" * 15_000_000}, codes=True)
         answer = (await ann.received(2))[-1]
         assert (answer["result"], answer["code"]) == (False, "text_too_long")
         assert "user_name has 15000000 characters; at most 200 are allowed" in answer["messages"][0]
-        ann.say(id=2, request="RegisterUser", args={"user_name": "x" * 200})
+        ann.send_in(id=2, request="RegisterUser", args={"user_name": "x" * 200})
         assert (await ann.received(3))[2]["result"]
         assert len(bob.protocol.sent) == 1
 
@@ -261,8 +261,8 @@ async def test_a_refusal_contains_what_is_needed_to_translate_it_if_codes_are_re
     async with connecting(services) as connect:
         handle(connect, "SaveScene", handler)
         ann = connect()
-        ann.say(id=1, request="SaveScene", codes=True)
-        ann.say(id=2, request="SaveScene")
+        ann.send_in(id=1, request="SaveScene", codes=True)
+        ann.send_in(id=2, request="SaveScene")
         first, second = [each for each in await ann.received(3) if each.get("response") == "SaveScene"]
         assert first["messages"] == second["messages"] == ["The scene 's1' is open."]
         assert (first["key"], first["values"]) == ("The scene {name} is open.", {"name": "'s1'"})

@@ -1,4 +1,4 @@
-"""Every message is answered, whatever it contains."""
+"""Every message is answered, valid or not."""
 
 import asyncio
 import contextlib
@@ -78,7 +78,7 @@ async def test_deeply_nested_json(server: ServerProcess) -> None:
 
 
 def meaningless(kind: Any) -> Any:
-    """Give arguments of the right shape that name nothing."""
+    """Return arguments of the right shape that name nothing that exists."""
     info = msgspec.inspect
     match msgspec.inspect.type_info(kind) if not isinstance(kind, info.Type) else kind:
         case info.StructType() as struct:
@@ -105,7 +105,7 @@ def meaningless(kind: Any) -> Any:
 
 @pytest.mark.parametrize("user", [None, "ann"])
 async def test_every_request_is_answered(server: ServerProcess, user: str | None) -> None:
-    """All of them at once over one connection: each gets exactly one answer, with its id and name."""
+    """All requests are sent at once over one connection: each gets exactly one answer, with its id and name."""
     assert len(RPCS) >= 118
     async with talking(server.url, user) as talker:
         sent = {}
@@ -199,7 +199,7 @@ def padded(size: int, number: int = 7) -> str:
 
 
 async def test_messages_are_accepted_refused_or_closed_by_size(server: ServerProcess) -> None:
-    """To 16 MiB served, to 32 MiB read and refused, beyond that closed with 1009."""
+    """Up to 16 MiB served, up to 32 MiB read and refused, beyond that closed with 1009."""
     async with talking(server.url, "sizes") as talker:
         served = await talker.raw(padded(16 * MIB))
         assert (served["id"], served["response"], served["result"]) == (7, "WriteLock", False)
@@ -218,7 +218,7 @@ async def test_messages_are_accepted_refused_or_closed_by_size(server: ServerPro
 
 
 async def test_requests_overtake_a_waiting_request(server: ServerProcess) -> None:
-    """Each request is a task of its own: one that waits for a lock does not hold up the next."""
+    """Each request is a task of its own: one that waits for a lock does not delay the next."""
     async with talking(server.url, "holder") as holder, talking(server.url, "waiter") as waiter:
         await holder.granted("WriteLock", {"object_id": "ADDING_OBJECT"})
         waiting = {"type": "Thing", "base": "Generic"}
@@ -241,7 +241,7 @@ async def test_a_client_that_does_not_read_delays_nobody_and_is_closed(tmp_path:
             plain.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             plain.sendall(HANDSHAKE)
             plain.setblocking(False)
-            # Masked with zeros, so that the payload stands as it is.
+            # Masked with zeros, so that the payload is unchanged.
             text = b'{"id": 1, "request": "GetObjectTypes"}'
             frame = bytes([0x81, 0x80 | len(text), 0, 0, 0, 0]) + text
             deadline = loop.time() + 60
@@ -250,7 +250,7 @@ async def test_a_client_that_does_not_read_delays_nobody_and_is_closed(tmp_path:
                 with contextlib.suppress(BlockingIOError, ConnectionError):
                     plain.send(frame * 50)
                 await quick.granted("SystemInfo")
-            # It is dropped, although it takes no close frame either.
+            # The connection is dropped, although the client does not read the close frame either.
             await until(lambda: b'"client disconnected"' in server.log.read_bytes())
         finally:
             plain.close()

@@ -1,4 +1,4 @@
-"""A driver that pip installs into the environment of a running server is offered, and works, without a restart."""
+"""A driver that pip installs into a running server's environment can be used without a restart."""
 
 import asyncio
 import shutil
@@ -111,7 +111,7 @@ async def test_a_broken_installation_is_named_and_harms_no_other_type(
         assert "distribution not_text cannot be read" in str(problems["NotText"])
         assert "no_such_package.gone" in str(problems["Gone"])
         assert before < {meta.type for meta in await client.get_object_types()}
-    # A server that starts with them names them too.
+    # A server that starts with these installations names the problems, too.
     await server.stop()
     await server.start()
     async with Client(server.url, "ann") as client:

@@ -11,7 +11,7 @@ from arcor2_server.settings import ServerSettings
 
 @pytest.fixture(autouse=True)
 def machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A machine with two addresses on networks, whose own name leads to itself, too."""
+    """Simulate a machine with two network addresses, whose host name resolves to loopback, too."""
     monkeypatch.setattr(module, "_outgoing_address", lambda: "192.0.2.7")
     monkeypatch.setattr(module, "_addresses_of_host_name", lambda: ["127.0.1.1", "192.0.2.7", "198.51.100.4"])
 

@@ -80,7 +80,7 @@ async def test_tree_lock_covers_the_whole_tree_of_the_root(locks: Locks) -> None
             await locks.read_lock("ann", item)
     assert locks.holds("ann", "ap2", tree=True)
     assert await locks.write_lock("ann", "act") == []
-    # Unlocking needs the very id that was locked.
+    # Unlocking needs the same id that was locked.
     with pytest.raises(Locked):
         await locks.write_unlock("ann", "ap1")
     assert set(await locks.write_unlock("ann", "ap2")) == WHOLE
@@ -140,7 +140,7 @@ async def test_auto_waits_for_the_lock_then_gives_up(locks: Locks) -> None:
             pass
     assert loop.time() - start >= 0.14
     assert locks.locked_roots() == ["robot"], "nothing of a refused set stays locked"
-    # Also when the same user holds it.
+    # Also if the same user holds it.
     with pytest.raises(Locked):
         async with locks.auto("ann", "robot"):
             pass
@@ -218,7 +218,7 @@ async def test_exclusive_waits_for_silent_locks_and_blocks_others(locks: Locks) 
             order.append("saving")
             saving.set()
             await asyncio.sleep(0.05)
-            # What runs inside may use locks itself.
+            # The code inside may use locks itself.
             async with locks.auto("ann", "SCENE"):
                 pass
             order.append("saved")
@@ -303,7 +303,7 @@ async def test_a_dry_run_reports_whether_the_tree_can_be_locked(locks: Locks) ->
 
 
 async def test_release_all_covers_children_too(locks: Locks) -> None:
-    """A lock on something that is not its own root is released as well (the protocol's quirk Q19)."""
+    """A lock on an item that is not its own root is released as well (the protocol's quirk Q19)."""
     await locks.write_lock("ann", "act")
     await locks.write_lock("ann", "ori2")
     await locks.read_lock("ann", "robot")

@@ -148,7 +148,7 @@ async def test_base_classes_cannot_be_replaced_or_deleted(types: ObjectTypes, st
         await types.add(source)
     with pytest.raises(InvalidData, match="Generic"):
         await types.remove("Generic")
-    # Nor by a source that is put straight into storage.
+    # Nor by a source that is written straight to the storage.
     before = types.meta("Generic")
     await storage.put_object_type(source)
     assert not await types.refresh()
@@ -173,7 +173,7 @@ async def test_an_upload_shadows_an_installed_type_until_it_is_deleted(types: Ob
     assert [(one.name, one.source) for one in types.sources_for(["UR5e"])] == [("UR5e", source)]
     assert [robot for robot in types.robot_metas() if robot.type == "UR5e"] == []
     assert [file.source for file in types.files() if file.name == "UR5e"][-1] == source
-    # Installed types next to it, in the same module, stay what they are.
+    # Other installed types of the same module are unchanged.
     assert {name: types.actions(name) for name in others} == others
     assert not any(types.meta(name).disabled for name in others)
     assert not await types.refresh(), "the caller of add notifies the clients"
@@ -182,7 +182,7 @@ async def test_an_upload_shadows_an_installed_type_until_it_is_deleted(types: Ob
     assert (types.meta("UR5e"), types.type_code("UR5e")) == (installed, code)
     assert not await types.refresh()
 
-    # Put straight into storage it is an update for clients, and so is its end.
+    # Written straight to the storage it is an update for clients, and so is its removal.
     await storage.put_object_type(ObjectTypeSource("UR5e", source))
     changes = await types.refresh()
     assert ([meta.type for meta in changes.updated], changes.added, changes.removed) == (["UR5e"], [], [])
@@ -204,14 +204,14 @@ async def test_changes_in_storage_are_noticed_once(types: ObjectTypes, storage: 
     await put_lamps(storage)
     assert not types.known("Lamp")
     changes = await types.refresh()
-    # A mixin is no type for clients.
+    # A mixin is not a type for clients.
     assert [meta.type for meta in changes.added] == ["Lamp", "RedLamp"]
     assert (changes.removed, changes.updated) == ([], [])
     assert types.revision > revision
     assert not await types.refresh()
     assert types.bases("RedLamp") == ["Lamp", "Generic"]
 
-    # A changed base changes what derives from it.
+    # A changed base class also changes the types that derive from it.
     await storage.put_object_type(
         ObjectTypeSource("Lamp", LAMP.replace("Gives light.", "Glows.").replace("0.0", "0.1"))
     )
@@ -231,7 +231,7 @@ async def test_other_changes_wait_for_the_next_refresh(types: ObjectTypes, stora
     await put_lamps(storage)
     await types.add(ObjectTypeSource("Other", LAMP.replace("Lamp", "Other")))
     changes = await types.refresh()
-    assert [meta.type for meta in changes.added] == ["Lamp", "RedLamp"], "the caller of add tells of Other himself"
+    assert [meta.type for meta in changes.added] == ["Lamp", "RedLamp"], "the caller of add announces Other"
 
 
 async def test_model_belongs_to_its_type(types: ObjectTypes, storage: Storage) -> None:
@@ -310,7 +310,7 @@ async def test_a_robot_description_is_named_only_while_it_exists(types: ObjectTy
 
 
 async def test_inheritance_over_uploaded_and_installed_types(types: ObjectTypes, storage: Storage) -> None:
-    """An uploaded type may derive from an installed one, and from an uploaded one that does."""
+    """An uploaded type may derive from an installed one, and from another uploaded one."""
     entry = types.type_code("BarcodeReader").entry_point
     module, _, name = entry.partition(":")
     base = f"from {module} import {name}\n\n\nclass DoorReader({name}):\n    _ABSTRACT = False\n"
@@ -334,7 +334,7 @@ class Loud:
     beep.__action__ = ActionMetadata()
 """
     await types.add(ObjectTypeSource("LoudReader", mixed))
-    assert types.meta("LoudReader").disabled, "its mixin is not there yet"
+    assert types.meta("LoudReader").disabled, "its mixin does not exist yet"
     await storage.put_object_type(ObjectTypeSource("Loud", loud))
     assert [meta.type for meta in (await types.refresh()).updated] == ["LoudReader"]
     reader = types.meta("LoudReader")
@@ -384,7 +384,7 @@ async def test_uploaded_types_survive_a_restart(types: ObjectTypes, storage: Sto
     again = ObjectTypes(KnownTypes(), storage, assets)
     await again.load()
     assert again.metas() == types.metas()
-    assert await again.refresh() == Changes(), "what was there at the start is no news"
+    assert await again.refresh() == Changes(), "types that exist at the start are not announced"
 
 
 # ------------------------------------------------------------------------------------------------ on the wire
@@ -399,10 +399,10 @@ async def test_new_types_are_announced_and_clear_the_cache(server: ServerProcess
         assert (await ann.request("NewObjectType", new, dry_run=True))["result"]
         assert await ann.granted("GetObjectTypes") == before
         await ann.granted("NewObjectType", new)
-        told = await bob.event("ChangedObjectTypes")
-        assert told == await ann.event("ChangedObjectTypes")
-        assert told["change_type"] == "add"
-        (ball,) = told["data"]
+        event = await bob.event("ChangedObjectTypes")
+        assert event == await ann.event("ChangedObjectTypes")
+        assert event["change_type"] == "add"
+        (ball,) = event["data"]
         assert (ball["type"], ball["base"], ball["has_pose"]) == ("Ball", "CollisionObject", True)
         assert (ball["object_model"], ball["description"]) == (SPHERE, "It's round.")
         after = await ann.granted("GetObjectTypes")
@@ -415,7 +415,7 @@ async def test_new_types_are_announced_and_clear_the_cache(server: ServerProcess
         assert refusal["result"] is False
         assert {one["id"] for one in refusal["data"]} == {"Ball", "Generic", "Nothing"}
         assert "Twin" in next(one["error"] for one in refusal["data"] if one["id"] == "Ball")
-        # Without names, all that can be deleted is.
+        # Without names, the request deletes every type that can be deleted.
         await ann.granted("DeleteObjectTypes")
         removed = [event for event in ann.events if event.get("change_type") == "remove"]
         assert [event["data"][0]["type"] for event in removed] == ["Twin", "Ball"]
@@ -473,12 +473,12 @@ class Unreadable(Generic):
 async def test_problems_contain_what_is_needed_to_translate_them_if_codes_are_requested(server: ServerProcess) -> None:
     async with talking(server.url, "ann") as ann, Client(server.url) as client:
         await client.rest.put_object_type("Unreadable", UNREADABLE)
-        # Events contain it for all clients.
-        (told,) = (await ann.event("ChangedObjectTypes"))["data"]
+        # Events contain the key and values for all clients.
+        (event,) = (await ann.event("ChangedObjectTypes"))["data"]
         plain = next(one for one in await ann.granted("GetObjectTypes") if one["type"] == "Unreadable")
         answer = await ann.request("GetObjectTypes", codes=True)
         full = next(one for one in answer["data"] if one["type"] == "Unreadable")
-        assert told == full
+        assert event == full
         assert (full["disabled"], full["problem"]) == (plain["disabled"], plain["problem"])
         assert (full.pop("key"), full.pop("values")) == (
             "{path}:{line}: {problem}",
@@ -538,7 +538,7 @@ def test_defaults_are_not_shared() -> None:
 # ------------------------------------------------------------------------------------------------ huge sources
 @pytest.fixture
 def parsed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """The lengths of the sources that this process parses."""
+    """Record the lengths of the sources that this process parses."""
     lengths: list[int] = []
     parse = ast.parse
 
@@ -578,7 +578,7 @@ async def test_a_huge_source_that_takes_too_long_is_disabled(
     await put_lamps(storage)
     await types.update()
     assert not types.meta("Lamp").disabled
-    assert stored.read_bytes() == before, "what failed once is tried again at the next start"
+    assert stored.read_bytes() == before, "a failed analysis is repeated at the next start"
     assert not [length for length in parsed if length > worker.HUGE]
 
 

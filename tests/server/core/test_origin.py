@@ -19,7 +19,7 @@ REBOUND = {"Host": "rebound.example:6789"}
 
 
 def rebound(server: ServerProcess, headers: dict[str, str]) -> connect:
-    """Connect to the server by a name that leads here."""
+    """Connect to the server by a host name that resolves to this machine."""
     port = int(server.url.rpartition(":")[2])
     return connect(f"ws://{REBOUND['Host']}", host="127.0.0.1", port=port, additional_headers=headers)
 

@@ -41,11 +41,11 @@ ADDED = {
     "RunPackage.Request.Args": {"shared_breakpoints"},
     "TemporaryPackage.Request.Args": {"shared_breakpoints"},
 }
-"""What we tell, or take, beside the protocol (docs/protocol.md), by the name of the type; it may be left out."""
+"""Optional fields that we add to the protocol (docs/protocol.md), by the name of the type."""
 
 
 class Comparison:
-    """Walks a type of the specification and one of ours side by side and notes where they differ."""
+    """Compares a type of the specification with one of ours and records the differences."""
 
     def __init__(self, types: dict[str, Any]) -> None:
         self.types = types
@@ -67,7 +67,7 @@ class Comparison:
             theirs = theirs["of"]
         match theirs["kind"]:
             case "string":
-                # `value` and the like are plain text; a time stamp is text with a pattern.
+                # `value` and the like are plain text; a time stamp is a text with a pattern.
                 self.expect(where, isinstance(ours, inspect.StrType), ours)
             case "integer":
                 self.expect(where, isinstance(ours, inspect.IntType), ours)
@@ -110,7 +110,7 @@ class Comparison:
         unset = {field.encode_name for field in msgspec.structs.fields(ours.cls) if field.default is UNSET}
         theirs = {field["name"]: field for field in self.types[name]["fields"]}
         for added in ADDED.get(name, ADDED.get(ours.cls.__name__, ())):
-            taken = ours.cls.__name__.endswith("Args")  # of what is told, a default would be told to old clients, too
+            taken = ours.cls.__name__.endswith("Args")  # in sent types, older clients would get the default, too
             self.expect(f"{where}.{added}", added in unset or (taken and not fields[added].required), ours)
             del fields[added]
         if set(fields) != set(theirs):

@@ -29,7 +29,7 @@ async def test_every_route_declares_its_least_role(tmp_path: Path) -> None:
         for handler in getattr(route, "route_handlers", None) or [cast("Any", route).route_handler]:
             handlers[f"{route.path} {handler.handler_name}"] = handler
     assert len(handlers) >= 4
-    # Litestar itself answers OPTIONS, with no more than the names of the methods.
+    # Litestar itself answers OPTIONS, only with the names of the methods.
     undeclared = [
         name
         for name, handler in handlers.items()

@@ -22,7 +22,7 @@ METHODS = {
 
 
 class Run:
-    """A run whose clock and events the test sets."""
+    """A run whose clock and events are controlled by the test."""
 
     def __init__(self, *, logic: bool = True, verdicts: bool = True) -> None:
         objects = [

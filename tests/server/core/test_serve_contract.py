@@ -20,7 +20,7 @@ from tests.server.core.serving import COMMAND, ServerProcess, running, talking
 
 @pytest.fixture(scope="module", autouse=True)
 def real_command() -> Iterator[None]:
-    """Start the real command, not a fork of a process that has imported it."""
+    """Start the real command instead of a fork of a process that has imported it."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ServerProcess, "forked", False)
         yield
@@ -37,7 +37,7 @@ async def run(*arguments: str) -> tuple[int, str, str]:
 
 
 async def refused_start(*arguments: str) -> tuple[int, str]:
-    """Start a server that cannot start: nothing on standard output, one line on standard error."""
+    """Start a server that must fail: nothing on standard output, one line on standard error."""
     status, out, err = await run("serve", *arguments)
     assert out == ""
     lines = err.splitlines()
@@ -171,7 +171,7 @@ async def test_rest_and_websocket_share_the_port(server: ServerProcess) -> None:
 
 
 def test_idle_memory_is_limited(server: ServerProcess) -> None:
-    """The whole server, spare host included, is far from this; a sudden heavy import is not."""
+    """The whole server, spare host included, needs far less; an unexpected heavy import exceeds the limit."""
     process = psutil.Process(server.process.pid)
     assert process.memory_full_info().pss < 150 * 1024 * 1024
 

@@ -18,7 +18,7 @@ from arcor2_server.files import write_private
 from arcor2_server.settings import ServerSettings
 
 MODULES = 1150
-"""Budget of imported modules. Each costs about 0.6 ms of every start; imports are four fifths of it."""
+"""Budget of imported modules. Each costs about 0.6 ms of every start; imports take four fifths of it."""
 NOT_NEEDED = {
     "alembic",
     "cryptography",
@@ -32,7 +32,7 @@ NOT_NEEDED = {
     "schemathesis",
     "transforms3d",
 }
-"""Packages that are installed next to the server, and that a start has no use for."""
+"""Installed packages that a start must not import."""
 START = """
 import asyncio, json, sys
 from pathlib import Path

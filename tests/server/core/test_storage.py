@@ -116,7 +116,7 @@ async def test_object_type_with_and_without_model(storage: Storage) -> None:
     assert [kind.id for kind in await storage.object_types()] == ["Crate", "mixin"]
     assert (await storage.object_types())[1].description == "helper"
     assert (await storage.object_types())[1].model is UNSET
-    # One model per id, of whatever kind; the type it belongs to counts as changed.
+    # One model per id, of any kind. The type it belongs to counts as changed.
     await storage.put_model(Sphere("Crate", 0.5))
     changed = await storage.object_type("Crate")
     assert changed.model == ObjectModel.of(Sphere("Crate", 0.5))
@@ -171,14 +171,14 @@ async def test_what_was_acknowledged_survives_a_kill(settings: ServerSettings) -
     for _ in range(10):
         assert await process.stdout.readline()
     process.send_signal(signal.SIGKILL)
-    told = 9 + len((await process.stdout.read()).splitlines())
+    acknowledged = 9 + len((await process.stdout.read()).splitlines())
     await process.wait()
     storage = await Storage.open(settings)
     with contextlib.closing(sqlite3.connect(settings.documents_database)) as connection:
         assert connection.execute("PRAGMA journal_mode").fetchone() == ("wal",)
     kept = {scene.id for scene in await storage.scenes()}
     await storage.close()
-    assert kept >= {f"scn_{n}" for n in range(told + 1)}
+    assert kept >= {f"scn_{n}" for n in range(acknowledged + 1)}
 
 
 async def test_every_commit_is_flushed(storage: Storage) -> None:

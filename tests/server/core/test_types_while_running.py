@@ -38,7 +38,7 @@ MESH = {"id": "Shelf", "assetId": "shelf.stl"}
 
 
 async def following(client: Talker) -> dict[str, Any]:
-    """Give the next event."""
+    """Return the next event."""
     return client.events.pop(0) if client.events else await client.receive(30)
 
 
@@ -102,7 +102,7 @@ async def test_a_type_is_added_changed_and_removed(server: ServerProcess) -> Non
         await ann.granted("StartScene")
         await scene_is(ann, "started")
         assert await boards() == {"low0", "low1"}
-        # What runs is what was read at the start; the next start takes what is there then.
+        # The running object uses the type as read at the start; the next start uses the current one.
         await put_type("Labels", LABELS.replace("low", "top"))
         assert await boards() == {"low0", "low1"}
         await ann.granted("StopScene")

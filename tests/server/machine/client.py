@@ -1,4 +1,4 @@
-"""A client of the random edits, with what it knows."""
+"""A client of the random edits, with its own copy of the state."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ Flat = dict[tuple[str, str], Any]
 
 
 def flat(picture: Picture) -> Flat:
-    """Everything by kind and id, so that states can be compared thing by thing."""
+    """Return every item by kind and id, so that states can be compared item by item."""
     found: Flat = {}
     for kind, content in picture.shown().items():
         if kind in ("scene", "project"):
@@ -20,7 +20,7 @@ def flat(picture: Picture) -> Flat:
 
 
 class Client:
-    """A connection with what it knows."""
+    """A connection with a copy of the state, updated by events."""
 
     def __init__(self, server: SessionServer, name: str) -> None:
         self.name = name
@@ -28,7 +28,7 @@ class Client:
         self.picture = Picture()
         self.events = 0
 
-    def look(self) -> None:
+    def apply_events(self) -> None:
         for event in self.person.events():
             self.events += 1
             self.picture.see(event)

@@ -1,4 +1,4 @@
-"""Edits to draw from: each gives a request for what is open now, chosen by a few numbers, and what to lock for it."""
+"""Edits to draw from: each builds a request for the open documents from a few numbers, and states what to lock."""
 
 import json
 from collections.abc import Callable
@@ -11,11 +11,11 @@ NAMES = ("a", "b", "c", "d", "e")
 DEFAULT = "default"
 
 Request = tuple[str, dict[str, Any], str, bool]
-"""A request with its arguments, the id to lock for it (empty: none), and whether with its tree."""
+"""A request with its arguments, the id to lock for it (empty: none), and whether to lock the tree."""
 
 
 class Draw:
-    """What is open, and the numbers that choose from it."""
+    """The open documents, and the numbers that choose from them."""
 
     def __init__(self, session: Any, numbers: tuple[int, int, int]) -> None:
         self.session = session
@@ -32,7 +32,7 @@ class Draw:
 
     @staticmethod
     def one(things: list[Any], number: int) -> str:
-        """Give the id of one of the things; one that does not exist where there is none."""
+        """Return the id of one of the items, or an id that does not exist if there are none."""
         return str(things[number % len(things)].id) if things else "nothing_0"
 
     def object(self, name: str) -> str:
@@ -42,7 +42,7 @@ class Draw:
         return self.one(self.project.action_points, number)
 
     def parent(self, number: int) -> str:
-        """A point, an object with a pose, or none."""
+        """Return a point, an object with a pose, or nothing."""
         candidates = ["", self.object("scale"), *(point.id for point in self.project.action_points)]
         return candidates[number % len(candidates)]
 
@@ -109,7 +109,7 @@ def _add_action(draw: Draw) -> Request:
 
 
 def _add_move(draw: Draw) -> Request:
-    """An action that refers to an orientation."""
+    """Build an action that refers to an orientation."""
     pose = {"name": "pose", "type": "pose", "value": json.dumps(draw.of_points("orientations", draw.z))}
     args = {"action_point_id": draw.point(draw.x), "name": draw.name, "type": f"{draw.object('robot')}/move"}
     return "AddAction", args | {"parameters": [pose], "flows": [{"type": DEFAULT, "outputs": []}]}, "", False
@@ -132,7 +132,7 @@ def _override(draw: Draw) -> dict[str, Any]:
 def _on(
     request: str, key: str, pick: str, tree: bool = False, **more: Callable[[Draw], Any]
 ) -> Callable[[Draw], Request]:
-    """A request about one thing, which is locked for it."""
+    """Return a request about one item, which is locked for it."""
 
     def build(draw: Draw) -> Request:
         found = draw.point(draw.x) if pick == "points" else draw.of_points(pick, draw.x)
@@ -142,7 +142,7 @@ def _on(
 
 
 def _free(request: str, **args: Callable[[Draw], Any]) -> Callable[[Draw], Request]:
-    """A request that takes its locks itself."""
+    """Return a request that acquires its locks itself."""
     return lambda draw: (request, {name: value(draw) for name, value in args.items()}, "", False)
 
 

@@ -1,4 +1,4 @@
-"""Fifty clients, ten of which never read: the others get everything in order, and the queues are bounded."""
+"""Fifty clients, ten of which never read: the others get every message in order, and the queues are bounded."""
 
 import asyncio
 import contextlib
@@ -13,12 +13,12 @@ READERS, DEAF = 40, 10
 EVENTS = 700
 TEXT = "x" * 9_900
 BOUND = 500_000
-"""Bytes that may wait for a client; what the system's own buffers take beside it is less than the rest."""
+"""Bytes that may wait for a client. The buffers of the system take less than the rest."""
 COST_MIB = 50
 
 
 async def _deaf(url: str) -> socket.socket:
-    """A websocket that is opened and never read from; its own buffer is small."""
+    """Return an open websocket with a small buffer of its own, which is never read."""
     host, _, port = url.partition("://")[2].strip("/").partition(":")
     deaf = socket.socket()
     deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -35,7 +35,7 @@ async def _deaf(url: str) -> socket.socket:
 
 
 async def _descriptions(talker: Talker) -> list[str]:
-    """Give how the descriptions begin that a client is told of, until there are all of them."""
+    """Return the beginnings of the descriptions that a client receives, once it has all of them."""
     found: list[str] = []
     while len(found) < EVENTS:
         message = await talker.receive(60.0)
@@ -62,9 +62,9 @@ async def test_clients_that_never_read_delay_nobody_and_are_closed(tmp_path: Pat
             args = {"scene_id": scene, "new_description": f"{number} {TEXT}"}
             await author.granted("UpdateSceneDescription", args)
         expected = [str(number) for number in range(EVENTS)]
-        assert all(told == expected for told in await asyncio.gather(*listening))
+        assert all(received == expected for received in await asyncio.gather(*listening))
         cost = (process.memory_full_info().pss - before) / 2**20
         assert cost <= COST_MIB
-        # They were closed for what waited for them, not for how long it took.
+        # They were closed for the number of waiting bytes, not for the time that these waited.
         await until(lambda: server.log.read_text().count("too slow") >= DEAF)
         await author.granted("SystemInfo")

@@ -1,6 +1,6 @@
-"""Two or three clients edit at random, lock, undo, leave and come back; what each knows from events is what there is.
+"""Clients edit at random, lock, undo, leave and return; the state that each derives from events must be correct.
 
-MACHINE_EXAMPLES=500 makes it a long run (with `--timeout 0`), which also looks for the shortest way to a failure.
+MACHINE_EXAMPLES=500 makes it a long run (with `--timeout 0`), which also minimizes a failing sequence.
 """
 
 import asyncio
@@ -29,7 +29,7 @@ from tests.server.session.work import Work
 
 NAMES = ("alice", "bob", "carol")
 LIMIT = 60
-"""Edits that the journal keeps: few enough that a long run outlives them."""
+"""Edits that the journal stores: few enough that a long run exceeds them."""
 
 users = st.integers(0, len(NAMES) - 1)
 numbers = st.tuples(st.integers(0, 11), st.integers(0, 11), st.integers(0, 11))
@@ -38,7 +38,7 @@ parts = st.tuples(edits, numbers, st.sampled_from(["", "", "", "Undo", "Redo"]))
 
 
 class Edits(RuleBasedStateMachine):
-    """The server's parts run in this process on an event loop of their own; each rule lets it run."""
+    """The server's parts run in this process on their own event loop; each rule runs the loop."""
 
     template: Path
 
@@ -83,12 +83,12 @@ class Edits(RuleBasedStateMachine):
     def session(self) -> Any:
         return self.server.session
 
-    def there_is(self) -> Flat:
+    def current_items(self) -> Flat:
         return flat(Picture.of(self.session.scene, self.session.project))
 
     def _opened(self) -> None:
-        """What is open now is what is saved; what its history was is not known here."""
-        self.saved = self.there_is()
+        """The saved document is the reference; its history is unknown to this test."""
+        self.saved = self.current_items()
         self.states = {self.session.revision: self.saved}
 
     # ------------------------------------------------------------------------------------------ requests
@@ -108,26 +108,26 @@ class Edits(RuleBasedStateMachine):
         return present[number % len(present)]
 
     def note(self) -> None:
-        self.states[self.session.revision] = self.there_is()
+        self.states[self.session.revision] = self.current_items()
 
     def single(self, who: str, request: str, **args: Any) -> Any:
-        """Ask; what is refused, or only asked whether it would be granted, changes and tells nothing."""
-        revision, before = self.session.revision, self.there_is()
-        self.look()
-        heard = {client.name: client.events for client in self.clients.values()}
+        """Send a request. If it is refused or a dry run, assert that it changes nothing and causes no event."""
+        revision, before = self.session.revision, self.current_items()
+        self.apply_events()
+        events_before = {client.name: client.events for client in self.clients.values()}
         answer = self.ask(who, request, **args)
         if isinstance(answer, Refused) or (args.get("dry_run") and RPCS[request].dry_run):
-            self.look()
-            assert (self.session.revision, self.there_is()) == (revision, before), (request, answer)
-            assert heard == {client.name: client.events for client in self.clients.values()}, (request, answer)
+            self.apply_events()
+            assert (self.session.revision, self.current_items()) == (revision, before), (request, answer)
+            assert events_before == {client.name: client.events for client in self.clients.values()}, (request, answer)
         if self.session.revision != revision:
             assert self.session.revision == revision + 1, request
             self.note()
         return answer
 
-    def look(self) -> None:
+    def apply_events(self) -> None:
         for client in self.clients.values():
-            client.look()
+            client.apply_events()
 
     # ------------------------------------------------------------------------------------------ edits
     def edit(self, who: str, wanted: Request, *, keep: bool, dry_run: bool) -> None:
@@ -183,7 +183,7 @@ class Edits(RuleBasedStateMachine):
             before = self.session.revision
             answer = self.single(who, request, dry_run=dry_run == 0)
             if not isinstance(answer, Refused) and dry_run:
-                self.taken_back(before, answer["number"])
+                self.assert_undone(before, answer["number"])
 
     @precondition(lambda self: self.session.scene is not None)
     @rule(number=users, back=st.integers(1, 8))
@@ -191,17 +191,17 @@ class Edits(RuleBasedStateMachine):
         before = self.session.revision
         answer = self.single(self.who(number), "Undo", number=before - back)
         if not isinstance(answer, Refused):
-            self.taken_back(before, before - back)
+            self.assert_undone(before, before - back)
 
-    def taken_back(self, before: int, number: int) -> None:
-        """What the edit touched is as before it; everything else is as it was."""
+    def assert_undone(self, before: int, number: int) -> None:
+        """Assert that the undone edit's items are as before it, and all others unchanged."""
         edit = self.session.history.find(number)
         if edit is None or number not in self.states or number - 1 not in self.states:
             return
         old, made = self.states[number - 1], self.states[number]
         touched = {key for key in old.keys() | made.keys() if old.get(key) != made.get(key)}
         expected = {key: value for key, value in self.states[before].items() if key not in touched}
-        assert self.there_is() == expected | {key: old[key] for key in touched if key in old}
+        assert self.current_items() == expected | {key: old[key] for key in touched if key in old}
 
     @precondition(lambda self: self.session.scene is not None)
     @rule(number=users, back=st.integers(0, 12))
@@ -209,7 +209,7 @@ class Edits(RuleBasedStateMachine):
         revision = self.session.revision - back
         answer = self.single(self.who(number), "RestoreRevision", revision=revision)
         if not isinstance(answer, Refused) and revision in self.states:
-            assert self.there_is() == self.states[revision]
+            assert self.current_items() == self.states[revision]
 
     # ------------------------------------------------------------------------------------------ locks, coming and going
     @precondition(lambda self: self.session.project is not None)
@@ -238,22 +238,22 @@ class Edits(RuleBasedStateMachine):
         if name in self.clients:
             return
 
-        async def come() -> None:
+        async def register() -> None:
             self.clients[name] = Client(self.server, name)
             await self._ask(name, "RegisterUser", user_name=name)
 
-        self.runner.run(come())
-        self.look()
+        self.runner.run(register())
+        self.apply_events()
 
     @rule(number=users)
     def lock_time_out(self, number: int) -> None:
-        """The locks of one who left are given back after a while."""
+        """The locks of a disconnected user are released after a delay."""
         if NAMES[number] not in self.clients and NAMES[number] in self.server.services.users._releases:
             self.server.services.users._releases[NAMES[number]].cancel()
             self.server.services.users._release(NAMES[number])
 
     # ------------------------------------------------------------------------------------------ whole documents
-    def give_locks_back(self) -> None:
+    def release_locks(self) -> None:
         for number in range(len(NAMES)):
             self.lock_time_out(number)
         for who in sorted(self.clients):
@@ -274,24 +274,24 @@ class Edits(RuleBasedStateMachine):
     @precondition(lambda self: self.session.scene is not None)
     @rule(number=users)
     def save(self, number: int) -> None:
-        self.give_locks_back()
+        self.release_locks()
         request = "SaveScene" if self.session.project is None else "SaveProject"
         answer = self.single(self.who(number), request)
-        assert isinstance(answer, Refused) is (request == "SaveProject" and self.there_is() == self.saved)
-        self.saved = self.there_is()
+        assert isinstance(answer, Refused) is (request == "SaveProject" and self.current_items() == self.saved)
+        self.saved = self.current_items()
         assert self.stored() == self.saved
 
     @rule(number=users, scene=st.booleans())
     def close_and_open(self, number: int, scene: bool) -> None:
-        self.give_locks_back()
+        self.release_locks()
         who = self.who(number)
         if self.session.scene is not None:
             answer = self.ask(who, "CloseScene" if self.session.project is None else "CloseProject", force=True)
             assert not isinstance(answer, Refused), answer
-            self.look()
+            self.apply_events()
         request, document = ("OpenScene", self.scene_id) if scene else ("OpenProject", self.project_id)
         answer = self.ask(who, request, id=document)
-        # A project does not open on a scene from which something it needs was removed by force.
+        # A project does not open on a scene that lost, by force, an object that the project needs.
         if isinstance(answer, Refused):
             answer = self.ask(who, "OpenScene", id=self.scene_id)
             assert not isinstance(answer, Refused), answer
@@ -299,8 +299,8 @@ class Edits(RuleBasedStateMachine):
 
     @rule()
     def crash(self) -> None:
-        """The files as they are on the disk now are all that a server which is killed leaves."""
-        there_was, changed = self.there_is(), self.session.has_changes
+        """A killed server leaves only the files that are on the disk now."""
+        items_before, changed = self.current_items(), self.session.has_changes
         history = list(self.session.history)
         left = Path(tempfile.mkdtemp(prefix="machine-")) / "data"
         copy_at_one_moment(self.directory, left)
@@ -310,41 +310,41 @@ class Edits(RuleBasedStateMachine):
         shutil.move(left, self.directory)
         left.parent.rmdir()
         self.runner.run(self._open())
-        assert (self.there_is(), self.session.has_changes) == (there_was, changed)
+        assert (self.current_items(), self.session.has_changes) == (items_before, changed)
         assert list(self.session.history) == history
         assert self.server.services.locks.locked_roots() == []
         for name in present:
             self.join(NAMES.index(name))
 
-    # ------------------------------------------------------------------------------------------ what always holds
+    # ------------------------------------------------------------------------------------------ invariants
     @invariant()
-    def everybody_knows_what_there_is(self) -> None:
+    def every_client_has_the_state(self) -> None:
         if not hasattr(self, "server"):
             return
-        there_is = self.there_is()
-        self.look()
+        current_items = self.current_items()
+        self.apply_events()
         for client in self.clients.values():
-            assert flat(client.picture) == there_is, client.name
-        assert self.session.has_changes is (there_is != self.saved)
+            assert flat(client.picture) == current_items, client.name
+        assert self.session.has_changes is (current_items != self.saved)
 
     @invariant()
-    def everybody_knows_who_locked_what(self) -> None:
+    def every_client_knows_the_locks(self) -> None:
         if not hasattr(self, "server") or self.session.project is None:
             return
         locks = self.server.services.locks
         for client in self.clients.values():
             for key, owner in client.picture.locks.items():
-                if owner != client.name and key != self.session.project.id and self._is_there(key):
+                if owner != client.name and key != self.session.project.id and self._exists(key):
                     assert locks.writer_of(key) == owner, (client.name, key, owner)
             for owner, ids in locks.announced().items():
                 if owner != client.name:
                     assert not [key for key in ids if client.picture.locks.get(key) != owner], (client.name, owner)
 
-    def _is_there(self, key: str) -> bool:
+    def _exists(self, key: str) -> bool:
         return any(self.session.document.find(kind, key) is not None for kind in Kind)
 
     @invariant()
-    def what_there_is_holds_together(self) -> None:
+    def documents_are_consistent(self) -> None:
         if not hasattr(self, "server") or (project := self.session.project) is None:
             return
         document, types = self.session.document, self.server.types
@@ -378,7 +378,7 @@ def test_random_edits(tmp_path: Path) -> None:
         deadline=None,
         database=None,
         suppress_health_check=list(HealthCheck),
-        # Looking for the shortest way to a failure may take minutes.
+        # Minimizing a failing sequence may take minutes.
         phases=list(Phase) if long_run else [Phase.generate],
         print_blob=True,
     )

@@ -1,4 +1,4 @@
-"""Object types without a device, which the tests upload: what the protocol asks of them, they answer at once."""
+"""Object types without a device, which the tests upload. Their methods return at once."""
 
 ARM = '''
 import math

@@ -1,4 +1,4 @@
-"""The workplace of the recorded sessions: a robot that stands where the recorded one stood, and moves at once."""
+"""The workplace of the recorded sessions: a robot with the recorded poses and joints, which moves at once."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource
 from tests.protocol import session
 
 ROBOT = "DobotMagician"
-"""Like the other recorded types it takes the place of an installed one, which has other parameters."""
+"""Like the other recorded types it replaces an installed one, which has other parameters."""
 
 
 def _answer(name: str, number: int) -> Any:
@@ -14,7 +14,7 @@ def _answer(name: str, number: int) -> Any:
 
 
 def source() -> str:
-    """Give the robot's module, with the joints and poses that were recorded."""
+    """Return the source of the robot's module, with the recorded joints and poses."""
     scene_session = "03_scene_online_robot"
     joints, pose, solved = _answer(scene_session, 47), _answer(scene_session, 53), _answer(scene_session, 55)
     return f'''
@@ -151,7 +151,7 @@ class RandomActions(Generic):
 
 
 def uploads() -> list[ObjectTypeSource]:
-    """Give the object types that a client would have uploaded before the sessions."""
+    """Return the object types that a client uploaded before the recorded sessions."""
     metas = _answer("01_connect_register", 4)
     box = next(meta["object_model"]["box"] for meta in metas if meta["type"] == "WeighingMachine")
     model = ObjectModel.of(Box(**box))

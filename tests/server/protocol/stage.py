@@ -20,7 +20,7 @@ from tests.server.protocol import devices
 from tests.server.session.session_server import Person, Refused
 
 PATIENCE = 40.0
-"""Seconds; the machine may be busy."""
+"""Time limit for conditions, s. Long, because the machine may be busy."""
 
 ORIGIN = {"position": {"x": 0, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
 FOCUS_POINTS = [Pose(Position(*point)) for point in ((0, 0, 0), (0.2, 0, 0), (0, 0.1, 0), (0.2, 0.1, 0.05))]
@@ -54,7 +54,7 @@ PARENTS = {
 
 
 def faults(message: dict[str, Any]) -> list[str]:
-    """Name what is wrong with a message by the types of the protocol and the rules for events."""
+    """Return the problems of a message according to the protocol's types and its rules for events."""
     found = ["an explicit null"] if _has_null(message) else []
     if "response" in message:
         declared, allowed = RPCS[message["response"]].data if message["response"] in RPCS else None, ANSWER
@@ -89,12 +89,12 @@ def _has_null(value: Any) -> bool:
 
 
 class Actor(Person):
-    """A client whose messages can be looked at before they are taken, and which looks at each itself."""
+    """A client that checks each message, and whose messages can be read without removing them."""
 
-    def _came(self, message: dict[str, Any]) -> None:
+    def _received(self, message: dict[str, Any]) -> None:
         stage: Any = self.server
         stage.faults += [f"{fault} in {message}" for fault in faults(message)]
-        super()._came(message)
+        super()._received(message)
 
     @property
     def waiting(self) -> list[dict[str, Any]]:
@@ -102,18 +102,18 @@ class Actor(Person):
 
 
 class Stage:
-    """What a test speaks to."""
+    """A server in this process, with the clients and ids that a test uses."""
 
     def __init__(self, services: Server) -> None:
         self.services = services
         self.endpoint = endpoints(services)[0]
         self.ids: dict[str, str] = {}
         self.faults: list[str] = []
-        """What is wrong with messages that were sent."""
+        """Problems of the messages that were sent."""
         self._people: list[Actor] = []
 
     async def newcomer(self) -> Actor:
-        """Let somebody connect; what he is greeted with is not taken."""
+        """Connect a client without registering a user. Its first messages stay in the queue."""
         person = Actor(self)  # type: ignore[arg-type]
         self._people.append(person)
         return person
@@ -123,12 +123,12 @@ class Stage:
         if name:
             await person.ask("RegisterUser", user_name=name)
         else:
-            await person.ask("SystemInfo")  # the greeting has come then
+            await person.ask("SystemInfo")  # the first messages have arrived by then
         person.take()
         return person
 
     async def spare_host(self) -> None:
-        """Return when the host that stands by is up."""
+        """Wait until the spare host runs."""
         hosts = self.services.hosts
         hosts.prepare()
         spare = hosts._spare
@@ -140,7 +140,7 @@ class Stage:
         await self.endpoint.close()
 
     async def place(self, person: Actor, **objects: str) -> None:
-        """Make a scene of objects by name and type; their ids are kept in `ids`."""
+        """Create a scene with objects given by name and type. Store their ids in `ids`."""
         await person.ask("NewScene", name="scene")
         for name, kind in objects.items():
             pose: dict[str, Any] = {"pose": ORIGIN} if self.services.types.meta(kind).has_pose else {}
@@ -161,17 +161,17 @@ class Stage:
 
 
 async def until(condition: Callable[[], bool]) -> None:
-    """Poll with a deadline."""
+    """Wait until the condition holds, or fail after the time limit."""
     async with asyncio.timeout(PATIENCE):
         while not condition():
             await asyncio.sleep(0.005)
 
 
 async def happens(person: Actor, event: str, **data: Any) -> dict[str, Any]:
-    """Wait for an event with such data among what was not taken yet; gives its data."""
+    """Wait for an event with this data among the messages that were not taken yet. Return its data."""
     found: list[dict[str, Any]] = []
 
-    def there() -> bool:
+    def arrived() -> bool:
         found[:] = [
             message["data"]
             for message in person.waiting
@@ -179,12 +179,12 @@ async def happens(person: Actor, event: str, **data: Any) -> dict[str, Any]:
         ]
         return bool(found)
 
-    await until(there)
+    await until(arrived)
     return found[0]
 
 
 async def refused(person: Actor, request: str, /, **args: Any) -> str:
-    """Send a request that must be refused; gives why. Nobody may be told anything."""
+    """Send a request that must be refused without any event. Return the message of the refusal."""
     person.take()
     try:
         await person.ask(request, **args)
@@ -194,18 +194,18 @@ async def refused(person: Actor, request: str, /, **args: Any) -> str:
     raise AssertionError(f"{request} was granted")
 
 
-async def _nothing_much() -> AsyncIterator[bytes]:
-    """Give the content of an asset that nobody reads here."""
+async def _content() -> AsyncIterator[bytes]:
+    """Return the content of an asset that the test does not read."""
     yield b"content"
 
 
 @contextlib.asynccontextmanager
 async def open_stage(directory: Path, *types: str, **settings: Any) -> AsyncIterator[Stage]:
-    """Bring up a server with the named types uploaded."""
+    """Start a server with the named types uploaded."""
     given: dict[str, Any] = {"lock_retries": 2, "lock_retry_wait": 0.02, "streaming_period": 0.05} | settings
     async with running_server(ServerSettings(data_dir=directory, **given)) as services:
         for asset in ("part.stl", "arm.zip") if types else ():
-            await services.assets.put(_nothing_much(), asset)
+            await services.assets.put(_content(), asset)
         for name in types:
             model = MODELS.get(name)
             wrapped = UNSET if model is None else ObjectModel.of(model)

@@ -77,7 +77,7 @@ def test_fit_refuses_lists_of_different_length() -> None:
 
 # ------------------------------------------------------------------------------------------------ the requests
 async def put_tip(stage: Stage, actor: Actor, position: Position) -> None:
-    """Move the arm there; the lock for that is not the one that the user holds."""
+    """Move the arm there. The move needs another lock than the one that the user holds."""
     pose = msgspec.to_builtins(Pose(position, Orientation(1, 0, 0, 0)))
     raw: dict[str, Any] = {"end_effector_id": "tip", "target_pose": pose, "speed": 1.0}
     await stage.services.online.call(stage.ids["arm"], "move_to_pose", raw)
@@ -151,7 +151,7 @@ async def test_an_object_is_aimed_by_its_focus_points(tmp_path: Path) -> None:
         # The locks stay with the user.
         assert "lock" in await refused(bob, "WriteLock", object_id=part)
 
-        # A point that was taken at the wrong place: told, and can be taken again.
+        # A point taken at the wrong place is reported and can be taken again.
         await alice.ask("ObjectAimingStart", **start)
         for index in range(4):
             wrong_point = FOCUS_POINTS[(index + 1) % 4]
@@ -162,14 +162,14 @@ async def test_an_object_is_aimed_by_its_focus_points(tmp_path: Path) -> None:
         await alice.ask("ObjectAimingCancel")
         assert "not aiming" in await refused(alice, "ObjectAimingCancel")
 
-        # Whoever gives the lock away cannot go on; at his next registration the aiming is forgotten.
+        # A user who releases the lock cannot go on. When they start again, the earlier aiming is discarded.
         await alice.ask("ObjectAimingStart", **start)
         await alice.ask("WriteUnlock", object_id=part)
         assert "lock" in await refused(alice, "ObjectAimingAddPoint", point_idx=0)
         await alice.ask("RegisterUser", user_name="alice")
         assert "not aiming" in await refused(alice, "ObjectAimingCancel")
 
-        # It ends with the scene.
+        # Aiming ends when the scene closes.
         await alice.lock(part)
         await alice.ask("ObjectAimingStart", **start)
         await alice.ask("WriteUnlock", object_id=part)

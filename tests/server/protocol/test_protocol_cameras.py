@@ -32,7 +32,7 @@ FOUND = Pose(Position(1, 2, 3), Orientation(0, 0, 1, 0))
 
 
 class Service:
-    """A calibration service that answers what it is told to, and keeps what it was asked."""
+    """A calibration service with preset answers, which records its requests."""
 
     def __init__(self) -> None:
         self.asked: list[Any] = []
@@ -101,7 +101,7 @@ class Service:
 
 
 def replaced_calibration(stage: Stage) -> Service:
-    """Let a service answer in place of the stage's own."""
+    """Replace the stage's calibration service."""
     service = Service()
     for method in ("camera", "markers", "robot"):
         setattr(stage.services.calibration, method, getattr(service, method))
@@ -117,10 +117,10 @@ async def ready(stage: Stage, **objects: str) -> tuple[Actor, Service]:
 
 
 def process(actor: Actor, name: str) -> list[tuple[str, bool]]:
-    """Give the states of a process that were told, and whether each had a message."""
-    told = [message["data"] for message in actor.waiting if message.get("event") == "ProcessState"]
-    assert {data["id"] for data in told} <= {name}
-    return [(data["state"], "message" in data) for data in told]
+    """Return the announced states of a process, and whether each had a message."""
+    states = [message["data"] for message in actor.waiting if message.get("event") == "ProcessState"]
+    assert {data["id"] for data in states} <= {name}
+    return [(data["state"], "message" in data) for data in states]
 
 
 async def test_a_camera_returns_its_picture_and_parameters(tmp_path: Path) -> None:
@@ -147,7 +147,7 @@ async def test_a_camera_returns_its_picture_and_parameters(tmp_path: Path) -> No
         assert isinstance(red, tuple)
         assert red[0] > 240 > 20 > max(red[1:])
         assert await alice.ask("CameraColorParameters", id=eye) == PARAMETERS
-        # A viewer needs neither a name nor the lock.
+        # A viewer needs neither a user name nor the lock.
         s = stage.services
         cameras = CameraOperations(s.session, s.online, s.cameras)
         assert Image.open(io.BytesIO((await cameras.take_picture(eye)).content)).size == (64, 48)  # type: ignore[arg-type]
@@ -173,7 +173,7 @@ async def test_client_pictures_are_calibrated_by_the_service(tmp_path: Path, req
     async with open_stage(tmp_path) as stage:
         stranger = await stage.person()
         args: dict[str, Any] = {"camera_parameters": PARAMETERS, "image": "\xff\xd8\x00picture"}
-        # A picture that is none; without markers that are configured it is not even looked at.
+        # Data that is not a picture is refused. Without configured markers the picture is not even decoded.
         words = "No markers are configured" if request_name == "GetCameraPose" else "picture"
         assert words in await refused(stranger, request_name, **args)
         service = replaced_calibration(stage)
@@ -185,7 +185,7 @@ async def test_client_pictures_are_calibrated_by_the_service(tmp_path: Path, req
             assert answer["pose"]["orientation"] == msgspec.to_builtins(inverse.orientation)
             answer = await stranger.ask(request_name, **args)
             assert answer["pose"]["position"] == {"x": 1, "y": 2, "z": 3}
-            assert service.asked.pop()[2] is None, "nothing is known of where the camera is"
+            assert service.asked.pop()[2] is None, "the pose of the camera is unknown"
         else:
             (seen,) = await stranger.ask(request_name, **args)
             assert seen["marker_id"] == 10
@@ -193,7 +193,7 @@ async def test_client_pictures_are_calibrated_by_the_service(tmp_path: Path, req
         parameters, (image,) = service.asked[0][:2]
         assert parameters.fy == 610
         assert image == b"\xff\xd8\x00picture"
-        # What the original never answered: a picture that is none.
+        # The original never answered a request whose picture is invalid.
         assert "not a picture" in await refused(stranger, request_name, **args | {"image": "€"})
         assert "empty" in await refused(stranger, request_name, **args | {"image": ""})
         assert len(service.asked) == 1
@@ -293,7 +293,7 @@ async def test_a_robot_pose_is_set_from_a_camera(tmp_path: Path) -> None:
         await alice.ask("CalibrateRobot", robot_id=arm)  # the first camera of the scene
         while not service.asked:
             await asyncio.sleep(0.005)
-        assert "lock" in await refused(bob, "WriteLock", object_id=eye), "the camera is kept until the end"
+        assert "lock" in await refused(bob, "WriteLock", object_id=eye), "the camera stays locked until the end"
         assert "is moving" in await refused(alice, "CalibrateRobot", robot_id=arm)
         assert "is moving" in await refused(
             alice,
@@ -309,10 +309,10 @@ async def test_a_robot_pose_is_set_from_a_camera(tmp_path: Path) -> None:
         await happens(carol, "ProcessState", state="finished")
         assert process(carol, "RobotCalibration") == [("started", False), ("finished", True)]
         tasks = [message["data"] for message in carol.waiting if message.get("event") == "TaskState"]
-        assert tasks == [], "nobody asked for these"
+        assert tasks == [], "nobody subscribed to these"
         assert carol.names() == ["ProcessState", "SceneObjectChanged/update", "ProcessState"]
         view, (depth,), model = service.asked[0]
-        assert [joint.value for joint in view.robot_joints[:3]] == [0, 0, 1], "it went to its calibration pose"
+        assert [joint.value for joint in view.robot_joints[:3]] == [0, 0, 1], "it moved to its calibration pose"
         assert (model.urdf.name, Path(model.urdf.path).read_bytes()) == ("arm.zip", b"content")
         assert view.robot_pose == Pose()
         picture = Image.open(io.BytesIO(depth))
@@ -368,14 +368,14 @@ async def test_calibration_records_are_listed_and_compared(tmp_path: Path) -> No
             found = (await stranger.ask("ListCalibrations", **args))["records"]  # type: ignore[arg-type]
             assert [one["id"] for one in found] == [one.id for one in expected]
 
-        # Where it is in the open scene, else a pose that was measured.
-        told = await stranger.ask("CheckCalibration", id=near.id)
-        assert (told["passed"], told["record_id"]) == (True, near.id)
-        assert told["distance"] == pytest.approx(0.001)
-        told = await stranger.ask("CheckCalibration", id=near.id, distance_limit=0.0005)
-        assert (told["passed"], "1.0 mm" in told["verdict"]) == (False, True)
-        told = await stranger.ask("CheckCalibration", id=far.id, pose=msgspec.to_builtins(FOUND))
-        assert (told["passed"], told["distance"]) == (True, 0.0)
+        # The pose in the open scene, else a measured pose.
+        check = await stranger.ask("CheckCalibration", id=near.id)
+        assert (check["passed"], check["record_id"]) == (True, near.id)
+        assert check["distance"] == pytest.approx(0.001)
+        check = await stranger.ask("CheckCalibration", id=near.id, distance_limit=0.0005)
+        assert (check["passed"], "1.0 mm" in check["verdict"]) == (False, True)
+        check = await stranger.ask("CheckCalibration", id=far.id, pose=msgspec.to_builtins(FOUND))
+        assert (check["passed"], check["distance"]) == (True, 0.0)
         assert (await stranger.ask("CheckCalibration", id=far.id))["passed"] is False
         assert (await stranger.ask("CheckCalibration", id=held.id, pose={}))["passed"] is True
         for args, words in (

@@ -1,4 +1,4 @@
-"""Edits that no recorded session contains: effect, events and refusals."""
+"""Edits that no recorded session contains: effects, events and refusals."""
 
 from pathlib import Path
 from typing import Any
@@ -6,8 +6,8 @@ from typing import Any
 from tests.server.protocol.stage import Actor, Stage, open_stage, refused
 
 
-def told(actor: Actor) -> list[tuple[str, str | None, str | None, Any]]:
-    """Give the events since the last time: name, change, parent, data."""
+def new_events(actor: Actor) -> list[tuple[str, str | None, str | None, Any]]:
+    """Return the events since the last call: name, change, parent, data."""
     return [(e["event"], e.get("change_type"), e.get("parent_id"), e.get("data")) for e in actor.events()]
 
 
@@ -26,7 +26,7 @@ async def test_settings_and_models_of_a_scene(tmp_path: Path) -> None:
         await alice.ask("UpdateObjectParameters", dry_run=True, **update)
         assert bob.events() == []
         await alice.ask("UpdateObjectParameters", **update)
-        ((event, change, parent, data),) = told(bob)
+        ((event, change, parent, data),) = new_events(bob)
         assert (event, change, parent) == ("SceneObjectChanged", "update", None)
         assert (data["id"], data["parameters"]) == (chooser, parameters)
         await alice.ask("WriteUnlock", object_id=chooser)
@@ -42,7 +42,7 @@ async def test_settings_and_models_of_a_scene(tmp_path: Path) -> None:
         )
         bob.take()
         await alice.ask("UpdateObjectModel", **model)
-        ((event, change, parent, data),) = told(bob)
+        ((event, change, parent, data),) = new_events(bob)
         assert (event, change, parent) == ("ChangedObjectTypes", "update", None)
         assert [(meta["type"], meta["object_model"]) for meta in data] == [("Plain", box)]
         assert "already" in await refused(alice, "UpdateObjectModel", **model)
@@ -58,7 +58,7 @@ async def test_settings_and_models_of_a_scene(tmp_path: Path) -> None:
 
 
 async def project(stage: Stage, alice: Actor, **objects: str) -> str:
-    """Open a project with one action point; gives its id."""
+    """Open a project with one action point. Return its id."""
     await stage.place(alice, **objects)
     await alice.ask("SaveScene")
     await alice.ask("NewProject", scene_id=stage.services.session.require_scene().id, name="project")
@@ -83,19 +83,19 @@ async def test_orientations_and_joints_are_taught_by_a_robot(tmp_path: Path) -> 
         await alice.ask("AddActionPointJointsUsingRobot", dry_run=True, **add)
         assert bob.events() == []
         await alice.ask("AddActionPointJointsUsingRobot", **add)
-        ((event, change, parent, joints),) = told(bob)
+        ((event, change, parent, joints),) = new_events(bob)
         assert (event, change, parent) == ("JointsChanged", "add", point)
         assert (joints["name"], joints["robot_id"], joints["is_valid"]) == ("taught", arm, True)
         assert [joint["value"] for joint in joints["joints"]][:3] == [0.4, 0.1, 0.3]
         await refused(alice, "AddActionPointJointsUsingRobot", **add)  # the name is taken
         left: dict[str, Any] = add | {"robot_id": two, "name": "left", "arm_id": "left"}
         await alice.ask("AddActionPointJointsUsingRobot", **left)
-        ((_, _, _, of_left),) = told(bob)
+        ((_, _, _, of_left),) = new_events(bob)
         assert (of_left["arm_id"], of_left["joints"]) == ("left", [{"name": "left_1", "value": 0.25}])
 
         straight = {"x": 0, "y": 0, "z": 0, "w": 1}
         await alice.ask("AddActionPointOrientation", action_point_id=point, name="o", orientation=straight)
-        ((_, _, _, orientation),) = told(bob)
+        ((_, _, _, orientation),) = new_events(bob)
         robot = {"robot_id": arm, "end_effector": "tip"}
         teach: dict[str, Any] = {"orientation_id": orientation["id"], "robot": robot}
         assert "hold" in await refused(bob, "UpdateActionPointOrientationUsingRobot", **teach)
@@ -106,19 +106,19 @@ async def test_orientations_and_joints_are_taught_by_a_robot(tmp_path: Path) -> 
         )
         bob.take()
         await alice.ask("UpdateActionPointOrientationUsingRobot", **teach)
-        ((event, change, parent, data),) = told(bob)
+        ((event, change, parent, data),) = new_events(bob)
         assert (event, change, parent) == ("OrientationChanged", "update", None)
         assert data["orientation"] == {"x": 1, "y": 0, "z": 0, "w": 0}
         await alice.ask("WriteUnlock", object_id=orientation["id"])
         bob.take()
 
-        # What an action uses stays; what none uses goes.
+        # Joints that an action uses are not removed; unused ones are.
         assert "lock" in await refused(bob, "RemoveActionPointJoints", joints_id=joints["id"])
         await alice.ask("RemoveActionPointJoints", joints_id=joints["id"])
-        ((event, change, parent, data),) = told(bob)
+        ((event, change, parent, data),) = new_events(bob)
         assert (event, change, parent, data["id"]) == ("JointsChanged", "remove", None, joints["id"])
         await alice.ask("RemoveActionPointOrientation", orientation_id=orientation["id"])
-        ((event, change, parent, data),) = told(bob)
+        ((event, change, parent, data),) = new_events(bob)
         assert (event, change, parent, data["id"]) == ("OrientationChanged", "remove", None, orientation["id"])
         (left_over,) = stage.services.session.require_project().action_points
         assert ([j.name for j in left_over.robot_joints], left_over.orientations) == (["left"], [])
@@ -147,11 +147,11 @@ async def test_robots_with_several_arms_and_hand_teaching(tmp_path: Path) -> Non
         await alice.ask("HandTeachingMode", dry_run=True, **teach)
         assert bob.events() == []
         await alice.ask("HandTeachingMode", **teach)
-        assert told(bob) == [("HandTeachingMode", None, None, {"robot_id": arm, "enabled": True})]
+        assert new_events(bob) == [("HandTeachingMode", None, None, {"robot_id": arm, "enabled": True})]
         step: dict[str, Any] = {"robot_id": arm, "end_effector_id": "tip", "axis": "x", "what": "position"}
         assert "by hand" in await refused(alice, "StepRobotEef", **step, mode="world", step=0.01)
         await alice.ask("HandTeachingMode", robot_id=arm, enable=False)
-        assert told(bob) == [("HandTeachingMode", None, None, {"robot_id": arm, "enabled": False})]
+        assert new_events(bob) == [("HandTeachingMode", None, None, {"robot_id": arm, "enabled": False})]
 
 
 async def test_logic_items_are_changed(tmp_path: Path) -> None:
@@ -184,7 +184,7 @@ async def test_logic_items_are_changed(tmp_path: Path) -> None:
         await alice.ask("UpdateLogicItem", dry_run=True, **change)
         assert bob.events() == []
         await alice.ask("UpdateLogicItem", **change)
-        ((event, kind, parent, data),) = told(bob)
+        ((event, kind, parent, data),) = new_events(bob)
         assert (event, kind, parent) == ("LogicItemChanged", "update", None)
         assert data == {"id": item, "start": first, "end": second, "condition": condition}
         await alice.ask("SaveProject")
@@ -195,7 +195,7 @@ async def test_logic_items_are_changed(tmp_path: Path) -> None:
         await alice.ask("CloseProject")
         bob.take()
         await alice.ask("OpenProject", id=project_id)
-        (opened, state) = told(bob)
+        (opened, state) = new_events(bob)
         assert (opened[0], opened[3]["project"]["logic"]) == ("OpenProject", saved["logic"])
         assert (state[0], state[3]) == ("SceneState", {"state": "stopped"})
         await refused(alice, "OpenProject", id=project_id)

@@ -34,8 +34,8 @@ async def stage(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Stage
         alice = await opened.person("alice")
         await opened.place(alice, arm="Arm", dumb="DumbArm", two="TwoArms")
         await add(alice, opened, "ur", "UR5e", BASE, host="127.0.0.99")
-        await solve(alice, opened.ids["ur"])  # the worker comes up
-        await opened.spare_host()  # of the module, not of the test in which it happens to come up
+        await solve(alice, opened.ids["ur"])  # starts the worker
+        await opened.spare_host()  # now, so that the start does not count as part of some test
         opened.alice = alice  # type: ignore[attr-defined]
         yield opened
 
@@ -90,7 +90,7 @@ async def test_scene_objects_are_obstacles(stage: Stage, alice: Actor) -> None:
     text = await refused(alice, "InverseKinematics", **args)
     assert "only in collision" in text
     assert "crate" in text
-    assert crate not in text, "people know it by its name"
+    assert crate not in text, "messages name it as users know it"
     joints = await solve(alice, robot, avoid_collisions=False)
     await alice.ask("RemoveFromScene", id=crate)
     assert await solve(alice, robot) == joints
@@ -111,7 +111,7 @@ async def test_impossible_requests_are_refused(stage: Stage, alice: Actor) -> No
         # Without a model the device is needed.
         args = {"robot_id": stage.ids[name], "end_effector_id": "tip", "pose": pose}
         assert "offline" in await refused(alice, "InverseKinematics", **args)
-    # An asset that is no model of a robot says so.
+    # An asset that is not a robot model is reported as such.
     args = {"robot_id": stage.ids["arm"], "end_effector_id": "tip", "pose": pose}
     assert "arm.zip" in await refused(alice, "InverseKinematics", **args)
     stranger = await stage.person()
@@ -128,7 +128,7 @@ async def test_object_settings_change_its_model(stage: Stage, alice: Actor) -> N
 
 
 async def test_kinematics_are_computed_for_a_robot_without_its_own(stage: Stage, alice: Actor) -> None:
-    """It is in operation: joints near to those that are given come from its model."""
+    """While the robot is online, joints near the given ones are computed from its model."""
     silent = DUMB_ARM.replace("class DumbArm", "class Silent").replace(
         "urdf_package_name = None", 'urdf_package_name = "ur5e.zip"'
     )

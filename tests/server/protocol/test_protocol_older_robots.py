@@ -27,7 +27,7 @@ async def test_a_robot_with_another_parameter_name_for_the_end_effector(tmp_path
         assert await tip_of(alice, arm) == {"x": 0.4, "y": 0.1, "z": 0.3}
         assert await alice.ask("GetEndEffectors", robot_id=arm) == ["tip"]
 
-        # Values of a parameter, from a method that calls its own parameter otherwise.
+        # Values of a parameter, from a method whose own parameter has another name.
         chosen = [{"id": "group", "value": "a"}]
         values = await alice.ask("ActionParamValues", id=arm, param_id="program", parent_params=chosen)
         assert sorted(values) == ["a1", "a2"]

@@ -43,9 +43,9 @@ EXPECTED = {
 for row in EXPECTED.values():
     row["StopAll"] = "ok"
 EXPECTED |= {"project_offline": EXPECTED["scene_offline"], "project_online": EXPECTED["scene_online"]}
-"""What is asked names nothing that there is: where it would be granted otherwise, it is refused for that alone."""
+"""Requests that the state permits. They are refused only because their arguments name nothing that exists."""
 ANONYMOUS = {"JogRobot", "HoldHandTeaching", "AcknowledgeStop"}
-"""They need a registered user, whose name they carry."""
+"""Requests that need a registered user, because they carry the user's name."""
 
 
 async def answer(person: Actor, name: str) -> str:
@@ -77,7 +77,7 @@ async def test_the_declared_role_is_required(tmp_path: Path) -> None:
         client.role = Role.OPERATOR
         for name, role in ROLES.items():
             assert RPCS[name].role is role
-            if name == "StopAll":  # nothing speaks against it
+            if name == "StopAll":  # allowed in every state
                 assert await answer(operator, name) == "ok"
                 continue
             text = await refused(operator, name, **(ASKED[name] or {}))
@@ -110,7 +110,7 @@ async def test_a_robot_is_streamed_while_a_program_runs(tmp_path: Path) -> None:
         viewer.take(), other.take()
         await until(lambda: len(joints(viewer)) >= 20 and len(joints(other)) >= 2)
         seen, usual = joints(viewer), joints(other)
-        assert all("time_ms" in data for data in seen), "it gets the ordinary events too"
+        assert all("time_ms" in data for data in seen), "the client also gets the ordinary events"
         steps = [after["time_ms"] - before["time_ms"] for before, after in itertools.pairwise(seen)]
         assert sum(steps) >= (len(steps) - 2) * 33.3, "faster than requested"
         assert min(steps) <= 60.0, "as slow as the ordinary events"
@@ -128,7 +128,7 @@ async def test_a_robot_is_streamed_while_a_program_runs(tmp_path: Path) -> None:
             with pytest.raises(Refused, match=words):
                 await viewer.ask("StreamRobot", **args)
 
-        # It ends with the program, and is asked for anew in the next.
+        # The stream ends with the program. A client subscribes again for the next one.
         await viewer.ask("StreamRobot", **what, rate=30)
         await alice.ask("StopPackage")
         await happens(viewer, "OpenProject")

@@ -65,7 +65,7 @@ async def test_a_tool_is_turned_down_with_the_smallest_change(tmp_path: Path) ->
         target = msgspec.convert(end["target_pose"], Pose)
         assert target.position == Position(0.3, 0.2, 0.1)
         assert Position(0, 0, 1).rotated(target.orientation).distance_to(Position(0, 0, -1)) < 1e-9
-        # The joints of this arm are position and rotation vector: no other angle of the circle changes them less.
+        # The joints of this arm are position and rotation vector. No other angle of the circle changes them less.
         here = tilted.rotation_vector()
         change = _distance(here, target.orientation)
         assert change < 1.0
@@ -74,14 +74,14 @@ async def test_a_tool_is_turned_down_with_the_smallest_change(tmp_path: Path) ->
             assert _distance(here, other) > change - 0.02
         assert not stage.services.online.moving
 
-        # It holds the caller's lock, before and after.
+        # The caller holds the lock before and after.
         assert "lock" in await refused(bob, "SetEefPerpendicularToWorld", **args)
         await put(Pose(Position(0.3, 0.2, -0.1), tilted))
         assert "below the floor" in await refused(alice, "SetEefPerpendicularToWorld", **args)
 
 
 def _distance(here: tuple[float, ...], orientation: Orientation) -> float:
-    """Give the change of the arm's joints: a rotation has two vectors, the short way round and the long way."""
+    """Return the change of the arm's joints. A rotation has two vectors: the short one and the long one."""
     short = orientation.rotation_vector()
     long = tuple(value * (1 - 2 * math.pi / math.hypot(*short)) for value in short)
     return min(sum(abs(a - b) for a, b in zip(here, way, strict=True)) for way in (short, long))

@@ -34,7 +34,7 @@ async def add(person: Actor, stage: Stage, name: str, kind: str, pose: Pose, **s
 
 
 async def point(person: Actor, stage: Stage, name: str, x: float, y: float, z: float) -> tuple[str, str]:
-    """Add an action point with an orientation that points down; gives both ids."""
+    """Add an action point with an orientation that points down. Return both ids."""
     await person.ask("AddActionPoint", name=name, position={"x": x, "y": y, "z": z})
     (added,) = [each for each in stage.services.session.require_project().action_points if each.name == name]
     await person.lock(added.id)
@@ -50,8 +50,8 @@ async def move(person: Actor, point_id: str, x: float, y: float, z: float) -> No
     await person.ask("WriteUnlock", object_id=point_id)
 
 
-def told(person: Actor) -> dict[str, str]:
-    """Give what the events so far say: the newest of each item."""
+def latest_results(person: Actor) -> dict[str, str]:
+    """Return the latest result of each item from the events so far."""
     found: dict[str, str] = {}
     for message in person.waiting:
         if message.get("event") == "ReachabilityChanged":
@@ -78,7 +78,7 @@ async def test_reachability_is_announced_and_follows_edits(tmp_path: Path) -> No
         near_point, near = await point(alice, stage, "near", 0.4, 0.2, 0.3)
         _, far = await point(alice, stage, "far", 3, 0, 0)
         await bob.ask("SubscribeEvents", events=["ReachabilityChanged"])
-        await until(lambda: told(bob) == {near: "reachable", far: "out_of_reach"})
+        await until(lambda: latest_results(bob) == {near: "reachable", far: "out_of_reach"})
         (event, *_) = [m["data"] for m in bob.waiting if m.get("event") == "ReachabilityChanged"]
         assert (event["robot_id"], event["end_effector_id"]) == (robot, "tcp")
         assert "arm_id" not in event
@@ -93,17 +93,17 @@ async def test_reachability_is_announced_and_follows_edits(tmp_path: Path) -> No
         assert [item["id"] for item in answer["items"]] == [far]
         assert await carol.ask("Reachability", end_effector_id="other") == []
 
-        # Only what changed is told.
+        # Only changed results are sent.
         bob.take()
         await move(alice, near_point, 2.5, 0, 0)
-        await until(lambda: told(bob) == {near: "out_of_reach"})
+        await until(lambda: latest_results(bob) == {near: "out_of_reach"})
         bob.take()
         await move(alice, near_point, 0.4, 0.2, 0.3)
-        await until(lambda: told(bob) == {near: "reachable"})
+        await until(lambda: latest_results(bob) == {near: "reachable"})
         bob.take()
-        # Something is put in the way, and taken out again.
+        # An obstacle is added, and removed again.
         stage.services.collisions.put(Obstacle.of(Box("box", 0.2, 0.2, 0.2), Pose(Position(0.4, 0.2, 0.3))))
-        await until(lambda: told(bob) == {near: "in_collision"})
+        await until(lambda: latest_results(bob) == {near: "in_collision"})
         (answer,) = await carol.ask("Reachability", ids=[near])
         assert "box" in answer["items"][0]["reason"]
         assert answer["items"][0].keys() == {"id", "reach", "reason"}
@@ -115,13 +115,13 @@ async def test_reachability_is_announced_and_follows_edits(tmp_path: Path) -> No
         assert contact["values"]["first"].startswith("ur"), "the name of the robot, not its id"
         bob.take()
         stage.services.collisions.remove("box")
-        await until(lambda: told(bob) == {near: "reachable"})
-        # Joints that are kept count too, for their robot.
+        await until(lambda: latest_results(bob) == {near: "reachable"})
+        # Stored joints count too, for their robot.
         names = [joint.name for joint in (await _joints(stage))]
         bob.take()
         beyond = [Joint(name, value) for name, value in zip(names, (0, -1.2, 1, -1.4, -1.57, 9), strict=True)]
         key = await _add_joints(stage, near_point, robot, beyond)
-        await until(lambda: told(bob) == {key: "out_of_reach"})
+        await until(lambda: latest_results(bob) == {key: "out_of_reach"})
 
         for args, words in (
             ({"robot_id": stage.ids["crate"]}, "not a robot"),
@@ -137,7 +137,7 @@ async def _joints(stage: Stage) -> list[Any]:
 
 
 async def _add_joints(stage: Stage, point_id: str, robot: str, joints: list[Joint]) -> str:
-    """Keep joints at a point, past the robot that is not there."""
+    """Add joints to a point without the request, which needs a robot that is online."""
     session = stage.services.session
     value = ProjectRobotJoints("kept", robot, joints, True, id="jnt_kept")
     await session.commit("alice", [session.document.add(Kind.JOINTS, "jnt_kept", value, parent=point_id)])
@@ -185,7 +185,7 @@ async def test_two_arms_are_obstacles_for_each_other(tmp_path: Path) -> None:
         await bob.ask("SubscribeEvents", events=["ReachabilityChanged"])
 
         async def reach(expected: dict[str, str]) -> dict[str, str]:
-            """Wait until that is what is told; gives the reasons."""
+            """Wait until these results have been announced. Return the reasons."""
             found: dict[str, str] = {}
             async with asyncio.timeout(PATIENCE):
                 while found != expected:
@@ -202,7 +202,7 @@ async def test_two_arms_are_obstacles_for_each_other(tmp_path: Path) -> None:
         reasons = await reach(free | {stage.ids["arm"]: "in_collision"})
         assert "arm/wrist" in reasons[stage.ids["arm"]]
         assert "other/wrist" in reasons[stage.ids["arm"]]
-        assert told(bob) == {between: "in_collision"}, "nobody edited anything"
+        assert latest_results(bob) == {between: "in_collision"}, "nobody edited anything"
         await alice.ask("MoveToJoints", robot_id=other, speed=1.0, joints=joints)
         await reach(free)
         await alice.ask("MoveToJoints", robot_id=other, speed=1.0, joints=[joints[0] | {"value": -1.57}, *joints[1:]])
@@ -250,7 +250,7 @@ async def test_a_gripped_part_is_an_obstacle_online(tmp_path: Path) -> None:
         _, above = await point(alice, stage, "above", 0.134, 0.492, 0.488)
         await alice.ask("SaveProject")
         await bob.ask("SubscribeEvents", events=["ReachabilityChanged"])
-        await until(lambda: told(bob) == {above: "reachable"})
+        await until(lambda: latest_results(bob) == {above: "reachable"})
         await stage.start(alice)
 
         async def claw(method: str, **args: float) -> None:
@@ -259,19 +259,19 @@ async def test_a_gripped_part_is_an_obstacle_online(tmp_path: Path) -> None:
         await claw("activate")
         bob.take()
         await claw("grip", width=0.0, force=1.0, speed=1.0)
-        await until(lambda: told(bob) == {above: "in_collision"})
+        await until(lambda: latest_results(bob) == {above: "in_collision"})
         (row,) = await alice.ask("Reachability", robot_id=robot, ids=[above])
         assert "part of claw and crate" in row["items"][0]["reason"]
         assert "part of claw" in stage.services.scene_collisions.online_obstacles()
         bob.take()
         await claw("release")
-        await until(lambda: told(bob) == {above: "reachable"})
+        await until(lambda: latest_results(bob) == {above: "reachable"})
         bob.take()
         await claw("grip", width=0.0, force=1.0, speed=1.0)
-        await until(lambda: told(bob) == {above: "in_collision"})
+        await until(lambda: latest_results(bob) == {above: "in_collision"})
         bob.take()
         await stage.stop(alice)
-        await until(lambda: told(bob) == {above: "reachable"})
+        await until(lambda: latest_results(bob) == {above: "reachable"})
 
 
 async def test_reachability_ends_with_the_document_and_survives_a_worker_crash(tmp_path: Path) -> None:
@@ -280,7 +280,7 @@ async def test_reachability_ends_with_the_document_and_survives_a_worker_crash(t
         await prepared(stage, alice)
         near_point, near = await point(alice, stage, "near", 0.4, 0.2, 0.3)
         await bob.ask("SubscribeEvents", events=["ReachabilityChanged"])
-        await until(lambda: told(bob) == {near: "reachable"})
+        await until(lambda: latest_results(bob) == {near: "reachable"})
         compute, board = stage.services.compute, stage.services.reachability
         pid = compute.pid(WorkerKind.KINEMATICS)
         assert pid is not None
@@ -289,7 +289,7 @@ async def test_reachability_ends_with_the_document_and_survives_a_worker_crash(t
         await move(alice, near_point, 2.5, 0, 0)
         await until(lambda: compute._workers[WorkerKind.KINEMATICS].process is not None and not board._idle.is_set())
         os.kill(pid, signal.SIGKILL)
-        await until(lambda: told(bob) == {near: "out_of_reach"})
+        await until(lambda: latest_results(bob) == {near: "out_of_reach"})
 
         pid = compute.pid(WorkerKind.KINEMATICS)
         assert pid is not None
@@ -297,10 +297,10 @@ async def test_reachability_ends_with_the_document_and_survives_a_worker_crash(t
         await move(alice, near_point, 0.4, 0.2, 0.3)
         bob.take()
         await alice.ask("CloseProject", force=True)
-        assert board._working is None, "nothing is worked out for a project that is closed"
+        assert board._working is None, "nothing is computed for a closed project"
         os.kill(pid, signal.SIGCONT)
         assert "is open" in await refused(alice, "Reachability")
-        assert told(bob) == {}
+        assert latest_results(bob) == {}
 
 
 async def test_a_damaged_robot_model_is_reported(tmp_path: Path) -> None:
@@ -315,6 +315,6 @@ async def test_a_damaged_robot_model_is_reported(tmp_path: Path) -> None:
             while True:
                 (answer,) = await alice.ask("Reachability")
                 assert [item["reach"] for item in answer["items"]] == ["unknown"]
-                if "reason" in answer["items"][0]:  # until it is known that it is not known
+                if "reason" in answer["items"][0]:  # the server may not know yet that the model is damaged
                     break
         assert "arm.zip" in answer["items"][0]["reason"]

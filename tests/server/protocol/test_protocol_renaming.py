@@ -1,4 +1,4 @@
-"""Projects from before an object type renamed an action or parameter, and projects of ARCOR2, open and run."""
+"""Projects open and run although an object type renamed an action or parameter, or although they come from ARCOR2."""
 
 from pathlib import Path
 from typing import Any
@@ -52,7 +52,7 @@ async def test_a_saved_project_opens_builds_and_runs(tmp_path: Path, whole: str,
         alice = await stage.person("alice")
         session, storage = stage.services.session, stage.services.storage
         point = await opened(stage, alice)
-        # Requests may give the former names, too.
+        # Requests may also use the former names.
         draw = await add(stage, alice, point, "draw", whole, **{low: 3, high: 3})
         await add(stage, alice, point, "part", "random_double", **{low: 0.5, high: 0.5})
         assert calls(session.require_project()) == NOW
@@ -63,7 +63,7 @@ async def test_a_saved_project_opens_builds_and_runs(tmp_path: Path, whole: str,
         (listed,) = await storage.projects()
         saved = await storage.project(listed.id)
 
-        # As it was saved before the names changed.
+        # As saved before the names changed.
         def before(action: Action, method: str) -> Action:
             pairs = zip(action.parameters, (low, high), strict=True)
             parameters = [msgspec.structs.replace(each, name=name) for each, name in pairs]
@@ -81,7 +81,7 @@ async def test_a_saved_project_opens_builds_and_runs(tmp_path: Path, whole: str,
         script = stage.services.settings.packages_dir / package / "script.py"
         call = 'rnd.random_int(3, 3, an="draw")'
         assert call in script.read_text()
-        # A script that somebody wrote may call the action as before.
+        # A script written by a user may still call the action by its former name.
         script.write_text(script.read_text().replace(call, f'rnd.{whole}({low}=3, {high}=3, an="draw")'))
         await alice.ask("RunPackage", id=package)
         assert (await happens(alice, "ActionStateAfter"))["results"] == ["3"]

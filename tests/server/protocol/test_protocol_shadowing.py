@@ -29,7 +29,7 @@ async def upload(stage: Stage, name: str, source: str) -> None:
 
 
 async def project(stage: Stage, alice: Actor) -> str:
-    """Save a project that inverts a value for ever, with one more action that never runs; return its id."""
+    """Save a project that inverts a value in an endless loop, and has one action outside of it; return its id."""
     await stage.place(alice, logic="LogicActions")
     await alice.ask("SaveScene")
     await alice.ask("NewProject", scene_id=stage.services.session.require_scene().id, name="inverting")
@@ -96,15 +96,15 @@ async def test_documents_use_the_type_that_shadows_an_installed_one(tmp_path: Pa
         assert found == ["unused: The object type Inverted logic has no action 'logical_and'."]
         assert "logical_and" in await refused(alice, "OpenProject", id=project_id)
 
-        # A released package runs the code that it was built with, a new one that of the upload.
+        # A released package runs the code that it was built with. A new package runs the uploaded code.
         assert await run(alice, released) == ["false"]
         await stop(alice)
         rebuilt = (await alice.ask("BuildProject", **build))["package_id"]
         assert await run(alice, rebuilt) == ["true"]
 
-        # Deleting restores the installed type. The program that runs goes on as it is.
-        (kept,) = await deleted(alice, "LogicActions")
-        assert kept["error"].startswith("The object type Inverted logic is used in the scenes")
+        # Deleting the upload restores the installed type. The running program is not affected.
+        (refusal,) = await deleted(alice, "LogicActions")
+        assert refusal["error"].startswith("The object type Inverted logic is used in the scenes")
         await stage.services.storage.delete_object_type("LogicActions")
         await stage.services.type_notifications.uploaded()
         assert await problems(alice, project_id) == []

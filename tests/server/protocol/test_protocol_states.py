@@ -1,4 +1,4 @@
-"""Answers of every request in six server states when its arguments name nothing, as recorded."""
+"""Answers of every request in six server states, as recorded, with arguments that name nothing that exists."""
 
 import re
 from pathlib import Path
@@ -19,7 +19,7 @@ UNANSWERED = "no answer in the peer (ours must answer)"
 
 
 def request(name: str, scene_id: str) -> dict[str, Any]:
-    """Give a request as it was recorded: dry where it can be, with arguments that name nothing."""
+    """Return a request as it was recorded: a dry run if possible, with ids that do not exist."""
     message: dict[str, Any] = {"id": 1, "request": name, "dry_run": RPCS[name].dry_run}
     if RPCS[name].args is None:
         return message
@@ -48,10 +48,10 @@ def outcome(answer: dict[str, Any]) -> str:
 
 
 def differs(name: str, state: str, recorded: str, ours: str) -> bool:
-    """Tell whether an outcome is another one.
+    """Return whether our outcome differs from the recorded one.
 
-    The peer's "other" takes in what it says of robots and cameras. Where nothing is open, it names the project to some
-    requests that need one, and the scene to others; ours names the scene.
+    The peer's "other" includes its messages about robots and cameras. Where nothing is open, it names the project in
+    some refusals and the scene in others. Our refusals name the scene.
     """
     if recorded == UNANSWERED:
         return ours == "ok"
@@ -63,7 +63,7 @@ def differs(name: str, state: str, recorded: str, ours: str) -> bool:
 
 
 async def enter(stage: Stage, alice: Actor, state: str) -> None:
-    """Go on to a state from the one before it in the matrix."""
+    """Change from the previous state of the matrix to this one."""
     match state:
         case "no_scene":
             await stage.place(alice, time="TimeActions")
@@ -102,7 +102,7 @@ async def test_every_request_in_every_state(tmp_path: Path) -> None:
 
 
 DIFFERENT: dict[str, str] = {}
-"""Deliberate differences; each stands in docs/protocol.md."""
+"""Deliberate differences. docs/protocol.md explains each."""
 
 
 def test_the_matrix_excludes_requests_that_change_the_state() -> None:

@@ -1,7 +1,7 @@
 """Every request and event of the protocol, and the tests that show its effect, its events and its refusals.
 
-What the recorded sessions and the state matrix hold is counted from them; for the rest the table names a test, which
-has to be there and to speak of it. Nothing of protocol.json may be left over.
+Recorded sessions and the state matrix cover most of them. For the others the table names a test, which must exist and
+mention the request or event. Every request and event of protocol.json must be covered.
 """
 
 import ast
@@ -67,7 +67,7 @@ GRANTED = {
     "UpdateOverride": f"{VALUES}::test_overrides_apply_online_and_in_the_package",
     "UploadPackage": f"{RUNNING}::test_packages_are_uploaded_renamed_and_deleted",
 }
-"""Where a request is granted that no recorded session shows so: its effect, and the events that it brings."""
+"""Tests of the effect and events of requests that no recorded session grants."""
 
 REFUSED = {
     "GetCameraPose": f"{CAMERAS}::test_client_pictures_are_calibrated_by_the_service",
@@ -80,11 +80,11 @@ REFUSED = {
     "StopPackage": f"{RUNNING}::test_each_run_state_allows_its_requests",
     "TemporaryPackage": "server/protocol/test_protocol_temporary.py::test_a_project_runs_and_is_reopened",
 }
-"""Where a request is refused that neither a recorded session nor the matrix shows so."""
+"""Tests of refusals that neither a recorded session nor the matrix contains."""
 
 NEVER_REFUSED = {"GetObjectTypes", "GetRobotMeta", "ListPackages", "ListProjects", "ListScenes", "ObjectTypeUsage",
                  "SystemInfo"}  # fmt: skip
-"""They need nothing and take nothing that could be wrong."""
+"""Requests without arguments that could be invalid, and which need nothing."""
 
 TOLD = {
     "ActionCancelled": f"{ONLINE}::test_a_single_action_can_be_cancelled",
@@ -94,15 +94,15 @@ TOLD = {
     "ProjectException": f"{RUNNING}::test_a_script_error_is_reported",
     "RobotMoveToJoints": f"{ONLINE}::test_a_motion_reports_start_and_end",
 }
-"""Where an event is told that no recorded session holds."""
+"""Tests of events that no recorded session contains."""
 
 NEVER_TOLD = {"Notification"}
-"""Declared and never sent, by the original either (protocol, 8)."""
+"""Declared and never sent, not even by the original (protocol, 8)."""
 
 
 @cache
 def functions(file: str) -> dict[str, set[str]]:
-    """Give the tests of a file with the texts and names that stand in each."""
+    """Return the tests of a file with the texts and names that occur in each."""
     return {
         node.name: {
             text
@@ -117,7 +117,7 @@ def functions(file: str) -> dict[str, set[str]]:
 
 @cache
 def recorded() -> tuple[set[str], set[str], set[str]]:
-    """Give what the sessions that are compared grant, refuse and tell."""
+    """Return the requests granted, the requests refused and the events in the compared sessions."""
     granted, refused, events = set(), set(), set()
     for name in SESSIONS:
         dry = {line["msg"]["id"]: line["msg"].get("dry_run") for line in session(name) if line["who"].endswith(">")}
@@ -138,13 +138,13 @@ def recorded() -> tuple[set[str], set[str], set[str]]:
 def test_the_named_test_exists_and_mentions_the_request(name: str, test: str) -> None:
     file, _, function = test.partition("::")
     texts = functions(file)[function]
-    assert name in texts, f"{test} says nothing of {name}"
+    assert name in texts, f"{test} does not mention {name}"
 
 
 @pytest.mark.parametrize(("name", "test"), REFUSED.items(), ids=REFUSED)
 def test_the_named_test_expects_a_refusal(name: str, test: str) -> None:
     file, _, function = test.partition("::")
-    assert functions(file)[function] & {"refused", "raises"}, f"{test} refuses {name} nowhere"
+    assert functions(file)[function] & {"refused", "raises"}, f"{test} expects no refusal of {name}"
 
 
 def test_every_request_has_a_test_of_its_effect() -> None:
@@ -154,7 +154,7 @@ def test_every_request_has_a_test_of_its_effect() -> None:
 
 
 CHECKED_BY_ITSELF = {"GetActions", "GetObjectTypes", "GetRobotMeta", "SystemInfo"}
-"""Granted in a session whose answer differs on purpose: what has to be the same of it is compared there."""
+"""Requests whose recorded answers differ on purpose. The comparison of the sessions checks what must be the same."""
 
 
 def test_every_request_has_a_test_of_its_refusal() -> None:

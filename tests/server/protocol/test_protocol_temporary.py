@@ -16,19 +16,19 @@ OPENED = ["PackageState stopping", "PackageState stopped", "PackageChanged/remov
 
 
 def story(actor: Actor) -> list[str]:
-    """Give what was told, in short, without the single actions."""
-    told = []
+    """Return a summary of the events, without the single actions."""
+    events = []
     for event in actor.events():
         name, data = event["event"], event.get("data", {})
         if name in ("PackageState", "SceneState"):
-            told.append(f"{name} {data['state']}")
+            events.append(f"{name} {data['state']}")
         elif not name.startswith("ActionState"):
-            told.append("/".join(filter(None, (name, event.get("change_type")))))
-    return told
+            events.append("/".join(filter(None, (name, event.get("change_type")))))
+    return events
 
 
 async def project(stage: Stage, actor: Actor, *, seconds: str = "0.05", **more: str) -> str:
-    """Make and save a project that waits again and again, with more objects; gives the action's id."""
+    """Create and save a project that waits in a loop, with more objects. Return the action's id."""
     await stage.place(actor, time="TimeActions", **more)
     await actor.ask("SaveScene")
     scene = stage.services.session.require_scene()
@@ -62,7 +62,7 @@ async def test_a_project_runs_and_is_reopened(tmp_path: Path) -> None:
         for person in (alice, bob, stranger):
             person.take()
 
-        # Nobody has to be logged in for it.
+        # No user has to be registered for it.
         await stranger.ask("TemporaryPackage")
         assert "response" in stranger.take()[0], "the answer comes before all events"
         before = await happens(bob, "ActionStateBefore")
@@ -85,7 +85,7 @@ async def test_a_project_runs_and_is_reopened(tmp_path: Path) -> None:
         assert story(bob) == CLOSED + OPENED
         assert await alice.ask("ListPackages") == []
         assert not stage.services.session.has_changes
-        assert (await alice.ask("Undo"))["request"] == "AddActionPoint", "the history goes on after a run"
+        assert (await alice.ask("Undo"))["request"] == "AddActionPoint", "the history continues after a run"
         assert len(stage.services.session.require_project().action_points) == 1
         await alice.ask("AddActionPoint", name="another", position={"x": 0, "y": 0, "z": 0})
 
@@ -103,10 +103,10 @@ async def test_an_online_scene_is_online_again_after_the_run(tmp_path: Path) -> 
         await alice.ask("StopPackage")
         await happens(alice, "OpenProject")
         await happens(alice, "SceneState", state="started")
-        told = story(alice)
-        assert told[:3] == ["SceneState stopping", "SceneState stopped", "ProjectClosed"]
-        assert told[-3:] == ["OpenProject", "SceneState starting", "SceneState started"]
-        assert "ShowMainScreen" not in told
+        events = story(alice)
+        assert events[:3] == ["SceneState stopping", "SceneState stopped", "ProjectClosed"]
+        assert events[-3:] == ["OpenProject", "SceneState starting", "SceneState started"]
+        assert "ShowMainScreen" not in events
         await stage.stop(alice)
 
 
@@ -117,9 +117,9 @@ async def test_the_project_is_reopened_when_its_program_cannot_start(tmp_path: P
         alice.take()
         await alice.ask("TemporaryPackage", breakpoints=["acp_none"])
         await happens(alice, "OpenProject")
-        told = story(alice)
-        assert "ProjectException" in told
-        assert told[-3:] == ["PackageState stopped", "PackageChanged/remove", "OpenProject"]
+        events = story(alice)
+        assert "ProjectException" in events
+        assert events[-3:] == ["PackageState stopped", "PackageChanged/remove", "OpenProject"]
         await alice.ask("CloseProject")
 
 
@@ -152,7 +152,7 @@ async def test_a_project_that_cannot_be_built_stays_open(tmp_path: Path, monkeyp
             assert await refused(alice, "TemporaryPackage") == "The disk is full."
         assert stage.services.session.project is not None
         assert not stage.services.execution.busy
-        # All at once: one of them runs it, the others are refused.
+        # Four at once: one of them runs it, the others are refused.
         outcomes = await asyncio.gather(*(alice.ask("TemporaryPackage") for _ in range(3)), return_exceptions=True)
         assert sum(outcome is None for outcome in outcomes) == 1
         await happens(alice, "PackageState", state="running")
@@ -175,7 +175,7 @@ async def test_a_server_ended_during_the_run_leaves_no_package_and_reopens_the_p
 
 
 async def test_a_server_killed_during_the_run_cleans_up_at_its_next_start(tmp_path: Path) -> None:
-    """The directory as it was in mid-run, as a kill or a power cut leaves it."""
+    """A kill or a power cut leaves the directory as it is during a run."""
     left, data = tmp_path / "left", tmp_path / "data"
     data.mkdir()
     async with open_stage(data) as stage:
@@ -183,7 +183,7 @@ async def test_a_server_killed_during_the_run_cleans_up_at_its_next_start(tmp_pa
         await project(stage, alice)
         await alice.ask("TemporaryPackage")
         await happens(alice, "ActionStateBefore")
-        await until(lambda: stage.services.runs._writing is None)  # what is asked for here is what is on the disk
+        await until(lambda: stage.services.runs._writing is None)  # the data on the disk matter here
         await asyncio.to_thread(shutil.copytree, data, left)
     packages = left / "packages"
     (package,) = packages.glob("pkg_*")

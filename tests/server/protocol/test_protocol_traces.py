@@ -1,8 +1,8 @@
-"""The recorded sessions of the spec, all of them in order, played to a whole server with devices and programs.
+"""All recorded sessions of the protocol, replayed in order on a complete server with devices and programs.
 
-Every request is sent as it was; each client must get the same answers and events in the same order, ids mapped and
-texts, times and the numbers of a random generator apart. What a program and a robot tell continually is compared by
-itself: how often it comes depends on the clock.
+Every request is sent as recorded. Each client must get the same answers and events in the same order. Ids are mapped;
+texts, times and random numbers are not compared. Periodic events of programs and robots are compared separately,
+because their number depends on the clock.
 """
 
 import asyncio
@@ -33,40 +33,40 @@ DIFFERENT = {
     4: "GetObjectTypes: other types are installed here",
     5: "GetActions: the robot's other actions are the driver's business",
     6: "GetRobotMeta: other robots are installed here",
-    10: "ListMeshes was never answered",
+    10: "the original never answered ListMeshes",
     63: "MoveToJoints always failed (Q9)",
-    64: "the lock that 63 never gave back is missing (Q9)",
-    65: "that lock is told now (Q9)",
+    64: "the lock that 63 never released is missing (Q9)",
+    65: "that lock is announced now (Q9)",
     103: "an integer literal is no double (Q11)",
 }
-"""Deliberate differences by the number of the request; docs/protocol.md has them."""
+"""Deliberate differences by the number of the request; docs/protocol.md describes them."""
 
 ADDED = ("category", "display_name", "icon")
-"""Fields that we add to what is recorded; clients pass over what they do not know."""
+"""Fields that we add to the recorded ones. Clients ignore unknown fields."""
 
 Messages = dict[str, list[dict[str, Any]]]
 
 
 class Exchange:
-    """A request with all that every client got until the next one."""
+    """A request with all messages that every client got before the next request."""
 
     def __init__(self, who: str, request: dict[str, Any]) -> None:
         self.who = who
         self.request = request
         self.received: Messages = {"A": [], "B": [], "C": []}
 
-    def told(self, who: str) -> list[dict[str, Any]]:
+    def compared(self, who: str) -> list[dict[str, Any]]:
         return [message for message in self.received[who] if message.get("event") not in CONTINUAL]
 
 
 NOTHING = "NO RESPONSE TO"
-"""What stands in a recorded session where nothing was sent."""
+"""Placeholder in a recorded session where nothing was sent."""
 REFUSED = ("b3", "b3_copy")
-"""The action that request 103 adds to the recorded project and not to ours, and its copy."""
+"""The action that request 103 adds to the recorded project but not to ours, and its copy."""
 
 
 def without_refused(value: Any) -> Any:
-    """Leave out of a recorded message what the refused action brought with it."""
+    """Remove what the action that we refuse added to a recorded message."""
     match value:
         case {"event": _, "data": {"name": name}} if name in REFUSED:
             return {NOTHING: name}
@@ -87,11 +87,11 @@ def exchanges(name: str) -> Iterator[Exchange]:
         elif found and NOTHING not in message:
             found[-1].received[who].append(message)
     for before, after in itertools.pairwise(found):
-        # What A had got before it sent its next request, B sometimes got just after that.
+        # B sometimes received just after the request a message that A received before it.
         while (
-            (late := after.told("B")[:1])
-            and len(before.told("B")) < len(before.told("A"))
-            and late[0] in before.told("A")
+            (late := after.compared("B")[:1])
+            and len(before.compared("B")) < len(before.compared("A"))
+            and late[0] in before.compared("A")
         ):
             before.received["B"].append(late[0])
             after.received["B"].remove(late[0])
@@ -99,7 +99,7 @@ def exchanges(name: str) -> Iterator[Exchange]:
 
 
 def comparable(value: Any, key: str = "") -> Any:
-    """Drop what may differ beside texts: when a package was built, and what a random generator gave."""
+    """Remove the values, other than texts, that may differ: build time of a package and random results."""
     match value:
         case str() if key == "error":
             return "<text>"
@@ -110,7 +110,7 @@ def comparable(value: Any, key: str = "") -> Any:
         case list() if key == "results":
             return ["<random>" if item in ("true", "false") else item for item in value]
         case list() if key in ("boxes", "spheres", "cylinders", "meshes"):
-            return sorted(value, key=operator.itemgetter("id"))  # told in the order of a directory
+            return sorted(value, key=operator.itemgetter("id"))  # sent in the order of a directory
         case list() if key == "data" and all(isinstance(item, str) for item in value):
             return sorted(value)
         case list():
@@ -123,7 +123,7 @@ def same(messages: list[dict[str, Any]]) -> Any:
 
 
 def first_difference(ours: Any, theirs: Any, where: str = "") -> str:
-    """Name the first place where two documents differ; empty when they are the same."""
+    """Name the first place where two documents differ; empty if they are equal."""
     match ours, theirs:
         case dict(), dict():
             if only := sorted(ours.keys() ^ theirs.keys()):
@@ -139,7 +139,7 @@ def first_difference(ours: Any, theirs: Any, where: str = "") -> str:
 
 
 def in_order(exchange: Exchange, messages: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Give messages as they are compared: the recorded server sent copied actions in the order of a set."""
+    """Return messages in the order of comparison: the recorded server sent copied actions in the order of a set."""
     if exchange.request["request"] != "CopyActionPoint":
         return messages
     return sorted(messages, key=lambda m: (m.get("event") == "ActionChanged", _name(m)))
@@ -150,7 +150,7 @@ def _name(message: dict[str, Any]) -> str:
 
 
 class Replay:
-    """Plays sessions one after the other."""
+    """Replays sessions one after the other."""
 
     def __init__(self, stage: Stage, people: dict[str, Actor]) -> None:
         self.stage = stage
@@ -174,18 +174,18 @@ class Replay:
                     await late.leave()
 
     async def _compare(self, exchange: Exchange, who: str, person: Actor) -> None:
-        number, expected = exchange.request["id"], exchange.told(who)
+        number, expected = exchange.request["id"], exchange.compared(who)
 
         def got() -> list[dict[str, Any]]:
             return [message for message in person.waiting if message.get("event") not in CONTINUAL]
 
-        def steady() -> bool:
+        def is_equal() -> bool:
             wanted = {message["event"] for message in exchange.received[who] if message.get("event") in CONTINUAL}
             return wanted <= {message.get("event") for message in person.waiting}
 
         try:
             async with asyncio.timeout(0.5 if number in DIFFERENT else None):
-                await until(lambda: len(got()) >= len(expected) and (who == "C" or steady()))
+                await until(lambda: len(got()) >= len(expected) and (who == "C" or is_equal()))
         except TimeoutError:
             if number not in DIFFERENT:
                 raise AssertionError(f"{who} at {exchange.request}: {got()} instead of {expected}") from None
@@ -222,7 +222,7 @@ def _recorded(name: str, number: int) -> dict[str, Any]:
 
 
 def check_what_differs(replay: Replay) -> None:
-    """Check of answers that differ on purpose what has to be the same, or ours to be better."""
+    """Check answers that differ on purpose: the common part must be equal, or our answer better."""
     first = SESSIONS[0]
     ours, theirs = replay.answers[3]["data"], _recorded(first, 3)["data"]
     assert set(theirs["supported_rpc_requests"]) <= set(ours["supported_rpc_requests"])
@@ -235,7 +235,7 @@ def check_what_differs(replay: Replay) -> None:
     moves = {action["name"]: action for action in replay.answers[5]["data"]}
     for action in _recorded(first, 5)["data"]:
         if action["name"] in ("move", "update_pose"):
-            ours = moves[action["name"]] | {"origins": action["origins"]}  # the recorded one inherits it
+            ours = moves[action["name"]] | {"origins": action["origins"]}  # the recorded flow inherits it
             assert without_texts(comparable(ours)) == without_texts(action)
     robots = {meta["type"]: meta for meta in replay.answers[6]["data"]}
     recorded = next(meta for meta in _recorded(first, 6)["data"] if meta["type"] == ROBOT)
@@ -255,20 +255,20 @@ def without_texts(value: Any) -> Any:
 
 
 def check_streams(replay: Replay) -> None:
-    """A robot's state goes to who subscribed alone, with the recorded joints."""
+    """Check that a robot's state is sent only to subscribers, with the recorded joints."""
     for number, event in ((57, "RobotJoints"), (58, "RobotEef")):
-        told = replay.continual[number]
+        received = replay.continual[number]
         recorded = next(
             line["msg"] for line in session(SESSIONS[2]) if line["msg"].get("event") == event and line["who"] == "A<"
         )
-        ours = [message for message in told["A"] if message["event"] == event]
+        ours = [message for message in received["A"] if message["event"] == event]
         assert same([ours[0]]) == same([replay.mapping.to_ours(recorded)])
-        assert told["B"] == []
-    assert replay.continual[70]["A"] == [], "nothing is sent to who does not want it any more"
+        assert received["B"] == []
+    assert replay.continual[70]["A"] == [], "nothing is sent after the subscription ends"
 
 
 def check_programs(replay: Replay) -> None:
-    """Both programs tell each action's begin and end, with the recorded parameters, to everybody."""
+    """Check that both programs announce start and end of each action, with the recorded parameters, to every client."""
     for name, numbers in ((SESSIONS[5], range(148, 150)), (SESSIONS[6], range(154, 159))):
         recorded = {
             (data["action_id"], tuple(data["parameters"]))
@@ -277,11 +277,11 @@ def check_programs(replay: Replay) -> None:
             for data in [line["msg"]["data"]]
         }
         for who in "AB":
-            told = [message for number in numbers for message in replay.continual[number][who]]
-            actions = [m for m in told if m["event"].startswith("ActionState")]
+            received = [message for number in numbers for message in replay.continual[number][who]]
+            actions = [m for m in received if m["event"].startswith("ActionState")]
             assert actions, who
             for before, after in zip(actions[::2], actions[1::2], strict=False):
                 assert (before["event"], after["event"]) == ("ActionStateBefore", "ActionStateAfter")
                 assert before["data"]["action_id"] == after["data"]["action_id"]
                 assert (before["data"]["action_id"], tuple(before["data"]["parameters"])) in recorded
-            assert {m["event"] for m in told} == CONTINUAL
+            assert {m["event"] for m in received} == CONTINUAL

@@ -45,12 +45,12 @@ async def test_a_live_object_offers_values(tmp_path: Path) -> None:
         assert "there is no shelf middle" in await refused(alice, "ActionParamValues", **items, parent_params=wrong)
         await bob.lock(chooser)
         assert "lock" in await refused(alice, "ActionParamValues", **asked)
-        assert await bob.ask("ActionParamValues", **asked), "who holds the write lock may ask"
+        assert await bob.ask("ActionParamValues", **asked), "the holder of the write lock may ask"
 
 
 # ------------------------------------------------------------------------------------------------ overrides
 async def project_that_greets(stage: Stage, alice: Actor) -> str:
-    """Make and save a project with one action, which tells the settings; gives the action's id."""
+    """Create and save a project whose only action returns the settings. Return the action's id."""
     await stage.place(alice, chooser="Chooser")
     await alice.ask("SaveScene")
     scene = stage.services.session.require_scene()
@@ -84,7 +84,7 @@ async def test_overrides_apply_online_and_in_the_package(tmp_path: Path) -> None
         for name in ("UpdateOverride", "DeleteOverride"):
             assert "not overridden" in await refused(alice, name, id=chooser, override=override)
 
-        async def told(request: str, change: str, given: dict[str, str]) -> None:
+        async def change_override(request: str, change: str, given: dict[str, str]) -> None:
             bob.take()
             await alice.ask(request, dry_run=True, id=chooser, override=given)
             assert bob.events() == []
@@ -94,11 +94,11 @@ async def test_overrides_apply_online_and_in_the_package(tmp_path: Path) -> None
                 "event": "OverrideUpdated", "change_type": change, "parent_id": chooser, "data": given,
             }  # fmt: skip
 
-        await told("AddOverride", "add", override)
-        await told("AddOverride", "add", level)
+        await change_override("AddOverride", "add", override)
+        await change_override("AddOverride", "add", level)
         assert "already" in await refused(alice, "AddOverride", id=chooser, override=override)
-        # One that is changed leaves the other alone (the original gave every override the new value).
-        await told("UpdateOverride", "update", override | {"value": '"moin"'})
+        # Changing one override leaves the others alone. The original gave every override the new value.
+        await change_override("UpdateOverride", "update", override | {"value": '"moin"'})
         await alice.ask("WriteUnlock", object_id=chooser)
         overridden = stage.services.session.require_project().object_overrides
         assert [(p.name, p.value) for p in overridden[0].parameters] == [("greeting", '"moin"'), ("level", "7")]
@@ -116,7 +116,7 @@ async def test_overrides_apply_online_and_in_the_package(tmp_path: Path) -> None
         await happens(alice, "OpenProject")
 
         await alice.lock(chooser)
-        await told("DeleteOverride", "remove", override | {"value": '"moin"'})
+        await change_override("DeleteOverride", "remove", override | {"value": '"moin"'})
         await alice.ask("WriteUnlock", object_id=chooser)
         await stage.start(alice)
         await alice.ask("ExecuteAction", action_id=action)

@@ -1,4 +1,4 @@
-"""What the tests of REST say again and again."""
+"""Common helpers of the REST tests."""
 
 import contextlib
 from collections.abc import AsyncIterator
@@ -18,14 +18,14 @@ TRANSLATION = {"key", "values"}
 
 @contextlib.asynccontextmanager
 async def asking(services: Server) -> AsyncIterator[httpx.AsyncClient]:
-    """Give what asks the parts of a server over REST, without a network between."""
+    """Return a client that sends requests to the server's parts over REST, without a network."""
     transport = httpx.ASGITransport(create_app(services))  # type: ignore[arg-type]
     async with httpx.AsyncClient(timeout=60, transport=transport, base_url="http://127.0.0.1:6789") as client:
         yield client
 
 
 async def start_workers(services: Server) -> None:
-    """Let the compute workers come up before the tests, not within the one that happens to need them first."""
+    """Start the compute workers now, so that no test pays for their start."""
     with contextlib.suppress(InvalidData):
         await services.compute.run(FrameByPoints([], []))
     with contextlib.suppress(InvalidData):
@@ -33,14 +33,14 @@ async def start_workers(services: Server) -> None:
 
 
 def granted(answer: httpx.Response) -> Any:
-    """Give the JSON of an answer that is no refusal."""
+    """Return the JSON of a successful answer."""
     assert answer.status_code == 200, answer.text
     assert answer.headers["content-type"] == "application/json"
     return answer.json()
 
 
 def refused(answer: httpx.Response, status: int, kind: str, *words: str) -> str:
-    """Give the message of a refusal in the protocol's form."""
+    """Return the message of a refusal in the protocol's form."""
     assert answer.status_code == status, answer.text
     assert answer.headers["content-type"] == "application/json"
     error = answer.json()

@@ -1,4 +1,4 @@
-"""The server's parts in this process, and its REST without a network between."""
+"""The server's parts in this process, and their REST services without a network."""
 
 import asyncio
 from collections.abc import AsyncIterator, Iterator
@@ -18,9 +18,9 @@ from tests.server.rest.asking import asking, start_workers
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def services(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Server]:
-    """All parts, for the tests of a module."""
+    """Start all parts, for the tests of a module."""
     directory: Path = tmp_path_factory.mktemp("rest")
-    # What comes up later belongs to all tests of the module, not to the one that happens to run then.
+    # Wait for parts that start late, so that no test pays for their start.
     with ThreadPoolExecutor(1) as executor:
         asyncio.get_running_loop().set_default_executor(executor)
         async with running_server(ServerSettings(data_dir=directory)) as parts:
@@ -33,14 +33,14 @@ async def services(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Se
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def http(services: Server) -> AsyncIterator[httpx.AsyncClient]:
-    """What asks them."""
+    """Return a REST client of the server's parts."""
     async with asking(services) as client:
         yield client
 
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
-    """A server of its own process, with a spare host."""
+    """Start a server in its own process, with a spare host."""
     process = ServerProcess(tmp_path_factory.mktemp("server") / "data")
     with asyncio.Runner() as runner:
         runner.run(process.start())

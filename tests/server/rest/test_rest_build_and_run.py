@@ -93,14 +93,14 @@ async def until_state(http: httpx.AsyncClient, *wanted: str) -> dict[str, Any]:
             await asyncio.sleep(0.02)
 
 
-async def until_in_the_way(http: httpx.AsyncClient, wanted: list[str]) -> None:
+async def until_obstacles(http: httpx.AsyncClient, wanted: list[str]) -> None:
     async with asyncio.timeout(20):
         while granted(await http.get("/collisions")) != wanted:
             await asyncio.sleep(0.02)
 
 
 async def next_of(talker: Talker, name: str, **data: Any) -> dict[str, Any]:
-    """Give the next event of that name and content; others are passed over."""
+    """Return the next event with this name and content; skip others."""
     async with asyncio.timeout(20):
         while True:
             message = talker.events.pop(0) if talker.events else await talker.receive()
@@ -120,7 +120,7 @@ async def test_a_project_is_built_and_imported_again(server: ServerProcess) -> N
             assert b"\xc3\xb6" in archive.read("package.json")
         package = answer.content
 
-        # As it was published it says what is saved: there is nothing to overwrite.
+        # The published project equals the saved one: there is nothing to overwrite.
         assert granted(await http.put("/project/import", files=as_file(package))) == {
             "sceneId": "scn_c",
             "projectId": "pro_c",
@@ -186,7 +186,7 @@ async def test_a_package_is_uploaded_downloaded_and_deleted(server: ServerProces
         ):
             refused(refusal, 404, "NotFound", "pkg_a")
         granted(await http.post("/packages/pkg_a", files=as_file(package)))
-        assert granted(await http.get("/packages/pkg_a/breakpoints")) == [], "they went with the old one"
+        assert granted(await http.get("/packages/pkg_a/breakpoints")) == [], "they were deleted with the old package"
 
         for bad in (b"no zip", zipped({"readme.txt": b""}), zipped({"../script.py": b""})):
             refused(await http.post("/packages/pkg_b", files=as_file(bad)), 400, "InvalidPackage")
@@ -212,8 +212,8 @@ async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess
         granted(await http.put("/packages/pkg_r/start"))
         info = await until_state(http, "Running")
         assert info["activePackageId"] == "pkg_r"
-        # What stands in the program's scene is in the way as long as it runs.
-        await until_in_the_way(http, ["obj_k"])
+        # Objects in the program's scene are obstacles as long as it runs.
+        await until_obstacles(http, ["obj_k"])
         line = {"pt1": {"x": 0, "y": 0, "z": 0}, "pt2": {"x": 5, "y": 0, "z": 0}}
         assert granted(await http.put("/utils/line-safe", json=line)) == {"safe": False, "object_id": "obj_k"}
         refused(await http.put("/packages/pkg_r/start"), 409, "PackageRunState")
@@ -226,7 +226,7 @@ async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess
         granted(await http.put("/packages/resume"))
         await until_state(http, "Running")
         granted(await http.put("/packages/stop"))
-        await until_in_the_way(http, [])
+        await until_obstacles(http, [])
         assert await until_state(http, "Completed") == {"state": "Completed", "activePackageId": "pkg_r"}
         (listed,) = [one for one in granted(await http.get("/packages")) if one["id"] == "pkg_r"]
         assert listed["executed"] > listed["created"]
@@ -235,13 +235,13 @@ async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess
         await until_state(http, "Paused")
         granted(await http.put("/packages/stop"))
         await until_state(http, "Completed")
-        # A point that is not in the project: the program cannot begin.
+        # A point that is not in the project: the program cannot start.
         granted(await http.put("/packages/pkg_r/breakpoints", params={"breakpoints": "acp_nowhere"}))
         granted(await http.put("/packages/pkg_r/debug"))
         info = await until_state(http, "Faulted")
         assert "acp_nowhere" in info["exceptionMessage"]
 
-        # Who ran what, and how it ended.
+        # Each run has its user and its result.
         runs = granted(await http.get("/api/runs", params={"package_id": "pkg_r", "limit": 2}))
         assert [(run["end"], run["start_paused"], run["project_id"]) for run in runs] == [
             ("failed", False, "pro_c"),
@@ -253,7 +253,7 @@ async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess
         assert older[0]["actions"] >= 1
         assert granted(await http.get("/api/runs", params={"projectId": "pro_none"})) == []
         refused(await http.get("/api/runs", params={"limit": 501}), 400, "Argument", "limit")
-        # When each device executed which action.
+        # The trace shows when each device executed which action.
         path = f"/api/runs/{older[0]['number']}"
         trace = granted(await http.get(path + "/trace"))
         span = trace["spans"][0]
@@ -288,7 +288,7 @@ async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess
 
 
 async def package_command(server: ServerProcess, *arguments: str) -> list[str]:
-    """Give what `arcor2-hw package` prints, in a window that is wide enough."""
+    """Return the output of `arcor2-hw package`, for a terminal that is wide enough."""
     process = await asyncio.create_subprocess_exec(
         *(*COMMAND, "package", *arguments, "--url", server.url),
         stdout=asyncio.subprocess.PIPE,
@@ -304,7 +304,7 @@ async def test_an_upload_of_a_hundred_megabytes_does_not_block_others(server: Se
     mesh = bytes(100_000_000)
     content = zipped({"script.py": b"", "data/mesh.bin": mesh})  # not compressed
     async with httpx.AsyncClient(base_url=base(server), timeout=60) as http:
-        # On a thread: to put a body of that size together takes this process a while too.
+        # In a thread, because building a body of that size takes time.
         url = base(server) + "/packages/pkg_big"
         follower = Client(server.url)
         await follower.open()
@@ -320,19 +320,19 @@ async def test_an_upload_of_a_hundred_megabytes_does_not_block_others(server: Se
             await asyncio.sleep(0.02)
         granted(upload.result())
         assert slowest < 20.0
-        assert most - before < 40_000_000, "it goes to the disk as it comes"
+        assert most - before < 40_000_000, "received data are written to the disk at once"
         states = await _upload_states(follower)
         assert {one.title for one in states} == {"Uploading the package pkg_big"}
         shares = [one.progress for one in states if not isinstance(one.progress, Unset)]
         assert shares == sorted(shares)
-        assert len([share for share in shares if 0.05 < share < 0.9]) >= 2, "as it comes"
+        assert len([share for share in shares if 0.05 < share < 0.9]) >= 2, "progress follows the received data"
         assert (states[-1].state, states[-1].progress) == ("finished", 1.0)
-        # What is refused has failed, with the reason.
+        # The task of a refused upload fails with the reason.
         answer = await http.post("/packages/pkg_bad", files=as_file(b"no zip"))
         assert answer.status_code == 400
         states = await _upload_states(follower)
         assert (states[-1].state, states[-1].message) == ("failed", answer.json()["message"])
-        # Who goes away in the middle has given it up.
+        # A client that disconnects cancels the upload.
         _, writer = await asyncio.open_connection(*base(server).removeprefix("http://").split(":"))
         writer.write(
             b"POST /packages/pkg_cut HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5000000\r\n"

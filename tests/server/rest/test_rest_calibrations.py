@@ -137,11 +137,11 @@ async def test_the_number_of_pictures_and_poses_must_match(http: httpx.AsyncClie
         "camera_parameters": PARAMETERS,
         "urdf_uri": "ur5e.zip",
     }
-    # A colour picture is no depth picture.
+    # A colour picture is not a depth picture.
     refused(await http.put("/api/calibration/robot", files=parts(pictures[:1], robot)), 400, "Argument")
     few = bytes(cv2.imencode(".png", np.zeros((480, 640), np.uint16))[1].tobytes())
     text = refused(await http.put("/api/calibration/robot", files=parts([few], robot)), 400, "Argument")
-    assert "missing" in text, "the model has joints of other names"
+    assert "missing" in text, "the joints of the model have other names"
     refused(
         await http.put("/api/calibration/robot", files=parts([few], robot | {"urdf_uri": "no.zip"})), 404, "NotFound"
     )
@@ -251,7 +251,7 @@ async def test_damaged_marker_files_are_renamed(tmp_path: Path) -> None:
     (notice,) = notices.notices
     assert str(path) in notice
     assert str(stored) in notice
-    # A later run still has the notice, until a client has got it.
+    # A later run still shows the notice, until a client has received it.
     later = damage(tmp_path)
     later.load()
     assert [event.data.message for event in later.greeting()] == [notice]

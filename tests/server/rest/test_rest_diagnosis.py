@@ -71,7 +71,7 @@ def test_the_newest_part_of_the_log_is_included() -> None:
         log.add(b"line %2d..." % number)
     assert log.lines() == [f"line {number}..." for number in range(40, 50)]
     log.add(b"x" * (2 * MAX_LINE))
-    assert log.lines() == []  # longer than all of it may be
+    assert log.lines() == []  # the line is longer than the limit for all lines
     event = {"event": "failed", "_record": object(), "what": object(), "exc_info": ValueError("why")}
     wide = RecentLog()
     assert wide(None, "error", event) is event
@@ -150,7 +150,7 @@ async def test_the_bundle_contains_open_documents_and_no_secrets(
         events = [json.loads(line)["event"] for line in files["log.jsonl"].splitlines()]
         assert "wrong token" in events
 
-        # A client's own notes are in it, cleaned as well; too many are refused.
+        # A client's own notes are included and redacted as well; too many are refused.
         noted = {"client": {"errors": [f"refused {PASSWORD}", f"at /?token={key}"], "token": key}}
         answer = await http.post("/api/diagnosis", json=noted, headers=by(key))
         notes = content(answer.content)["client.json"]

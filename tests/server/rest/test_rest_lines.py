@@ -12,7 +12,7 @@ from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Models, Sphere
 
 
 def inside(point: Position, placed: Obstacle, inflation: float) -> bool:
-    """Tell it the plain way, to compare with."""
+    """Compute by definition, for comparison, whether a point is inside."""
     local = (point - placed.pose.position).rotated(placed.pose.orientation.inverted())
     match placed.model:
         case Box() as box:
@@ -51,7 +51,7 @@ def test_a_line_hits_shapes_that_contain_its_points(
     way = end - start
     samples = [start + Position(way.x * share, way.y * share, way.z * share) for share in SHARES]
     hit = first_hit(start, end, [("it", placed)], inflation) is not None
-    # Between two samples a line can graze a body unseen: only then the two may differ, and only by so much.
+    # Between two samples a line can graze a body unnoticed. Only then may the results differ, and only slightly.
     if hit:
         near = inflation + math.hypot(*way) / SAMPLES * 2 + 1e-9
         assert any(inside(point, placed, 2 * near) for point in samples)

@@ -14,7 +14,7 @@ async def test_types_are_announced_before_the_scene_opens(server: ServerProcess)
             granted(await http.put("/object-types", json=lamp(name)))
         await ann.granted("NewScene", {"name": "scene"})
         announced: list[str] = []
-        # A busy computer may announce the uploads in two events.
+        # On a busy computer the uploads may be announced in two events.
         while "OpenScene" not in [event["event"] for event in ann.events]:
             ann.events.append(await ann.receive())
         while ann.events[0]["event"] == "ChangedObjectTypes":
@@ -35,7 +35,7 @@ async def test_lists_show_stored_documents_and_their_problems(server: ServerProc
         granted(await http.put("/object-types", json=lamp("LampC")))
         granted(await http.put("/scenes", json=scene("scn_c", "LampC")))
         listed = {one["id"]: one for one in await bob.granted("ListScenes")}
-        assert "problems" in listed["scn_c"], "it has no pose"
+        assert "problems" in listed["scn_c"], "its object has no pose"
         body = scene("scn_c", "LampC")
         body["objects"][0]["pose"] = {}
         stamp = granted(await http.put("/scenes", json=body))

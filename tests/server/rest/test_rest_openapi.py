@@ -30,7 +30,7 @@ SNAKE = {"LineCheckResult", "MarkerCorners"}
 
 
 class Comparison:
-    """Walks a schema of theirs and one of ours side by side and notes where they differ."""
+    """Compares a schema of the original with ours and records the differences."""
 
     def __init__(self, theirs: dict[str, Any], ours: dict[str, Any]) -> None:
         self.parts = theirs["components"]["schemas"], ours["components"]["schemas"]
@@ -38,7 +38,7 @@ class Comparison:
         self.seen: set[str] = set()
 
     def resolved(self, schema: dict[str, Any], side: int) -> dict[str, Any]:
-        """Give a schema without references and with its bases taken in."""
+        """Return a schema with references and base schemas resolved."""
         if "$ref" in schema:
             schema = self.parts[side][schema["$ref"].rpartition("/")[2]]
         merged: dict[str, Any] = {"properties": {}, "required": []}
@@ -89,7 +89,7 @@ def test_the_document_matches_the_original_operations(name: str) -> None:
                 continue
             parameters = {one["name"]: one for one in our["parameters"]}
             for wanted in their.get("parameters", ()):
-                # A path parameter may be called as one likes; so may not a query's.
+                # A path parameter may have any name; a query parameter may not.
                 found = parameters.get(wanted["name"])
                 if found is None or found["in"] != wanted["in"]:
                     differences.append(f"{where}: the parameter {wanted['name']} is missing")
@@ -141,7 +141,7 @@ async def test_the_command_line_prints_the_document(tmp_path: Path) -> None:
     out, err = await process.communicate()
     assert (process.returncode, err) == (0, b"")
     assert json.loads(out) == document()
-    assert list(tmp_path.iterdir()) == [], "nothing was set up for it"
+    assert list(tmp_path.iterdir()) == [], "the command creates no files"
 
 
 async def test_the_documentation_page_needs_no_foreign_resources(http: httpx.AsyncClient) -> None:
@@ -158,5 +158,5 @@ async def test_the_documentation_page_needs_no_foreign_resources(http: httpx.Asy
         assert f"{kind}-src 'sha256-{digest}'" in policy
         assert "http" not in content
     assert "innerHTML" not in text
-    # What it reads is there.
+    # The resources that the page loads exist.
     assert (await http.get("/swagger/api/swagger.json")).json()["paths"]["/swagger"]

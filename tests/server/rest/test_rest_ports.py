@@ -69,7 +69,7 @@ def test_two_services_cannot_have_one_port() -> None:
 
 
 def ports_of(server: ServerProcess) -> dict[str, int]:
-    """Read from the log which ports there are."""
+    """Read the open ports from the log."""
     entries = (json.loads(line) for line in server.log.read_text().splitlines() if line.startswith("{"))
     return {line["service"]: line["port"] for line in entries if line["event"] == "classic port"}
 
@@ -97,7 +97,7 @@ async def test_each_service_listens_at_its_port(tmp_path: Path) -> None:
             assert {"/scenes", "/collisions", "/project/publish", "/packages", "/markers/corners"} <= set(
                 everything["paths"]
             )
-        # A websocket there is ARServer's, but at the Execution service's port.
+        # A websocket there is ARServer's, except at the Execution service's port.
         async with talking(f"ws://127.0.0.1:{ports['Storage']}") as talker:
             await talker.granted("SystemInfo")
         async with connect(f"ws://127.0.0.1:{ports[SOCKET]}") as socket:
@@ -125,7 +125,7 @@ async def entered(socket: ClientConnection) -> Talker:
 
 
 async def collected(talker: Talker, until: dict[str, Any]) -> list[str]:
-    """Give the names of the events up to one with that data."""
+    """Return the names of the events up to one with this data."""
     names = []
     async with asyncio.timeout(30):
         while True:
@@ -147,7 +147,7 @@ async def test_the_execution_port_serves_only_packages(tmp_path: Path) -> None:
         for name in ("SystemInfo", "RegisterUser", "ListScenes", "NewScene", "NoSuchThing"):
             assert name in await execution.refused(name)
         assert "Version" in await editor.refused("Version")
-        # What goes on in the editor is none of its business.
+        # Events of the editor are not sent to it.
         await editor.granted("NewScene", {"name": "scene"})
         await editor.granted("CloseScene", {"force": True})
         await prepare(http)

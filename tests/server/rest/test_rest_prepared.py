@@ -32,14 +32,14 @@ SHOWN = "/api/assets/{}/shown"
 
 @pytest_asyncio.fixture(autouse=True, scope="module", loop_scope="module")
 async def worker(services: Server) -> None:
-    """The worker for meshes is up before the tests."""
+    """Start the mesh worker before the tests."""
     with contextlib.suppress(InvalidData):
         await services.compute.run(PrepareAsset(StoredFile("/nonexistent", "none.stl")))
 
 
 @pytest.fixture
 def runs(services: Server, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Names of what the worker is asked to prepare."""
+    """Record the names of the meshes that the worker prepares."""
     asked: list[str] = []
     run = services.compute.run
 
@@ -58,7 +58,7 @@ async def put(http: httpx.AsyncClient, key: str, content: bytes, name: str = "",
 
 
 def no_digest(content: bytes, mark: bytes) -> bytes:
-    """The same mesh, other bytes: what stands in the header of a binary STL counts for nothing."""
+    """Return the same mesh as other bytes: the header of a binary STL has no meaning."""
     return mark.ljust(80) + content[80:]
 
 
@@ -75,7 +75,7 @@ async def test_simultaneous_requests_share_one_conversion(
     assert len(content) < 0.4 * len(BALL)
     assert answers[0].headers["content-type"] == "model/gltf-binary"
     assert (await http.get(SHOWN.format("ball.stl"))).content == content
-    # The same under another name is not made again; nor by a server that starts anew.
+    # The same mesh under another name is not converted again, not even after a restart.
     await put(http, "same.stl", BALL)
     assert (await http.get(SHOWN.format("same.stl"))).content == content
     anew = prepared_module.DisplayModels(
@@ -97,7 +97,7 @@ async def test_assets_are_cached_and_compressed_by_http_headers(http: httpx.Asyn
     known = {"If-None-Match": f'"other", W/{packed.headers["etag"]}'}
     again = await http.get(SHOWN.format("tagged.stl"), headers=known)
     assert (again.status_code, again.content) == (304, b"")
-    # Another mesh under the same id is another answer.
+    # Another mesh under the same id results in another answer.
     await put(http, "tagged.stl", no_digest(BALL, b"newer"), upsert=True)
     assert (await http.get(SHOWN.format("tagged.stl"), headers=known)).status_code == 200
 
@@ -178,7 +178,7 @@ async def test_outdated_and_unused_assets_are_removed(
     assert set(folder.glob("*.glb")) == kept | {second.plain}
     assert first.packed is not None
     assert not first.packed.exists()
-    # It comes back when it is asked for.
+    # It is converted again on request.
     assert (await services.display_models.get("first.stl")).plain.is_file()
 
 

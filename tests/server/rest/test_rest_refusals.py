@@ -29,8 +29,8 @@ from arcor2_server.rest.responses import refusal
 def test_every_refusal_has_its_status(error: Arcor2Error, status: int, kind: str) -> None:
     answer = refusal("Calibration", error)
     assert answer.status_code == status
-    said = msgspec.json.decode(answer.content)
-    assert (said["type"], said["message"], said["service"]) == (kind, str(error), "Calibration")
+    body = msgspec.json.decode(answer.content)
+    assert (body["type"], body["message"], body["service"]) == (kind, str(error), "Calibration")
 
 
 def test_error_types_are_kept_across_processes() -> None:
@@ -41,12 +41,12 @@ def test_error_types_are_kept_across_processes() -> None:
 
 def test_the_answer_contains_what_is_needed_to_translate_it() -> None:
     inner = KinematicsError("{x:.1f} m is too far.", x=3)
-    said = msgspec.json.decode(
+    body = msgspec.json.decode(
         refusal("Calibration", Arcor2Error("{name}: {reason}", name="arm", reason=inner)).content
     )
     reason = {"text": "3.0 m is too far.", "key": "{x} m is too far.", "values": {"x": "3.0"}}
-    assert (said["message"], said["key"]) == ("arm: 3.0 m is too far.", "{name}: {reason}")
-    assert said["values"] == {"name": "arm", "reason": reason}
+    assert (body["message"], body["key"]) == ("arm: 3.0 m is too far.", "{name}: {reason}")
+    assert body["values"] == {"name": "arm", "reason": reason}
     assert "key" not in msgspec.json.decode(refusal("Calibration", Arcor2Error("No marker.")).content)
 
 

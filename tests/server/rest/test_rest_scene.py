@@ -29,7 +29,7 @@ def line(*points: tuple[float, float, float]) -> dict[str, Any]:
 
 
 def box_stl(x: float, y: float, z: float) -> bytes:
-    """Give an STL file of a box around its origin."""
+    """Return an STL file of a box around its origin."""
     made: bytes = trimesh.creation.box((x, y, z)).export(file_type="stl")
     return made
 
@@ -53,7 +53,7 @@ async def test_collision_models_are_added_and_removed(http: httpx.AsyncClient) -
     granted(await http.delete("/collisions/crate"))
     refused(await http.delete("/collisions/crate"), 404, "NotFound", "crate")
     assert granted(await http.put("/utils/line-safe", json=through_all))["object_id"] == "ball"
-    # Put in again elsewhere, it is there and not here.
+    # Added again at another place, it is only there.
     granted(await http.put("/collisions/sphere", params={"sphereId": "ball", "radius": 0.5}, json=at(5, 3)))
     assert granted(await http.put("/utils/line-safe", json=through_all))["object_id"] == "tube"
 
@@ -74,12 +74,12 @@ async def test_meshes_are_obstacles_with_their_exact_shape(http: httpx.AsyncClie
     granted(await http.put("/collisions/mesh", params=mesh, json=at(5)))
     assert granted(await http.put("/utils/line-safe", json=through)) == {"safe": False, "object_id": "table"}
     assert granted(await http.put("/utils/line-safe", json=above)) == {"safe": True}
-    # What comes first is told, whatever of it is a mesh.
+    # The first obstacle on the line is returned, mesh or not.
     granted(await http.put("/collisions/sphere", params={"sphereId": "ball", "radius": 0.5}, json=at(3)))
     assert granted(await http.put("/utils/line-safe", json=through))["object_id"] == "ball"
     granted(await http.put("/collisions/sphere", params={"sphereId": "ball", "radius": 0.5}, json=at(8)))
     assert granted(await http.put("/utils/line-safe", json=through))["object_id"] == "table"
-    # Put in again, larger: it reaches up to where the other line is.
+    # Added again, larger: it now reaches the other line.
     granted(await http.put("/collisions/mesh", params=mesh | {"meshScaleZ": 2}, json=at(5)))
     assert granted(await http.put("/utils/line-safe", json=above)) == {"safe": False, "object_id": "table"}
 
@@ -88,7 +88,7 @@ async def test_meshes_are_obstacles_with_their_exact_shape(http: httpx.AsyncClie
     granted(await http.post("/assets", params={"id": "bad.stl"}, files={"assetData": ("bad.stl", b"no mesh at all")}))
     answer = await http.put("/collisions/mesh", params=mesh | {"meshFileId": "bad.stl"}, json=at(5))
     refused(answer, 400, "Argument", "bad.stl")
-    # One that goes while it is in use is named.
+    # A model that is removed during a request is named.
     granted(await http.delete("/assets/table.stl"))
     granted(await http.put("/collisions/sphere", params={"sphereId": "ball", "radius": 0.5}, json=at(8)))
     refused(await http.put("/utils/line-safe", json=through), 400, "Argument", "table.stl")
@@ -142,7 +142,7 @@ async def test_objects_of_the_online_scene_are_obstacles(http: httpx.AsyncClient
         answer = granted(await own.put("/utils/line-safe", json=line((0, 0, 0), (10, 0, 0))))
         assert answer == {"safe": False, "object_id": "obj_crate"}
         granted(await own.put("/system/stop"))
-        assert granted(await own.get("/collisions")) == ["obj_crate"], "it is still there"
+        assert granted(await own.get("/collisions")) == ["obj_crate"], "the obstacle still exists"
         await services.online.begin_stop("ann")
         await until(lambda: services.online.state.value == "stopped")
         assert granted(await own.get("/collisions")) == []

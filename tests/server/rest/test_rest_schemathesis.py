@@ -29,11 +29,11 @@ from tests.server.core.serving import until
 from tests.server.rest.asking import TRANSLATION, start_workers
 
 EXAMPLES = 8
-"""For each of some seventy operations."""
+"""Number of examples for each of about seventy operations."""
 
 
 class Loop:
-    """An event loop on a thread of its own, where the parts of the server live: schemathesis itself knows none."""
+    """An event loop in its own thread for the server's parts, because schemathesis has none."""
 
     def __init__(self, directory: Path) -> None:
         self._directory = directory
@@ -70,16 +70,16 @@ class Loop:
         self._thread.join(20)
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
-        """Be the ASGI application, for whatever loop asks."""
+        """Act as an ASGI application for any event loop."""
         theirs = asyncio.get_running_loop()
 
         async def take() -> Any:
             return await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(receive(), theirs))
 
-        async def give(message: Any) -> None:
+        async def send_on(message: Any) -> None:
             await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(send(message), theirs))
 
-        work = asyncio.run_coroutine_threadsafe(self.app(scope, take, give), self._loop)
+        work = asyncio.run_coroutine_threadsafe(self.app(scope, take, send_on), self._loop)
         await asyncio.wrap_future(work)
 
 

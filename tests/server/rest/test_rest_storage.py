@@ -69,7 +69,7 @@ async def test_a_large_project_round_trips(http: httpx.AsyncClient) -> None:
     whole = msgspec.structs.replace(workplace.scene(), objects=[])
     granted(await http.put("/scenes", json=camel(whole)))
     granted(await http.put("/projects", json=camel(workplace.project())))
-    # Whoever made his client from the original's OpenAPI sends snake_case: it is taken too.
+    # Clients generated from the original's OpenAPI send snake_case, which is accepted too.
     stored = granted(await http.get(f"/projects/{workplace.project().id}"))
     granted(await http.put("/projects", json=msgspec.to_builtins(workplace.project())))
     again = granted(await http.get(f"/projects/{workplace.project().id}"))
@@ -141,7 +141,7 @@ async def test_error_exits_survive_a_client_that_does_not_know_them(http: httpx.
     granted(await http.put("/projects", json=without))
     again = granted(await http.get("/projects/pro_e"))
     assert again == stored | {"description": "theirs", "modified": again["modified"]}
-    granted(await http.put("/projects", json=sent))  # it removed the item
+    granted(await http.put("/projects", json=sent))  # the client removed the item
     assert [item["id"] for item in granted(await http.get("/projects/pro_e"))["logic"]] == ["lit_1"]
     granted(await http.put("/projects?exact=true", json=sent))
     [stored_point] = granted(await http.get("/projects/pro_e"))["actionPoints"]
@@ -171,7 +171,7 @@ async def test_a_project_is_stored_and_deleted_with_its_parts(http: httpx.AsyncC
         refused(await http.get(f"/projects/none/{path}"), 404, "NotFound")
         refused(await http.put(f"/projects/none/{path}", json=value), 404, "NotFound")
         refused(await http.put(f"/projects/pro_a/{path}", json={}), 400, "Argument")
-    assert granted(await http.get("/projects/pro_a"))["parameters"] == [], "beside the document, not inside of it"
+    assert granted(await http.get("/projects/pro_a"))["parameters"] == [], "they are not stored inside the document"
 
     query = {"project_id": "pro_a", "new_project_name": "copy", "newDescription": "mine", "newProjectId": "pro_b"}
     copy = granted(await http.put("/projects/clone", params=query))
@@ -189,7 +189,7 @@ async def test_a_project_is_stored_and_deleted_with_its_parts(http: httpx.AsyncC
     for path in ("", "/sources", "/parameters", "/object-parameters"):
         refused(await http.get(f"/projects/pro_a{path}"), 404, "NotFound")
     granted(await http.put("/projects", json=project("pro_a", "scn_p")))
-    assert granted(await http.get("/projects/pro_a/parameters")) == [], "what was beside the old one is gone with it"
+    assert granted(await http.get("/projects/pro_a/parameters")) == [], "the parameters are deleted with their project"
 
 
 # ------------------------------------------------------------------------------------------------ models
@@ -212,7 +212,7 @@ async def test_a_model_is_stored_and_deleted(http: httpx.AsyncClient, kind: str,
     other = "box" if kind != "box" else "sphere"
     refused(await http.get(f"/models/a_{kind}/{other}"), 404, "NotFound", other)
     refused(await http.get(f"/models/a_{kind}/pyramid"), 400, "Argument", "pyramid")
-    # One model per id: one of another kind takes its place.
+    # One model per id: a model of another kind replaces it.
     replacement = {"id": f"a_{kind}"} | dict(MODELS)[other]
     granted(await http.put(f"/models/{other}", json=replacement))
     refused(await http.get(f"/models/a_{kind}/{kind}"), 404, "NotFound")
@@ -253,7 +253,7 @@ async def test_an_object_type_is_stored_and_deleted(http: httpx.AsyncClient, ser
     assert services.types.meta("Lamp").description == "Gives light."
     assert services.types.meta("Lamp").object_model.sphere.radius == 0.2  # type: ignore[union-attr]
     assert "Lamp" in [one["id"] for one in granted(await http.get("/object-types"))]
-    # A stored scene may use it, and it can be deleted all the same: the lists then name the problem.
+    # A stored scene may use it, and it can still be deleted: the lists then name the problem.
     granted(await http.put("/scenes", json=scene("scn_lamp", "Lamp")))
     granted(await http.delete("/object-types/Lamp"))
     assert not services.types.known("Lamp")
@@ -298,7 +298,7 @@ async def test_a_series_of_uploads_is_announced_once(
         announced.append((str(event.change_type), [meta.type for meta in event.data]))
 
     async def end_of(*bodies: dict[str, Any]) -> None:
-        """Send all, none of which may be announced at once, and wait until they are announced."""
+        """Send all requests, none of which may be announced at once, and wait until they are announced."""
         before = len(announced)
         monkeypatch.setattr(notifications, "QUIET", 600)
         for body in bodies:
@@ -323,7 +323,7 @@ async def test_a_series_of_uploads_is_announced_once(
     await end_of(lamp("LampA", model={"id": "LampA", "type": "Sphere"}))
     assert announced[1:] == [("remove", ["LampC"]), ("update", ["LampA"])], "LampD was added and deleted: no change"
 
-    # Requests that open a scene or list types announce changes before: nothing is left for the timer.
+    # Requests that open a scene or list types announce the changes first: nothing is left for the timer.
     monkeypatch.setattr(notifications, "QUIET", 0.05)
     granted(await http.put("/object-types", json=lamp("LampE")))
     changes = await services.types.refresh()
@@ -348,7 +348,7 @@ async def test_an_asset_is_stored_and_deleted(http: httpx.AsyncClient) -> None:
     assert answer.headers["content-disposition"] == "attachment; filename*=UTF-8''..%2F%C3%A4rm.stl"
 
     refused(await http.post("/assets", params={"id": "chair"}, files=file), 409, "Conflict", "chair")
-    # The name of the file may be missing, and content that is text stays what it is.
+    # The file name may be missing, and text content is not changed.
     newer = granted(await http.post("/assets?id=chair&upsert=true", files={"assetData": (None, b"solid")}))
     assert newer["created"] == info["created"]
     assert newer["modified"] > info["modified"]

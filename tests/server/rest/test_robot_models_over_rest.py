@@ -1,4 +1,4 @@
-"""Models of installed drivers' robots, as an editor fetches them."""
+"""Models of the robots of installed drivers, as an editor fetches them."""
 
 import io
 import zipfile

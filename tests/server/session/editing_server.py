@@ -1,4 +1,4 @@
-"""A process that adds actions and prints the name of each once it is acknowledged; the test kills it."""
+"""A process that adds actions and prints the name of each acknowledged one, until the test kills it."""
 
 import asyncio
 import sys

@@ -1,4 +1,4 @@
-"""Every edit of a project as a request, and somebody who watches what is told of it."""
+"""Every edit of a project as a request, and a client that follows their events."""
 
 from typing import Any
 
@@ -17,14 +17,14 @@ def shown(server: SessionServer) -> dict[str, Any]:
 
 
 class Watcher:
-    """Somebody who sees nothing but the ordinary events, and must know what the server knows."""
+    """A client that receives only the ordinary events and must have the same state as the server."""
 
     def __init__(self, server: SessionServer, person: Person) -> None:
         self.server, self.person = server, person
         self.picture = Picture.of(server.session.scene, server.session.project)
         person.take()
 
-    def look(self) -> list[str]:
+    def apply_events(self) -> list[str]:
         names = []
         for event in self.person.events():
             names.append("/".join(filter(None, (event["event"], event.get("change_type")))))
@@ -34,7 +34,7 @@ class Watcher:
 
 
 async def rich_project(work: Work) -> dict[str, str]:
-    """Two objects with points, orientations, joints, actions, logic, a parameter and an override."""
+    """Create two objects with points, orientations, joints, actions, logic, a parameter and an override."""
     ask, server = work.person.ask, work.person.server
     await work.project()
     ids = {"robot": work.object("robot"), "base": await work.add_point("base", work.object("scale"))}
@@ -72,7 +72,7 @@ async def rich_project(work: Work) -> dict[str, str]:
 
 
 Edit = tuple[str, dict[str, Any], str, bool]
-"""A request, its arguments ("@x" stands for an id), what has to be locked for it, and whether as a tree."""
+"""A request, its arguments ("@x" is replaced with an id), the id to lock for it, and whether to lock its tree."""
 
 EDITS: dict[str, Edit] = {
     "AddActionPoint": ("AddActionPoint", {"name": "new", "position": ORIGIN, "parent": "@below"}, "", False),

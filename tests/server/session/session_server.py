@@ -1,7 +1,7 @@
 """A server without a socket: the real endpoint, hub, locks, storage, journal; object types as recorded.
 
-What is missing of a whole server is the network, the cell host and the analysis of object types: they have tests of
-their own, and the same requests are sent to a real server process elsewhere.
+The network, the cell host and the analysis of object types are missing. They have their own tests, and other tests
+send the same requests to a real server process.
 """
 
 import asyncio
@@ -145,7 +145,7 @@ class RecordedTypes:
 
 
 class FakeCell:
-    """The cell, offline until told otherwise, with one robot that stands still."""
+    """A cell that is offline by default, with one robot at a fixed pose."""
 
     def __init__(self) -> None:
         self.state = SceneStateEnum.STOPPED
@@ -177,7 +177,7 @@ class FakeCell:
 
 
 class _Socket:
-    """A websocket whose other side is the test: it takes everything at once."""
+    """A websocket whose other end is the test, which takes every message at once."""
 
     def __init__(self, take: Callable[[dict[str, Any]], None]) -> None:
         self.incoming: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
@@ -212,17 +212,17 @@ class Refused(Exception):
 
 
 class Person:
-    """A client of the server, which keeps all that comes, answers and events in order, until it is taken."""
+    """A client of the server. It stores answers and events in order until the test takes them."""
 
     def __init__(self, server: "SessionServer") -> None:
         self.server = server
         self._messages: list[dict[str, Any]] = []
         self._answers: dict[int, asyncio.Future[dict[str, Any]]] = {}
         self._number = 1000
-        self._socket: Any = _Socket(self._came)
+        self._socket: Any = _Socket(self._received)
         self._served = asyncio.create_task(server.endpoint.serve(self._socket))
 
-    def _came(self, message: dict[str, Any]) -> None:
+    def _received(self, message: dict[str, Any]) -> None:
         self._messages.append(message)
         if "response" in message:
             answer = self._answers.pop(message["id"])
@@ -234,7 +234,7 @@ class Person:
         await self._served
 
     async def send(self, request: dict[str, Any]) -> dict[str, Any]:
-        """Send a request as it stands and give the answer as it came."""
+        """Send a request unchanged and return the whole answer."""
         answer = self._answers[request["id"]] = asyncio.get_running_loop().create_future()
         self._socket.incoming.put_nowait({"type": "websocket.receive", "text": json.dumps(request)})
         await asyncio.wait((answer, self._served), return_when=asyncio.FIRST_COMPLETED)
@@ -245,7 +245,7 @@ class Person:
     async def ask(
         self, request_name: str, /, *, dry_run: bool = False, codes: bool = False, undo_step: str = "", **args: Any
     ) -> Any:
-        """Send a request; gives the answer's data, raises Refused with its message."""
+        """Send a request; return the answer's data. Raise Refused with its message."""
         self._number += 1
         request: dict[str, Any] = {"id": self._number, "request": request_name, "dry_run": dry_run, "codes": codes}
         if undo_step:
@@ -258,20 +258,20 @@ class Person:
         return answer.get("data")
 
     def take(self) -> list[dict[str, Any]]:
-        """Give what came since the last time."""
+        """Return the messages since the last call."""
         taken, self._messages = self._messages, []
         return taken
 
     def put_back(self, messages: list[dict[str, Any]]) -> None:
-        """Leave what was taken too early for the next time."""
+        """Put messages back for the next call."""
         self._messages[:0] = messages
 
     def events(self) -> list[dict[str, Any]]:
-        """Give the events since the last time, without the answers."""
+        """Return the events since the last call, without the answers."""
         return [message for message in self.take() if "event" in message]
 
     def names(self) -> list[str]:
-        """Give the events since the last time in short."""
+        """Return short names of the events since the last call."""
         return ["/".join(filter(None, (e["event"], e.get("change_type")))) for e in self.events()]
 
     async def lock(self, item: str, tree: bool = False) -> None:
@@ -280,7 +280,7 @@ class Person:
 
 
 class SessionServer:
-    """The parts of a server that the session works with."""
+    """The parts of a server that the session uses."""
 
     def __init__(self, services: Server, types: RecordedTypes, cell: FakeCell) -> None:
         self.services = services
@@ -308,7 +308,7 @@ class SessionServer:
 
 @contextlib.asynccontextmanager
 async def open_server(directory: Path, **settings: Any) -> AsyncIterator[SessionServer]:
-    """Bring up the parts over a data directory."""
+    """Start the parts with a data directory."""
     given: dict[str, Any] = {"lock_retries": 2, "lock_retry_wait": 0.02} | settings
     chosen = ServerSettings(data_dir=directory, **given)
     types, cell, hub = RecordedTypes(), FakeCell(), Hub()

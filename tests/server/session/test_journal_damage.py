@@ -15,7 +15,7 @@ from arcor2_server.documents.journal_records import ALL, Base, Loss, Recovered, 
 
 EDITS = 40
 REBASED = 12
-"""The edit after which the journal began anew, as when the scene is saved."""
+"""The edit after which the journal starts with a new base, as when the scene is saved."""
 
 
 def scene(name: str) -> Base:
@@ -44,7 +44,7 @@ ALL_OBJECTS = [f"object_{number}" for number in range(1, EDITS + 1)]
 
 @pytest.fixture(scope="module")
 def killed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a directory as a killed server leaves it: some changes in the database, the newest in the log."""
+    """Return a directory as a killed server leaves it: some changes in the database, the latest in the log."""
     directory = tmp_path_factory.mktemp("running")
     file = JournalFile(directory / "journal.sqlite")
     file.open()
@@ -78,7 +78,7 @@ def reopened(directory: Path) -> tuple[Recovered | None, Loss | None]:
 
 
 def check(directory: Path, damage: str) -> Loss | None:
-    """Open the journal; assert that it is whole, or that the loss is reported, and that it can be used again."""
+    """Open the journal; assert that it is complete or reports the loss, and that it can be used again."""
     found, loss = reopened(directory)
     whole = objects(found) == ALL_OBJECTS
     assert whole or loss is not None, damage
@@ -86,7 +86,7 @@ def check(directory: Path, damage: str) -> Loss | None:
         assert "scene 'open'" in loss.lost, damage
         assert whole or "lost" in loss.lost, damage
         assert not loss.stored_as or Path(loss.stored_as).exists(), damage
-        # What could not be reopened is never older than what was lost.
+        # The reopened document is never older than the reported loss.
         assert objects(found) == ALL_OBJECTS[: len(objects(found))], damage
     again, loss_again = reopened(directory)
     assert objects(again) == objects(found), damage

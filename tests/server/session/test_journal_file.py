@@ -1,4 +1,4 @@
-"""The journal's file, without a server."""
+"""The file of the journal, without a server."""
 
 import re
 import sqlite3
@@ -292,7 +292,7 @@ def test_without_a_position_the_content_of_the_file_is_used(path: Path) -> None:
     change(path, "delete from edit where number = 5")
     found, loss = reopened(path)
     assert numbers(found) == [1, 2, 3, 4]
-    assert loss is None, "nobody knows of the fifth change any more"
+    assert loss is None, "nothing records the fifth change any more"
 
 
 def test_an_older_document_is_not_reopened_for_a_newer_one(path: Path, tmp_path: Path) -> None:
@@ -307,7 +307,7 @@ def test_an_older_document_is_not_reopened_for_a_newer_one(path: Path, tmp_path:
     assert loss.lost == "Unsaved changes of scene 'new' are lost. Open it again: it is as last saved."
     with closing(JournalFile(path)) as file:
         file.open()
-        assert file.position.serial == 2, "openings are not numbered twice"
+        assert file.position.serial == 2, "each opening has its own number"
 
 
 def test_a_second_owner_is_refused(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

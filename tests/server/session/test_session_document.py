@@ -76,7 +76,7 @@ def state(document: Document) -> tuple[bytes, Scene | None, Project | None]:
 
 
 def lookups(document: Document) -> dict[str, object]:
-    """Give all lookups, without those that are empty."""
+    """Return all lookups, without the empty ones."""
     indexes = document._indexes
     names = ("names", "users", "leaving", "arriving", "points")
     return {name: {key: set(ids) for key, ids in getattr(indexes, name).items()} for name in names} | {
@@ -93,7 +93,7 @@ def test_a_document_round_trips() -> None:
 
 
 def _random_edit(document: Document, draw: random.Random) -> list[Change]:
-    """Give some change that the requests could make, or several."""
+    """Make one or several of the changes that requests can make."""
 
     def some(kind: Kind) -> Item | None:
         items = document.of_kind(kind)
@@ -153,15 +153,15 @@ def test_random_edits_undo_redo_and_replay(seed: int, length: int) -> None:
         document.apply(changes)
         steps.append(changes)
         states.append(state(document))
-    # The lookups are what they would be had the document been made of its items.
+    # The lookups are the same as in a document made of its items.
     assert lookups(document) == lookups(Document(document.items()))
-    # Through the journal: base and changes, written and read, are the same document.
+    # Through the journal: base and changes, written and read, result in the same document.
     replayed = Document(decode_items(base))
     for changes in steps:
         replayed.apply(decode_changes(encode_rows(changes)))
     assert state(replayed) == states[-1]
     assert lookups(replayed) == lookups(document)
-    # Back step by step, order of the items included, and forth again.
+    # Undo step by step, the order of the items included, then redo.
     for changes, before in zip(reversed(steps), reversed(states[:-1]), strict=True):
         document.apply([change.inverse() for change in reversed(changes)])
         assert state(document) == before

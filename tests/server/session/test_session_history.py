@@ -31,7 +31,7 @@ async def test_every_edit_of_a_project_can_be_undone(
         await make(alice, edit, ids)
         after = shown(server)
         assert after != saved, name
-        watcher.look()
+        watcher.apply_events()
         assert server.session.has_changes
         alice.take()
         answer = await alice.ask("Undo")
@@ -41,15 +41,15 @@ async def test_every_edit_of_a_project_can_be_undone(
         assert "response" in first  # the answer comes first
         assert events, name
         assert not [event for event in events if "Locked" in event["event"]]
-        watcher.look()
+        watcher.apply_events()
         assert shown(server) == saved, name
         assert not server.session.has_changes, name
         assert (await alice.ask("Redo"))["request"] == name
-        watcher.look()
+        watcher.apply_events()
         assert shown(server) == after, name
         assert server.session.has_changes
         await alice.ask("Undo")
-        watcher.look()
+        watcher.apply_events()
         assert shown(server) == saved, name
         assert server.services.locks.locked_roots() == [], name
 
@@ -70,21 +70,21 @@ async def test_all_edits_can_be_undone_and_redone_in_a_row(
     states.append(shown(server))
     for state in reversed(states[:-1]):
         await alice.ask("Undo")
-        watcher.look()
+        watcher.apply_events()
         assert shown(server) == state
     with pytest.raises(Refused, match="nothing"):
         await alice.ask("Undo")
     for state in states[1:]:
         await alice.ask("Redo")
-        watcher.look()
+        watcher.apply_events()
         assert shown(server) == state
     with pytest.raises(Refused, match="nothing"):
         await alice.ask("Redo")
     await alice.ask("RestoreRevision", revision=numbered)
-    watcher.look()
+    watcher.apply_events()
     assert shown(server) == states[0]
     await alice.ask("Undo")
-    watcher.look()
+    watcher.apply_events()
     assert shown(server) == states[-1]
 
 
@@ -159,10 +159,10 @@ async def test_every_edit_of_a_scene_can_be_undone(
     ]
     for edit in edits:
         await make(alice, edit, ids)
-        watcher.look()
+        watcher.apply_events()
         assert server.session.has_changes
         assert (await alice.ask("Undo"))["request"] == edit[0]
-        watcher.look()
+        watcher.apply_events()
         assert shown(server) == saved, edit[0]
         assert not server.session.has_changes
     await alice.ask("CloseScene")
@@ -201,20 +201,20 @@ async def test_the_history_lists_users_and_edits(server: SessionServer, alice: P
     await bob.ask("AddActionPoint", name="b", position=ORIGIN)
     await make(alice, ("RenameActionPoint", {"action_point_id": p, "new_name": "q"}, p, False), {})
     await alice.ask("Undo")
-    told = await alice.ask("History")
-    assert (told["revision"], told["oldest"], told["undo"], told["redo"]) == (4, 0, 1, 4)
-    rows = [(e["number"], e["user"], e["request"], e["how"], e.get("of"), e["in_force"]) for e in told["edits"]]
+    answer = await alice.ask("History")
+    assert (answer["revision"], answer["oldest"], answer["undo"], answer["redo"]) == (4, 0, 1, 4)
+    rows = [(e["number"], e["user"], e["request"], e["how"], e.get("of"), e["in_force"]) for e in answer["edits"]]
     assert rows == [
         (4, "alice", "RenameActionPoint", "undo", 3, True),
         (3, "alice", "RenameActionPoint", "edit", None, False),
         (2, "bob", "AddActionPoint", "edit", None, True),
         (1, "alice", "AddActionPoint", "edit", None, True),
     ]
-    assert told["edits"][1]["items"] == [{"kind": "action_point", "id": p, "name": "q", "change": "update"}]
-    assert told["edits"][3]["items"][0]["change"] == "add"
-    told = await bob.ask("History", limit=1, before=3)
-    assert ([e["number"] for e in told["edits"]], told["undo"]) == ([2], 2)
-    assert "redo" not in told
+    assert answer["edits"][1]["items"] == [{"kind": "action_point", "id": p, "name": "q", "change": "update"}]
+    assert answer["edits"][3]["items"][0]["change"] == "add"
+    answer = await bob.ask("History", limit=1, before=3)
+    assert ([e["number"] for e in answer["edits"]], answer["undo"]) == ([2], 2)
+    assert "redo" not in answer
     with pytest.raises(Refused, match="wrong"):
         await bob.ask("History", limit=1001)
 
@@ -230,18 +230,18 @@ async def test_a_revision_can_be_restored_across_users(
         await make(alice, EDITS[name], ids)
     await Work(bob).add_action(ids["base"], "bobs")
     after = shown(server)
-    watcher.look()
+    watcher.apply_events()
     assert await alice.ask("RestoreRevision", dry_run=True, revision=revision) == {"revision": server.session.revision}
     assert shown(server) == after
     answer = await alice.ask("RestoreRevision", revision=revision)
     assert answer == {"revision": server.session.revision}
-    watcher.look()
+    watcher.apply_events()
     assert shown(server) == saved
     assert not server.session.has_changes
     assert (await alice.ask("History", limit=1))["edits"][0]["of"] == revision
     assert "nothing" not in await refused(alice, "RestoreRevision", revision=revision)
     await alice.ask("Undo")
-    watcher.look()
+    watcher.apply_events()
     assert shown(server) == after
     for wrong in (-1, server.session.revision + 1):
         assert "can be restored" in await refused(alice, "RestoreRevision", revision=wrong)
@@ -262,8 +262,8 @@ async def test_undo_works_after_saving_and_after_a_restart(tmp_path: Path) -> No
         alice, bob = await server.person("alice"), await server.person("bob")
         assert list(server.session.history) == history
         assert not server.session.has_changes
-        told = await alice.ask("History")
-        assert (told["undo"], told["redo"]) == (2, 5)
+        answer = await alice.ask("History")
+        assert (answer["undo"], answer["redo"]) == (2, 5)
         assert "undo" not in await bob.ask("History")
         await alice.ask("Redo")
         assert server.session.has_changes
@@ -285,7 +285,7 @@ async def test_a_reverted_change_counts_as_saved_after_a_restart(tmp_path: Path)
         await Work(alice).project("p")
         await alice.ask("SaveProject")
         await Work(alice).add_point("q")
-        for _ in range(4):  # the journal begins anew at a document that is not the saved one
+        for _ in range(4):  # the journal starts with a new base, which is not the saved document
             await alice.ask("Undo")
             await alice.ask("Redo")
     async with open_server(tmp_path, history_limit=4) as server:
@@ -300,12 +300,12 @@ async def test_the_history_limit_bounds_undo(tmp_path: Path) -> None:
         alice = await server.person("alice")
         work = Work(alice)
         await work.project(*(f"p{number}" for number in range(8)))
-        told = await alice.ask("History")
-        assert (told["revision"], told["oldest"], len(told["edits"])) == (8, 3, 5)
+        answer = await alice.ask("History")
+        assert (answer["revision"], answer["oldest"], len(answer["edits"])) == (8, 3, 5)
         assert "can be restored" in await refused(alice, "RestoreRevision", revision=2)
         for _ in range(3):
             await alice.ask("Undo")
-        # Each undo is an edit too: two of the five that are kept are still to be undone, until they drop out.
+        # Each undo is an edit too: two of the five stored edits can still be undone, until they are dropped.
         while "undo" in await alice.ask("History"):
             await alice.ask("Undo")
         assert len(server.session.history) == 5
@@ -343,7 +343,7 @@ async def test_an_undo_that_cannot_be_stored_is_reverted(
 
     await work.project("p")
     await alice.ask("SaveProject")
-    before, told = shown(server), await alice.ask("History")
+    before, history = shown(server), await alice.ask("History")
 
     def full(connection: sqlite3.Connection, job: object, serial: int) -> None:
         raise sqlite3.OperationalError("database or disk is full")
@@ -353,7 +353,7 @@ async def test_an_undo_that_cannot_be_stored_is_reverted(
         assert "disk is full" in await refused(alice)
     assert shown(server) == before
     assert not server.session.has_changes
-    assert await alice.ask("History") == told
+    assert await alice.ask("History") == history
     await alice.ask("Undo")
     assert server.session.has_changes
 
@@ -380,5 +380,5 @@ async def test_a_failed_save_keeps_unsaved_changes(
 
 
 async def test_older_clients_are_notified_of_undo(alice: Person) -> None:
-    told = await alice.ask("SystemInfo")
-    assert {"Undo", "Redo", "History", "RestoreRevision"} <= set(told["supported_rpc_requests"])
+    answer = await alice.ask("SystemInfo")
+    assert {"Undo", "Redo", "History", "RestoreRevision"} <= set(answer["supported_rpc_requests"])

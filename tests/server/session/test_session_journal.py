@@ -67,11 +67,11 @@ async def test_acknowledged_edits_survive_a_kill(tmp_path: Path, moment: float) 
         missing = set(acknowledged) - set(kept)
         assert not missing
         assert len(acknowledged) >= 50
-        # Nobody waits for more than one answer: beyond what was acknowledged there is at most one edit of each.
+        # Each client waits for an answer before its next edit: at most one edit of each exists without acknowledgement.
         assert len(kept) <= len(acknowledged) + 8
         assert server.session.project_changed
         assert not server.session.scene_changed
-        # It is a document like any other: it goes on, and is saved.
+        # It is a document like any other: it can be edited and saved.
         alice = await server.person("alice")
         await add_point(alice, "afterwards")
         await alice.ask("SaveProject")
@@ -172,7 +172,7 @@ async def test_the_journal_stays_short(tmp_path: Path) -> None:
         assert server.session.project == project
         assert server.session.has_changes
         assert len(server.session.history) == 10
-        # The edits that are kept lead back step by step.
+        # The stored edits can be undone step by step.
         document = server.session.document
         for edit in reversed(server.session.history):
             document.apply([change.inverse() for change in reversed(edit.changes)])
@@ -295,7 +295,7 @@ async def test_a_crash_right_after_saving_leaves_it_saved(tmp_path: Path, monkey
     async with open_server(tmp_path) as server:
         alice = await server.person("alice")
         await open_project(alice)
-        monkeypatch.setattr(server.session, "_shorten", lambda: None)  # the journal never learns of it
+        monkeypatch.setattr(server.session, "_shorten", lambda: None)  # the base in the journal stays the old one
         await alice.ask("SaveProject")
         saved = await server.services.storage.project(server.session.require_project().id)
     async with open_server(tmp_path) as server:

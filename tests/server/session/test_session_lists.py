@@ -1,4 +1,4 @@
-"""Lists of saved documents: problems are checked only where something changed."""
+"""Lists of saved documents: problems are checked again only where something changed."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -54,7 +54,7 @@ async def test_only_changed_documents_are_checked_again(
     reads.taken()
     assert [entry["description"] for entry in await alice.ask("ListProjects")] == ["", "", "", "other"]
     assert reads.taken() == ["pro", "scn"]
-    # A scene that changed concerns all its projects.
+    # A changed scene concerns all its projects.
     await alice.ask("OpenScene", id=scene)
     await alice.ask("RemoveFromScene", id=work.object("time"), force=True)
     await server.services.storage.put_scene(server.session.require_scene())
@@ -62,7 +62,7 @@ async def test_only_changed_documents_are_checked_again(
     assert all(entry["problems"] for entry in await alice.ask("ListProjects"))
     assert reads.taken().count("pro") == 4
     await alice.ask("CloseScene", force=True)
-    # So does a type that is gone.
+    # So does a removed type.
     del server.types._metas["WeighingMachine"]
     server.types.revision += 1
     assert "WeighingMachine" in (await alice.ask("ListScenes"))[0]["problems"][0]
@@ -96,7 +96,7 @@ async def test_problems_can_be_translated_by_clients_that_ask_for_codes(server: 
                 "values": {"name": "scale", "type": "WeighingMachine", "setting": "bogus"},
             },
         ]
-        # Both answers are cached, each for its clients.
+        # Both answers are cached, one for each kind of client.
         assert await alice.ask(request) == [plain]
         assert (await alice.ask(request, codes=True))[0]["problem_messages"] == messages
 

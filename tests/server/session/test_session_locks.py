@@ -1,4 +1,4 @@
-"""Locks of the open project: widened to a tree, narrowed, and released when their user is lost."""
+"""Locks of the open project: widened to a tree, narrowed, and released when their user's connection is lost."""
 
 import asyncio
 from pathlib import Path
@@ -26,12 +26,12 @@ async def test_update_lock_widens_to_the_tree_and_narrows_to_the_object(alice: P
         await person.ask("UpdateLock", object_id=parent, new_type=kind)
 
     for person in (alice, bob):
-        with pytest.raises(Refused):  # nobody holds it
+        with pytest.raises(Refused):  # nobody holds the lock
             await update(person, "TREE")
     await alice.lock(parent)
-    with pytest.raises(Refused):  # another user does
+    with pytest.raises(Refused):  # another user holds it
         await update(bob, "TREE")
-    with pytest.raises(Refused):  # it is no tree
+    with pytest.raises(Refused):  # the lock does not cover a tree
         await update(alice, "OBJECT")
     await bob.lock(child)
     with pytest.raises(Refused):  # another user holds a part of the tree
@@ -44,7 +44,7 @@ async def test_update_lock_widens_to_the_tree_and_narrows_to_the_object(alice: P
     assert lock_events(bob) == lock_events(alice) == [("ObjectsLocked", rest, "alice")]
     with pytest.raises(Refused):
         await bob.lock(child)
-    with pytest.raises(Refused):  # it is a tree already
+    with pytest.raises(Refused):  # the lock covers a tree already
         await update(alice, "TREE")
     bob.take()
 
@@ -67,7 +67,7 @@ async def test_all_locks_of_a_lost_user_are_released(tmp_path: Path) -> None:
         orientation = await work.add_orientation(child)
         tree = work.point("other")
         below = await work.add_point("below", tree)
-        # Parts of trees, which the original keeps locked for ever, and a whole one.
+        # Parts of trees, which the original keeps locked for ever, and a whole tree.
         await alice.lock(child)
         await alice.lock(orientation)
         await alice.lock(tree, tree=True)

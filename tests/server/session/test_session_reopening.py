@@ -41,13 +41,13 @@ async def test_each_user_can_undo_and_redo_after_close_and_open(
     await Work(bob).add_point("bobs")
     await alice.ask("Undo")
     await alice.ask("SaveProject")
-    told = {person: await person.ask("History") for person in (alice, bob)}
-    assert (points(server), told[alice]["undo"], told[alice]["redo"], told[bob]["undo"]) == (["a", "bobs"], 1, 4, 3)
+    stack = {person: await person.ask("History") for person in (alice, bob)}
+    assert (points(server), stack[alice]["undo"], stack[alice]["redo"], stack[bob]["undo"]) == (["a", "bobs"], 1, 4, 3)
     await reopen(alice)
-    assert {person: await person.ask("History") for person in (alice, bob)} == told
+    assert {person: await person.ask("History") for person in (alice, bob)} == stack
     assert not server.session.has_changes
     await alice.ask("Redo")
-    assert points(server) == ["a", "b", "bobs"], "what comes back takes its old place"
+    assert points(server) == ["a", "b", "bobs"], "a restored item is at its old place"
     assert server.session.has_changes
     await bob.ask("Undo")
     assert points(server) == ["a", "b"]
@@ -74,7 +74,7 @@ async def test_a_project_that_was_never_saved_leaves_no_history(
 ) -> None:
     await work.project("a")
     await alice.ask("CloseProject", force=True)
-    assert len(list(server.services.settings.history_dir.iterdir())) == 1, "that of the scene"
+    assert len(list(server.services.settings.history_dir.iterdir())) == 1, "the history of the scene"
 
 
 @pytest.mark.parametrize("killed", [False, True])
@@ -107,7 +107,7 @@ async def test_history_of_a_closed_project_survives_a_restart(tmp_path: Path, ki
 async def test_a_kill_right_after_opening_loses_no_history(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, external: bool
 ) -> None:
-    """The history is written to the journal after the answer to OpenProject."""
+    """The history is written to the journal only after the answer to OpenProject."""
     (tmp_path / "before").mkdir()
     async with open_server(tmp_path / "before") as server:
         alice = await server.person("alice")
@@ -168,7 +168,7 @@ async def test_undo_is_refused_for_what_was_changed_meanwhile(server: SessionSer
     for number, what in ((1, "moved (action point) was changed"), (2, "gone (action point) was removed")):
         text = await refused(alice, "Undo", number=number)
         assert text == f"{what} since outside the editor, while the document was closed (edit 4)."
-    await alice.ask("Undo")  # nobody else has touched this one
+    await alice.ask("Undo")  # nobody else has changed this one
     assert points(server) == ["moved", "added"]
     await alice.ask("RestoreRevision", revision=3)
     assert points(server) == ["moved", "gone", "same"]
@@ -252,7 +252,7 @@ async def test_a_project_with_a_damaged_history_opens(
     file = max(server.services.settings.history_dir.iterdir(), key=lambda each: each.stat().st_mtime_ns)
     assert file.stat().st_mode & 0o777 == 0o600
     await alice.ask("OpenScene", id=(await alice.ask("ListScenes"))[0]["id"])
-    await alice.ask("CloseScene")  # the history of what was closed last is not read from the disk
+    await alice.ask("CloseScene")  # the history of the document closed last is not read from the disk
     file.write_bytes(file.read_bytes()[:-5] if content == "cut" else content)
     await alice.ask("OpenProject", id=project)
     assert points(server) == ["a"]

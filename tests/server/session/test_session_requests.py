@@ -118,7 +118,7 @@ async def test_an_action_and_its_connections_are_removed_by_one_edit(
     await alice.ask("RemoveAction", id=two, with_steps=True, dry_run=True)
     assert len(server.session.history) == edits
     await alice.ask("RemoveAction", id=two, with_steps=True)
-    # What led to it leads on; the step that led away from it is gone.
+    # The connections that led to it lead to its successor; the connection after it is removed.
     assert bob.names() == ["LogicItemChanged/remove", "LogicItemChanged/update", "ActionChanged/remove"]
     logic = {item.id: (item.start, item.end) for item in server.session.require_project().logic}
     assert logic[steps[one, two]] == (one, three)
@@ -128,7 +128,7 @@ async def test_an_action_and_its_connections_are_removed_by_one_edit(
     assert {(item.start, item.end): item.id for item in server.session.require_project().logic} == steps
     await alice.ask("Redo")
     assert {item.id: (item.start, item.end) for item in server.session.require_project().logic} == logic
-    # The last one: nothing may lead straight from START to END.
+    # The last one: no connection may lead straight from START to END.
     await alice.ask("RemoveAction", id=one, with_steps=True)
     await alice.ask("RemoveAction", id=three, with_steps=True)
     assert server.session.require_project().logic == []
@@ -225,7 +225,7 @@ async def test_edits_of_many_users_at_once_keep_their_order(
     alice.take()
 
     async def edit(n: int) -> None:
-        # Parameters are renamed by their holder alone: no lock in common, so that edits really overlap.
+        # Each user renames their own parameter: without a common lock, the edits really overlap.
         for count in range(20):
             await crowd[n].ask("UpdateProjectParameter", id=parameters[n], name=f"p{n}_{count}")
             await crowd[n].lock(parameters[n])
@@ -298,7 +298,7 @@ async def test_a_copy_refers_to_its_own_items(work: Work, alice: Person) -> None
     assert work.action("linked_copy").parameters[0].value == f'"{new_source.id}/default/0"'
     new_orientation = document.named("orientation", "o", work.point("below_copy"))
     assert work.action("move_copy").parameters[0].value == f'"{new_orientation}"'
-    # Nothing of the original is used by the copy, nor the other way round.
+    # The copy uses nothing of the original, nor the other way round.
     assert {getattr(user, "name", "") for user in document.users_of(orientation)} == {"move"}
     assert {getattr(user, "name", "") for user in document.users_of(new_source.id)} == {"linked_copy"}
 
@@ -342,7 +342,7 @@ async def test_overrides(work: Work, alice: Person) -> None:
     assert work.session.require_project().object_overrides == []
 
 
-# ------------------------------------------------------------------------------------------------ what saving does
+# ------------------------------------------------------------------------------------------------ effects of saving
 async def test_saving_a_moved_object_makes_joints_invalid_in_its_projects(
     server: SessionServer, work: Work, alice: Person
 ) -> None:
@@ -384,7 +384,7 @@ async def test_an_object_used_by_projects_is_not_removed(server: SessionServer, 
     with pytest.raises(Refused, match="used in project"):
         await alice.ask("RemoveFromScene", id=work.object("scale"))
     await alice.ask("RemoveFromScene", id=work.object("scale"), force=True)
-    # Until the scene is saved nothing has happened to the project.
+    # The project is unchanged until the scene is saved.
     assert (await server.services.storage.project(project)).action_points[0].parent
     await alice.ask("SaveScene")
     await alice.ask("CloseScene")

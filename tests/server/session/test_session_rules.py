@@ -113,7 +113,7 @@ def test_valid_connections_are_accepted() -> None:
     add(document, step("a", "b", "a/default/0", "true"))
     add(document, step("a/default", "c", "a/default/0", "false"))
     add(document, step("b", "c"))
-    # Turning a step round is no loop by itself: the step that is replaced does not count.
+    # Reversing a connection is not a loop by itself: the replaced connection does not count.
     check_logic_item(document, meta_of, step("c", "b", key="b>c"))
     with pytest.raises(InvalidData, match="loop"):
         check_logic_item(document, meta_of, step("c", "b", key="new"))
@@ -124,7 +124,7 @@ def test_numbers_and_texts_may_have_a_default_branch() -> None:
     document = branching("a", "b", "c", "d", "e")
     add(document, step("START", "a"))
     add(document, step("a", "b", "a/default/2", "3"))
-    add(document, step("a", "c"))  # otherwise
+    add(document, step("a", "c"))  # the default branch
     add(document, step("a", "d", "a/default/2", "-4"))
     for item, reason in (
         (step("a", "e"), "but one needs a condition"),
@@ -134,7 +134,7 @@ def test_numbers_and_texts_may_have_a_default_branch() -> None:
         with pytest.raises(InvalidData, match=reason):
             check_logic_item(document, meta_of, item)
     add(document, step("a", "e", "a/default/3", '"soft"'))
-    # The step for everything else may get a condition, and another one become it.
+    # The default branch may get a condition, and another connection become the default.
     check_logic_item(document, meta_of, step("a", "c", "a/default/2", "7", key="a>c"))
     with pytest.raises(InvalidData, match="but one"):
         check_logic_item(document, meta_of, step("a", "d", key="a>d"))
@@ -208,7 +208,7 @@ def test_the_check_of_complex_logic_does_not_follow_every_path() -> None:
     names = [f"c{n}" for n in range(1000)]
     chain = branching(*names)
     with counted_calls() as calls:
-        for one, other in zip(names[-2::-1], names[:0:-1], strict=True):  # each check walks the whole rest
+        for one, other in zip(names[-2::-1], names[:0:-1], strict=True):  # each check follows all the rest
             add(chain, step(one, other))
     assert calls[0] < 10 * len(names) ** 2
     with pytest.raises(InvalidData, match="loop"):
@@ -317,7 +317,7 @@ def test_parameters_of_actions(types: RecordedTypes, parameter: tuple[str, str],
 
 
 def test_checking_time_grows_linearly(types: RecordedTypes) -> None:
-    """Parents in one chain and results linked from action to action: the worst for a check that looks round."""
+    """Parents in one chain and results linked from action to action: the worst case for checks that search."""
 
     def chain(size: int) -> Project:
         points = []
@@ -346,7 +346,7 @@ def test_checking_time_grows_linearly(types: RecordedTypes) -> None:
             best = min(best, time.thread_time() - began)
         return best
 
-    assert cost(1000) < 25 * cost(100)  # ten times the size; a square would be a hundred times the time
+    assert cost(1000) < 25 * cost(100)  # ten times the size; quadratic time would be a factor of a hundred
 
 
 # ------------------------------------------------------------------------------------------------ parents
@@ -427,7 +427,7 @@ def test_rotating_a_parent_rotates_its_children() -> None:
     changes, changed = changes_for_parent(document, "acp", "obj_a")
     document.apply(changes)
     assert changed == ["acp", "c"]
-    # By hand: seen from the object, whose x axis points along the world's y.
+    # Computed by hand: seen from the object, whose x axis points along the world's y axis.
     assert document.action_point("acp").position.distance_to(Position(1, 0, 0)) < 1e-12
     assert document.action_point("c").position.distance_to(Position(0, -1, 0)) < 1e-12
     assert document.orientation("ori")[1].orientation.angle_to(turned.orientation.inverted()) < 1e-12
@@ -442,7 +442,7 @@ def test_a_descendant_as_parent_is_refused() -> None:
 
 
 def test_a_project_after_an_object_was_removed() -> None:
-    """Points stay where they were in the world; actions of the object go, with their steps and overrides."""
+    """Points keep their poses in the world; the object's actions are removed, with their connections and overrides."""
     turned = Pose(Position(1, 2, 3), Orientation.from_rotation_vector(0, 0, 1))
     scale = SceneObject("scale", "WeighingMachine", turned, [], "obj_s")
     scene = Scene("s", id="scn", objects=[scale, TIME])

@@ -1,4 +1,4 @@
-"""The scene is edited while a project is open, by the requests that extend the protocol."""
+"""The scene is edited while a project is open, with the requests that extend the protocol."""
 
 import pytest
 

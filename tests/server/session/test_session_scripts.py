@@ -1,4 +1,4 @@
-"""The script of the open project: read, checked and imported, also while others edit."""
+"""The script of the open project: read, checked and imported, also while other users edit."""
 
 import pytest
 
@@ -11,7 +11,7 @@ STORED = {"flows": [{"type": "default", "outputs": ["lucky"]}]}
 
 @pytest.fixture
 async def work(alice: Person) -> Work:
-    """A program: sleep, then draw, which is followed by another pause or by the end."""
+    """Create a program: sleep, then draw, followed by another pause or by the end."""
     work = Work(alice)
     await work.project("here")
     here = work.point("here")
@@ -49,7 +49,7 @@ async def test_script_of_unsaved_changes_is_imported_as_one_step_of_undo(
     same = await alice.ask("CheckScript", script=script, revision=loaded["revision"])
     assert (same["problems"], same["changes"]) == ([], [])
     assert (await alice.ask("ImportScript", script=script, revision=loaded["revision"]))["changes"] == []
-    assert server.session.revision == loaded["revision"], "nothing to import is no edit"
+    assert server.session.revision == loaded["revision"], "an import without changes is not an edit"
 
     edited = script.replace('0.5, an="pause"', '2.5, an="pause"').replace(
         "        if lucky == True:\n", '        time.say("rolled", an="shout")\n        if lucky == True:\n'
@@ -94,7 +94,7 @@ async def test_problems_name_line_and_column(alice: Person, work: Work) -> None:
         assert "line" not in problem["message"]
         with pytest.raises(Refused, match=f"line {line}"):
             await alice.ask("ImportScript", script=broken, revision=revision)
-    # What concerns no line, and the translation for clients that ask for it.
+    # Problems that concern no line, and the translation for clients that request it.
     found = await alice.ask("CheckScript", codes=True, script=script, revision=revision + 1)
     assert "line" not in found["problems"][0]
 
@@ -112,7 +112,7 @@ async def test_edits_of_others_since_the_script_was_loaded_survive(alice: Person
     assert work.action("pause").parameters[0].value == "2.5"
     assert work.action("later").id == again
     assert work.action("extra")
-    # The same action: refused with the name of the other user, and nothing is changed.
+    # Both edited the same action: the import is refused with the name of the other user, and changes nothing.
     revision = (await alice.ask("ProjectScript"))["revision"]
     script = (await alice.ask("ProjectScript"))["script"]
     pause = work.action("pause").id

@@ -1,4 +1,4 @@
-"""The reason for which each editing request is refused first, in the recorded server states."""
+"""The reason for which each editing request is refused, in the recorded server states."""
 
 from typing import Any
 
@@ -46,7 +46,7 @@ REASONS = {
 
 
 def example(of: Any) -> Any:
-    """Give some value of a type as JSON has it, with required fields alone."""
+    """Return an example of a type as JSON, with only the required fields."""
     info = msgspec.inspect.type_info(of) if not isinstance(of, msgspec.inspect.Type) else of
     match info:
         case msgspec.inspect.StructType():
@@ -99,11 +99,11 @@ async def test_requests_are_refused_for_the_recorded_reason(
     for name in OURS:
         recorded = STATES[state][name].removeprefix("refused: ")
         answer = await person.send(request(name))
-        said = "ok" if answer["result"] else answer["messages"][0]
-        assert "are wrong:" not in said, said
+        text = "ok" if answer["result"] else answer["messages"][0]
+        assert "are wrong:" not in text, text
         if recorded in REASONS:
             compared += 1
-            if REASONS[recorded] not in said:
-                wrong[name] = f"{recorded}: {said}"
+            if REASONS[recorded] not in text:
+                wrong[name] = f"{recorded}: {text}"
     assert wrong == {}
     assert compared == {"unregistered_no_scene": 55, "no_scene": 44, "scene_offline": 34}[state]

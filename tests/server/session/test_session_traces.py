@@ -1,4 +1,4 @@
-"""Recorded sessions played again: the same answers and events in the same order, except for ids."""
+"""Recorded sessions are replayed: the same answers and events in the same order, except for ids."""
 
 import operator
 import re
@@ -18,7 +18,7 @@ ID = re.compile(r"\b(?:scn|obj|pro|acp|ori|joi|act|lit|pco|pkg)_[0-9a-f]{32}\b")
 
 
 class Mapping:
-    """Recorded ids and ours, by the order in which they appear."""
+    """Recorded ids and ours, paired by the order in which they appear."""
 
     def __init__(self) -> None:
         self._ours: dict[str, str] = {}
@@ -34,7 +34,7 @@ class Mapping:
         return value
 
     def learn(self, recorded: Any, ours: Any) -> None:
-        """Pair ids that stand at the same place."""
+        """Pair ids that are at the same place."""
         match recorded, ours:
             case str(), str():
                 for theirs, mine in zip(ID.findall(recorded), ID.findall(ours), strict=False):
@@ -48,7 +48,7 @@ class Mapping:
 
 
 def plain(value: Any, key: str = "") -> Any:
-    """Drop what may differ: texts, times, and order where it means nothing."""
+    """Remove what may differ: texts, times, and order where it has no meaning."""
     match value:
         case dict():
             kept = {k: plain(v, k) for k, v in value.items() if k not in ("created", "modified", "int_modified", "t")}
@@ -73,7 +73,7 @@ def plain(value: Any, key: str = "") -> Any:
 
 
 def exchanges(name: str) -> Iterator[tuple[str, dict[str, Any], dict[str, list[dict[str, Any]]]]]:
-    """Give each request with what every client received until the next one."""
+    """Return each request with the messages that every client received before the next one."""
     who, request = "", {}
     received: dict[str, list[dict[str, Any]]] = {"A": [], "B": []}
     for line in session(name):
@@ -93,9 +93,9 @@ async def play(
     differs: dict[int, str] | None = None,
     only: range | None = None,
 ) -> int:
-    """Send what was recorded and compare; gives how many answers and events were compared.
+    """Send the recorded requests and compare; return how many answers and events were compared.
 
-    `differs` says why a request is sent without comparing; `only` picks requests by their numbers.
+    `differs` states why a request is sent without comparing; `only` selects requests by their numbers.
     """
     compared = 0
     for who, request, recorded in exchanges(name):
@@ -132,12 +132,12 @@ def recorded_answer(name: str, number: int) -> Any:
 
 
 async def test_the_recorded_session_gives_the_same_messages(server: SessionServer, people: dict[str, Person]) -> None:
-    """A scene is made, changed by a robot, gets a project that is edited off line and on line; all is deleted."""
+    """A scene is created, changed by a robot, gets a project that is edited offline and online; all is deleted."""
     mapping, robot = Mapping(), "03_scene_online_robot"
     assert await play("02_scene", people, mapping) == 78
 
     server.cell.pose = msgspec.convert(recorded_answer(robot, 53), Pose)
-    server.cell.pose.position.z += 0.001  # the step made meanwhile (request 66)
+    server.cell.pose.position.z += 0.001  # the step made in between (request 66)
     server.cell.joints = msgspec.convert(recorded_answer(robot, 47), list[Joint])
     server.cell.state = SceneStateEnum.STARTED
     assert await play(robot, people, mapping, only=range(70, 73)) == 5

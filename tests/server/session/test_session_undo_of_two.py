@@ -1,4 +1,4 @@
-"""Undo while others edit: refusals, the users they name, and locks."""
+"""Undo while other users edit: refusals, the users they name, and locks."""
 
 import asyncio
 
@@ -25,7 +25,7 @@ async def test_undo_reverts_only_own_edits(server: SessionServer, alice: Person,
     assert {work.point("a"), work.point("b2")} == {a, b}
     await bob.ask("Undo")
     assert {work.point("a"), work.point("b")} == {a, b}
-    # What others do meanwhile does not end what one can redo; what one does oneself ends it.
+    # Edits of others do not affect what a user can redo. An edit of their own ends it.
     await bob.ask("AddActionPoint", name="c", position=ORIGIN)
     await alice.ask("Redo")
     assert work.point("a2") == a
@@ -46,7 +46,7 @@ async def test_undo_is_refused_naming_the_user_who_changed_it_since(alice: Perso
     await bob.ask("WriteUnlock", object_id=p)
     assert "bob" in (text := await refused(alice))
     assert "UpdateActionPointPosition" in text
-    # Once that is taken back too, nothing stands against it.
+    # Once that edit is undone too, the undo is allowed.
     await bob.ask("Undo")
     await alice.ask("Undo")
     assert work.point("p") == p
@@ -65,12 +65,12 @@ async def test_undo_is_refused_when_others_use_the_item(
     assert "bob" in await refused(alice)
     await bob.ask("RemoveAction", id=action)
     await alice.ask("Undo")
-    # A name that was taken meanwhile.
+    # A name that is in use meanwhile.
     await builder.add_point("p")
     assert "bob" in await refused(alice, "Redo")
     await bob.ask("Undo")
     await alice.ask("Redo")
-    # A step to an action, a result that is used.
+    # A connection to an action, or a result that is used.
     one = await work.add_action(p, "one")
     await bob.ask("AddLogicItem", start="START", end=one)
     assert "bob" in await refused(alice)
@@ -78,7 +78,7 @@ async def test_undo_is_refused_when_others_use_the_item(
     await alice.ask("WriteUnlock", object_id=one)
     await bob.ask("Undo")
     await alice.ask("Undo")
-    # The parent is gone.
+    # The parent was removed.
     await bob.ask("RemoveActionPoint", id=p)
     assert "bob" in await refused(alice, "Redo")
 
@@ -115,7 +115,7 @@ async def test_undo_is_refused_while_others_hold_locks(
     await bob.lock(p)
     assert "bob" in await refused(alice)
     await bob.ask("WriteUnlock", object_id=p)
-    # A new name moves nothing: what hangs on the point may be locked. A move takes it along.
+    # A new name moves nothing: the point's children may be locked. A move includes them.
     await bob.lock(below)
     await alice.ask("Undo")
     await bob.ask("WriteUnlock", object_id=below)
@@ -129,7 +129,7 @@ async def test_undo_is_refused_while_others_hold_locks(
     await bob.ask("ReadLock", object_id=below)
     assert "bob" in await refused(alice)
     await bob.ask("ReadUnlock", object_id=below)
-    # Ones own locks are no hindrance, and stay.
+    # Locks of the same user do not prevent it, and stay.
     await alice.lock(p, tree=True)
     await alice.ask("Undo")
     assert server.services.locks.write_locked_by("alice") == [p]
@@ -147,7 +147,7 @@ async def test_locks_follow_removed_and_moved_items(
     )  # fmt: skip
     await alice.lock(a)
     await alice.ask("Undo")
-    await bob.lock(b, tree=True)  # what was below it is not any more
+    await bob.lock(b, tree=True)  # its former children are no longer below it
     with pytest.raises(Refused, match="alice"):
         await bob.ask("WriteLock", object_id=a)
     await bob.ask("WriteUnlock", object_id=b)

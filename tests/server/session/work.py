@@ -1,4 +1,4 @@
-"""Makes scenes and projects by requests."""
+"""Scenes and projects made by requests."""
 
 from typing import Any
 

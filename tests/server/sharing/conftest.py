@@ -1,4 +1,4 @@
-"""A server for each test, and waiting for what is told a moment later."""
+"""A server for each test, and helpers that wait for events."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
@@ -12,8 +12,8 @@ from tests.server.session.session_server import Person, SessionServer, open_serv
 PATIENCE = 40.0
 
 
-async def came(person: Person, name: str, where: Callable[[Any], bool] = lambda _: True) -> Any:
-    """Wait for an event; gives its data. What came before it is gone then, what came after it is kept."""
+async def expect(person: Person, name: str, where: Callable[[Any], bool] = lambda _: True) -> Any:
+    """Wait for an event and return its data. Drop earlier messages, keep later ones."""
     async with asyncio.timeout(PATIENCE):
         while True:
             seen = person.take()
@@ -25,7 +25,7 @@ async def came(person: Person, name: str, where: Callable[[Any], bool] = lambda 
 
 
 async def subscribed(person: Person, *names: str, **more: Any) -> Person:
-    """Subscribe, and forget what is told at once."""
+    """Subscribe, and drop the events that are sent at once."""
     await person.ask("SubscribeEvents", events=list(names), **more)
     person.take()
     return person
@@ -33,24 +33,24 @@ async def subscribed(person: Person, *names: str, **more: Any) -> Person:
 
 @pytest.fixture
 async def server(tmp_path: Path) -> AsyncIterator[SessionServer]:
-    """A server without a socket."""
+    """Start a server without a socket."""
     async with open_server(tmp_path) as opened:
         yield opened
 
 
 @pytest.fixture
 async def alice(server: SessionServer) -> Person:
-    """Somebody who is logged in."""
+    """Connect a registered user."""
     return await server.person("alice")
 
 
 @pytest.fixture
 async def bob(server: SessionServer) -> Person:
-    """Somebody else who is logged in."""
+    """Connect another registered user."""
     return await server.person("bob")
 
 
 @pytest.fixture
 async def stranger(server: SessionServer) -> Person:
-    """Somebody who is not logged in."""
+    """Connect a client without a registered user."""
     return await server.person()

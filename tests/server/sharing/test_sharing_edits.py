@@ -10,7 +10,7 @@ from arcor2_server.execution import breakpoints
 from tests.server.session.edits import EDITS, make, rich_project
 from tests.server.session.session_server import Person, Refused, SessionServer, open_server
 from tests.server.session.work import POSE, Work
-from tests.server.sharing.conftest import came, subscribed
+from tests.server.sharing.conftest import expect, subscribed
 
 
 @pytest.fixture
@@ -27,13 +27,13 @@ async def test_breakpoints_are_shared_and_announced(alice: Person, bob: Person, 
     both = {action, work.point("p")}
     answer = await alice.ask("SetBreakpoints", add=sorted(both))
     assert (set(answer["ids"]), answer["user"], answer["project_id"]) == (both, "alice", project)
-    told = await came(bob, "BreakpointsChanged")
-    assert (set(told["ids"]), told["user"]) == (both, "alice")
+    event = await expect(bob, "BreakpointsChanged")
+    assert (set(event["ids"]), event["user"]) == (both, "alice")
     assert set((await stranger.ask("GetBreakpoints"))["ids"]) == both
-    await alice.ask("SetBreakpoints", add=[action])  # is set already
+    await alice.ask("SetBreakpoints", add=[action])  # it is already set
     await bob.ask("SetBreakpoints", remove=[action, "act_none"])
-    told = await came(bob, "BreakpointsChanged")
-    assert (told["ids"], told["user"]) == ([work.point("p")], "bob")
+    event = await expect(bob, "BreakpointsChanged")
+    assert (event["ids"], event["user"]) == ([work.point("p")], "bob")
     assert work.session.revision == revision
     with pytest.raises(Refused, match="act_none"):
         await alice.ask("SetBreakpoints", add=["act_none"])
@@ -61,10 +61,10 @@ async def test_a_breakpoint_is_removed_and_restored_with_its_action(alice: Perso
     await alice.ask("SetBreakpoints", add=[action])
     await subscribed(bob, "BreakpointsChanged")
     await alice.ask("RemoveAction", id=action)
-    assert (await came(bob, "BreakpointsChanged"))["ids"] == []
+    assert (await expect(bob, "BreakpointsChanged"))["ids"] == []
     assert (await bob.ask("GetBreakpoints"))["ids"] == []
     await alice.ask("Undo")
-    assert (await came(bob, "BreakpointsChanged"))["ids"] == [action]
+    assert (await expect(bob, "BreakpointsChanged"))["ids"] == [action]
     await work.add_action(work.point("p"), "other")
     await asyncio.sleep(0.02)
     assert "BreakpointsChanged" not in bob.names()
@@ -98,15 +98,15 @@ async def test_breakpoints_belong_to_the_project(tmp_path: Path) -> None:
 # ---------------------------------------------------------------------------------------------- undo and redo
 async def test_each_user_is_notified_of_possible_undo(alice: Person, bob: Person, stranger: Person, work: Work) -> None:
     await stranger.ask("SubscribeEvents", events=["HistoryChanged"])
-    assert await came(stranger, "HistoryChanged") == {"revision": 0}
+    assert await expect(stranger, "HistoryChanged") == {"revision": 0}
     await work.project()
     await subscribed(bob, "HistoryChanged")
     await alice.ask("SubscribeEvents", events=["HistoryChanged"])
-    assert (await came(alice, "HistoryChanged")) == {"revision": 0}
+    assert (await expect(alice, "HistoryChanged")) == {"revision": 0}
     await work.add_point("p")
     point = work.point("p")
-    told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 1)
-    assert told == {
+    event = await expect(alice, "HistoryChanged", lambda data: data["revision"] == 1)
+    assert event == {
         "revision": 1,
         "undo": {
             "number": 1,
@@ -122,38 +122,38 @@ async def test_each_user_is_notified_of_possible_undo(alice: Person, bob: Person
             },
         },
     }
-    assert await came(bob, "HistoryChanged", lambda data: data["revision"] == 1) == {"revision": 1}
+    assert await expect(bob, "HistoryChanged", lambda data: data["revision"] == 1) == {"revision": 1}
     await alice.lock(point, tree=True)
     await alice.ask("RenameActionPoint", action_point_id=point, new_name="q")
-    told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 2)
-    assert told["undo"]["text"] == "renaming the action point p to q"
+    event = await expect(alice, "HistoryChanged", lambda data: data["revision"] == 2)
+    assert event["undo"]["text"] == "renaming the action point p to q"
     await alice.ask("Undo")
-    told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 3)
-    assert told["undo"]["text"] == "adding the action point p"
-    assert told["redo"]["text"] == "renaming the action point p to q"
+    event = await expect(alice, "HistoryChanged", lambda data: data["revision"] == 3)
+    assert event["undo"]["text"] == "adding the action point p"
+    assert event["redo"]["text"] == "renaming the action point p to q"
     await alice.ask("Redo")
-    told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 4)
-    assert told["undo"]["text"] == "renaming the action point p to q"
-    assert "redo" not in told
+    event = await expect(alice, "HistoryChanged", lambda data: data["revision"] == 4)
+    assert event["undo"]["text"] == "renaming the action point p to q"
+    assert "redo" not in event
     await alice.lock(point, tree=True)
     await alice.ask("UpdateActionPointPosition", action_point_id=point, new_position={"x": 1.0, "y": 0.0, "z": 0.0})
-    told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 5)
-    assert told["undo"]["text"] == "moving the action point q"
+    event = await expect(alice, "HistoryChanged", lambda data: data["revision"] == 5)
+    assert event["undo"]["text"] == "moving the action point q"
     await work.add_action(point, "wait")
-    told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 6)
-    assert told["undo"]["text"] == "adding the action wait"
+    event = await expect(alice, "HistoryChanged", lambda data: data["revision"] == 6)
+    assert event["undo"]["text"] == "adding the action wait"
     await alice.ask("RestoreRevision", revision=1)
-    told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 7)
-    assert told["undo"]["text"] == "going back to revision 1"
+    event = await expect(alice, "HistoryChanged", lambda data: data["revision"] == 7)
+    assert event["undo"]["text"] == "going back to revision 1"
     await alice.ask("Undo")
-    told = await came(alice, "HistoryChanged", lambda data: data["revision"] == 8)
-    assert told["redo"]["text"] == "going back to revision 1"
+    event = await expect(alice, "HistoryChanged", lambda data: data["revision"] == 8)
+    assert event["redo"]["text"] == "going back to revision 1"
     bob.take()
     await bob.ask("RegisterUser", user_name="bobby")
-    assert (await came(bob, "HistoryChanged"))["revision"] == 8
+    assert (await expect(bob, "HistoryChanged"))["revision"] == 8
     await alice.ask("WriteUnlock", object_id=point)
     await alice.ask("CloseProject", force=True)
-    assert await came(alice, "HistoryChanged") == {"revision": 0}
+    assert await expect(alice, "HistoryChanged") == {"revision": 0}
 
 
 SENTENCES = {

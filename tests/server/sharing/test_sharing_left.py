@@ -16,7 +16,7 @@ MOVED = {"x": 1.0, "y": 0.0, "z": 0.0}
 
 
 async def leave(person: Person) -> None:
-    """End the connection."""
+    """Close the connection."""
     await person.leave()
     person.server._people.remove(person)
 
@@ -68,7 +68,7 @@ async def test_locks_of_a_user_who_left_are_listed_and_taken_over(
         await bob.ask("TakeOverLocks", user="alice")
     await bob.lock(p, tree=True)
     await bob.ask("UpdateActionPointPosition", action_point_id=p, new_position=MOVED)
-    # The user who lost the locks learns of it on returning, once.
+    # The user who lost the locks is notified once, on returning.
     for expected in (["bob released your locks", "scale, p, q"], []):
         again = Person(server)
         server._people.append(again)
@@ -98,7 +98,7 @@ async def test_a_user_who_returns_in_time_keeps_the_locks(server: SessionServer,
 @pytest.mark.parametrize(
     ("presence", "role", "used"),
     [
-        (None, Role.STANDARD_USER, True),  # an existing client does not say what it shows
+        (None, Role.STANDARD_USER, True),  # an existing client does not send its screen
         (None, Role.OPERATOR, False),
         ({"document": "", "view": "operator"}, Role.PROGRAMMER, False),
         ({"document": "@", "view": "3d"}, Role.OPERATOR, True),
@@ -117,15 +117,15 @@ async def test_users_of_an_open_project_are_listed(
 
 # ---------------------------------------------------------------------------------------------- running a package
 async def package(stage: Stage, actor: Actor) -> str:
-    """Make a package of a project that waits again and again; leaves the project open."""
+    """Build a package of a project that waits in a loop, and leave the project open."""
     await project(stage, actor)
     key = stage.services.session.require_project().id
     built = await actor.ask("BuildProject", project_id=key, package_name="package")
     return str(built["package_id"])
 
 
-async def at_the_machine(stage: Stage) -> Actor:
-    """Somebody with the operator's screen."""
+async def operator_client(stage: Stage) -> Actor:
+    """Connect a client that shows the operator's screen."""
     olga = await stage.person("olga")
     await olga.ask("UpdatePresence", view="operator")
     return olga
@@ -134,7 +134,7 @@ async def at_the_machine(stage: Stage) -> Actor:
 async def test_a_project_that_was_left_open_does_not_block_a_program(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         session, locks = stage.services.session, stage.services.locks
-        alice, olga = await stage.person("alice"), await at_the_machine(stage)
+        alice, olga = await stage.person("alice"), await operator_client(stage)
         key = await package(stage, alice)
         await alice.ask("AddActionPoint", name="unsaved", position=ORIGIN)
         point = session.require_project().action_points[0].id
@@ -147,7 +147,7 @@ async def test_a_project_that_was_left_open_does_not_block_a_program(tmp_path: P
         opened, history = session.project, list(session.history)
         with pytest.raises(Refused, match="no_such"):
             await olga.ask("RunPackage", id="no_such")
-        assert (session.project, locks.owners()) == (opened, ["alice"]), "what cannot run changes nothing"
+        assert (session.project, locks.owners()) == (opened, ["alice"]), "a package that cannot run changes nothing"
         olga.take()
         await olga.ask("RunPackage", id=key)
         assert locks.owners() == []
@@ -166,7 +166,7 @@ async def test_a_project_that_was_left_open_does_not_block_a_program(tmp_path: P
         names = [message["event"] for message in olga.events()]
         assert "ShowMainScreen" not in names
         assert names.index("ProjectClosed") < names.index("PackageInfo") < names.index("OpenProject")
-        # Again, while nobody is there; and its owner finds it as it was.
+        # Again, without any user; the owner then finds the project unchanged.
         await olga.ask("RunPackage", id=key)
         await happens(olga, "PackageState", state="running")
         await olga.ask("StopPackage")
@@ -187,7 +187,7 @@ async def _refusal(person: Actor, request: str, **args: Any) -> str:
 
 async def test_a_restart_during_a_temporary_run_reopens_the_project(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
-        alice, olga = await stage.person("alice"), await at_the_machine(stage)
+        alice, olga = await stage.person("alice"), await operator_client(stage)
         key = await package(stage, alice)
         await alice.ask("AddActionPoint", name="unsaved", position=ORIGIN)
         await leave(alice)
@@ -202,9 +202,9 @@ async def test_a_restart_during_a_temporary_run_reopens_the_project(tmp_path: Pa
 
 async def test_a_project_in_use_stays_open(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
-        alice, olga = await stage.person("alice"), await at_the_machine(stage)
+        alice, olga = await stage.person("alice"), await operator_client(stage)
         key = await package(stage, alice)
-        await olga.ask("RunPackage", id=key)  # offline it is no obstacle
+        await olga.ask("RunPackage", id=key)  # the offline object is not an obstacle
         await happens(olga, "PackageState", state="running")
         assert stage.services.session.project is not None
         await olga.ask("StopPackage")

@@ -10,7 +10,7 @@ from arcor2_hw.data.role import Role
 from arcor2_server.collaboration import presence, previews
 from tests.server.session.session_server import Person, Refused, SessionServer
 from tests.server.session.work import ORIGIN, UPRIGHT, Work
-from tests.server.sharing.conftest import came, subscribed
+from tests.server.sharing.conftest import expect, subscribed
 
 POSE = {"position": {"x": 1.0, "y": 2.0, "z": 3.0}, "orientation": UPRIGHT}
 
@@ -18,29 +18,29 @@ POSE = {"position": {"x": 1.0, "y": 2.0, "z": 3.0}, "orientation": UPRIGHT}
 # ---------------------------------------------------------------------------------------------- presence
 async def test_presence_of_users_is_announced(server: SessionServer, alice: Person, stranger: Person) -> None:
     await stranger.ask("SubscribeEvents", events=["UserPresence"])
-    assert (await came(stranger, "UserPresence")) == {"user": "alice", "online": True, "role": "programmer"}
+    assert (await expect(stranger, "UserPresence")) == {"user": "alice", "online": True, "role": "programmer"}
     bob = await server.person("bob")
-    assert (await came(stranger, "UserPresence"))["user"] == "bob"
-    said: dict[str, Any] = {
+    assert (await expect(stranger, "UserPresence"))["user"] == "bob"
+    sent: dict[str, Any] = {
         "document": "pro_1",
         "selected": ["acp_1"],
         "editing": "act_1",
         "view": "Flow",
         "camera": POSE,
     }
-    await bob.ask("UpdatePresence", **said)
-    event = await came(stranger, "UserPresence", lambda data: "presence" in data)
-    assert (event["user"], event["presence"]) == ("bob", said)
+    await bob.ask("UpdatePresence", **sent)
+    event = await expect(stranger, "UserPresence", lambda data: "presence" in data)
+    assert (event["user"], event["presence"]) == ("bob", sent)
     late = await server.person("carol")
     await late.ask("SubscribeEvents", events=["UserPresence"])
     everybody = {e["data"]["user"]: e["data"].get("presence") for e in late.events()}
-    assert everybody == {"alice": None, "bob": said, "carol": None}
+    assert everybody == {"alice": None, "bob": sent, "carol": None}
     await bob.ask("RegisterUser", user_name="rob")
-    assert (await came(stranger, "UserPresence", lambda data: data["user"] == "bob"))["online"] is False
-    assert "presence" not in await came(stranger, "UserPresence", lambda data: data["user"] == "rob")
+    assert (await expect(stranger, "UserPresence", lambda data: data["user"] == "bob"))["online"] is False
+    assert "presence" not in await expect(stranger, "UserPresence", lambda data: data["user"] == "rob")
     await late.leave()
     server._people.remove(late)
-    assert (await came(stranger, "UserPresence", lambda data: not data["online"]))["user"] == "carol"
+    assert (await expect(stranger, "UserPresence", lambda data: not data["online"]))["user"] == "carol"
 
 
 async def test_presence_needs_a_user_and_is_limited(alice: Person, stranger: Person) -> None:
@@ -59,9 +59,9 @@ async def test_fast_updates_are_reduced_to_the_newest(
     began = time.monotonic()
     for number in range(300):
         await alice.ask("UpdatePresence", view=str(number))
-    events = [await came(bob, "UserPresence", lambda data: data["user"] == "alice")]
+    events = [await expect(bob, "UserPresence", lambda data: data["user"] == "alice")]
     while events[-1]["presence"]["view"] != "299":
-        events.append(await came(bob, "UserPresence"))
+        events.append(await expect(bob, "UserPresence"))
     assert len(events) <= 2 + (time.monotonic() - began) / presence.PERIOD
 
 
@@ -89,15 +89,15 @@ async def test_a_drag_is_sent_to_others_until_it_ends(alice: Person, bob: Person
     await subscribed(alice, "MovePreview")
     await alice.lock(point, tree=True)
     await drag(alice, point, 0.25)
-    event = await came(bob, "MovePreview")
+    event = await expect(bob, "MovePreview")
     assert event == {"id": point, "user": "alice", "position": {"x": 0.25, "y": 0.0, "z": 0.0}}
-    # The end comes after what it leads to, so that nothing jumps back.
+    # The end of a drag is sent after the resulting change, so that nothing jumps back.
     await alice.ask("UpdateActionPointPosition", action_point_id=point, new_position={"x": 0.5, "y": 0.0, "z": 0.0})
-    await came(bob, "ActionPointChanged")
-    assert await came(bob, "MovePreview") == {"id": point, "user": "alice"}
+    await expect(bob, "ActionPointChanged")
+    assert await expect(bob, "MovePreview") == {"id": point, "user": "alice"}
     await drag(alice, point, 0.75)
     await alice.ask("PreviewMove", id=point)
-    await came(bob, "MovePreview", is_over)
+    await expect(bob, "MovePreview", is_over)
     assert "MovePreview" not in alice.names()
     assert work.session.document.action_point(point).position.x == 0.5
     assert (await alice.ask("History"))["revision"] == work.session.revision
@@ -110,16 +110,16 @@ async def test_a_drag_ends_with_its_lock_or_its_user(
     await subscribed(bob, "MovePreview")
     await alice.lock(point, tree=True)
     await drag(alice, point, 1.0)
-    await came(bob, "MovePreview")
+    await expect(bob, "MovePreview")
     await alice.ask("WriteUnlock", object_id=point)
-    assert is_over(await came(bob, "MovePreview"))
+    assert is_over(await expect(bob, "MovePreview"))
     carol = await server.person("carol")
     await carol.lock(point, tree=True)
     await drag(carol, point, 2.0)
-    await came(bob, "MovePreview")
+    await expect(bob, "MovePreview")
     await carol.leave()
     server._people.remove(carol)
-    assert await came(bob, "MovePreview") == {"id": point, "user": "carol"}
+    assert await expect(bob, "MovePreview") == {"id": point, "user": "carol"}
     assert server.services.previews._dragged == {}
 
 
@@ -136,7 +136,7 @@ async def test_invalid_drags_are_refused(
         await drag(alice, "no_such", 1.0)
     with pytest.raises(Refused, match="no joints"):
         await alice.ask("PreviewMove", id=point, joints=[])
-    await alice.ask("PreviewMove", id=orientation, orientation=UPRIGHT)  # by the lock of its point
+    await alice.ask("PreviewMove", id=orientation, orientation=UPRIGHT)  # the lock of its point is sufficient
     with pytest.raises(Refused, match="does not hold"):
         await drag(alice, robot, 1.0)
     client = server.services.users.client_of("alice")
@@ -155,7 +155,7 @@ async def test_a_fast_drag_is_sent_at_most_thirty_times_a_second(alice: Person, 
         await drag(alice, point, float(number))
     seen: list[float] = []
     while not seen or seen[-1] < 299:
-        seen.append((await came(bob, "MovePreview"))["position"]["x"])
+        seen.append((await expect(bob, "MovePreview"))["position"]["x"])
     assert seen == sorted(seen)
     assert seen[0] == 0
     assert len(seen) <= 2 + (time.monotonic() - began) / previews.PERIOD

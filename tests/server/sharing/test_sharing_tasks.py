@@ -1,4 +1,4 @@
-"""Tasks as clients follow them, on a whole server without its socket; obstacles while an object is disabled."""
+"""Tasks from the clients' view, on a complete server without a socket; obstacles while an object is disabled."""
 
 import asyncio
 from pathlib import Path
@@ -35,7 +35,7 @@ async def test_a_scene_is_started_and_stopped(tmp_path: Path) -> None:
         ended = await happens(bob, "TaskState", state="finished")
         assert ended["id"] == begun["id"]
         assert ended["progress"] == 1
-        assert under_way == [begun["id"]]  # it takes two imports and two connections: it was not over yet
+        assert under_way == [begun["id"]]  # two imports and two connections take longer than this
         progress = [task["progress"] for task in tasks(bob) if "progress" in task]
         assert progress == sorted(progress)
         await happens(alice, "SceneState", state="started")
@@ -115,7 +115,7 @@ async def test_task_progress_is_throttled_except_its_end() -> None:
     board = Tasks(hub)
     task = board.begin(TaskKind.COMPUTATION, Message.of("Counting"))
     for number in range(500):
-        task.at(number / 499 * 2, f"step {number}")  # beyond 1 is 1
+        task.at(number / 499 * 2, f"step {number}")  # values above 1 count as 1
         if number % 50 == 0:
             await asyncio.sleep(0.001)
     assert len(sent) < 50
@@ -142,7 +142,7 @@ async def test_a_disabled_object_is_no_obstacle(tmp_path: Path) -> None:
         await stage.place(alice, part="Part", plain="Plain")
         await stage.start(alice)
         services, part = stage.services, stage.ids["part"]
-        assert set(services.scene_collisions.online_obstacles()) == {part}  # the other one has no model
+        assert set(services.scene_collisions.online_obstacles()) == {part}  # the other object has no model
         await services.online.call(part, "set_enabled", {"state": False})
         await until(lambda: services.scene_collisions.online_obstacles() == {})
         await services.online.call(part, "set_enabled", {"state": True})

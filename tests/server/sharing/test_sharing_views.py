@@ -9,7 +9,7 @@ from arcor2_hw.data.role import Role
 from arcor2_server.collaboration import view_states
 from tests.server.session.session_server import Person, Refused, SessionServer, open_server
 from tests.server.session.work import Work
-from tests.server.sharing.conftest import came, subscribed
+from tests.server.sharing.conftest import expect, subscribed
 
 
 async def view(person: Person, scope: str = "user", **more: Any) -> Any:
@@ -37,18 +37,18 @@ async def test_shared_view_states_are_announced(
     for person in (alice, bob):
         await subscribed(person, "ViewStateChanged")
     await alice.ask("SetViewState", scope="user", document="pro_1", values={"a": 1, "b": None})
-    told = await came(screen, "ViewStateChanged")
-    assert told["values"] == {"a": 1, "b": None}
-    assert (told["user"], told["document"], told["scope"]) == ("alice", "pro_1", "user")
+    event = await expect(screen, "ViewStateChanged")
+    assert event["values"] == {"a": 1, "b": None}
+    assert (event["user"], event["document"], event["scope"]) == ("alice", "pro_1", "user")
     answer = await bob.ask("SetViewState", scope="shared", document="pro_1", values={"place/START": [0, 1, 2]})
     for person in (alice, screen):
-        told = await came(person, "ViewStateChanged")
-        assert (told["scope"], told["revision"], told["values"]) == (
+        event = await expect(person, "ViewStateChanged")
+        assert (event["scope"], event["revision"], event["values"]) == (
             "shared",
             answer["revision"],
             {"place/START": [0, 1, 2]},
         )
-        assert "user" not in told
+        assert "user" not in event
     assert bob.events() == []
     await stranger.ask("SubscribeEvents", events=[], users=["alice"], send=False)
     await alice.ask("SetViewState", scope="user", values={"a": 2})
@@ -72,7 +72,7 @@ async def test_invalid_view_states_are_refused(
         await alice.ask("SetViewState", scope="user", values={"k" * 201: 1})
     with pytest.raises(Refused, match=r"'a'.*bytes"):
         await alice.ask("SetViewState", scope="user", values={"b": 1, "a": "x" * view_states.MAX_VALUE})
-    assert (await view(alice))["values"] == {}  # nothing of a refused request is kept
+    assert (await view(alice))["values"] == {}  # a refused request stores nothing
     monkeypatch.setattr(view_states, "MAX_KEYS", 3)
     await alice.ask("SetViewState", scope="user", values={"a": 1, "b": 2, "c": 3})
     with pytest.raises(Refused, match="keys"):
@@ -120,7 +120,7 @@ async def test_view_states_survive_a_restart_and_end_with_their_document(tmp_pat
         lists = server.services.storage.revision
         after = await alice.ask("SetViewState", scope="user", values={"x": 1})
         assert after["revision"] > before["revision"]
-        assert server.services.storage.revision == lists  # lists of documents need not be made anew
+        assert server.services.storage.revision == lists  # cached lists of documents stay valid
         await alice.ask("DeleteProject", id=project)
         for scope in ("user", "shared"):
             assert (await view(alice, scope, document=project))["values"] == {}
