@@ -147,8 +147,18 @@ async def test_the_tower_was_green_while_the_program_ran_and_is_red_after_it(cel
 # ---------------------------------------------------------------------------------------------------- sabotage
 async def test_each_fault_is_reported_and_the_cell_restarts(cell: Cell) -> None:
     tell, run = cell.run.tell, cell.run
-    await tell("erp", "add_order", order="AGAIN", product="Controller board", quantity=1)
     async with Client(cell.url, "tests") as client:
+        # The label of the board cannot be read: the board is rejected and reported, and the program goes on.
+        await cell.renew()
+        await tell("erp", "add_order", order="UNREAD", product="Controller board", quantity=1)
+        assert await cell.program(client, {"picture": lambda: tell("reader", "health", value="FAIL")}) == ""
+        await tell("reader", "health", value="OK")
+        assert (await tell("world", "truth"))["counts"]["bad"] == 1
+        (unread,) = [result for result in (await tell("erp", "truth"))["results"] if result["order"] == "UNREAD"]
+        assert (unread["serial"], unread["passed"]) == ("unread", False)
+        assert "no code was read" in unread["note"]
+        await tell("erp", "add_order", order="AGAIN", product="Controller board", quantity=1)
+
         # The barcode reader does not answer.
         await cell.renew()
         await tell("reader", "silence")

@@ -191,6 +191,51 @@ async def test_branch_takes_four_taps_and_step_two(work: Work) -> None:
     await work.mode("3D")
 
 
+async def test_error_exit_is_added_in_the_graph_and_its_error_used(work: Work) -> None:
+    """By two taps; it is for any error until its kinds are chosen."""
+    screen, page = work.screen, work.screen.page
+    grab = await work.add("grab", "robot/get_digital_input", "good", number=number(1))
+    tell = await work.add("tell", "flow/show_message", "bad", text=ActionParameter("text", "string", '""'))
+    await screen.close_panels()
+    await work.mode("Flow")
+    graph = page.get_by_role("region", name=texts.GRAPH)
+    await graph.get_by_role("button", name=texts.WHOLE_PROGRAM).click()
+    await graph.locator('.react-flow__node[aria-label^="grab,"] .flow-name').click()
+    work.taps = 0
+    await work.tap_button("grab: On error", graph)
+    await page.get_by_role("status").filter(has_text="Tap the step that follows if grab fails").wait_for()
+    await graph.locator('.react-flow__node[aria-label^="tell,"] .flow-name').click()
+    exit_ = (await work.told("LogicItemChanged")).data
+    assert (exit_.start, exit_.end, exit_.error_kinds) == (grab, tell, ["error"])
+    await work.told("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
+    await work.panel.get_by_label("Name of the error").wait_for()
+    await page.get_by_role("button", name=re.compile("^Undo")).click()
+    gone = await work.told("LogicItemChanged")
+    assert (gone.change_type, gone.data.id) == (ChangeType.REMOVE, exit_.id)
+    await page.get_by_role("button", name=re.compile("^Redo")).click()
+    await work.told("LogicItemChanged")
+    named = next(each for point in (await work.saved()).action_points for each in point.actions if each.id == grab)
+    assert named.error_output == "get_digital_input_error"
+    await graph.locator('.react-flow__node[aria-label^="grab,"] .flow-name').click()
+    await work.panel.locator(".next-step", has_text="on error").click()
+    # Its kinds are chosen in plain words, and the edge tells them.
+    for kind in ("Refused", "Not done in time"):
+        await work.panel.locator(".kinds .chip", has_text=kind).click()
+        changed = (await work.told("LogicItemChanged")).data
+    assert changed.error_kinds == ["refused", "device_timeout"]
+    await graph.get_by_text("on error: 2 kinds").wait_for()
+    await screen.picture("program error exit")
+    # Parts of the error are offered where the action has failed.
+    await graph.locator('.react-flow__node[aria-label^="tell,"] .flow-name').click()
+    await work.panel.get_by_role("radiogroup", name="Source of text").get_by_text("Result").click()
+    await work.panel.get_by_label("text", exact=True).select_option(label="text of the error of grab")
+    await work.told("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
+    assert reference((await work.parameters(tell))["text"]) == f"{grab}/error/2"
+    assert await screen.faults() == []
+    await work.mode("3D")
+    assert (await screen.item(exit_.id))["kind"] == "logic"
+
+
 async def test_graph_does_not_move_under_a_tap(work: Work) -> None:
     """Additions of other users are laid out after the release."""
     screen, page = work.screen, work.screen.page

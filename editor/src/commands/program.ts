@@ -24,6 +24,7 @@ import { isClosed } from "../store/selectors";
 import type { State } from "../store/state";
 import { notify, now, select, setUi, store } from "../store/store";
 import { awaited } from "./awaited";
+import { addErrorExit } from "./errorExits";
 import { ask, held, newStep, refusal, sentence } from "./requests";
 
 /** Return why a request cannot edit the program now; an empty string if it can. */
@@ -105,7 +106,8 @@ async function insert(id: string, slot: Slot, step: CallOptions): Promise<void> 
     if (start) await call("UpdateLogicItem", { logic_item_id: item, start, end, condition }, step);
   };
   if (branch) await update(branch.id, doc.logic[branch.id]?.end ?? END, branch.condition);
-  if (redirect) await update(redirect, id, slot.condition);
+  if (redirect)
+    await update(redirect, id, slot.condition); // an error exit keeps its kinds
   else await call("AddLogicItem", { start: slot.after, end: id, condition: slot.condition }, step);
   await call("AddLogicItem", { start: id, end: to }, step);
 }
@@ -288,8 +290,8 @@ export async function removeAction(id: string): Promise<void> {
 // ------------------------------------------------------------------------------------------------ connections
 
 /** Start a connection: the next tap on an action ends it. */
-export function startConnecting(from: string, condition?: ProjectLogicIf, item?: string): void {
-  setUi({ connecting: { from, condition, item } });
+export function startConnecting(from: string, condition?: ProjectLogicIf, item?: string, error = false): void {
+  setUi({ connecting: { from, condition, item, error } });
 }
 
 export const cancelConnecting = (): void => setUi({ connecting: null });
@@ -299,11 +301,12 @@ export async function finishConnecting(to: string): Promise<void> {
   const { connecting } = now().ui;
   if (!connecting) return;
   cancelConnecting();
-  const { from, condition, item } = connecting;
+  const { from, condition, item, error } = connecting;
   if (item !== undefined) {
     const step = now().doc?.logic[item];
     if (step && (await updateStep(item, step.start, to, step.condition))) select({ kind: "logic", id: item });
-  } else await connect(from, to, condition);
+  } else if (error) await addErrorExit(from, to);
+  else await connect(from, to, condition);
 }
 
 /** Connect `to` after `from`, under a free condition unless one is given. Notify the user if it is impossible. */

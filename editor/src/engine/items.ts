@@ -115,7 +115,9 @@ export interface LinkItem extends Base {
   inside: boolean;
   /** Text at the line; empty for an unconditional connection. */
   condition: string;
-  branch: "always" | "true" | "false" | "value";
+  branch: "always" | "true" | "false" | "value" | "error";
+  /** The running program has followed it: drawn in the colour of what runs. */
+  taken?: boolean;
 }
 
 export type Item = ObjectItem | RobotItem | PointItem | OrientationItem | PuckItem | LinkItem;

@@ -21,7 +21,7 @@ export interface Palette {
   start: Color;
   end: Color;
   /** Colours of connections by branch; dashes and labels distinguish them too. */
-  link: Record<"always" | "true" | "false" | "value", Color>;
+  link: Record<"always" | "true" | "false" | "value" | "error", Color>;
   reach: Record<"reachable" | "near_limit" | "in_collision" | "out_of_reach" | "unknown", Color>;
   /** Colours of actions by object. */
   actions: Color[];
@@ -61,7 +61,13 @@ export const LIGHT: Palette = {
   object: color(0x9fb3c4),
   robot: color(0xdfe4ea),
   point: color(0x1d5f8a),
-  link: { always: color(0x4a5663), true: color(0x0b7a4b), false: color(0xc05a00), value: color(0x3d5bb8) },
+  link: {
+    always: color(0x4a5663),
+    true: color(0x0b7a4b),
+    false: color(0xc05a00),
+    value: color(0x3d5bb8),
+    error: color(0xc4161c),
+  },
 };
 
 export const DARK: Palette = {
@@ -75,5 +81,11 @@ export const DARK: Palette = {
   object: color(0x5c7186),
   robot: color(0xb9c2cc),
   point: color(0x6fbcec),
-  link: { always: color(0x9aa7b4), true: color(0x47c68c), false: color(0xf0913a), value: color(0x8ea8ff) },
+  link: {
+    always: color(0x9aa7b4),
+    true: color(0x47c68c),
+    false: color(0xf0913a),
+    value: color(0x8ea8ff),
+    error: color(0xff6b62),
+  },
 };

@@ -2,28 +2,31 @@
 
 import type { ObjectAction, ProjectLogicIf } from "../protocol/types";
 import type { OpenDocument, State } from "../store/state";
-import { conditionsOf, END, linkTo, outgoing, placeOf, START } from "./logic";
-
-/** Types whose actions control the program. They are always offered; their objects are added when they are needed. */
-export const SERVICES: readonly string[] = ["FlowActions", "LogicActions", "CounterActions"];
+import { conditionsOf, END, errorExits, isErrorExit, linkTo, nextSteps, placeOf, START } from "./logic";
 
 const IN_SPACE: ReadonlySet<string> = new Set(["pose", "position", "joints", "relative_pose"]);
 
 /** Return whether an action needs a point in space. */
 export const needsPlace = ({ parameters }: ObjectAction): boolean => parameters.some((each) => IN_SPACE.has(each.type));
 
-/** A place after a step of the program; with a condition, on that branch. */
+/** A place after a step of the program; with a condition, on that branch; with an error exit, on that exit. */
 export interface Slot {
   after: string;
   condition?: ProjectLogicIf;
+  /** Id of an existing error exit. */
+  exit?: string;
 }
 
 /** Text that identifies a slot. */
-export const slotKey = ({ after, condition }: Slot): string => JSON.stringify([after, condition]);
+export const slotKey = ({ after, condition, exit }: Slot): string => JSON.stringify([after, condition, exit]);
 
 /** Return the slots after a step, the one that is usually wanted first. */
 function slotsAfter(doc: OpenDocument, types: State["types"], after: string): Slot[] {
-  const steps = outgoing(doc, after);
+  return [...regular(doc, types, after), ...errorExits(doc, after).map(({ id }) => ({ after, exit: id }))];
+}
+
+function regular(doc: OpenDocument, types: State["types"], after: string): Slot[] {
+  const steps = nextSteps(doc, after);
   const plain = steps.find((each) => !each.condition);
   const taken = steps.flatMap(({ condition }): Slot[] => (condition ? [{ after, condition }] : []));
   const own = conditionsOf(doc, types, after).find((each) => each.action.id === after && each.type === "boolean");
@@ -43,6 +46,8 @@ export const slotsOf = (doc: OpenDocument, types: State["types"]): Slot[] =>
 
 /** Return where the next action goes: after the selected one, else at the end of the program. */
 export function slotFor(doc: OpenDocument, types: State["types"], selected: string): Slot {
+  const exit = doc.logic[selected];
+  if (isErrorExit(exit)) return { after: placeOf(exit.start), exit: exit.id };
   const after = selected in doc.actions || selected === START ? selected : lastOf(doc);
   return slotsAfter(doc, types, after)[0] ?? { after };
 }
@@ -53,7 +58,7 @@ function lastOf(doc: OpenDocument): string {
   let at = START;
   while (!seen.has(at)) {
     seen.add(at);
-    const next = outgoing(doc, at).map((each) => placeOf(each.end));
+    const next = nextSteps(doc, at).map((each) => placeOf(each.end));
     at = next.find((each) => each !== END && !seen.has(each)) ?? at;
   }
   return at;
@@ -69,8 +74,9 @@ export interface Insertion {
   to: string;
 }
 
-export function insertion(doc: OpenDocument, { after, condition }: Slot): Insertion {
-  const steps = outgoing(doc, after);
+export function insertion(doc: OpenDocument, { after, condition, exit }: Slot): Insertion {
+  if (exit !== undefined) return { redirect: exit, to: doc.logic[exit]?.end ?? END };
+  const steps = nextSteps(doc, after);
   const same = steps.find(
     (each) => each.condition?.what === condition?.what && each.condition?.value === condition?.value,
   );

@@ -1,20 +1,14 @@
-/** The connections of a program: predecessors, successors, conditions and free branches. */
+/** What can follow an action of a program: results, conditions and free branches. */
 
 import { t } from "@lingui/core/macro";
 import type { Action, LogicItem, ObjectAction, ProjectLogicIf } from "../protocol/types";
 import type { Of, OpenDocument, State } from "../store/state";
+import { errorWords } from "./errorKinds";
+import { END, errorExits, incoming, isErrorExit, nextSteps, outgoing, placeOf, START } from "./steps";
 
-export const START = "START";
-export const END = "END";
+export * from "./steps";
+
 const BRANCHABLE: ReadonlySet<string> = new Set(["boolean", "integer", "integer_enum", "string_enum"]);
-
-/** Return the action, START or END at one end of a connection, without the name of the flow. */
-export const placeOf = (end: string): string => end.split("/")[0] ?? end;
-
-export const outgoing = (doc: OpenDocument, id: string): LogicItem[] =>
-  Object.values(doc.logic).filter((item) => placeOf(item.start) === id);
-export const incoming = (doc: OpenDocument, id: string): LogicItem[] =>
-  Object.values(doc.logic).filter((item) => placeOf(item.end) === id);
 
 /** Return the description of an action by its type; undefined if unknown. */
 export function metaOf(
@@ -72,8 +66,15 @@ export function usable(doc: OpenDocument, types: State["types"], id: string, typ
   const free = incoming(doc, id).length === 0;
   return Object.values(doc.actions)
     .filter((each) => each.id !== id && (free ? !later.has(each.id) : earlier.has(each.id)))
+    .filter((each) => !canHaveFailed(doc, each.id, id))
     .flatMap((each) => resultsOf(doc, types, each))
     .filter((result) => result.type === type);
+}
+
+/** Return whether a path leads from an error exit of an action to an item: the action has no results there. */
+export function canHaveFailed(doc: OpenDocument, action: string, at: string): boolean {
+  const ends = errorExits(doc, action).map((each) => placeOf(each.end));
+  return ends.some((end) => end === at || after(doc, end).has(at));
 }
 
 export const linkTo = (result: Result): string => `${result.action.id}/default/${result.index}`;
@@ -90,7 +91,7 @@ export function conditionsOf(doc: OpenDocument, types: State["types"], id: strin
   const own = doc.actions[id];
   if (!own) return [];
   const earlier = before(doc, id);
-  const others = Object.values(doc.actions).filter((each) => earlier.has(each.id));
+  const others = Object.values(doc.actions).filter((each) => earlier.has(each.id) && !canHaveFailed(doc, each.id, id));
   return [own, ...others].flatMap((each) => resultsOf(doc, types, each)).filter((each) => BRANCHABLE.has(each.type));
 }
 
@@ -103,7 +104,7 @@ export interface NewStep {
 
 /** Return a free branch of `from`, or a sentence if there is none. */
 export function freeStep(doc: OpenDocument, types: State["types"], from: string): NewStep | string {
-  const siblings = outgoing(doc, from);
+  const siblings = nextSteps(doc, from);
   if (siblings.length === 0) return {};
   if (from === START) return t`A program has one first action. Move the connection from Start instead.`;
   const asked = siblings.find((each) => each.condition)?.condition;
@@ -127,22 +128,35 @@ function firstFree(type: string, taken: string[]): string | undefined {
   for (let number = 0; ; number++) if (!taken.includes(String(number))) return String(number);
 }
 
-/** Return why a connection cannot lead to an item; an empty string if it can. The server decides in the end. */
-export function cannotLead(doc: OpenDocument, from: string, to: string, item = ""): string {
+/**
+ * Return why a connection cannot lead to an item; an empty string if it can. The server decides in the end.
+ *
+ * `item` is the connection if it exists, `error` tells whether it is an error exit.
+ */
+export function cannotLead(
+  doc: OpenDocument,
+  from: string,
+  to: string,
+  item = "",
+  error = isErrorExit(doc.logic[item]),
+): string {
   if (to === START) return t`Start cannot follow a step.`;
   if (from === END) return t`Nothing can follow End.`;
   if (from === to) return t`An action cannot follow itself.`;
   if (from === START && to === END) return t`Put an action between Start and End.`;
+  if (from === START && error) return t`Start cannot fail.`;
   const others = outgoing(doc, from).filter((each) => each.id !== item);
-  if (others.some((each) => placeOf(each.end) === to)) return t`These steps are already connected.`;
+  if (others.some((each) => placeOf(each.end) === to && isErrorExit(each) === error))
+    return t`These steps are already connected.`;
   if (after(doc, to).has(from)) return t`This connection would create a loop.`;
   return "";
 }
 
-/** Return a condition as text: "passed is yes". */
+/** Return a condition as text: "passed is yes", "on error". */
 export function conditionWords(doc: OpenDocument, types: State["types"], item: LogicItem): string {
   const { condition } = item;
-  if (!condition) return outgoing(doc, placeOf(item.start)).length > 1 ? t`else` : "";
+  if (isErrorExit(item)) return errorWords(item.error_kinds);
+  if (!condition) return nextSteps(doc, placeOf(item.start)).length > 1 ? t`else` : "";
   const result = resultAt(doc, types, condition.what);
   const own = result?.action.id === placeOf(item.start);
   const value =

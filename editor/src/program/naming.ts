@@ -1,6 +1,7 @@
 /** Free names, and names as words. */
 
 import { translate } from "../i18n/serverMessages";
+import type { Action } from "../protocol/types";
 import type { OpenDocument } from "../store/state";
 
 /** Return a name, with the first number that makes it unique. */
@@ -22,9 +23,12 @@ export function actionNames(doc: OpenDocument): string[] {
   return Object.values(doc.actions).map((each) => each.name);
 }
 
-/** Return the names of all stored results, which have to be unique. */
+/** Return the names of all stored results and errors, which have to be unique. */
 export function outputNames(doc: OpenDocument): string[] {
-  return Object.values(doc.actions).flatMap((each) => each.flows.flatMap((flow) => flow.outputs));
+  return Object.values(doc.actions).flatMap(({ flows, error_output }) => [
+    ...flows.flatMap((flow) => flow.outputs),
+    ...(error_output ? [error_output] : []),
+  ]);
 }
 
 /** Return names for the results of a new action. */
@@ -37,3 +41,7 @@ export function newOutputs(doc: OpenDocument, method: string, count: number): st
   }
   return names;
 }
+
+/** Return a name for the error of an action. */
+export const freeErrorName = (doc: OpenDocument, action: Pick<Action, "type" | "name">): string =>
+  freeName(`${action.type.split("/")[1] ?? action.name}_error`, outputNames(doc));

@@ -1,10 +1,25 @@
 /** Problems of a program, found before it runs. */
 
 import { t } from "@lingui/core/macro";
-import type { OpenDocument, State } from "../store/state";
-import { after, END, incoming, linkTo, metaOf, outgoing, placeOf, resultAt, resultsOf, START } from "./logic";
+import type { Action } from "../protocol/types";
+import type { Of, OpenDocument, State } from "../store/state";
+import { decoded } from "./decoded";
+import { errorAt, hasFailed, linkToError, partNames } from "./errorExits";
+import {
+  after,
+  canHaveFailed,
+  END,
+  incoming,
+  linkTo,
+  metaOf,
+  nextSteps,
+  outgoing,
+  placeOf,
+  resultAt,
+  resultsOf,
+  START,
+} from "./logic";
 import { reachOfAction } from "./reach";
-import { decoded } from "./values";
 
 export interface Problem {
   /** Id of the faulty item, which a tap selects. */
@@ -45,7 +60,7 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
   const used = after(doc, START);
   if (outgoing(doc, START).length === 0) error(START, t`Start has no next step. Connect it to the first action.`);
   for (const action of Object.values(doc.actions)) {
-    const steps = outgoing(doc, action.id);
+    const steps = nextSteps(doc, action.id);
     if (!used.has(action.id)) {
       const loose = incoming(doc, action.id).length === 0;
       warn(
@@ -128,7 +143,13 @@ function ofAction(
       if (!(String(value) in doc.parameters))
         error(action.id, t`${action.name}: the variable used for ${wanted.name} no longer exists.`);
     } else if (parameter.type === "link") {
-      const result = resultAt(doc, types, String(value));
+      const link = String(value);
+      const problem = /^[^/]*\/error\//.test(link)
+        ? errorProblem(doc, action, wanted.name, link)
+        : failedProblem(doc, action, wanted.name, link);
+      if (problem) error(action.id, problem);
+      if (problem !== undefined) continue;
+      const result = resultAt(doc, types, link);
       if (!result) error(action.id, t`${action.name}: the result used for ${wanted.name} no longer exists.`);
       else if (doc.project?.has_logic && !after(doc, result.action.id).has(action.id)) {
         warn(
@@ -145,19 +166,38 @@ function ofAction(
   }
 }
 
-/** Return the names of the actions that use a project parameter or a result. */
+/** Return the problem of a link to an error; an empty string if there is none. */
+function errorProblem(doc: OpenDocument, action: Of<Action>, parameter: string, link: string): string {
+  const part = errorAt(doc, link);
+  if (!part) return t`${action.name}: the error used for ${parameter} is not stored.`;
+  if (!doc.project?.has_logic || !after(doc, START).has(action.id) || hasFailed(doc, part.action.id, action.id))
+    return "";
+  const { name } = part.action;
+  return t`${action.name}: ${parameter} uses the error of ${name}, which has not failed on all paths to it.`;
+}
+
+/** Return the problem of a link to a result of an action that can have failed; undefined if it cannot. */
+function failedProblem(doc: OpenDocument, action: Of<Action>, parameter: string, link: string): string | undefined {
+  const source = doc.actions[link.split("/")[0] ?? ""];
+  if (!source || !canHaveFailed(doc, source.id, action.id)) return undefined;
+  return t`${action.name}: ${parameter} uses a result of ${source.name}, which can have failed before it.`;
+}
+
+/** Return the names of the actions that use a project parameter, a result, or the error of an action. */
 export function usersOf(
   doc: OpenDocument,
   types: State["types"],
-  of: { parameter: string } | { action: string },
+  of: { parameter: string } | { action: string } | { error: string },
 ): string[] {
   const users: string[] = [];
   const links = new Set(
-    "action" in of
-      ? doc.actions[of.action]
-        ? resultsOf(doc, types, doc.actions[of.action] as never).map(linkTo)
-        : []
-      : [],
+    "error" in of
+      ? partNames().map((_, index) => linkToError({ action: { id: of.error }, index }))
+      : "action" in of
+        ? doc.actions[of.action]
+          ? resultsOf(doc, types, doc.actions[of.action] as never).map(linkTo)
+          : []
+        : [],
   );
   for (const action of Object.values(doc.actions)) {
     const uses = action.parameters.some(({ type, value }) => {

@@ -1,7 +1,7 @@
 /** Reachability of the targets of an action. Pure functions. */
 
 import type { Action, Reach, ReachabilityData } from "../protocol/types";
-import { decoded } from "./values";
+import { decoded } from "./decoded";
 
 /** From best to worst. */
 export const REACHES: readonly Reach[] = ["reachable", "near_limit", "unknown", "in_collision", "out_of_reach"];

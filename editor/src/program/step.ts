@@ -1,10 +1,13 @@
 /** The running action in words: what it does, its parameters, and how long it usually takes. Pure functions. */
 
+import { t } from "@lingui/core/macro";
 import type { Action, ActionParameter, TraceEntry } from "../protocol/types";
 import type { Of, OpenDocument, State } from "../store/state";
+import { decoded } from "./decoded";
+import { errorAt } from "./errorExits";
 import { metaOf } from "./logic";
 import { words } from "./naming";
-import { decoded, type Extra, extraOf, shownUnit, textOf } from "./values";
+import { type Extra, extraOf, shownUnit, textOf } from "./values";
 
 /** Largest number of shown parameters. */
 const SHOWN = 3;
@@ -93,6 +96,8 @@ function shortValue(doc: OpenDocument, action: Of<Action>, { type, value }: Acti
   const read = decoded(value);
   if (type === "project_parameter") return doc.parameters[String(read)]?.name ?? "";
   if (type === "link") {
+    const part = errorAt(doc, String(read));
+    if (part) return t`${part.name} of ${part.action.name}`;
     const [from = "", , index] = String(read).split("/");
     const source = doc.actions[from]?.flows.find((flow) => flow.type === "default");
     return source?.outputs?.[Number(index)] ?? "";

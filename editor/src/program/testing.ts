@@ -15,12 +15,19 @@ export const meta = (name: string, returns: string[], parameters: ObjectAction["
 export const number = { name: "by", type: "integer", dynamic_value: false };
 export const TYPES: State["types"] = {
   ...initialState().types,
-  actions: { Device: [meta("ask", ["boolean"]), meta("count", ["integer"], [number]), meta("act", [])] },
+  actions: {
+    Device: [
+      meta("ask", ["boolean"]),
+      meta("count", ["integer"], [number]),
+      meta("act", []),
+      meta("show", [], [{ ...number, type: "string" }]),
+    ],
+  },
 };
 
 /**
  * Build a program: actions a, b, ... by their kinds, at one point; connections as [from, to, value of the result of
- * from].
+ * from], or ["a", "b", "on refused stale"] for an error exit. Actions with error exits name their error.
  */
 export function program(
   kinds: Record<string, string>,
@@ -29,16 +36,22 @@ export function program(
 ): OpenDocument {
   const at = { x: 0, y: 0, z: 0 };
   const actions = Object.entries(kinds).map(([id, kind]) => {
-    const outputs = kind === "act" ? [] : [`${id}_result`];
-    const given = kind === "count" ? [{ name: "by", type: "integer", value: "1", ...parameters[id] }] : [];
-    return { id, name: id, type: `device/${kind}`, parameters: given, flows: [{ type: "default" as const, outputs }] };
+    const outputs = kind === "act" || kind === "show" ? [] : [`${id}_result`];
+    const takes = kind === "count" || kind === "show";
+    const given = takes ? [{ name: "by", type: "integer", value: "1", ...parameters[id] }] : [];
+    const flows = [{ type: "default" as const, outputs }];
+    const fails = steps.some(([from, , value]) => from === id && value?.startsWith("on "));
+    const error = fails ? { error_output: `${id}_error` } : {};
+    return { id, name: id, type: `device/${kind}`, parameters: given, flows, ...error };
   });
   const logic = steps.map(
     ([start, end, value], index): LogicItem => ({
       id: `s${index}`,
       start,
       end,
-      ...(value === undefined ? {} : { condition: { what: `${start}/default/0`, value } }),
+      ...(value?.startsWith("on ")
+        ? { error_kinds: value.split(" ").slice(1) }
+        : value !== undefined && { condition: { what: `${start}/default/0`, value } }),
     }),
   );
   const scene: Scene = {

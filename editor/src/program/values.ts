@@ -4,6 +4,7 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { decimal, numberFrom } from "../formats";
 import type { ActionParameter, ParameterMeta } from "../protocol/types";
+import { decoded } from "./decoded";
 
 /** Additional data of a parameter. */
 export interface Extra {
@@ -85,16 +86,6 @@ export function extraOf(meta: Pick<ParameterMeta, "extra"> | undefined): Extra {
 
 export function sourceOf(parameter: ActionParameter): Source {
   return parameter.type === "link" || parameter.type === "project_parameter" ? parameter.type : "value";
-}
-
-/** Return the decoded value; undefined if it is not JSON. */
-export function decoded(json: string | undefined): unknown {
-  if (json === undefined) return undefined;
-  try {
-    return JSON.parse(json);
-  } catch {
-    return undefined;
-  }
 }
 
 /** Return a value as the text of a field. */

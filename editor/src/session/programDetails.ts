@@ -1,7 +1,7 @@
 /** Request the data of programs that events only update: actions, run history, trace of the running program. */
 
 import { inUserLanguage } from "../i18n/serverMessages";
-import { SERVICES } from "../program/chain";
+import { SERVICES } from "../program/services";
 import { withRuns } from "../store/reduce";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";

@@ -20,6 +20,8 @@ export interface Connecting {
   condition?: ProjectLogicIf;
   /** The existing connection whose target is changed. */
   item?: string;
+  /** It becomes an error exit. */
+  error?: boolean;
 }
 
 /** The ghost: a robot shown at another pose. */

@@ -78,6 +78,12 @@ test("connections have the kind and text of their branch", () => {
   expect(made.l1).toMatchObject({ branch: "always", condition: "" });
   expect(made.l2).toMatchObject({ branch: "false", condition: "no" });
   expect(made.l3).toMatchObject({ branch: "value", condition: "firm" });
+  const failing = workplace();
+  failing.doc = {
+    ...failing.doc,
+    logic: { l3: { id: "l3", start: "a1", end: "a2", error_kinds: ["refused"] } },
+  } as never;
+  expect(items(failing).l3).toMatchObject({ branch: "error", condition: "on error: Refused", taken: false });
 });
 
 test("unchanged items are the same objects", () => {

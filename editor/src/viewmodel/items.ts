@@ -3,7 +3,10 @@
 import { t } from "@lingui/core/macro";
 import type { Item, LinkItem, RobotItem } from "../engine/items";
 import { decimal } from "../formats";
+import { errorWords } from "../program/errorKinds";
 import { reachOfAction, worse } from "../program/reach";
+import { type BranchKind, branchKind } from "../program/steps";
+import { takenExit } from "../program/taken";
 import type { LogicItem, Pose, Position, Reach } from "../protocol/types";
 import { isRunning } from "../store/selectors";
 import type { OpenDocument, State } from "../store/state";
@@ -121,15 +124,18 @@ export class ItemMaker {
     if (state.view.user.hide_steps === true && state.ui.connecting === null) return found;
     const open = isOpen(state);
     const dim = isDim(state);
+    const exit = takenExit(state)?.id;
     for (const item of Object.values(doc.logic)) {
       const [from, to] = [item.start, item.end].map((id) => doc.actions[id]?.pointId);
       const moved = [item.start, item.end].some((id) => isPosition(state.view.shared[`place/${id}`]));
       const inside = from !== undefined && from === to && !moved && !open(from);
       const pale = dim(item.id);
-      add(item.id, [item, inside, pale, ...notify(item.id)], () => ({
+      const taken = item.id === exit;
+      add(item.id, [item, inside, pale, taken, ...notify(item.id)], () => ({
         ...link(item, common(item.id, "")),
         inside,
-        dim: pale,
+        dim: pale && !taken,
+        taken,
       }));
     }
     return found;
@@ -260,19 +266,16 @@ function bestReach(state: State): Record<string, Reach> {
   return best;
 }
 
-type Own = "kind" | "from" | "to" | "inside" | "condition" | "branch";
+type Own = "kind" | "from" | "to" | "inside" | "condition" | "branch" | "taken";
 
 function link(item: LogicItem, base: Omit<LinkItem, Own>): Omit<LinkItem, "inside"> {
-  const { condition } = item;
-  const branch = !condition
-    ? "always"
-    : condition.value === "true"
-      ? "true"
-      : condition.value === "false"
-        ? "false"
-        : "value";
-  const words = branch === "true" ? t`yes` : branch === "false" ? t`no` : condition ? plain(condition.value) : "";
-  return { ...base, kind: "logic", from: item.start, to: item.end, condition: words, branch };
+  const branch = branchKind(item);
+  return { ...base, kind: "logic", from: item.start, to: item.end, condition: wordsOf(item, branch), branch };
+}
+
+function wordsOf({ condition, error_kinds = [] }: LogicItem, branch: BranchKind): string {
+  if (branch === "error") return errorWords(error_kinds);
+  return branch === "true" ? t`yes` : branch === "false" ? t`no` : condition ? plain(condition.value) : "";
 }
 
 /** Return a value as text: JSON strings have quotes. */

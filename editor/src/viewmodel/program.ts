@@ -1,6 +1,6 @@
 /** How the program is drawn in space: stacks, what is pale, and where Start and End are. Pure functions. */
 
-import { END, incoming, outgoing, placeOf, START } from "../program/logic";
+import { END, incoming, outgoing, placeOf, START } from "../program/steps";
 import type { Position } from "../protocol/types";
 import type { OpenDocument, State } from "../store/state";
 import { worldOf } from "./frames";

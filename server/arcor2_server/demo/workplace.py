@@ -15,7 +15,15 @@ from arcor2_hw.data.editor import ViewScope
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box, Model3dType, ObjectAction, ObjectModel
 from arcor2_hw.data.parameter import Parameter
-from arcor2_hw.data.project import Action, ActionParameter, Flow, Project, ProjectLogicIf
+from arcor2_hw.data.project import (
+    ERROR_FLOW,
+    ERROR_PARTS,
+    Action,
+    ActionParameter,
+    Flow,
+    Project,
+    ProjectLogicIf,
+)
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidData
 
@@ -72,7 +80,7 @@ class Step(Struct, frozen=True, forbid_unknown_fields=True):
     """An action.
 
     A parameter "@point" is the pose of an action point, "$name" a project parameter, "#result" the result of an
-    earlier step.
+    earlier step, "#error.text" a part of the error named `error`.
     """
 
     name: str
@@ -81,15 +89,20 @@ class Step(Struct, frozen=True, forbid_unknown_fields=True):
     action: str
     parameters: dict[str, Scalar] = field(default_factory=dict)
     results: list[str] = field(default_factory=list)
+    error: str = ""
 
 
 class Link(Struct, frozen=True, forbid_unknown_fields=True):
-    """A connection of the logic. With `result`, it is followed if the result has the value."""
+    """A connection of the logic.
+
+    With `result`, it is followed if the result has the value; with `errors`, if `start` fails with one of these kinds.
+    """
 
     start: str
     end: str
     result: str = ""
     value: bool = True
+    errors: list[str] = field(default_factory=list)
 
 
 class Workplace(Struct, frozen=True, forbid_unknown_fields=True):
@@ -291,19 +304,27 @@ class Creation:
             await self._client.call(
                 "AddAction",
                 rpc.AddActionArgs(
-                    points[step.point], step.name, f"{obj.id}/{step.action}", given, [Flow(outputs=step.results)]
+                    points[step.point],
+                    step.name,
+                    f"{obj.id}/{step.action}",
+                    given,
+                    [Flow(outputs=step.results)],
+                    step.error or UNSET,
                 ),
             )
             added: Action = (await self._client.next_event("ActionChanged")).data
             actions[step.name] = added
             results |= {result: f"{added.id}/default/{number}" for number, result in enumerate(step.results)}
+            if step.error:
+                parts = enumerate(ERROR_PARTS)
+                results |= {f"{step.error}.{part}": f"{added.id}/{ERROR_FLOW}/{number}" for number, part in parts}
         for link in self._workplace.logic:
             condition: ProjectLogicIf | Unset = UNSET
             if link.result:
                 condition = ProjectLogicIf(results[link.result], _json(link.value))
             start = link.start if link.start == "START" else actions[link.start].id
             end = link.end if link.end == "END" else actions[link.end].id
-            await self._client.call("AddLogicItem", rpc.AddLogicItemArgs(start, end, condition))
+            await self._client.call("AddLogicItem", rpc.AddLogicItemArgs(start, end, condition, link.errors or UNSET))
 
     @staticmethod
     def _parameter(

@@ -28,13 +28,16 @@ const PALE = 0.75;
 const DIM = 0.25;
 /** Layer of what is picked but drawn by `LinkLines`. */
 export const PICKED = 1;
-/** Lengths of dash and gap, m; empty: solid. */
-const DASHES: Record<LinkItem["branch"], [number, number] | null> = {
+/** Lengths of dashes, each followed by its gap, m; null: solid. */
+const DASHES: Record<LinkItem["branch"], number[] | null> = {
   always: null,
   true: [0.05, 0.014],
   false: [0.014, 0.014],
   value: [0.03, 0.02],
+  error: [0.045, 0.012, 0.008, 0.012],
 };
+/** How far error exits bend to the side, as a part of their length and at most, m: another line may have their ends. */
+const ASIDE = [0.2, 0.1] as const;
 /** Where the arrowhead is, as a part of the line. */
 const HEAD = 0.86;
 /** Height of the label, m, and its limits on the screen, pixels. */
@@ -68,7 +71,7 @@ export class LinkThing extends Thing<LinkItem> {
   update(item: LinkItem): void {
     this.item = item;
     const { palette } = this.context;
-    const color = item.selected ? palette.selected : palette.link[item.branch];
+    const color = item.selected ? palette.selected : item.taken ? palette.running : palette.link[item.branch];
     this.color.copy(color);
     if (item.dim) this.color.lerp(palette.background, PALE);
     if (this.label) this.label.material.opacity = item.dim ? DIM : 1;
@@ -146,6 +149,10 @@ export class LinkThing extends Thing<LinkItem> {
     const length = Math.max(1e-3, from.distanceTo(to));
     const top = new Vector3().addVectors(from, to).multiplyScalar(0.5);
     top.z += Math.min(0.25, 0.03 + length * 0.3);
+    if (this.item.branch === "error") {
+      const aside = new Vector3(to.y - from.y, from.x - to.x, 0).normalize();
+      top.addScaledVector(aside, 2 * Math.min(ASIDE[1], ASIDE[0] * length)); // the middle is half as far away
+    }
     // A quadratic curve and its directions.
     const place = (t: number) => new Vector3().lerpVectors(from, top, t).lerp(new Vector3().lerpVectors(top, to, t), t);
     const way = (t: number) =>
@@ -159,11 +166,14 @@ export class LinkThing extends Thing<LinkItem> {
     const dash = DASHES[this.item.branch];
     if (!dash) strips.push(strip(0, 1, SECTIONS[this.context.quality]));
     else {
-      const [on, off] = dash;
       const full = from.distanceTo(this.middle) + this.middle.distanceTo(to);
-      const most = Math.max(on + off, full / 40); // long lines have longer dashes, not more of them
-      for (let at = 0; at < full; at += most)
-        strips.push(strip(at / full, Math.min(1, (at + (most * on) / (on + off)) / full), DASHED));
+      const period = dash.reduce((sum, each) => sum + each);
+      const scale = Math.max(1, full / 40 / period); // long lines have longer dashes, not more of them
+      for (let at = 0, n = 0; at < full; n += 2) {
+        const [on, off] = [n, n + 1].map((each) => scale * (dash[each % dash.length] as number)) as [number, number];
+        strips.push(strip(at / full, Math.min(1, (at + on) / full), DASHED));
+        at += on + off;
+      }
     }
     this.arrow = { strips, head: [place(HEAD), way(HEAD)] };
     this.line.geometry.dispose();

@@ -14,7 +14,12 @@ export type FlowNodeType = Node<
   "box"
 >;
 
-export function FlowNode({ data }: NodeProps<FlowNodeType>) {
+/** Where error exits leave a node. */
+export const FAILS = "fails";
+
+const onError = (): Branch => ({ id: "error", label: t`On error` });
+
+export function FlowNode({ data, selected }: NodeProps<FlowNodeType>) {
   const { box, running, paused, breakpoint, fault, target, from } = data;
   return (
     <div className={`flow-node ${box.kind}`} data-running={running} data-target={target} data-from={from}>
@@ -38,33 +43,52 @@ export function FlowNode({ data }: NodeProps<FlowNodeType>) {
       {box.values && <div className="small flow-values">{box.values}</div>}
       <div className="flow-branches">
         {box.branches.map((branch) => (
-          <Handle
-            key={branch.id}
-            id={branch.id}
-            type="source"
-            position={Position.Bottom}
-            className={`flow-branch ${branch.id}`}
-            role="button"
-            tabIndex={0}
-            aria-label={`${box.name}: ${branch.label}`}
-            onClick={(event) => {
-              event.stopPropagation();
-              begin(lastIn(box), branch);
-            }}
-            onKeyDown={(event) => {
-              if (event.key !== "Enter" && event.key !== " ") return;
-              event.stopPropagation();
-              begin(lastIn(box), branch);
-            }}
-          >
-            {branch.label}
-          </Handle>
+          <Out key={branch.id} id={lastIn(box)} name={box.name} branch={branch} />
         ))}
         {box.branches.length === 0 && box.kind !== "end" && (
           <Handle type="source" position={Position.Bottom} className="flow-none" isConnectable={false} aria-hidden />
         )}
       </div>
+      {(box.kind === "action" || box.kind === "fold") && (
+        <>
+          <Handle
+            id={FAILS}
+            type="source"
+            position={Position.Right}
+            className="flow-none"
+            isConnectable={false}
+            aria-hidden
+          />
+          {selected && box.kind === "action" && <Out id={box.id} name={box.name} branch={onError()} />}
+        </>
+      )}
     </div>
+  );
+}
+
+/** A free branch, or the exit of errors. */
+function Out({ id, name, branch }: { id: string; name: string; branch: Branch }) {
+  return (
+    <Handle
+      id={branch.id}
+      type="source"
+      position={branch.id === "error" ? Position.Right : Position.Bottom}
+      className={`flow-branch ${branch.id}`}
+      role="button"
+      tabIndex={0}
+      aria-label={`${name}: ${branch.label}`}
+      onClick={(event) => {
+        event.stopPropagation();
+        begin(id, branch);
+      }}
+      onKeyDown={(event) => {
+        if (event.key !== "Enter" && event.key !== " ") return;
+        event.stopPropagation();
+        begin(id, branch);
+      }}
+    >
+      {branch.label}
+    </Handle>
   );
 }
 
@@ -77,5 +101,5 @@ export function conditionOf(branch: Branch) {
 function begin(id: string, branch: Branch): void {
   const why = notEditable(now(), "AddLogicItem");
   if (why) notify("info", why);
-  else startConnecting(id, conditionOf(branch));
+  else startConnecting(id, conditionOf(branch), undefined, branch.id === "error");
 }

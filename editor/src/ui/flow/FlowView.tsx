@@ -13,13 +13,16 @@ import {
 } from "@xyflow/react";
 import { useMemo, useRef } from "react";
 import "@xyflow/react/dist/base.css";
+import { addErrorExit } from "../../commands/errorExits";
 import { connect, finishConnecting, notEditable, removeAction, removeStep } from "../../commands/program";
 import { cannotLead } from "../../program/logic";
 import { problemsOf } from "../../program/problems";
+import { placeOf } from "../../program/steps";
+import { takenExit } from "../../program/taken";
 import { notify, now, select, setUi, useEditor } from "../../store/store";
 import { selectionOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
-import { conditionOf, FlowNode, type FlowNodeType } from "./FlowNode";
+import { conditionOf, FAILS, FlowNode, type FlowNodeType } from "./FlowNode";
 import { foldAll, unfold, useFolds } from "./folding";
 import { type Box, firstIn, graphOf, lastIn } from "./graph";
 import { usePressed } from "./usePressed";
@@ -29,11 +32,17 @@ import "../program/program.css";
 import "./flow.css";
 
 const NODE_TYPES = { box: FlowNode };
-const COLOURS = { always: "var(--ink-2)", true: "var(--good)", false: "var(--warn)", value: "var(--accent)" } as const;
+const COLOURS = {
+  always: "var(--ink-2)",
+  true: "var(--good)",
+  false: "var(--warn)",
+  value: "var(--accent)",
+  error: "var(--bad)",
+} as const;
 /** Return the name shown at a node of the graph. */
 const nameIn = (graph: { boxes: Box[] }, id: string): string => graph.boxes.find((each) => each.id === id)?.name ?? "";
 
-const DASHES = { always: undefined, true: "14 4", false: "3 5", value: "9 6" } as const;
+const DASHES = { always: undefined, true: "14 4", false: "3 5", value: "9 6", error: "12 4 2 4" } as const;
 
 /** Return the handler of taps on nodes and connections. */
 function useChoose(): (box: Pick<Box, "id" | "kind" | "run">) => void {
@@ -71,6 +80,7 @@ function Flow() {
   const paused = useEditor((state) => state.program.state === "paused");
   const breakpoints = useEditor((state) => state.breakpoints);
   const selected = useEditor((state) => state.ui.selection?.id ?? "");
+  const exit = useEditor((state) => takenExit(state)?.id);
   const connecting = useEditor((state) => state.ui.connecting);
   const dark = useEditor((state) => state.ui.theme === "dark" || (state.ui.theme === "system" && state.ui.systemDark));
   const reach = useEditor((state) => state.reach);
@@ -100,31 +110,44 @@ function Flow() {
         breakpoint: box.id in breakpoints,
         fault: problems.find((each) => each.id === box.id)?.text ?? "",
         target:
-          connecting !== null && doc !== null && cannotLead(doc, connecting.from, firstIn(box), connecting.item) === "",
+          connecting !== null &&
+          doc !== null &&
+          cannotLead(doc, connecting.from, firstIn(box), connecting.item, connecting.error || undefined) === "",
         from: connecting?.from === lastIn(box),
       },
     }),
   );
   const edges = graph.lines.map((line): Edge => {
+    const taken = line.id === exit;
     const colour = line.id === selected ? "#ff9500" : COLOURS[line.branch];
     return {
       id: line.id,
       source: line.from,
+      ...(line.branch === "error" && { sourceHandle: FAILS }),
       target: line.to,
       type: "smoothstep",
       label: line.words || undefined,
       selected: line.id === selected,
-      className: `flow-line ${line.branch}`,
+      className: `flow-line ${line.branch}${taken ? " taken" : ""}`,
       interactionWidth: 44,
-      ariaLabel: [t`Step from ${nameIn(graph, line.from)} to ${nameIn(graph, line.to)}`, line.words]
+      ariaLabel: [
+        t`Step from ${nameIn(graph, line.from)} to ${nameIn(graph, line.to)}`,
+        line.words,
+        taken ? t`taken` : "",
+      ]
         .filter(Boolean)
         .join(", "),
       markerEnd: { type: MarkerType.ArrowClosed, color: colour, width: 20, height: 20 },
-      style: { stroke: colour, strokeWidth: line.id === selected ? 4 : 2.5, strokeDasharray: DASHES[line.branch] },
+      style: {
+        stroke: colour,
+        strokeWidth: line.id === selected || taken ? 5 : 2.5,
+        strokeDasharray: DASHES[line.branch],
+      },
     };
   });
 
-  const { moved, whole } = useViewport(graph.boxes, running.at(-1) ?? executing, selected);
+  const step = doc?.logic[selected];
+  const { moved, whole } = useViewport(graph.boxes, running.at(-1) ?? executing, step ? placeOf(step.start) : selected);
 
   const box = (id: string): Pick<Box, "id" | "kind" | "run" | "branches"> =>
     graph.boxes.find((each) => each.id === id) ?? { id, kind: "action", run: [], branches: [] };
@@ -148,12 +171,14 @@ function Flow() {
           "controls.zoomIn.ariaLabel": t`Zoom in`,
           "controls.zoomOut.ariaLabel": t`Zoom out`,
         }}
-        isValidConnection={({ source, target }) =>
-          doc !== null && cannotLead(doc, lastIn(box(source)), firstIn(box(target))) === ""
+        isValidConnection={({ source, target, sourceHandle }) =>
+          doc !== null &&
+          cannotLead(doc, lastIn(box(source)), firstIn(box(target)), "", sourceHandle === "error") === ""
         }
         onConnect={({ source, target, sourceHandle }) => {
           const why = notEditable(now(), "AddLogicItem");
           if (why) return notify("info", why);
+          if (sourceHandle === "error") return void addErrorExit(lastIn(box(source)), firstIn(box(target)));
           const branch = box(source).branches.find((each) => each.id === sourceHandle);
           void connect(lastIn(box(source)), firstIn(box(target)), branch && conditionOf(branch));
         }}

@@ -2,7 +2,16 @@
 
 import { Graph, layout } from "@dagrejs/dagre";
 import { plural, t } from "@lingui/core/macro";
-import { conditionWords, END, outgoing, placeOf, resultsOf, START } from "../../program/logic";
+import {
+  type BranchKind,
+  branchKind,
+  conditionWords,
+  END,
+  nextSteps,
+  placeOf,
+  resultsOf,
+  START,
+} from "../../program/logic";
 import { valuesOf } from "../../program/step";
 import type { OpenDocument, State } from "../../store/state";
 
@@ -13,9 +22,9 @@ const LINE = 21;
 const BRANCHES = 22;
 const BORDER = { width: 132, height: 68 };
 
-/** A free branch of an action: the next step, or one for a value of its result. */
+/** A free branch of an action: the next step, one for a value of its result, or an error exit. */
 export interface Branch {
-  id: "next" | "true" | "false" | "branch";
+  id: "next" | "true" | "false" | "branch" | "error";
   label: string;
   /** `<action>/default/<index>`, for a value of a result. */
   what?: string;
@@ -44,7 +53,7 @@ export interface Line {
   from: string;
   to: string;
   words: string;
-  branch: "always" | "true" | "false" | "value";
+  branch: BranchKind;
 }
 
 /** Return the node id of a folded sequence; no action has such an id. */
@@ -59,16 +68,15 @@ export function graphOf(
   const into = new Map(folded.flatMap((run) => run.map((id) => [id, foldOf(run)] as const)));
   const shown = (id: string) => into.get(id) ?? id;
   const lines = Object.values(doc.logic)
-    .map((item): Line => {
-      const { value } = item.condition ?? {};
-      return {
+    .map(
+      (item): Line => ({
         id: item.id,
         from: shown(placeOf(item.start)),
         to: shown(placeOf(item.end)),
         words: conditionWords(doc, types, item),
-        branch: value === undefined ? "always" : value === "true" || value === "false" ? value : "value",
-      };
-    })
+        branch: branchKind(item),
+      }),
+    )
     .filter(({ from, to }) => from !== to);
   const bare: Omit<Box, "x" | "y">[] = [
     {
@@ -133,7 +141,7 @@ function sized(branches: Branch[], values = false): Pick<Box, "branches" | "widt
 export function branchesOf(doc: OpenDocument, types: State["types"], id: string): Branch[] {
   const action = doc.actions[id];
   if (!action) return [];
-  const branches = outgoing(doc, id);
+  const branches = nextSteps(doc, id);
   const result = resultsOf(doc, types, action).find(
     (each) => each.type === "boolean" || each.type === "integer" || each.type.endsWith("_enum"),
   );
@@ -157,7 +165,8 @@ function placed(boxes: Omit<Box, "x" | "y">[], lines: Line[]): Map<string, { x: 
   for (const { id, width, height } of boxes) graph.setNode(id, { width, height });
   for (const { id, from, to, words } of lines) {
     if (graph.hasNode(from) && graph.hasNode(to))
-      graph.setEdge(from, to, { width: words.length * 8, height: 18, labelpos: "c" }, id);
+      // A branch starts right after its action, and waits where it joins.
+      graph.setEdge(from, to, { width: words.length * 8, height: 18, labelpos: "c", weight: words ? 2 : 1 }, id);
   }
   layout(graph);
   return new Map(

@@ -5,9 +5,11 @@ import { msg, t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { awaited } from "../../commands/awaited";
 import { addParameter, dynamicValues, lastDynamicValues, notEditable, setParameter } from "../../commands/program";
+import { decoded } from "../../program/decoded";
+import { linkToError, usableErrors } from "../../program/errorExits";
 import { linkTo, metaOf, usable } from "../../program/logic";
 import { freeName, words } from "../../program/naming";
-import { decoded, extraOf, initial, SIMPLE, type Source, sourceOf, typeName } from "../../program/values";
+import { extraOf, initial, SIMPLE, type Source, sourceOf, typeName } from "../../program/values";
 import type { ActionParameter, ParameterMeta } from "../../protocol/types";
 import type { State } from "../../store/state";
 import { now, useEditor } from "../../store/store";
@@ -65,6 +67,7 @@ function One({
   const { doc, types } = state;
   if (!doc) return null;
   const results = usable(doc, types, actionId, type);
+  const errors = type === "string" ? usableErrors(doc, actionId) : [];
   const simple = (SIMPLE as readonly string[]).includes(type);
   const constants = Object.values(doc.parameters).filter(
     (each) => each.type === type && each.name !== "scene_id" && each.name !== "project_id",
@@ -74,7 +77,7 @@ function One({
       ? ["link"]
       : [
           "value",
-          ...(results.length > 0 || chosen === "link" ? (["link"] as const) : []),
+          ...(results.length + errors.length > 0 || chosen === "link" ? (["link"] as const) : []),
           ...(simple ? (["project_parameter"] as const) : []),
         ];
   const set = (of: Source, json: string) =>
@@ -97,10 +100,16 @@ function One({
           {...field}
           type="string"
           json={chosen === "link" ? parameter?.value : undefined}
-          choices={results.map((each) => ({
-            json: JSON.stringify(linkTo(each)),
-            label: t`${each.name} of ${each.action.name}`,
-          }))}
+          choices={[
+            ...results.map((each) => ({
+              json: JSON.stringify(linkTo(each)),
+              label: t`${each.name} of ${each.action.name}`,
+            })),
+            ...errors.map((each) => ({
+              json: JSON.stringify(linkToError(each)),
+              label: t`${each.name} of ${each.action.name}`,
+            })),
+          ]}
           hint={t`result of an earlier action`}
           onSet={(json) => set("link", json)}
         />

@@ -17,8 +17,10 @@ import { createPortal } from "react-dom";
 import { aimedPlace } from "../../commands/crosshair";
 import { addAction, notEditable, type Where } from "../../commands/program";
 import { byName } from "../../formats";
-import { needsPlace, pointFor, SERVICES, type Slot, slotFor, slotKey, slotsOf } from "../../program/chain";
+import { needsPlace, pointFor, type Slot, slotFor, slotKey, slotsOf } from "../../program/chain";
+import { errorWords } from "../../program/errorKinds";
 import { words } from "../../program/naming";
+import { SERVICES } from "../../program/services";
 import type { ObjectAction } from "../../protocol/types";
 import { whyUnavailable } from "../../store/permissions";
 import type { State } from "../../store/state";
@@ -175,8 +177,9 @@ function Cross() {
 }
 
 /** Return a slot as text: "move", "test: if no". */
-function slotWords(state: State, { after, condition }: Slot): string {
+function slotWords(state: State, { after, condition, exit }: Slot): string {
   const name = nameOf(state, after);
+  if (exit !== undefined) return `${name}: ${errorWords(state.doc?.logic[exit]?.error_kinds ?? [])}`;
   if (!condition) return name;
   if (condition.value === "true") return t`${name}: if yes`;
   if (condition.value === "false") return t`${name}: if no`;

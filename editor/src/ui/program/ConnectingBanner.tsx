@@ -20,7 +20,11 @@ export default function ConnectingBanner() {
   if (!connecting) return null;
   return (
     <div className="banner" role="status">
-      <span>{t`Tap the step that follows ${nameOf(now(), connecting.from)}.`}</span>
+      <span>
+        {connecting.error
+          ? t`Tap the step that follows if ${nameOf(now(), connecting.from)} fails.`
+          : t`Tap the step that follows ${nameOf(now(), connecting.from)}.`}
+      </span>
       <Button look="plain" className="wraps" onPress={cancelConnecting}>
         {t`Cancel`}
       </Button>

@@ -2,15 +2,19 @@
 
 import { plural, t } from "@lingui/core/macro";
 import { finishConnecting, notEditable, removeStep, startConnecting } from "../../commands/program";
+import { freeKinds } from "../../program/errorExits";
 import {
+  branchKind,
   cannotLead,
   conditionsOf,
   conditionWords,
   END,
   linkTo,
+  nextSteps,
   outgoing,
   placeOf,
   resultAt,
+  START,
 } from "../../program/logic";
 import { runsOf } from "../../program/runs";
 import type { ProjectLogicIf } from "../../protocol/types";
@@ -28,7 +32,8 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
   const { doc, types } = state;
   const { connecting } = state.ui;
   if (!doc) return null;
-  const steps = outgoing(doc, id);
+  const steps = nextSteps(doc, id);
+  const all = outgoing(doc, id);
   const why = notEditable(state, "AddLogicItem");
   if (connecting?.from === id) return <Targets from={id} />;
   const own = conditionsOf(doc, types, id)[0];
@@ -43,13 +48,13 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
   });
   return (
     <>
-      {steps.length === 0 && <p className="quiet small">{t`None`}</p>}
+      {all.length === 0 && <p className="quiet small">{t`None`}</p>}
       <ul className="next-steps">
-        {steps.map((step) => (
+        {all.map((step) => (
           <li key={step.id}>
             <Button look="plain" className="next-step" onPress={() => select({ kind: "logic", id: step.id })}>
               {conditionWords(doc, types, step) && (
-                <span className={`branch ${branchOf(step.condition)}`}>{conditionWords(doc, types, step)}</span>
+                <span className={`branch ${branchKind(step)}`}>{conditionWords(doc, types, step)}</span>
               )}
               <span aria-hidden="true">→</span> {nameOf(state, placeOf(step.end))}
             </Button>
@@ -88,6 +93,11 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
             {t`Branch`}
           </Button>
         )}
+        {id !== START && freeKinds(doc, id).length > 0 && (
+          <Button why={why} onPress={() => startConnecting(id, undefined, undefined, true)}>
+            <span className="branch error">{t`on error`}</span> {t`Connect`}
+          </Button>
+        )}
       </div>
       {run && (
         <Button
@@ -106,20 +116,19 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
 };
 export default Next;
 
-export const branchOf = (condition: ProjectLogicIf | undefined): string =>
-  !condition ? "always" : condition.value === "true" || condition.value === "false" ? condition.value : "value";
-
 /** List of possible next steps, for users who do not tap in the view. */
 function Targets({ from }: { from: string }) {
   const state = useEditor((each) => each);
   const { doc } = state;
   if (!doc) return null;
-  const { item } = state.ui.connecting ?? {};
-  const targets = [...ordered(doc), END].filter((id) => cannotLead(doc, from, id, item) === "");
+  const { item, error } = state.ui.connecting ?? {};
+  const targets = [...ordered(doc), END].filter((id) => cannotLead(doc, from, id, item, error || undefined) === "");
   return (
     <>
       <p className="small">
-        {t`Tap the step that follows ${nameOf(state, from)}, in the view or here. Press Escape to cancel.`}
+        {error
+          ? t`Tap the step that follows if ${nameOf(state, from)} fails, in the view or here. Press Escape to cancel.`
+          : t`Tap the step that follows ${nameOf(state, from)}, in the view or here. Press Escape to cancel.`}
       </p>
       <ul className="next-steps targets" aria-label={t`Possible next steps`}>
         {targets.map((id) => (

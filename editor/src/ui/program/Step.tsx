@@ -3,7 +3,7 @@
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { notEditable, removeStep, setCondition, startConnecting } from "../../commands/program";
-import { conditionsOf, linkTo, outgoing, placeOf, resultAt, START } from "../../program/logic";
+import { conditionsOf, linkTo, nextSteps, placeOf, resultAt, START } from "../../program/logic";
 import { now, select, useEditor } from "../../store/store";
 import { nameOf, selectionOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
@@ -22,7 +22,7 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
   const why = notEditable(state, "UpdateLogicItem");
   const results = from === START ? [] : conditionsOf(doc, types, from);
   const result = step.condition && resultAt(doc, types, step.condition.what);
-  const alone = outgoing(doc, from).length === 1;
+  const alone = nextSteps(doc, from).length === 1;
   const choose = async (what: string) => {
     const chosen = results.find((each) => linkTo(each) === what);
     setProblem(

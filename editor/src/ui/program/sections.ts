@@ -1,6 +1,7 @@
 /** Sections of the panel about actions, connections, START and END; their bodies are loaded when they are needed. */
 
 import { msg } from "@lingui/core/macro";
+import { isErrorExit } from "../../program/steps";
 import { lazyComponent } from "../kit/lazy";
 import type { Section } from "../workplace/section";
 
@@ -25,8 +26,14 @@ export const programSections: readonly Section[] = [
   {
     id: "step",
     title: msg`Condition`,
-    applies: ({ kind }) => kind === "logic",
+    applies: ({ kind, id }, state) => kind === "logic" && !isErrorExit(state.doc?.logic[id]),
     Body: lazyComponent(() => import("./Step")),
+  },
+  {
+    id: "error-exit",
+    title: msg`If the action fails`,
+    applies: ({ kind, id }, state) => kind === "logic" && isErrorExit(state.doc?.logic[id]),
+    Body: lazyComponent(() => import("./ErrorExit")),
   },
   {
     id: "breakpoint",

@@ -1,0 +1,24 @@
+/** The error exit that a running program takes. */
+
+import type { LogicItem } from "../protocol/types";
+import { isRunning } from "../store/selectors";
+import type { State } from "../store/state";
+import { END, errorExits, outgoing, placeOf, START } from "./steps";
+
+/** Return the error exit that the running program took last, until its next cycle; undefined if it took none. */
+export function takenExit(state: State): LogicItem | undefined {
+  const { doc, program } = state;
+  if (!doc || !isRunning(state)) return undefined;
+  const failed = program.trace.findLastIndex((each) => each.error !== undefined);
+  const entry = program.trace[failed];
+  if (!entry) return undefined;
+  const later = program.trace.slice(failed + 1).filter((each) => each.thread_id === entry.thread_id);
+  const first = placeOf(outgoing(doc, START)[0]?.end ?? "");
+  const exits = errorExits(doc, entry.action_id);
+  const next = later[0]?.action_id;
+  if (next === undefined || later.some((each) => each.action_id === first)) {
+    const back = next === first && later.length === 1;
+    return back ? exits.find((each) => placeOf(each.end) === END) : undefined;
+  }
+  return exits.find((each) => placeOf(each.end) === next);
+}
