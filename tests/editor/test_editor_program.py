@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable
 from typing import Any
 
 import msgspec
@@ -234,6 +234,35 @@ async def test_error_exit_is_added_in_the_graph_and_its_error_used(work: Work) -
     assert await screen.faults() == []
     await work.mode("3D")
     assert (await screen.item(exit_.id))["kind"] == "logic"
+
+
+async def test_action_is_moved_in_the_list_and_back_by_one_undo(work: Work) -> None:
+    page = work.screen.page
+    first, second, third = [await work.add(name, "flow/wait", "good") for name in ("one", "two", "three")]
+    start = (await work.saved()).logic[0]
+    for pair in ((start.start, first), (first, second), (second, third), (third, start.end)):
+        if pair[0] == "START":
+            await work.client.call("UpdateLogicItem", rpc.UpdateLogicItemArgs(start.id, *pair))
+        else:
+            await work.client.call("AddLogicItem", rpc.AddLogicItemArgs(*pair))
+
+    async def order() -> list[str]:
+        steps = {item.start: item.end for item in (await work.saved()).logic if not item.condition}
+        return [first, *(steps[each] for each in (first, steps.get(first, "")) if each in steps)]
+
+    await work.tool(texts.PROGRAM)
+    await work.mode("Actions")
+    await work.tap_button("Move three")
+    await work.tap_button("Move three up")
+    await until(lambda: _is(order(), [first, third, second]), "the action is moved", 20)
+    await work.screen.picture("program list")
+    assert await work.screen.faults() == []
+    await page.get_by_role("button", name=re.compile("^Undo")).click()
+    await until(lambda: _is(order(), [first, second, third]), "the move is undone", 20)
+
+
+async def _is(found: Awaitable[list[str]], wanted: list[str]) -> bool:
+    return await found == wanted
 
 
 async def test_graph_does_not_move_under_a_tap(work: Work) -> None:

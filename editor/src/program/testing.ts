@@ -35,13 +35,13 @@ export function program(
   parameters: Record<string, object> = {},
 ): OpenDocument {
   const at = { x: 0, y: 0, z: 0 };
+  const failing = new Set(steps.flatMap(([start, , value]) => (value?.startsWith("on ") ? [start] : [])));
   const actions = Object.entries(kinds).map(([id, kind]) => {
     const outputs = kind === "act" || kind === "show" ? [] : [`${id}_result`];
     const takes = kind === "count" || kind === "show";
     const given = takes ? [{ name: "by", type: "integer", value: "1", ...parameters[id] }] : [];
     const flows = [{ type: "default" as const, outputs }];
-    const fails = steps.some(([from, , value]) => from === id && value?.startsWith("on "));
-    const error = fails ? { error_output: `${id}_error` } : {};
+    const error = failing.has(id) ? { error_output: `${id}_error` } : {};
     return { id, name: id, type: `device/${kind}`, parameters: given, flows, ...error };
   });
   const logic = steps.map(

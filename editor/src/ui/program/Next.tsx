@@ -3,6 +3,7 @@
 import { plural, t } from "@lingui/core/macro";
 import { finishConnecting, notEditable, removeStep, startConnecting } from "../../commands/program";
 import { freeKinds } from "../../program/errorExits";
+import { ordered } from "../../program/listing";
 import {
   branchKind,
   cannotLead,
@@ -24,7 +25,6 @@ import { fold } from "../flow/folding";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/section";
-import { ordered } from "./Steps";
 import "./program.css";
 
 const Next: Section["Body"] = ({ selection: { id } }) => {

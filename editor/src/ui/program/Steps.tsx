@@ -1,27 +1,73 @@
-/** All actions in the order of execution, unreachable ones last; with breakpoints. */
+/**
+ * The program as a list in the order of execution, with indented branches, breakpoints and the running action. Only the
+ * rows in view are rendered.
+ */
 
 import { t } from "@lingui/core/macro";
-import { useMemo } from "react";
+import { useEffect, useMemo, useRef, useState } from "react";
 import { Button as AriaButton, ToggleButton } from "react-aria-components";
 import { breakAt } from "../../commands/run";
 import { storeViewState } from "../../commands/viewstate";
-import { conditionWords, incoming, outgoing, placeOf, START } from "../../program/logic";
+import { listingOf, type Row } from "../../program/listing";
+import { branchKind, conditionWords } from "../../program/logic";
+import { movableRuns } from "../../program/moving";
 import type { Problem } from "../../program/problems";
+import { END, placeOf } from "../../program/steps";
+import { takenExit } from "../../program/taken";
 import { theEngine } from "../../session/engine";
 import { whyUnavailable } from "../../store/permissions";
-import type { OpenDocument } from "../../store/state";
-import { notify, select, setUi, useEditor } from "../../store/store";
-import { nameOf, withNames } from "../../viewmodel/names";
+import { isRunning } from "../../store/selectors";
+import type { State } from "../../store/state";
+import { notify, now, select, setUi, useEditor } from "../../store/store";
+import { nameOf, selectionOf, withNames } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 import { ReachBadge } from "../points/Reach";
+import { type Drag, MoveHandle } from "./MoveHandle";
+import { at, useRows } from "./useRows";
+
+/** Heights of rows, and indentation of a level up to the deepest one shown, in pixels at the usual text size. */
+const HEIGHT: Readonly<Record<Row["kind"], number>> = { action: 62, branch: 48, goto: 48, unreached: 40 };
+const INDENT = 16;
+const DEEPEST = 7;
 
 export function Steps({ problems }: { problems: Problem[] }) {
   const state = useEditor((each) => each);
-  const { doc, types, breakpoints, program } = state;
-  const order = useMemo(() => (doc ? ordered(doc) : []), [doc]);
-  const cannot = whyUnavailable(state, "SetBreakpoints");
+  const { doc, program, live, ui } = state;
+  const [drag, setDrag] = useState<Drag | null>(null);
+  const rows = useMemo(() => (doc ? listingOf(doc) : []), [doc?.actions, doc?.logic]);
+  const runs = useMemo(
+    () => (doc ? movableRuns(doc) : new Map<string, readonly string[]>()),
+    [doc?.actions, doc?.logic],
+  );
+  const faults = useMemo(() => new Map([...problems].reverse().map((each) => [each.id, each])), [problems]);
+  const list = useRef<HTMLOListElement>(null);
+  const { tops, first, last, show } = useRows(
+    list,
+    rows.map((row) => HEIGHT[row.kind]),
+  );
+
+  const running = program.running.at(-1) ?? live.executing;
+  const active = isRunning(state);
+  const followed = useRef(true);
+  useEffect(() => {
+    followed.current = true;
+    // The user scrolls: the list does not move any more before the next run.
+    const scrolled = () => (followed.current = false);
+    const host = list.current?.closest(".panel-body");
+    for (const event of ["wheel", "touchmove"]) host?.addEventListener(event, scrolled, { passive: true });
+    return () => {
+      for (const event of ["wheel", "touchmove"]) host?.removeEventListener(event, scrolled);
+    };
+  }, [active]);
+  const follows = active && followed.current && running !== "" ? running : (ui.selection?.id ?? "");
+  useEffect(() => {
+    const index = rows.findIndex((row) => idOf(row) === follows);
+    if (index >= 0) show(index);
+  }, [follows, rows, show]);
+
   if (!doc) return null;
-  if (order.length === 0) return <p className="quiet">{t`No actions yet. Add one under “Add”.`}</p>;
+  if (rows.length === 0) return <p className="quiet">{t`No actions yet. Add one under “Add”.`}</p>;
+  const exit = takenExit(state)?.id;
   return (
     <>
       <label className="check">
@@ -32,48 +78,41 @@ export function Steps({ problems }: { problems: Problem[] }) {
         />
         <span>{t`Show steps in the 3D view`}</span>
       </label>
-      <ol className="steps">
-        {order.map((id) => {
-          const action = doc.actions[id];
-          if (!action) return null;
-          const problem = problems.find((each) => each.id === id);
-          const after = incoming(doc, id)
-            .map((item) => conditionWords(doc, types, item))
-            .filter(Boolean);
-          const running = program.running.includes(id) || state.live.executing === id;
+      <ol className="steps" ref={list} style={{ height: at(tops, rows.length) }} aria-label={t`Program`}>
+        {rows.slice(first, last).map((row, n) => {
+          const index = first + n;
+          const id = idOf(row);
           return (
-            <li key={id} data-running={running} data-selected={state.ui.selection?.id === id}>
-              <ToggleButton
-                className="breakpoint"
-                aria-label={t`Pause before ${action.name}`}
-                isSelected={id in breakpoints}
-                onChange={(on) => (cannot ? notify("info", cannot) : void breakAt(id, on))}
-              >
-                <span className="breakpoint-dot" aria-hidden="true" />
-              </ToggleButton>
-              <AriaButton
-                className="step"
-                onPress={() => {
-                  select({ kind: "action", id });
-                  setUi({ tool: "" });
-                  theEngine()?.focus(id);
-                }}
-              >
-                <span className="step-head">
-                  <span className="step-name">{action.name}</span>
-                  <ReachBadge id={id} />
-                </span>
-                <span className="quiet small">
-                  {t`${nameOf(state, action.type.split("/")[0] ?? "")} at ${nameOf(state, action.pointId)}`}
-                  {after.length > 0 && ` · ${t`if ${after.join(", ")}`}`}
-                </span>
-                {running && <span className="tag good">{t`running`}</span>}
-                {problem && (
-                  <span className={`tag ${problem.level === "error" ? "bad" : "warn"}`}>
-                    <Icon name="warn" size={14} /> {withNames(state, problem.text)}
-                  </span>
-                )}
-              </AriaButton>
+            <li
+              key={id + row.kind}
+              aria-setsize={rows.length}
+              aria-posinset={index + 1}
+              data-action={row.kind === "action" ? id : undefined}
+              data-depth={row.depth}
+              data-running={program.running.includes(id) || live.executing === id}
+              data-selected={ui.selection?.id === id}
+              data-taken={exit === id}
+              data-drop={drag && drag.over === id ? drag.side : undefined}
+              style={{
+                top: at(tops, index),
+                height: at(tops, index + 1) - at(tops, index),
+                left: Math.min(row.depth, DEEPEST) * INDENT,
+              }}
+            >
+              {row.kind === "action" ? (
+                <ActionRow
+                  state={state}
+                  id={id}
+                  problem={faults.get(id)}
+                  run={runs.get(id)}
+                  drag={drag}
+                  onDrag={setDrag}
+                />
+              ) : row.kind === "unreached" ? (
+                <p className="quiet small">{t`Never run:`}</p>
+              ) : (
+                <LinkRow state={state} row={row} problem={faults.get(id)} />
+              )}
             </li>
           );
         })}
@@ -82,19 +121,86 @@ export function Steps({ problems }: { problems: Problem[] }) {
   );
 }
 
-/** Return the actions breadth-first from START, then unreachable ones. */
-export function ordered(doc: OpenDocument): string[] {
-  const found: string[] = [];
-  const waiting = [START];
-  const seen = new Set<string>([START]);
-  for (let id = waiting.shift(); id !== undefined; id = waiting.shift()) {
-    if (id in doc.actions) found.push(id);
-    for (const item of outgoing(doc, id)) {
-      const next = placeOf(item.end);
-      if (seen.has(next)) continue;
-      seen.add(next);
-      waiting.push(next);
-    }
-  }
-  return [...found, ...Object.keys(doc.actions).filter((id) => !seen.has(id))];
+const idOf = (row: Row): string => (row.kind === "action" ? row.id : row.kind === "unreached" ? "" : row.item.id);
+
+interface ActionRowProps {
+  state: State;
+  id: string;
+  problem: Problem | undefined;
+  /** The actions among which it can be moved. */
+  run: readonly string[] | undefined;
+  drag: Drag | null;
+  onDrag: (drag: Drag | null) => void;
+}
+
+function ActionRow({ state, id, problem, run, drag, onDrag }: ActionRowProps) {
+  const { doc, breakpoints, program, live } = state;
+  const action = doc?.actions[id];
+  if (!doc || !action) return null;
+  const cannot = whyUnavailable(state, "SetBreakpoints");
+  const running = program.running.includes(id) || live.executing === id;
+  return (
+    <>
+      <ToggleButton
+        className="breakpoint"
+        aria-label={t`Pause before ${action.name}`}
+        isSelected={id in breakpoints}
+        onChange={(on) => (cannot ? notify("info", cannot) : void breakAt(id, on))}
+      >
+        <span className="breakpoint-dot" aria-hidden="true" />
+      </ToggleButton>
+      <AriaButton className="step" data-name onPress={() => goTo(id)}>
+        <span className="step-head">
+          <span className="step-name">{action.name}</span>
+          <ReachBadge id={id} />
+          {running && <span className="tag good">{program.state === "paused" ? t`waiting` : t`running`}</span>}
+        </span>
+        {problem ? (
+          <span className={`small step-more ${problem.level === "error" ? "error" : ""}`} title={problem.text}>
+            <Icon name="warn" size={14} /> {withNames(state, problem.text)}
+          </span>
+        ) : (
+          <span className="quiet small step-more">
+            {t`${nameOf(state, action.type.split("/")[0] ?? "")} at ${nameOf(state, action.pointId)}`}
+          </span>
+        )}
+      </AriaButton>
+      {run && <MoveHandle id={id} name={action.name} run={run} drag={drag} onDrag={onDrag} />}
+    </>
+  );
+}
+
+/** The head of a branch, or where it continues. */
+function LinkRow({
+  state,
+  row: { kind, item },
+  problem,
+}: {
+  state: State;
+  row: Extract<Row, { kind: "branch" | "goto" }>;
+  problem: Problem | undefined;
+}) {
+  const { doc, types } = state;
+  if (!doc) return null;
+  const to = placeOf(item.end);
+  const words = conditionWords(doc, types, item) || t`always`;
+  return (
+    <AriaButton className="step-branch" data-name onPress={() => goTo(kind === "branch" ? item.id : to)}>
+      {kind === "branch" ? (
+        <span className={`branch ${branchKind(item)}`}>{words}</span>
+      ) : (
+        <>
+          <span aria-hidden="true">→</span>
+          <span className="step-more">{to === END ? t`end of the cycle` : t`continues with ${nameOf(state, to)}`}</span>
+        </>
+      )}
+      {problem && <Icon name="warn" size={14} />}
+    </AriaButton>
+  );
+}
+
+function goTo(id: string): void {
+  select(selectionOf(now(), id));
+  setUi({ tool: "" });
+  theEngine()?.focus(id);
 }
