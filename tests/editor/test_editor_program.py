@@ -532,7 +532,14 @@ async def test_code_is_edited_and_imported(work: Work) -> None:
     await page.keyboard.press("End")
     for _ in "reader.dance()":
         await page.keyboard.press("Backspace")
-    await page.keyboard.type('flow.wait(0.5, an="rest")')
+    # Its completion inserts the call with fields, and the signature is shown meanwhile.
+    await page.keyboard.type("flow.wa")
+    await code.get_by_role("option", name="wait").wait_for()
+    await page.keyboard.press("Enter")
+    await expect(code.locator(".cm-signature strong")).to_contain_text("seconds")
+    await page.keyboard.type("0.5")
+    await page.keyboard.press("Tab")
+    await page.keyboard.type("rest")
     await code.get_by_text(re.compile("changes to import")).wait_for()
     await code.get_by_role("button", name="Review and import").click()
     await code.get_by_role("heading", name="Changes in the project").wait_for()

@@ -38,6 +38,7 @@ import {
 } from "@codemirror/view";
 import { tags } from "@lezer/highlight";
 import { t } from "@lingui/core/macro";
+import { completing } from "./completing";
 import { actionsOf, boilerplate, idsOf, type ScriptAction } from "./script";
 
 /** What the lines of a script show about their actions, by name. */
@@ -190,6 +191,7 @@ export const appearance = (): Extension => [
     replace: t`Replace`,
     "replace all": t`Replace all`,
     close: t`Close`,
+    Completions: t`Suggestions`,
     // The library puts the number in place of the sign.
     "$ unchanged lines": t`${"$"} unchanged lines`,
   }),
@@ -230,6 +232,7 @@ export class CodeMirror {
         indentOnInput(),
         indentUnit.of("    "),
         search({ top: true }),
+        completing(),
         linter((view) => handlers.check(view.state.doc.toString()), { delay: 600 }),
         keymap.of([...searchKeymap, ...foldKeymap, ...historyKeymap, ...defaultKeymap]),
         this.editable.of(editing(false)),
