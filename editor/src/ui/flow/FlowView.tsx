@@ -10,6 +10,7 @@ import {
   MiniMap,
   ReactFlow,
   ReactFlowProvider,
+  useStore,
 } from "@xyflow/react";
 import { useMemo, useRef } from "react";
 import "@xyflow/react/dist/base.css";
@@ -22,16 +23,21 @@ import { takenExit } from "../../program/taken";
 import { notify, now, select, setUi, useEditor } from "../../store/store";
 import { selectionOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
+import { inColumns } from "./columns";
 import { conditionOf, FAILS, FlowNode, type FlowNodeType } from "./FlowNode";
 import { foldAll, unfold, useFolds } from "./folding";
 import { type Box, firstIn, graphOf, lastIn } from "./graph";
 import { usePressed } from "./usePressed";
 import { useViewport } from "./useViewport";
 import { SMALLEST } from "./viewport";
+import { WrappedEdge } from "./WrappedEdge";
 import "../program/program.css";
 import "./flow.css";
 
 const NODE_TYPES = { box: FlowNode };
+const EDGE_TYPES = { wrapped: WrappedEdge };
+/** Steps in which the layout follows the size of the view, pixels. */
+const COARSE = 40;
 const COLOURS = {
   always: "var(--ink-2)",
   true: "var(--good)",
@@ -92,7 +98,10 @@ function Flow() {
   );
   const choose = useChoose();
   const host = useRef<HTMLDivElement>(null);
-  const graph = usePressed(host, latest);
+  const width = useStore((state) => Math.floor(state.width / COARSE) * COARSE);
+  const height = useStore((state) => Math.floor(state.height / COARSE) * COARSE);
+  const wrapped = useMemo(() => inColumns(latest, { width, height }), [latest, width, height]);
+  const graph = usePressed(host, wrapped);
 
   const nodes = graph.boxes.map(
     (box): FlowNodeType => ({
@@ -125,7 +134,9 @@ function Flow() {
       source: line.from,
       ...(line.branch === "error" && { sourceHandle: FAILS }),
       target: line.to,
-      type: "smoothstep",
+      ...(graph.detours.has(line.id)
+        ? { type: "wrapped", data: { detour: graph.detours.get(line.id) } }
+        : { type: "smoothstep" }),
       label: line.words || undefined,
       selected: line.id === selected,
       className: `flow-line ${line.branch}${taken ? " taken" : ""}`,
@@ -158,6 +169,7 @@ function Flow() {
         nodes={nodes}
         edges={edges}
         nodeTypes={NODE_TYPES}
+        edgeTypes={EDGE_TYPES}
         colorMode={dark ? "dark" : "light"}
         nodesDraggable={false}
         connectOnClick={false}

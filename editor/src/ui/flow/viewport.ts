@@ -37,12 +37,21 @@ export function wholeView(boxes: readonly Rect[], { width, height }: Size): View
   };
 }
 
-/** Return the first view: the whole graph if it stays readable, else its start at the upper edge. */
+/**
+ * Return the first view: the whole graph if it stays readable, else its start at the upper edge. All columns are shown
+ * if they fit.
+ */
 export function firstView(boxes: readonly Rect[], start: Rect | undefined, size: Size): Viewport {
   const whole = wholeView(boxes, size);
   if (whole.zoom >= READABLE || !start) return whole;
-  const middle = (start.x + start.width / 2) * READABLE;
-  return { x: size.width / 2 - middle, y: MARGIN.top - start.y * READABLE, zoom: READABLE };
+  const left = Math.min(...boxes.map((each) => each.x));
+  const wide = (Math.max(...boxes.map((each) => each.x + each.width)) - left) * READABLE;
+  const free = size.width - MARGIN.left - MARGIN.right;
+  const x =
+    wide <= free
+      ? MARGIN.left + (free - wide) / 2 - left * READABLE
+      : size.width / 2 - (start.x + start.width / 2) * READABLE;
+  return { x, y: MARGIN.top - start.y * READABLE, zoom: READABLE };
 }
 
 /**
