@@ -252,6 +252,10 @@ describe("operation", () => {
       data: { action_id: "a" },
     });
     expect(state.program.running).toEqual(["b"]);
+    // The end of a failed action is reported by the trace only.
+    const entry = { run: 1, number: 1, name: "b", action_id: "b", started: "2026-01-01T00:00:00Z", error: "failed" };
+    const failed = reduce(state, { event: "ExecutionTrace", data: entry }, NOW);
+    expect(failed.program?.running).toEqual([]);
     expect(
       { ...state, ...reduce(state, { event: "PackageState", data: { state: "stopped" } }, NOW) }.program.running,
     ).toEqual([]);

@@ -340,8 +340,13 @@ function program(state: State, event: ServerEvent): Partial<State> | null {
     case "ActionStateAfter":
       return become({ running: now.running.filter((each) => each !== event.data.action_id) });
     case "ExecutionTrace": {
-      const rest = now.trace.filter((each) => each.run === event.data.run && each.number !== event.data.number);
-      return become({ trace: [...rest, event.data].slice(-TRACE) });
+      const { run, number, error, action_id } = event.data;
+      const rest = now.trace.filter((each) => each.run === run && each.number !== number);
+      const trace = [...rest, event.data].slice(-TRACE);
+      // After a failed action there is no ActionStateAfter; an error exit may continue the program.
+      return become(
+        error === undefined ? { trace } : { trace, running: now.running.filter((each) => each !== action_id) },
+      );
     }
     case "DryRunChanged": {
       const known = now.dryRun;
