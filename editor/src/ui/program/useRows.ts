@@ -1,9 +1,11 @@
-/** Which rows of a long list in the panel are in view. */
+/** The rows of a list in the panel that are rendered. */
 
 import { type RefObject, useCallback, useLayoutEffect, useMemo, useRef, useState } from "react";
 
 /** Rows up to this distance from the view are rendered too, pixels; the distance is rounded to steps of this size. */
 const AHEAD = 600;
+/** Longer lists render only the rows in view. */
+const MANY = 200;
 const STEP = 100;
 
 /** Return the place of the upper edge of a row; of the number of rows, the height of the list. */
@@ -75,5 +77,7 @@ export function useRows(list: RefObject<HTMLElement | null>, heights: readonly n
     },
     [list],
   );
-  return { tops, first: rowAt(tops, view.from), last: Math.min(heights.length, rowAt(tops, view.to) + 1), show };
+  const count = heights.length;
+  if (count <= MANY) return { tops, first: 0, last: count, show };
+  return { tops, first: rowAt(tops, view.from), last: Math.min(count, rowAt(tops, view.to) + 1), show };
 }
