@@ -43,8 +43,10 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     port: int = 6789
     insecure: bool = False
     """Require no token, also from other machines."""
-    fingerprint: str = ""
-    """SHA-256 of the certificate; empty without TLS."""
+    certificate: Path | None = None
+    """The certificate of the server; None without TLS."""
+    authority: Path | None = None
+    """The local authority that issued the certificate; None without TLS, or if the user provides the certificate."""
     classic_ports: dict[str, int] = {}
     """Additional ports by the name of the ARCOR2 service; empty: everything is on one port."""
     legacy: "LegacyListener | None" = None

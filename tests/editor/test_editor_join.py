@@ -17,6 +17,8 @@ import pytest_asyncio
 from playwright.async_api import Browser, Route, expect
 
 from arcor2_hw.data.role import Role
+from arcor2_server.access.authority import AUTHORITY
+from arcor2_server.access.certificate import fingerprint
 from arcor2_server.access.tokens import TokenFile
 from tests.editor import texts
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
@@ -69,6 +71,19 @@ async def test_token_in_the_address_is_used_and_removed(server: ServerProcess, b
         # An operator cannot create scenes; the button is disabled.
         await screen.page.get_by_role("radio", name=texts.SCENES).click()
         await expect(screen.page.get_by_role("button", name=texts.NEW_SCENE)).to_be_disabled()
+
+
+async def test_a_refused_websocket_is_told_apart_from_a_stopped_server(server: ServerProcess, browser: Browser) -> None:
+    """A browser may trust the page, but not its websocket, if the certificate is not installed."""
+    async with screen_of(browser, server.url) as screen:
+        await screen.page.add_init_script(
+            "window.WebSocket = function () { setTimeout(() => this.onclose({code: 1006, reason: ''})); }"
+        )
+        await screen.join("Eva")
+        await screen.sees("The server answers, but the live connection fails.")
+        await screen.page.route("**/healthz/ready", lambda route: route.abort())
+        screen.expected_errors = ("net::ERR_FAILED",)
+        await screen.sees("The server cannot be reached.")
 
 
 async def test_name_in_use_is_refused_and_returning_users_join_by_one_tap(
@@ -150,6 +165,7 @@ async def test_invitation_shows_the_fingerprint_of_the_tls_certificate(
             about = screen.page.get_by_role("dialog", name="About")
             invitation = about.get_by_role("region", name="Invite others")
             shown = (await invitation.locator(".fingerprint code").inner_text()).replace(":", "")
+            trust = invitation.locator(".trust")
             invited = await _joining(screen)
             code = invitation.get_by_role("img")
             if invited["addresses"]:  # the machine is on a network
@@ -158,6 +174,8 @@ async def test_invitation_shows_the_fingerprint_of_the_tls_certificate(
                 read, _, _ = cv2.QRCodeDetector().detectAndDecode(picture)
                 assert read == invited["addresses"][0]
                 assert read.startswith("https://")
+                assert read.replace("https://", "http://", 1) in await trust.inner_text()
+                assert fingerprint(data_dir / AUTHORITY) in await trust.inner_text()
             else:
                 await invitation.get_by_text("accepts connections from this computer only").wait_for()
             assert await screen.faults() == []

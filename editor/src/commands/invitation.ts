@@ -7,6 +7,8 @@ export interface Joining {
   addresses: string[];
   /** SHA-256 fingerprint of the certificate; empty without TLS. */
   fingerprint: string;
+  /** SHA-256 fingerprint of the local certificate authority; empty if the server has none. */
+  authority: string;
 }
 
 /** Request it from the server; an older server does not know it, so the address of this page is returned. */
@@ -14,11 +16,15 @@ export async function loadInvitation(): Promise<Joining> {
   const here = isHere(location.hostname) ? [] : [location.origin];
   try {
     const response = await rest("/api/joining");
-    const { addresses, fingerprint } = (await response.json()) as Partial<Joining>;
+    const { addresses, fingerprint, authority } = (await response.json()) as Partial<Joining>;
     // The address of this page is known to work.
-    return { addresses: [...new Set([...here, ...(addresses ?? [])])], fingerprint: fingerprint ?? "" };
+    return {
+      addresses: [...new Set([...here, ...(addresses ?? [])])],
+      fingerprint: fingerprint ?? "",
+      authority: authority ?? "",
+    };
   } catch {
-    return { addresses: here, fingerprint: "" };
+    return { addresses: here, fingerprint: "", authority: "" };
   }
 }
 

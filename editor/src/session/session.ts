@@ -39,6 +39,9 @@ export class Session {
   private token = "";
   /** Number of the connection, so that an answer that belongs to an earlier one changes nothing. */
   private epoch = 0;
+  /** The server serves pages, but the last attempts to open a websocket failed. */
+  private socketRefused = false;
+  private connecting = false;
   private readonly presence = new PresenceReporter();
   /** Followers whose data contain texts of the server. */
   private readonly details: readonly Follower[] = [new DocumentDetails(), new ProgramDetails()];
@@ -105,7 +108,11 @@ export class Session {
   private onState(state: ConnectionState, reason: string, code: number): void {
     this.epoch++;
     note("connection", `${state} ${reason} ${code}`);
+    const failed = this.connecting && state === "waiting" && !reason;
+    this.connecting = state === "connecting";
+    if (failed) void this.checkServer(this.epoch);
     if (state === "open") {
+      this.socketRefused = false;
       for (const each of this.followers) each.reset();
       // The server sends locks, users and tasks again; the document stays on the screen.
       store.setState((known) => ({
@@ -123,12 +130,31 @@ export class Session {
       const was = now().connection.status;
       setConnection({
         status: was === "ready" || was === "joining" || was === "lost" ? "lost" : "connecting",
-        reason: reason || t`The server cannot be reached.`,
+        reason: reason || this.unreachable(),
       });
     } else if (state === "closed" && code === TOKEN_REFUSED) {
       const invalid = reason || t`The token is not valid.`;
       setConnection({ status: "refused", reason: this.token ? invalid : t`A token is needed.`, needsToken: true });
     }
+  }
+
+  private unreachable(): string {
+    if (!this.socketRefused) return t`The server cannot be reached.`;
+    return location.protocol === "https:"
+      ? t`The server answers, but the browser refuses the live connection. Install the certificate of the server from http://${location.host}/ on this device.`
+      : t`The server answers, but the live connection fails. Check the proxy or firewall between this device and the server.`;
+  }
+
+  /** Find out why a websocket cannot be opened: a browser may accept the certificate for the page only. */
+  private async checkServer(epoch: number): Promise<void> {
+    const request = { cache: "no-store", signal: AbortSignal.timeout(3000) } as const;
+    const answers = await fetch("/healthz/ready", request).then(
+      (response) => response.ok,
+      () => false,
+    );
+    if (now().connection.status === "ready" || answers === this.socketRefused) return;
+    this.socketRefused = answers;
+    if (epoch === this.epoch) setConnection({ reason: this.unreachable() });
   }
 
   /** Log in and load what the home screen needs. */

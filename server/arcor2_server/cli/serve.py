@@ -9,10 +9,11 @@ import importlib
 import os
 import signal
 import socket
+import ssl
 import sys
 from collections.abc import Generator
 from pathlib import Path
-from typing import IO, Annotated, Literal
+from typing import IO, TYPE_CHECKING, Annotated, Literal, cast
 
 import msgspec
 import uvloop
@@ -29,12 +30,16 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.cell import Cell, read_cell
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound, StorageError
+from arcor2_server.access.addresses import certified_hosts
 from arcor2_server.access.admission import is_local, is_loopback
 from arcor2_server.access.tokens import TokenFile
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.log import setup as server_logging
 from arcor2_server.settings import DEVICE_FILES_NAME, LegacyListener, ServerSettings
 from arcor2_server.websocket.classic_ports import ports_from_environment
+
+if TYPE_CHECKING:
+    from arcor2_server.access.authority import Authority
 
 log = arcor2_server.log.get_logger(__name__)
 
@@ -43,6 +48,9 @@ LegacyRole = Literal["operator", "standard_user", "advanced_user", "technician"]
 
 PREPARE_AFTER = 0.5
 """Delay after the start before a spare cell host is started, s, so that waiting clients are served first."""
+
+RENEW_PERIOD = 600.0
+"""Time between two checks of the certificate, s."""
 
 GC_THRESHOLD = (700, 10, 10)
 """The default thresholds of the interpreter, which `main` raises for the imports."""
@@ -90,8 +98,8 @@ def serve(
     tls
         PEM files of a certificate chain and its key for TLS.
     self_signed
-        Use TLS with a self-signed certificate, whose fingerprint is shown. This is the default if other machines can
-        connect.
+        Use TLS with a certificate of a local authority, which devices install once from the same address with http://.
+        This is the default if other machines can connect.
     insecure
         Require no token, and use TLS only if requested. Use this only in an isolated network.
     legacy_listen
@@ -230,7 +238,7 @@ def _bind_legacy(
 def _certificate(
     settings: ServerSettings, given: tuple[Path, Path] | None, self_signed: bool
 ) -> tuple[ServerSettings, tuple[Path, Path] | None]:
-    """Return the settings with the fingerprint, and the files of certificate and key; None without TLS.
+    """Return the settings with the certificate, and the files of certificate and key; None without TLS.
 
     Raises:
         CannotServe: the certificate cannot be used.
@@ -239,13 +247,36 @@ def _certificate(
         return settings, None
     from arcor2_server.access import certificate  # slow to import, and not needed without TLS
 
+    authority = None
     try:
-        files = given or certificate.self_signed(settings.data_dir, settings.host)
-        sha256 = certificate.fingerprint(files)
-        log.info("certificate", sha256=sha256, file=str(files[0]))
+        if given is None:
+            issuer = _authority(settings)
+            issuer.renew()
+            given, authority = issuer.files, issuer.file
+            log.info("certificate authority", sha256=certificate.fingerprint(authority), file=str(authority))
+        log.info("certificate", sha256=certificate.check(given), file=str(given[0]))
     except certificate.CertificateProblem as error:
         raise CannotServe(ExitStatus.CERTIFICATE_UNUSABLE, str(error)) from error
-    return msgspec.structs.replace(settings, fingerprint=sha256), files
+    return msgspec.structs.replace(settings, certificate=given[0], authority=authority), given
+
+
+def _authority(settings: ServerSettings) -> "Authority":
+    from arcor2_server.access.authority import Authority
+
+    return Authority(settings.data_dir, lambda: certified_hosts(settings.host))
+
+
+async def _renew_certificate(settings: ServerSettings, used: ssl.SSLContext) -> None:
+    """Renew the certificate before it expires, and when the machine has a new address. Clients stay connected."""
+    authority = _authority(settings)
+    while True:
+        await asyncio.sleep(RENEW_PERIOD)
+        try:
+            if await asyncio.to_thread(authority.renew):
+                used.load_cert_chain(*authority.files)
+                log.info("certificate renewed", file=str(authority.files[0]))
+        except (Arcor2Error, OSError) as error:
+            log.error("the certificate cannot be renewed", reason=str(error))
 
 
 async def run(
@@ -280,7 +311,14 @@ async def run(
 
         loop = asyncio.get_running_loop()
         config = configuration(create_app(running), settings, certificate)
-        server = Server(config, settings, ConnectionLimits.of(settings), legacy, when_ready)
+        renewal = trust_page = None
+        if settings.authority is not None:
+            from arcor2_server.web.trust_page import TrustPage
+
+            config.load()
+            renewal = loop.create_task(_renew_certificate(settings, cast("ssl.SSLContext", config.ssl)))
+            trust_page = TrustPage(settings.authority, settings)
+        server = Server(config, settings, ConnectionLimits.of(settings), legacy, when_ready, trust_page)
         for number in (signal.SIGTERM, signal.SIGINT):
             loop.add_signal_handler(number, server.end)
         try:
@@ -290,6 +328,9 @@ async def run(
             if error.errno != errno.EADDRINUSE:
                 raise
             raise _no_port(settings.host, listeners[0].getsockname()[1], error) from error
+        finally:
+            if renewal is not None:
+                renewal.cancel()
 
 
 @contextlib.contextmanager

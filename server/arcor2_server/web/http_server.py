@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import functools
 import socket
 import ssl
 import sys
@@ -29,6 +30,8 @@ KEEP_ALIVE: Final = 20
 It must be longer than the time for which clients keep idle connections (httpx 5 s, aiohttp 15 s). Otherwise a client
 sends a request on a connection that the server is closing, and gets no answer.
 """
+TLS_HANDSHAKE: Final = b"\x16"
+"""First byte of a TLS connection (RFC 8446, 5.1). No HTTP request starts with it."""
 PAUSE: Final = 0.5
 """Time without accepting connections after the file descriptors were used up, s."""
 
@@ -65,6 +68,7 @@ class Listener:
         connected: creates the protocol of a connection.
         tls: TLS settings, None for plain TCP.
         handshake_timeout: time limit of the TLS handshake, s.
+        plain: creates the protocol of a connection without TLS on a socket with TLS; None refuses such a connection.
         backlog: maximum number of connections that wait to be accepted.
 
     Raises:
@@ -78,10 +82,12 @@ class Listener:
         connected: Callable[[Connection], asyncio.Protocol],
         tls: ssl.SSLContext | None,
         handshake_timeout: float,
+        plain: Callable[[Connection], asyncio.Protocol] | None,
         backlog: int,
     ) -> None:
 
         self._socket, self._limits, self._connected, self._tls = listener, limits, connected, tls
+        self._plain = plain if tls else None
         self._handshake_timeout = handshake_timeout
         self._loop = asyncio.get_running_loop()
         self._tasks: set[asyncio.Task[None]] = set()
@@ -141,13 +147,16 @@ class Listener:
         assert task is not None
         connection.drop = task.cancel
         self._connecting.add(task)
+        connected, tls = self._connected, self._tls
         try:
+            if self._plain is not None and not await self._starts_tls(accepted):
+                connected, tls = self._plain, None
             # From here on the event loop owns the socket and closes it in any case.
             await self._loop.connect_accepted_socket(
-                lambda: self._connected(connection),
+                lambda: connected(connection),
                 accepted,
-                ssl=self._tls,
-                ssl_handshake_timeout=self._handshake_timeout if self._tls else None,
+                ssl=tls,
+                ssl_handshake_timeout=self._handshake_timeout if tls else None,
             )
         except OSError as error:  # includes ssl.SSLError and TimeoutError of the handshake
             log.debug("connection failed", address=connection.address, reason=str(error))
@@ -158,9 +167,38 @@ class Listener:
         finally:
             self._connecting.discard(task)
 
+    async def _starts_tls(self, accepted: socket.socket) -> bool:
+        """Wait for the first byte without consuming it, and return whether it starts a TLS handshake.
+
+        Close the socket if it fails. Raise OSError if the client sends nothing.
+        """
+        readable: asyncio.Future[None] = self._loop.create_future()
+        self._loop.add_reader(accepted, lambda: readable.done() or readable.set_result(None))
+        try:
+            async with asyncio.timeout(self._handshake_timeout):
+                await readable
+            first = accepted.recv(1, socket.MSG_PEEK)
+            if not first:
+                raise ConnectionResetError("the client has disconnected")
+        except BaseException:
+            self._loop.remove_reader(accepted)
+            accepted.close()
+            raise
+        self._loop.remove_reader(accepted)
+        return first == TLS_HANDSHAKE
+
 
 class Server(uvicorn.Server):
-    """The server of uvicorn with connection limits and a report when it is ready. The caller handles signals."""
+    """The server of uvicorn with connection limits and a report when it is ready. The caller handles signals.
+
+    Args:
+        config: the configuration of uvicorn.
+        settings: the settings of the server.
+        limits: the connection limits.
+        legacy: bound socket for clients without TLS.
+        when_ready: called when the server is ready.
+        plain: application for clients that use plain HTTP on a port with TLS; None refuses them.
+    """
 
     def __init__(
         self,
@@ -169,8 +207,13 @@ class Server(uvicorn.Server):
         limits: ConnectionLimits,
         legacy: socket.socket | None,
         when_ready: Callable[[], None],
+        plain: object | None = None,
     ) -> None:
         super().__init__(config)
+        self._plain = None
+        if plain is not None:
+            self._plain = configuration(plain, settings)
+            self._plain.load()
         self._settings = settings
         self._limits = limits
         self._legacy = legacy
@@ -194,16 +237,18 @@ class Server(uvicorn.Server):
     def _listen(self, listener: socket.socket, tls: ssl.SSLContext | None) -> Listener:
         timeout = self._settings.request_timeout
 
-        def connected(connection: Connection) -> asyncio.Protocol:
+        def protocol(config: uvicorn.Config, connection: Connection) -> asyncio.Protocol:
             return HttpProtocol(
-                config=self.config,
+                config=config,
                 server_state=self.server_state,
                 app_state=cast("dict[str, Any]", self.lifespan.state),
                 connection=connection,
                 request_timeout=timeout,
             )
 
-        return Listener(listener, self._limits, connected, tls, timeout, self.config.backlog)
+        connected = functools.partial(protocol, self.config)
+        plain = functools.partial(protocol, self._plain) if self._plain else None
+        return Listener(listener, self._limits, connected, tls, timeout, plain, self.config.backlog)
 
     @contextlib.contextmanager
     def capture_signals(self) -> Generator[None, None, None]:

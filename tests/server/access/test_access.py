@@ -21,7 +21,7 @@ from websockets.exceptions import ConnectionClosedError
 
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData, NotFound
-from arcor2_server.access import certificate
+from arcor2_server.access import authority, certificate
 from arcor2_server.access.admission import Access, AccessRefused
 from arcor2_server.access.tokens import COPY, FILE, TokenFile
 from arcor2_server.cli.exit_status import ExitStatus
@@ -312,9 +312,9 @@ async def test_tls_with_a_generated_certificate(tmp_path: Path) -> None:
     secret = TokenFile(tmp_path / "data").add("first", Role.OPERATOR)[1]
     async with running(tmp_path / "data", "--self-signed") as server:
         assert server.url.startswith("wss://")
-        file = server.data_dir / certificate.CERTIFICATE
-        assert stat.S_IMODE((server.data_dir / certificate.KEY).stat().st_mode) == 0o600
-        assert certificate.fingerprint((file, server.data_dir / certificate.KEY)) in server.log.read_text()
+        file = server.data_dir / authority.CERTIFICATE
+        assert stat.S_IMODE((server.data_dir / authority.KEY).stat().st_mode) == 0o600
+        assert certificate.fingerprint(file) in server.log.read_text()
         async with connect(server.url, additional_headers=bearer(secret), ssl=trusting(file)) as socket:
             talker = Talker(socket)
             await talker.event("ShowMainScreen")

@@ -16,7 +16,7 @@ import pytest
 import uvloop
 from websockets.asyncio.client import connect
 
-from arcor2_server.access import certificate
+from arcor2_server.access.authority import CERTIFICATE, Authority
 from arcor2_server.access.connection_limits import OWN_FILES, Connection, ConnectionLimits
 from arcor2_server.settings import ServerSettings
 from arcor2_server.web import http_server
@@ -160,7 +160,11 @@ async def served(
     **limits: Any,
 ) -> Any:
     settings = ServerSettings(data_dir=tmp_path, request_timeout=request_timeout)
-    files = certificate.self_signed(tmp_path, "127.0.0.1") if tls else None
+    files = None
+    if tls:
+        authority = Authority(tmp_path, lambda: ["127.0.0.1", "localhost"])
+        authority.renew()
+        files = authority.files
     counted = ConnectionLimits(**{"total": 400, "per_address": 200, **limits})
     listener = listener or socket.socket()
     with listener:
@@ -294,7 +298,7 @@ async def test_connections_are_counted_before_tls(tmp_path: Path) -> None:
     async with served(tmp_path, tls=True, request_timeout=3.0, per_address=10) as here:
         for _ in range(20):
             here.silent()
-        trusting = ssl.create_default_context(cafile=str(tmp_path / certificate.CERTIFICATE))
+        trusting = ssl.create_default_context(cafile=str(tmp_path / CERTIFICATE))
         async with httpx.AsyncClient(timeout=60, base_url=f"https://127.0.0.1:{here.port}", verify=trusting) as http:
             assert (await http.get("/")).text == "0"
             assert len(here.limits) <= 10

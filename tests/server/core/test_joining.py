@@ -2,10 +2,13 @@
 
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from arcor2_server.access import addresses as module
 from arcor2_server.access.addresses import server_addresses
+from arcor2_server.access.authority import Authority
+from arcor2_server.access.certificate import fingerprint
 from arcor2_server.settings import ServerSettings
 
 
@@ -34,9 +37,14 @@ def test_invitations_list_reachable_addresses(tmp_path: Path, host: str, address
 
 
 def test_invitations_use_the_port_of_the_request(tmp_path: Path) -> None:
-    settings = ServerSettings(data_dir=tmp_path, host="192.0.2.9", port=0, fingerprint="AB:CD")
+    authority = Authority(tmp_path, lambda: ["192.0.2.9"])
+    authority.renew()
+    settings = ServerSettings(data_dir=tmp_path, host="192.0.2.9", port=0, certificate=authority.files[0])
     found = server_addresses(settings, 41234)
-    assert (found.addresses, found.fingerprint) == (["https://192.0.2.9:41234"], "AB:CD")
+    assert (found.addresses, found.authority) == (["https://192.0.2.9:41234"], "")
+    assert found.fingerprint == fingerprint(authority.files[0])
+    own = server_addresses(msgspec.structs.replace(settings, authority=authority.file), 41234)
+    assert own.authority == fingerprint(authority.file) != own.fingerprint
 
 
 def test_without_a_network_there_is_no_invitation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

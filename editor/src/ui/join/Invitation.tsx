@@ -20,7 +20,7 @@ export function Invitation() {
     };
   }, []);
   if (!joining) return <Waiting>{t`Loading…`}</Waiting>;
-  const { addresses, fingerprint } = joining;
+  const { addresses, fingerprint, authority } = joining;
   const [best, ...others] = addresses;
   return (
     <section className="invitation" aria-label={t`Invite others`}>
@@ -44,6 +44,14 @@ export function Invitation() {
             </p>
           </div>
         </>
+      )}
+      {authority && best !== undefined && (
+        <p className="small trust">
+          {t`On a new device, open this address once and install the certificate of the server:`}{" "}
+          <strong>{best.replace(/^https:/, "http:")}</strong>
+          <br />
+          {t`The page shows this SHA-256 fingerprint:`} <code>{authority}</code>
+        </p>
       )}
       {fingerprint && (
         <p className="small fingerprint">
