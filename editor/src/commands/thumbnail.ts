@@ -26,6 +26,8 @@ function setThumbnail(document: string, thumbnail: Thumbnail): void {
 /** Take a thumbnail of the open document and store it, even if the document is closed meanwhile. */
 export async function keepThumbnail(): Promise<void> {
   const document = openId(now());
+  // In AR, the view shows the picture of the camera, which stays on this device.
+  if (now().ui.ar) return;
   const blob = whyUnavailable(now(), "SaveProject") || !serves("SetViewState") ? null : await theEngine()?.picture();
   if (!blob) return;
   const thumbnail = await smaller(blob);

@@ -1,6 +1,6 @@
 /** The camera: orbit around a point, or fly. z is up. It reports when a frame has to be drawn. */
 
-import { PerspectiveCamera, Vector3 } from "three";
+import { type Matrix4, PerspectiveCamera, Vector3 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { bestDirection, fitted, marginsOf } from "./framing";
 
@@ -38,6 +38,8 @@ export class View {
   private width = 1;
   private height = 1;
   private fittedTo = { width: 1, height: 1 };
+  /** What the user saw before a measured camera was shown; null without one. */
+  private before: (Viewpoint & { fov: number }) | null = null;
   private readonly forget = new AbortController();
 
   constructor(
@@ -69,7 +71,7 @@ export class View {
 
   /** Move a flying camera by the pressed keys for the time since the last frame, s. Return whether it moves. */
   fly(seconds: number): boolean {
-    if (this.pressed.size === 0) return false;
+    if (this.pressed.size === 0 || this.measured) return false;
     const step = new Vector3();
     for (const key of this.pressed) step.add(new Vector3(...(KEYS[key] ?? [0, 0, 0])));
     const forward = this.camera.getWorldDirection(new Vector3());
@@ -87,7 +89,7 @@ export class View {
 
   /** Show all points as large as possible, from the current direction or from the one in which they fill the view. */
   fit(points: readonly Vector3[], best = false): void {
-    if (points.length === 0) return;
+    if (points.length === 0 || this.measured) return;
     this.setMode("orbit");
     const { width, height } = this;
     const opening = { width, height, fov: this.camera.fov, margins: marginsOf(width, height) };
@@ -102,6 +104,7 @@ export class View {
   /** Whether the size differs from that of the last fit as it does after a panel opens, not after a message appears. */
   get resizedSinceFit(): boolean {
     const { width, height } = this.fittedTo;
+    if (this.measured) return false;
     return Math.abs(Math.log(this.width / width)) > 0.1 || Math.abs(Math.log(this.height / height)) > 0.2;
   }
 
@@ -111,13 +114,44 @@ export class View {
 
   /** Fly from the current position, or orbit around a point in front of the camera. */
   setMode(mode: ViewMode): void {
-    if (mode === this.mode) return;
+    if (mode === this.mode || this.measured) return;
     const ahead = this.camera.getWorldDirection(new Vector3());
     this.controls.enableZoom = this.controls.enablePan = mode === "orbit";
     this.controls.minDistance = mode === "orbit" ? 0.05 : NOSE;
     this.controls.target.copy(this.camera.position).addScaledVector(ahead, mode === "fly" ? NOSE : START.length());
     this.controls.update();
     this.changed();
+  }
+
+  /** Whether the camera is where a real one was measured. Then controls and commands do not move it. */
+  get measured(): boolean {
+    return this.before !== null;
+  }
+
+  /** Show the world from a measured camera until `release`. `fov`: vertical field of view, degrees. */
+  follow(pose: Matrix4, fov: number): void {
+    this.before ??= { ...this.viewpoint, fov: this.camera.fov };
+    this.controls.enabled = false;
+    pose.decompose(this.camera.position, this.camera.quaternion, this.camera.scale);
+    this.camera.fov = fov;
+    this.camera.updateProjectionMatrix();
+    this.changed();
+  }
+
+  /** Return to what was seen before, or `stay` where the camera was. */
+  release(stay = false): void {
+    const { before } = this;
+    if (!before) return;
+    this.before = null;
+    this.controls.enabled = true;
+    this.camera.fov = before.fov;
+    this.camera.updateProjectionMatrix();
+    if (stay) {
+      const ahead = this.camera.getWorldDirection(new Vector3());
+      before.position = this.camera.position.toArray();
+      before.target = this.camera.position.clone().addScaledVector(ahead, 1).toArray();
+    }
+    this.set(before.position, before.target);
   }
 
   /** Fly while held; `key` is a key code: KeyW forward, KeyE up, and so on. */
@@ -133,6 +167,7 @@ export class View {
 
   /** Look at the target from a side. */
   look(from: ViewName): void {
+    if (this.measured) return;
     this.setMode("orbit");
     const distance = this.camera.position.distanceTo(this.controls.target);
     const direction = {
@@ -149,6 +184,7 @@ export class View {
   }
 
   set(position: [number, number, number], target: [number, number, number]): void {
+    if (this.measured) return;
     this.camera.position.set(...position);
     this.controls.target.set(...target);
     this.controls.update();
@@ -161,7 +197,7 @@ export class View {
 
   /** Disabled while something else is dragged. */
   enable(on: boolean): void {
-    this.controls.enabled = on;
+    this.controls.enabled = on && !this.measured;
   }
 
   dispose(): void {

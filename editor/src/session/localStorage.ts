@@ -7,6 +7,8 @@ const KEYS = {
   theme: "arcor2-hw.theme",
   hand: "arcor2-hw.left-handed",
   language: "arcor2-hw.language",
+  /** Focal lengths of the cameras of this device. */
+  lenses: "arcor2-hw.lenses",
 };
 
 export function remembered(key: keyof typeof KEYS): string {

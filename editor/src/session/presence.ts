@@ -23,7 +23,7 @@ export function presenceOf(state: State): Presence {
     selected: selection ? [selection.id] : [],
     ...(aimed ? { aimed } : {}),
     ...(state.ui.draft ? { editing: state.ui.draft.id } : {}),
-    view: state.doc ? "3d" : "home",
+    view: state.ui.ar ? "ar" : state.doc ? "3d" : "home",
   };
 }
 

@@ -112,6 +112,33 @@ export interface ScriptDraft {
   text: string;
 }
 
+/** Augmented reality: the picture of the camera behind the 3D view. */
+export interface Ar {
+  /** `looking`: no marker was seen yet; `bridging`: the orientation sensor replaces the markers for a moment. */
+  phase: "starting" | "looking" | "registered" | "bridging" | "lost";
+  /** Picture and pose are frozen. */
+  frozen: boolean;
+  /** Whether the outlines of the markers are shown. */
+  markers: boolean;
+  /** The last registration. */
+  grade: "good" | "fair" | "rough";
+  /** Expected error of the overlay, m. */
+  error: number;
+  used: readonly number[];
+  contradicting: readonly number[];
+  /** Two markers contradict each other. */
+  undecided: boolean;
+  /** Whether the focal length of the camera is known. */
+  checked: boolean;
+  /** Time of the last registration, ms since the epoch. */
+  seenAt: number;
+  /** Why no marker is found. */
+  loss: "dark" | "blurred" | "unseen";
+  /** How far the last correction moved the overlay, m, if it was visible; 0 otherwise. */
+  corrected: number;
+  startedAt: number;
+}
+
 export interface Ui {
   selection: Selection | null;
   /** The item at the crosshair. */
@@ -140,6 +167,8 @@ export interface Ui {
   robotTab: "tool" | "joints" | "hand" | "go";
   programTab: "add" | "steps" | "problems" | "parameters";
   crosshair: Crosshair;
+  /** Null while AR is off. */
+  ar: Ar | null;
   jogging: Jogging;
   measurement: Measurement | null;
   /** Pose of the last calibrated object before the calibration, until the user accepts or reverts the new one. */
@@ -169,6 +198,7 @@ export function initialUi(): Ui {
     recentActions: [],
     recentCommands: [],
     crosshair: { listed: false, candidates: [], chosen: "" },
+    ar: null,
     jogging: {
       frame: "world",
       press: "step",

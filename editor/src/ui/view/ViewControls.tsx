@@ -22,6 +22,9 @@ import { type Direction, SIDES } from "./sides";
 import "../aim/aim.css";
 import "./view.css";
 
+const StartAr = lazyComponent(() => import("../ar/StartAr"));
+const ArView = lazyComponent(() => import("../ar/ArView"));
+
 /** Half edge, pixels. */
 const HALF = 30;
 
@@ -52,6 +55,8 @@ export default function ViewControls({ engine }: { engine: Engine }) {
   const bookmarks = bookmarksOf(stored);
   const always = useEditor(aimsAlways);
   const listed = useEditor((state) => state.ui.crosshair.listed);
+  const ar = useEditor((state) => state.ui.ar !== null);
+  const [starting, setStarting] = useState(false);
   useCrosshairKey();
   useEffect(followItemRequests, []);
   const change = (next: ViewMode) => {
@@ -98,20 +103,29 @@ export default function ViewControls({ engine }: { engine: Engine }) {
   ];
   return (
     <>
-      <div className="view-controls">
-        <Button icon="zoom" aria-label={t`Show all`} onPress={() => engine.focus()} />
-        <Cube engine={engine} onLook={look} />
-        <More label={t`Views`} icon="eye" look="" choices={choices} />
-      </div>
-      {(always || listed) && <Aim engine={engine} />}
+      {!ar && (
+        <div className="view-controls">
+          <Button icon="zoom" aria-label={t`Show all`} onPress={() => engine.focus()} />
+          <Cube engine={engine} onLook={look} />
+          <More label={t`Views`} icon="eye" look="" choices={choices} />
+          <Button icon="camera" aria-label={t`Augmented reality`} onPress={() => setStarting(true)}>
+            {t`AR`}
+          </Button>
+        </div>
+      )}
+      <Suspense fallback={null}>
+        {starting && <StartAr onClose={() => setStarting(false)} />}
+        {ar && <ArView engine={engine} />}
+      </Suspense>
+      {(always || listed || ar) && <Aim engine={engine} />}
       <OffScreen engine={engine} />
       <Clusters engine={engine} />
-      {insets && (
+      {insets && !ar && (
         <Suspense fallback={null}>
           <Insets engine={engine} onLook={look} onClose={() => setInsets(false)} />
         </Suspense>
       )}
-      {mode === "fly" && <FlyPad view={engine.view} onDone={() => change("orbit")} />}
+      {mode === "fly" && !ar && <FlyPad view={engine.view} onDone={() => change("orbit")} />}
       {naming && (
         <AskName
           title={t`Save view`}

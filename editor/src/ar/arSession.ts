@@ -1,0 +1,258 @@
+/** A running AR view: pictures of the camera go to the worker, and are shown with the pose that was found in them. */
+
+import type { Engine } from "../engine/engine";
+import type { Ar } from "../store/ui";
+import { Backdrop } from "./backdrop";
+import { type Mat3, mean, type Vec3 } from "./geometry";
+import { Gyro, turnedView } from "./gyro";
+import { type FocalLength, KNOWN, lensOf } from "./lens";
+import type { Layout } from "./places";
+import type { Lens, View } from "./pose";
+import { JUMP, jumpBetween } from "./registration";
+import { ArProblem, obstacleOfError } from "./support";
+import type { Found } from "./tracker";
+import type { FromWorker, ToWorker } from "./worker";
+
+/** Time for which the orientation sensor replaces the markers, and the time without it, ms. */
+const BRIDGE = 1500;
+const BLINK = 300;
+/** Time between two reports of the state, ms, unless its phase changes. */
+const REPORT = 250;
+/** Time for which a correction is reported, ms. */
+const CORRECTION = 4000;
+/** How much of the items is hidden, by phase: before the first registration, they are somewhere else. */
+const VEILS: Readonly<Record<Ar["phase"], number>> = {
+  starting: 1,
+  looking: 1,
+  registered: 0,
+  bridging: 0.2,
+  lost: 0.65,
+};
+const WANTED: MediaTrackConstraints = {
+  facingMode: { ideal: "environment" },
+  width: { ideal: 1280 },
+  height: { ideal: 720 },
+  frameRate: { ideal: 30 },
+};
+
+/** What is shown: for the outlines of the markers, and for tests. */
+export interface Shown {
+  found: Found;
+  view: View | null;
+  lens: Lens;
+  /** Time from the picture to the overlay, and in the worker, ms. */
+  latency: number;
+  ms: number;
+  /** Number of pictures. */
+  count: number;
+}
+
+interface Options {
+  engine: Engine;
+  layout: Layout;
+  /** The known focal length of a camera by its name; null if it is not known. */
+  stored: (camera: string) => FocalLength | null;
+  store: (camera: string, focal: FocalLength | null) => void;
+  report: (state: Partial<Ar>) => void;
+  /** Called when the camera ends without our doing. */
+  ended: () => void;
+}
+
+/** Open the camera at the back. Reject with ArProblem. It has to be called in a tap. */
+export async function openCamera(): Promise<MediaStream> {
+  try {
+    return await navigator.mediaDevices.getUserMedia({ audio: false, video: WANTED });
+  } catch (error) {
+    throw new ArProblem(obstacleOfError(error));
+  }
+}
+
+export function releaseCamera(stream: MediaStream): void {
+  for (const track of stream.getTracks()) track.stop();
+}
+
+export class ArSession {
+  /** The configured markers. */
+  get places(): Layout["places"] {
+    return this.options.layout.places;
+  }
+
+  /** What is shown; null before the first picture. */
+  shown: Shown | null = null;
+  /** Called after each picture. */
+  onPicture: () => void = () => {};
+
+  private readonly video = document.createElement("video");
+  /** The picture that is drawn, and the one that the worker reads. */
+  private readonly canvas = document.createElement("canvas");
+  private readonly context = this.canvas.getContext("2d", { alpha: false });
+  private readonly waiting = document.createElement("canvas");
+  private readonly waitingContext = this.waiting.getContext("2d", { alpha: false });
+  private readonly gyro = new Gyro();
+  private backdrop: Backdrop | null = null;
+  private worker: Worker | null = null;
+  private ended = false;
+  private frozen = false;
+  private busy = false;
+  private taken = 0;
+  /** Orientation of the camera in the waiting picture, and in the last one with markers. */
+  private orientation: Mat3 | null = null;
+  private anchor: { view: View; orientation: Mat3 | null; at: number } | null = null;
+  private phase: Ar["phase"] = "looking";
+  private reportedAt = 0;
+  private correction = { size: 0, at: 0 };
+  private readonly camera: string;
+  private readonly middles: Vec3[];
+
+  constructor(
+    private readonly stream: MediaStream,
+    private readonly options: Options,
+  ) {
+    const [track] = stream.getVideoTracks();
+    const { width = 0, height = 0 } = track?.getSettings() ?? {};
+    this.camera = `${track?.label} ${Math.max(width, height)} × ${Math.min(width, height)}`;
+    this.middles = [...options.layout.places.values()].map(({ corners }) => mean(corners));
+    if (track) track.onended = () => this.ended || options.ended();
+    this.video.muted = true;
+    this.video.playsInline = true;
+    this.video.srcObject = stream;
+  }
+
+  async start(): Promise<void> {
+    await this.video.play();
+    if (this.ended) return;
+    this.beginWorker(this.options.stored(this.camera));
+    this.next();
+  }
+
+  /** Release the camera. `stay`: keep the viewpoint instead of returning to the one before. */
+  stop(stay = false): void {
+    this.ended = true;
+    releaseCamera(this.stream);
+    this.video.srcObject = null;
+    this.worker?.terminate();
+    this.gyro.stop();
+    this.backdrop?.dispose();
+    this.options.engine.view.release(stay);
+  }
+
+  /** Keep the picture and the pose, or continue. */
+  freeze(on: boolean): void {
+    this.frozen = on;
+    this.options.report({ frozen: on });
+    if (!on) this.next();
+  }
+
+  /** Forget the focal length and the last pose. */
+  recalibrate(): void {
+    this.options.store(this.camera, null);
+    this.worker?.terminate();
+    this.anchor = null;
+    this.busy = false;
+    this.beginWorker(null);
+    this.enter("looking", {});
+    this.freeze(false);
+  }
+
+  private beginWorker(focal: FocalLength | null): void {
+    const { codes, places } = this.options.layout;
+    const worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+    worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.take(data);
+    worker.onerror = () => this.options.ended();
+    this.worker = worker;
+    this.send({ setup: { codes, places, focal } });
+  }
+
+  private send(message: ToWorker, transfer: Transferable[] = []): void {
+    this.worker?.postMessage(message, transfer);
+  }
+
+  /** Take the next picture as soon as the camera has one. */
+  private next(): void {
+    if (this.ended || this.frozen || this.busy) return;
+    this.busy = true;
+    const take = () => void this.capture();
+    if ("requestVideoFrameCallback" in this.video) this.video.requestVideoFrameCallback(take);
+    else requestAnimationFrame(take);
+  }
+
+  private async capture(): Promise<void> {
+    const { videoWidth: width, videoHeight: height } = this.video;
+    if (this.ended || this.frozen || !width || !height) {
+      this.busy = false;
+      if (!this.frozen) requestAnimationFrame(() => this.next());
+      return;
+    }
+    this.taken = performance.now();
+    this.orientation = this.gyro.camera;
+    if (this.waiting.width !== width) this.waiting.width = width;
+    if (this.waiting.height !== height) this.waiting.height = height;
+    this.waitingContext?.drawImage(this.video, 0, 0);
+    const bitmap = await createImageBitmap(this.waiting);
+    this.send({ bitmap }, [bitmap]);
+  }
+
+  private take({ found, ms }: FromWorker): void {
+    this.busy = false;
+    if (this.ended || this.frozen) return;
+    this.draw(found, ms);
+    this.next();
+  }
+
+  private draw(found: Found, ms: number): void {
+    const { width, height, registration, focal, checked } = found;
+    const now = performance.now();
+    const lens = lensOf(focal, width, height);
+    const before = this.predicted();
+    const age = this.anchor ? now - this.anchor.at : Number.POSITIVE_INFINITY;
+    let view = before;
+    if (registration) {
+      view = registration.view;
+      const jump = before && age > BLINK ? jumpBetween(before, view, this.middles) : 0;
+      if (jump > JUMP) this.correction = { size: jump, at: now };
+      this.anchor = { view, orientation: this.orientation, at: now };
+      if (focal.deviation <= KNOWN) this.options.store(this.camera, focal);
+    }
+    if (this.canvas.width !== width || this.canvas.height !== height) {
+      this.backdrop?.dispose(); // a texture has one size
+      this.backdrop = null;
+      [this.canvas.width, this.canvas.height] = [width, height];
+    }
+    this.context?.drawImage(this.waiting, 0, 0);
+    this.backdrop ??= new Backdrop(this.options.engine, this.canvas);
+    const bridged = age <= (this.anchor?.orientation && this.orientation ? BRIDGE : BLINK);
+    const phase = registration ? "registered" : !this.anchor ? "looking" : bridged ? "bridging" : "lost";
+    this.backdrop.show(view, lens, VEILS[phase]);
+    const count = (this.shown?.count ?? 0) + 1;
+    this.shown = { found, view, lens, latency: now - this.taken, ms, count };
+    this.enter(phase, {
+      checked,
+      loss: found.loss ?? "unseen",
+      corrected: now - this.correction.at < CORRECTION ? this.correction.size : 0,
+      ...(registration && {
+        grade: registration.grade,
+        error: registration.error,
+        used: registration.used,
+        contradicting: registration.contradicting,
+        undecided: registration.undecided,
+        seenAt: Date.now(),
+      }),
+    });
+    this.onPicture();
+  }
+
+  /** Return the view of the waiting picture without its markers: the last one, turned as the device was. */
+  private predicted(): View | null {
+    if (!this.anchor) return null;
+    const { view, orientation } = this.anchor;
+    return orientation && this.orientation ? turnedView(view, orientation, this.orientation) : view;
+  }
+
+  private enter(phase: Ar["phase"], state: Partial<Ar>): void {
+    const now = performance.now();
+    if (phase === this.phase && now - this.reportedAt < REPORT) return;
+    this.phase = phase;
+    this.reportedAt = now;
+    this.options.report({ ...state, phase });
+  }
+}

@@ -1,0 +1,106 @@
+/** The picture of the camera behind the items of the 3D view, and in front of them as a veil that dims them. */
+
+import { CanvasTexture, Matrix4, Mesh, MeshBasicMaterial, type Object3D, PlaneGeometry, SRGBColorSpace } from "three";
+import type { Engine } from "../engine/engine";
+import { eyeOf, type Lens, type View } from "./pose";
+
+/** Depth of the picture in the view: behind everything. */
+const DEPTH = 0.999;
+
+const inverse = new Matrix4();
+const plane = new Matrix4();
+const pose = new Matrix4();
+
+/** Where a picture is in a view that it fills: factor, and pixels of the view. */
+export interface Placement {
+  scale: number;
+  width: number;
+  height: number;
+}
+
+/** Return the size at which a picture fills a view; what exceeds the view is cut off at both sides. */
+export function placed(picture: { width: number; height: number }, view: { width: number; height: number }): Placement {
+  const scale = Math.max(view.width / picture.width, view.height / picture.height);
+  return { scale, width: picture.width * scale, height: picture.height * scale };
+}
+
+export class Backdrop {
+  private readonly texture: CanvasTexture;
+  private readonly picture: Mesh<PlaneGeometry, MeshBasicMaterial>;
+  private readonly veil: Mesh<PlaneGeometry, MeshBasicMaterial>;
+  private readonly hidden: Object3D[];
+  private readonly fog;
+
+  constructor(
+    private readonly engine: Engine,
+    private readonly canvas: HTMLCanvasElement,
+  ) {
+    this.texture = new CanvasTexture(canvas);
+    this.texture.colorSpace = SRGBColorSpace;
+    this.texture.generateMipmaps = false;
+    this.picture = this.sheet(-1000, 1);
+    this.veil = this.sheet(1000, 0);
+    this.hidden = engine.scene.children.filter((each) => each.userData.ground && each.visible);
+    for (const each of this.hidden) each.visible = false;
+    this.fog = engine.scene.fog;
+    engine.scene.fog = null;
+  }
+
+  /** Show the picture of the canvas with the items as seen from a view. `veil`: how much of the items is hidden. */
+  show(view: View | null, lens: Lens, veil: number): void {
+    const { width, height } = this.engine.shown();
+    const { scale, ...size } = placed(this.canvas, { width, height });
+    const fov = (2 * Math.atan(height / (2 * scale * lens.focal)) * 180) / Math.PI;
+    if (view) this.engine.view.follow(poseOf(view), fov);
+    const { camera } = this.engine.view;
+    camera.updateMatrixWorld();
+    inverse.copy(camera.projectionMatrix).invert();
+    plane.makeScale(size.width / width, size.height / height, 1).setPosition(0, 0, DEPTH);
+    for (const sheet of [this.picture, this.veil]) {
+      sheet.matrixWorld.multiplyMatrices(camera.matrixWorld, inverse).multiply(plane);
+    }
+    this.veil.visible = veil > 0;
+    this.veil.material.opacity = veil;
+    this.texture.needsUpdate = true;
+    this.engine.invalidate();
+  }
+
+  dispose(): void {
+    for (const sheet of [this.picture, this.veil]) {
+      sheet.removeFromParent();
+      sheet.geometry.dispose();
+      sheet.material.dispose();
+    }
+    this.texture.dispose();
+    for (const each of this.hidden) each.visible = true;
+    this.engine.scene.fog ??= this.fog;
+    this.engine.invalidate();
+  }
+
+  private sheet(order: number, opacity: number): Mesh<PlaneGeometry, MeshBasicMaterial> {
+    const material = new MeshBasicMaterial({
+      map: this.texture,
+      depthTest: false,
+      depthWrite: false,
+      fog: false,
+      toneMapped: false,
+      transparent: opacity < 1,
+      opacity,
+    });
+    const sheet = new Mesh(new PlaneGeometry(2, 2), material);
+    sheet.renderOrder = order;
+    sheet.frustumCulled = false;
+    sheet.matrixAutoUpdate = sheet.matrixWorldAutoUpdate = false;
+    sheet.raycast = () => {};
+    sheet.userData.ground = true; // nothing to select
+    this.engine.scene.add(sheet);
+    return sheet;
+  }
+}
+
+/** Return the pose of a camera of three.js (x right, y up, z backward) in the workplace. */
+function poseOf(view: View): Matrix4 {
+  const [x, y, z] = view.turn;
+  const [ex, ey, ez] = eyeOf(view);
+  return pose.set(x[0], -y[0], -z[0], ex, x[1], -y[1], -z[1], ey, x[2], -y[2], -z[2], ez, 0, 0, 0, 1);
+}

@@ -1,0 +1,47 @@
+/** Whether AR can start on this device with these markers, and why not. */
+
+import type { Layout } from "./places";
+
+/**
+ * Why AR cannot start. `insecure`: the page is not trusted; `browser`: it lacks a function; `markers`: none is
+ * configured; `dictionary`: AR does not detect the configured markers; the others are about the camera.
+ */
+export type Obstacle = "insecure" | "browser" | "markers" | "dictionary" | "refused" | "missing" | "busy" | "ended";
+
+/** An obstacle, thrown by the start of AR. */
+export class ArProblem extends Error {
+  constructor(readonly obstacle: Obstacle) {
+    super(obstacle);
+  }
+}
+
+/** The parts of the browser that AR needs. */
+export interface Abilities {
+  secure: boolean;
+  camera: boolean;
+  workers: boolean;
+}
+
+export function abilitiesOf(scope: typeof globalThis): Abilities {
+  return {
+    secure: scope.isSecureContext,
+    camera: typeof scope.navigator?.mediaDevices?.getUserMedia === "function",
+    workers: typeof scope.OffscreenCanvas === "function" && typeof scope.createImageBitmap === "function",
+  };
+}
+
+/** Return what prevents AR; null if nothing is known to. */
+export function obstacleOf({ secure, camera, workers }: Abilities, layout: Layout | null): Obstacle | null {
+  if (!secure) return "insecure"; // without it, browsers hide the camera
+  if (!camera || !workers) return "browser";
+  if (!layout) return null;
+  if (!layout.supported) return "dictionary";
+  return layout.places.size > 0 ? null : "markers";
+}
+
+/** Return the obstacle for an error of `getUserMedia`. */
+export function obstacleOfError(error: unknown): Obstacle {
+  const name = error instanceof Error ? error.name : "";
+  if (name === "NotAllowedError" || name === "SecurityError") return "refused";
+  return name === "NotReadableError" || name === "AbortError" ? "busy" : "missing";
+}

@@ -1,0 +1,113 @@
+/** What the worker does with each picture: detect markers, register the camera, and search for the focal length. */
+
+import { detect, type Sighting } from "./detector";
+import { type Grey, half } from "./grey";
+import { ASSUMED, type FocalLength, KNOWN, LensSearch, lensOf } from "./lens";
+import type { Places, View } from "./pose";
+import { markerErrors, type Registration, register } from "./registration";
+
+/** Why no marker is found: darkness, a blurred picture, or another reason. */
+export type Loss = "dark" | "blurred" | "unseen";
+
+export interface Setup {
+  /** Codes of the configured markers by id. */
+  codes: ReadonlyMap<number, number>;
+  places: Places;
+  /** The focal length, if it is known. */
+  focal: FocalLength | null;
+}
+
+export interface Found {
+  width: number;
+  height: number;
+  seen: Sighting[];
+  registration: Registration | null;
+  /** Errors of the markers, pixels, by id. */
+  errors: ReadonlyMap<number, number>;
+  loss: Loss | null;
+  focal: FocalLength;
+  /** Whether the focal length is known well enough. */
+  checked: boolean;
+}
+
+/** Mean brightness below which a picture is too dark. */
+const DARK = 35;
+/** Sharpness relative to the pictures with markers, below which a picture is blurred. */
+const BLURRED = 0.5;
+
+export class Tracker {
+  private focal: FocalLength;
+  private search: LensSearch | null = null;
+  private size = "";
+  private excluded: number[] = [];
+  private last: View | undefined;
+  /** Sharpness of the last pictures with markers. */
+  private sharp = 0;
+
+  constructor(private readonly setup: Setup) {
+    this.focal = setup.focal ?? ASSUMED;
+  }
+
+  look(picture: Grey): Found {
+    const { width, height } = picture;
+    const seen = detect(picture, this.setup.codes);
+    const registration = this.register(seen, width, height);
+    const learned = registration !== null && this.learn(seen, registration, width, height);
+    return this.found(picture, seen, learned ? this.register(seen, width, height) : registration);
+  }
+
+  private register(seen: readonly Sighting[], width: number, height: number): Registration | null {
+    const { deviation } = this.focal;
+    const options = { deviation, known: deviation <= KNOWN, excluded: this.excluded, near: this.last };
+    return register(seen, this.setup.places, lensOf(this.focal, width, height), options);
+  }
+
+  private found(picture: Grey, seen: Sighting[], registration: Registration | null): Found {
+    const { width, height } = picture;
+    const lens = lensOf(this.focal, width, height);
+    const { light, sharpness } = registration && this.sharp > 0 ? NOT_MEASURED : lightOf(half(picture));
+    if (registration) this.sharp ||= sharpness;
+    this.last = registration?.view;
+    return {
+      width,
+      height,
+      seen,
+      registration,
+      errors: registration ? markerErrors(seen, this.setup.places, registration.view, lens) : new Map(),
+      loss: registration ? null : light < DARK ? "dark" : sharpness < BLURRED * this.sharp ? "blurred" : "unseen",
+      focal: this.focal,
+      checked: this.focal.deviation <= KNOWN,
+    };
+  }
+
+  /** Use a new view for the search of the focal length. Return whether it changed. */
+  private learn(seen: readonly Sighting[], { view }: Registration, width: number, height: number): boolean {
+    const size = `${Math.max(width, height)} × ${Math.min(width, height)}`;
+    if (size !== this.size || !this.search) {
+      this.size = size;
+      this.search = new LensSearch(this.setup.places, width, height);
+    }
+    if (this.focal.deviation <= KNOWN || !this.search.add(seen, view)) return false;
+    const result = this.search.result();
+    if (!result || result.deviation >= this.focal.deviation) return false;
+    this.focal = { relative: result.relative, deviation: result.deviation };
+    this.excluded = result.contradicting;
+    return true;
+  }
+}
+
+const NOT_MEASURED = { light: 255, sharpness: 0 };
+
+/** Return the mean brightness, and the mean square of the differences between neighbours. */
+function lightOf({ data, width, height }: Grey): { light: number; sharpness: number } {
+  let [sum, squares, count] = [0, 0, 0];
+  for (let y = 0; y < height; y += 4) {
+    for (let x = 1; x < width; x++) {
+      const value = data[y * width + x] as number;
+      sum += value;
+      squares += (value - (data[y * width + x - 1] as number)) ** 2;
+      count++;
+    }
+  }
+  return { light: sum / count, sharpness: squares / count };
+}

@@ -1,0 +1,113 @@
+/** Augmented reality on this device. Pictures of the camera are processed here and are not sent to the server. */
+
+import { ArSession, openCamera, releaseCamera } from "../ar/arSession";
+import { askForMotion } from "../ar/gyro";
+import type { FocalLength } from "../ar/lens";
+import { type Layout, layoutOf, type MarkerTable } from "../ar/places";
+import { ArProblem, type Obstacle } from "../ar/support";
+import { theEngine } from "../session/engine";
+import { remember, remembered } from "../session/localStorage";
+import { rest } from "../session/rest";
+import { now, setUi } from "../store/store";
+import type { Ar } from "../store/ui";
+
+declare module "../store/runtime" {
+  interface Runtime {
+    /** The running AR view; what users see of it is `ui.ar`. */
+    ar?: ArSession | undefined;
+  }
+}
+
+/** Request the configured markers. */
+export async function loadMarkers(): Promise<Layout> {
+  return layoutOf((await (await rest("/api/calibration/markers")).json()) as MarkerTable);
+}
+
+/**
+ * Start AR; call it in a tap, since iOS asks for the motion sensor only then. Reject with ArProblem.
+ *
+ * @param onEnd called with the obstacle if the camera ends later.
+ */
+export async function startAr(layout: Layout, onEnd: (obstacle: Obstacle) => void): Promise<void> {
+  leaveAr();
+  await askForMotion();
+  const stream = await openCamera();
+  const engine = theEngine();
+  if (!engine) {
+    releaseCamera(stream);
+    return;
+  }
+  const session = new ArSession(stream, {
+    engine,
+    layout,
+    stored: (camera) => lenses()[camera] ?? null,
+    store: storeLens,
+    report,
+    ended: () => {
+      leaveAr();
+      onEnd("ended");
+    },
+  });
+  now().runtime.ar = session;
+  setUi({ ar: initialAr() });
+  await session.start().catch(() => {
+    leaveAr();
+    throw new ArProblem("busy");
+  });
+}
+
+/** Leave AR and stop the camera. `stay`: continue in the 3D view from the same viewpoint. */
+export function leaveAr(stay = false): void {
+  const { runtime } = now();
+  runtime.ar?.stop(stay);
+  runtime.ar = undefined;
+  if (now().ui.ar) setUi({ ar: null });
+}
+
+export const freezeAr = (on: boolean): void => now().runtime.ar?.freeze(on);
+
+export function recalibrateAr(): void {
+  now().runtime.ar?.recalibrate();
+}
+
+export const showMarkers = (markers: boolean): void => report({ markers });
+
+function report(change: Partial<Ar>): void {
+  const { ar } = now().ui;
+  if (ar) setUi({ ar: { ...ar, ...change } });
+}
+
+function initialAr(): Ar {
+  return {
+    phase: "starting",
+    frozen: false,
+    markers: false,
+    grade: "rough",
+    error: 0,
+    used: [],
+    contradicting: [],
+    undecided: false,
+    checked: false,
+    seenAt: 0,
+    loss: "unseen",
+    corrected: 0,
+    startedAt: Date.now(),
+  };
+}
+
+/** Return the focal lengths of the cameras of this device. */
+function lenses(): Record<string, FocalLength> {
+  try {
+    return (JSON.parse(remembered("lenses") || "{}") as Record<string, FocalLength> | null) ?? {};
+  } catch {
+    return {};
+  }
+}
+
+function storeLens(camera: string, focal: FocalLength | null): void {
+  const known = lenses();
+  const before = known[camera];
+  if (before?.relative === focal?.relative) return;
+  const { [camera]: _, ...others } = known;
+  remember("lenses", JSON.stringify(focal ? { ...others, [camera]: focal } : others));
+}

@@ -1,0 +1,97 @@
+/** What AR does and needs, before the browser asks for the camera; or why it cannot start, and what to do. */
+
+import { plural, t } from "@lingui/core/macro";
+import { useEffect, useState } from "react";
+import type { Layout } from "../../ar/places";
+import { ArProblem, abilitiesOf, type Obstacle, obstacleOf } from "../../ar/support";
+import { loadMarkers, startAr } from "../../commands/ar";
+import { notify } from "../../store/store";
+import { Window } from "../kit/dialogs";
+import { Button, Waiting } from "../kit/kit";
+
+/** Return why AR cannot start, and the next step. */
+function reasonOf(obstacle: Obstacle, dictionary: string): string {
+  switch (obstacle) {
+    case "insecure":
+      return t`Browsers allow the camera only on pages that they trust. Open http://${location.host}/ and install the certificate of the server, then open this page with https.`;
+    case "browser":
+      return t`This browser has no access to a camera. Update it, or use a current Safari, Chrome, Edge or Firefox.`;
+    case "markers":
+      return t`No markers are configured. A technician prints markers, sticks them into the workplace and stores their poses with: arcor2-hw calibrate online markers`;
+    case "dictionary":
+      return t`AR detects markers of the dictionaries 4x4_50, 4x4_100 and 4x4_250, and the workplace has markers of ${dictionary}. Print markers of 4x4_50.`;
+    case "refused":
+      return t`The camera was not allowed. Allow it for this page in the settings of the browser, then try again.`;
+    case "missing":
+      return t`This device has no camera.`;
+    case "busy":
+      return t`Another app uses the camera. Close it, then try again.`;
+    case "ended":
+      return t`The camera has stopped. Start AR again.`;
+  }
+}
+
+export default function StartAr({ onClose }: { onClose: () => void }) {
+  const [layout, setLayout] = useState<Layout | null>(null);
+  const [failure, setFailure] = useState("");
+  const [obstacle, setObstacle] = useState(() => obstacleOf(abilitiesOf(globalThis), null));
+  const [opening, setOpening] = useState(false);
+  useEffect(() => {
+    let over = false;
+    loadMarkers()
+      .then((found) => {
+        if (over) return;
+        setLayout(found);
+        setObstacle(obstacleOf(abilitiesOf(globalThis), found));
+      })
+      .catch((error: unknown) => over || setFailure(error instanceof Error ? error.message : String(error)));
+    return () => {
+      over = true;
+    };
+  }, []);
+  const start = () => {
+    if (!layout) return;
+    setOpening(true);
+    startAr(layout, (reason) => notify("error", reasonOf(reason, layout.dictionary)))
+      .then(onClose)
+      .catch((error: unknown) => {
+        setOpening(false);
+        setObstacle(error instanceof ArProblem ? error.obstacle : "missing");
+      });
+  };
+  const permanent = obstacle && ["insecure", "browser", "markers", "dictionary"].includes(obstacle);
+  const count = layout?.places.size ?? 0;
+  return (
+    <Window title={t`Augmented reality`} onClose={onClose}>
+      {!permanent && (
+        <>
+          <p>
+            {t`The 3D view appears over the picture of the camera. Markers in the workplace tell where the camera is.`}
+          </p>
+          <p className="quiet">
+            {t`The browser asks for the camera, and on an iPad also for the motion sensor. Pictures stay on this device.`}
+          </p>
+        </>
+      )}
+      {(obstacle || failure) && (
+        <p role="alert" className="notice-line bad">
+          {obstacle ? reasonOf(obstacle, layout?.dictionary ?? "") : failure}
+        </p>
+      )}
+      {!layout && !failure && !obstacle && <Waiting>{t`Loading…`}</Waiting>}
+      {count > 0 && !permanent && (
+        <p className="quiet small">
+          {plural(count, { one: "# marker is configured.", other: "# markers are configured." })}
+        </p>
+      )}
+      <div className="actions">
+        <Button onPress={onClose}>{permanent ? t`Close` : t`Cancel`}</Button>
+        {!permanent && (
+          <Button look="primary" icon="camera" isDisabled={!layout || opening} onPress={start} autoFocus>
+            {t`Start AR`}
+          </Button>
+        )}
+      </div>
+    </Window>
+  );
+}
