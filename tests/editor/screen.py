@@ -66,12 +66,17 @@ def chromium() -> str:
 
 
 @asynccontextmanager
-async def running_browser(*, behind: bool = False) -> AsyncIterator[Browser]:
-    """Run Chromium. `behind`: with a low priority, so that software rendering does not delay drivers and fakes."""
+async def running_browser(*more: str, behind: bool = False) -> AsyncIterator[Browser]:
+    """Run Chromium, with more arguments.
+
+    Args:
+        more: additional arguments.
+        behind: with a low priority, so that software rendering does not delay drivers and fakes.
+    """
     async with async_playwright() as playwright:
         path = _BEHIND if behind else chromium()
         environment: dict[str, str | float | bool] = {**os.environ, "BROWSER": chromium()}
-        browser = await playwright.chromium.launch(executable_path=path, args=ARGUMENTS, env=environment)
+        browser = await playwright.chromium.launch(executable_path=path, args=[*ARGUMENTS, *more], env=environment)
         try:
             yield browser
         finally:

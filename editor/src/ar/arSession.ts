@@ -208,7 +208,8 @@ export class ArSession {
     let view = before;
     if (registration) {
       view = registration.view;
-      const jump = before && age > BLINK ? jumpBetween(before, view, this.middles) : 0;
+      const wasLost = this.phase === "bridging" || this.phase === "lost";
+      const jump = before && wasLost ? jumpBetween(before, view, this.middles) : 0;
       if (jump > JUMP) this.correction = { size: jump, at: now };
       this.anchor = { view, orientation: this.orientation, at: now };
       if (focal.deviation <= KNOWN) this.options.store(this.camera, focal);

@@ -1,6 +1,15 @@
 /** The picture of the camera behind the items of the 3D view, and in front of them as a veil that dims them. */
 
-import { CanvasTexture, Matrix4, Mesh, MeshBasicMaterial, type Object3D, PlaneGeometry, SRGBColorSpace } from "three";
+import {
+  CanvasTexture,
+  DoubleSide,
+  Matrix4,
+  Mesh,
+  MeshBasicMaterial,
+  type Object3D,
+  PlaneGeometry,
+  SRGBColorSpace,
+} from "three";
 import type { Engine } from "../engine/engine";
 import { eyeOf, type Lens, type View } from "./pose";
 
@@ -38,12 +47,12 @@ export class Backdrop {
     this.texture = new CanvasTexture(canvas);
     this.texture.colorSpace = SRGBColorSpace;
     this.texture.generateMipmaps = false;
-    this.picture = this.sheet(-1000, 1);
-    this.veil = this.sheet(1000, 0);
     this.hidden = engine.scene.children.filter((each) => each.userData.ground && each.visible);
     for (const each of this.hidden) each.visible = false;
     this.fog = engine.scene.fog;
     engine.scene.fog = null;
+    this.picture = this.sheet(-1000, 1);
+    this.veil = this.sheet(1000, 0);
   }
 
   /** Show the picture of the canvas with the items as seen from a view. `veil`: how much of the items is hidden. */
@@ -80,6 +89,7 @@ export class Backdrop {
   private sheet(order: number, opacity: number): Mesh<PlaneGeometry, MeshBasicMaterial> {
     const material = new MeshBasicMaterial({
       map: this.texture,
+      side: DoubleSide, // the projection mirrors it
       depthTest: false,
       depthWrite: false,
       fog: false,

@@ -55,6 +55,11 @@ function adviceOf(ar: Ar): string {
   return "";
 }
 
+/** The word of a button; on a phone, only its icon is visible. */
+function Word({ children }: { children: string }) {
+  return <span className="ar-word">{children}</span>;
+}
+
 export default function ArView({ engine }: { engine: Engine }) {
   const ar = useEditor((state) => state.ui.ar);
   useTicking(1);
@@ -64,25 +69,25 @@ export default function ArView({ engine }: { engine: Engine }) {
   const { word, shape, look } = gradeOf(ar);
   const registered = ar.seenAt > 0;
   const stale = ar.phase === "bridging" && Date.now() - ar.seenAt < NOTICED;
-  const advice = stale ? "" : adviceOf(ar);
+  const advice = stale || ar.frozen ? "" : adviceOf(ar);
   return (
     <>
       {ar.markers && <MarkerOutlines engine={engine} />}
       <div className="view-controls ar-controls" role="group" aria-label={t`Augmented reality`}>
         <Button icon="close" onPress={() => leaveAr()}>
-          {t`Leave AR`}
+          <Word>{t`Leave AR`}</Word>
         </Button>
         <Button icon={ar.frozen ? "play" : "pause"} onPress={() => freezeAr(!ar.frozen)} aria-pressed={ar.frozen}>
-          {ar.frozen ? t`Continue` : t`Freeze`}
+          <Word>{ar.frozen ? t`Continue` : t`Freeze`}</Word>
         </Button>
         <Button icon="eye" onPress={() => leaveAr(true)}>
-          {t`Seat view`}
+          <Word>{t`Seat view`}</Word>
         </Button>
         <Button icon="zoom" onPress={() => showMarkers(!ar.markers)} aria-pressed={ar.markers}>
-          {t`Markers`}
+          <Word>{t`Markers`}</Word>
         </Button>
         <Button icon="redo" onPress={recalibrateAr}>
-          {t`Recalibrate`}
+          <Word>{t`Recalibrate`}</Word>
         </Button>
       </div>
       <div className={`ar-status ${look}`} data-phase={ar.phase} role="group" aria-label={t`Quality of AR`}>

@@ -50,7 +50,7 @@ function draw(into: SVGSVGElement, engine: Engine): void {
     const [x, y] = shown(corners[0]);
     const words = document.createElementNS(SVG, "text");
     const error = found.errors.get(id);
-    words.textContent = error === undefined ? `${id}` : `${id}: ${decimal(error, 1)} px`;
+    words.textContent = error === undefined ? `${id}` : `${id}: ${decimal(error, 2)} px`;
     words.setAttribute("x", `${x}`);
     words.setAttribute("y", `${y - 6}`);
     parts.push(words);

@@ -1,0 +1,164 @@
+"""Augmented reality over the picture of a fake camera whose poses are known."""
+
+import asyncio
+import re
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import pytest_asyncio
+from msgspec import to_builtins
+from playwright.async_api import expect
+
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.object_type import Box, Model3dType, ObjectModel
+from tests.editor import texts
+from tests.editor.ar_probe import overlay_errors
+from tests.editor.camera_video import CAMERA, MARKERS, MIDDLE, Shot, markers_file, write_video
+from tests.editor.screen import VIEWPORTS, Screen, running_browser, screen_of
+from tests.server.core.serving import ServerProcess, running, talking
+
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+
+Point = tuple[float, float, float]
+ASIDE: list[Point] = [(0.69, 0.025, 0.0), (-0.31, 0.025, 0.0), (0.19, 0.525, 0.0), (0.19, 0.025, 0.3)]
+"""Points half a metre from the middle of the markers, m, and one above it."""
+MAX_NEAR = 0.001
+"""Largest error of the overlay near the markers, m."""
+MAX_ASIDE = 0.002
+RECORD_TRACKS = """{
+    const ask = navigator.mediaDevices?.getUserMedia.bind(navigator.mediaDevices);
+    window.__tracks = [];
+    if (ask) navigator.mediaDevices.getUserMedia = async (wanted) => {
+        const stream = await ask(wanted);
+        window.__tracks.push(...stream.getTracks());
+        return stream;
+    };
+}"""
+"""Record the tracks of the camera in the page."""
+
+
+@asynccontextmanager
+async def open_cell(directory: Path, *arguments: str) -> AsyncIterator[ServerProcess]:
+    """A server with an open scene: a box between the markers."""
+    box = ObjectModel(Model3dType.BOX, box=Box("box", 0.1, 0.06, 0.04))
+    async with running(directory / "data", *arguments) as process:
+        async with talking(process.url, "preparer") as talker:
+            await talker.granted("NewScene", {"name": "Cell"})
+            at = Pose(Position(0.19, 0.14, 0.02))
+            await talker.granted(
+                "AddVirtualCollisionObjectToScene", to_builtins({"name": "box", "pose": at, "model": box})
+            )
+        yield process
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
+async def server(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -> AsyncIterator[ServerProcess]:
+    directory = tmp_path_factory.mktemp("ar")
+    (directory / "markers.yaml").write_text(markers_file())
+    async with open_cell(directory, "--markers", str(directory / "markers.yaml")) as process:
+        yield process
+
+
+async def start_ar(screen: Screen) -> None:
+    await screen.page.get_by_role("button", name="Augmented reality (AR)").click()
+    await screen.press("Start AR")
+
+
+async def until_fitting(
+    screen: Screen, shots: list[Shot], points: list[tuple[float, float, float]], most: float
+) -> None:
+    """Wait until the overlay fits in five consecutive looks."""
+    fitting, worst = 0, 0.0
+    for _ in range(600):
+        if errors := await overlay_errors(screen, shots, points):
+            worst = max(errors)
+            fitting = fitting + 1 if worst <= most else 0
+            if fitting == 5:
+                return
+        await asyncio.sleep(0.05)
+    raise AssertionError(f"the overlay is {1000 * worst:.2f} mm off")
+
+
+async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp_path: Path) -> None:
+    shots = write_video(tmp_path / "camera.mjpeg")
+    async with (
+        running_browser(*CAMERA, f"--use-file-for-fake-video-capture={tmp_path / 'camera.mjpeg'}") as browser,
+        screen_of(browser, server.url, "ipad", touch=True) as screen,
+    ):
+        page = screen.page
+        await page.add_init_script(RECORD_TRACKS)
+        await screen.join("Eva")
+        await screen.until("() => window.__engine?.ids().length > 0")
+        before = await page.evaluate("window.__engine.view.viewpoint")
+        await page.get_by_role("button", name="Augmented reality (AR)").click()
+        await screen.sees("Pictures stay on this device.")
+        assert await screen.barriers() == []
+        await screen.picture("ar start")
+        await screen.press("Start AR")
+        await until_fitting(screen, shots, [MIDDLE], MAX_NEAR)
+        # The focal length is found while the camera moves.
+        quality = page.get_by_role("group", name="Quality of AR")
+        await expect(quality).to_have_text(re.compile(r"Good ±\d+ mm, 2 markers, now"))
+        await until_fitting(screen, shots, ASIDE, MAX_ASIDE)
+        outlines = page.get_by_role("button", name="Markers")
+        await outlines.click()
+        await expect(page.locator(".ar-markers polygon.seen")).to_have_count(2)
+        await screen.picture("ar ipad")
+        await outlines.click()
+        # A frozen picture is not drawn again, and the editor works over it.
+        await screen.press("Freeze")
+        await screen.sees("Frozen")
+        await screen.settle()
+        assert await screen.faults() == []
+        assert await screen.barriers() == []
+        # The picture is where the markers are expected.
+        screenshot = cv2.imdecode(np.frombuffer(await page.screenshot(), np.uint8), cv2.IMREAD_GRAYSCALE)
+        assert screenshot is not None
+        dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+        _, numbers, _ = cv2.aruco.ArucoDetector(dictionary).detectMarkers(screenshot)
+        assert sorted(np.ravel(numbers).tolist()) == sorted(MARKERS)
+        frames = await screen.frames()
+        box = await page.evaluate("window.__engine.ids().find((id) => __engine.item(id).name === 'box')")
+        at = (await screen.item(box))["screen"]
+        assert await screen.frames() == frames
+        canvas = await page.locator(".view canvas").bounding_box()
+        assert canvas is not None
+        await page.mouse.click(canvas["x"] + at["x"], canvas["y"] + at["y"])
+        await page.get_by_role("complementary").get_by_role("heading", name="box").wait_for()
+        await screen.picture("ar selected")
+        await screen.close_panels()
+        await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
+        await screen.press("Continue")
+        await until_fitting(screen, shots, [MIDDLE], MAX_NEAR)
+        assert await screen.faults() == []
+        await screen.picture("ar phone")
+        await page.set_viewport_size(VIEWPORTS["ipad"])  # type: ignore[arg-type]
+        # Leaving stops the camera and restores the view.
+        await screen.press("Leave AR")
+        await screen.until("() => window.__tracks.every((track) => track.readyState === 'ended')")
+        after = await page.evaluate("window.__engine.view.viewpoint")
+        assert after["position"] + after["target"] == pytest.approx(before["position"] + before["target"])
+        # The focal length is stored for this camera, so the next registration is good at once.
+        await start_ar(screen)
+        await until_fitting(screen, shots, ASIDE, MAX_ASIDE)
+        assert "unchecked" not in await quality.inner_text()
+        await screen.press("Seat view")
+        await page.get_by_role("button", name="Show all").wait_for()
+        assert await page.evaluate("window.__engine.view.viewpoint") != before
+        assert await page.get_by_role("button", name=texts.SETTINGS).is_visible()
+
+
+async def test_ar_without_markers_says_what_to_do(tmp_path: Path, built_editor: Path) -> None:
+    async with (
+        open_cell(tmp_path) as server,
+        running_browser(*CAMERA) as browser,
+        screen_of(browser, server.url) as screen,
+    ):
+        await screen.join("Eva")
+        await screen.page.get_by_role("button", name="Augmented reality (AR)").click()
+        await screen.sees("No markers are configured.")
+        assert await screen.page.get_by_role("button", name="Start AR").count() == 0
