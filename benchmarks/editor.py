@@ -24,6 +24,7 @@ from arcor2_hw.data.events import SceneStateEnum
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.project import ActionParameter, Flow, Project
 from arcor2_server.web.editor import FILES
+from benchmarks import augmented
 from benchmarks.metrics import Metric, Report, median, percentile
 from tests.e2e.harness import Cell, running_cell, scene_state, until
 from tests.editor import texts
@@ -272,6 +273,7 @@ async def large(report: Report, browser: Browser, cell: Cell, client: Client, pr
 async def measure(report: Report, directory: Path) -> None:
     """Measure everything in this group."""
     size(report)
+    augmented.size(report)
     async with running_cell(directory) as cell, running_browser() as browser:
         client = await cell.client("colleague")
         scene, project = await cell.open(client)
@@ -286,6 +288,7 @@ async def measure(report: Report, directory: Path) -> None:
         await client.call("StartScene")
         await scene_state(client, SceneStateEnum.STARTED, 30)
         await loading(report, browser, cell)
+        await augmented.augmented(report, directory, cell.url)
         async with screen_of(browser, cell.url) as screen:
             await screen.page.add_init_script(_PROBE)
             await screen.join("Eva")

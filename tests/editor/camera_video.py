@@ -49,13 +49,19 @@ class Shot:
         return FOCAL * seen[:, :2] / seen[:, 2:] + middle, seen[:, 2]
 
 
-def markers_file() -> str:
+def marker_table() -> dict[str, Any]:
     """Return the configuration of the markers."""
-    lines = [f"marker_size: {SIZE}", "markers:"]
-    for number, (x, y, angle) in MARKERS.items():
-        turn = f"{{x: 0, y: 0, z: {np.sin(angle / 2)}, w: {np.cos(angle / 2)}}}"
-        lines.append(f"  {number}: {{pose: {{position: {{x: {x}, y: {y}, z: 0}}, orientation: {turn}}}}}")
-    return "\n".join(lines)
+    markers = [
+        {
+            "marker_id": number,
+            "pose": {
+                "position": {"x": x, "y": y, "z": 0},
+                "orientation": {"x": 0, "y": 0, "z": float(np.sin(angle / 2)), "w": float(np.cos(angle / 2))},
+            },
+        }
+        for number, (x, y, angle) in MARKERS.items()
+    ]
+    return {"marker_size": SIZE, "markers": markers}
 
 
 def write_video(file: Path, pictures: int = 40) -> list[Shot]:

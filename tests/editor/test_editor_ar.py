@@ -1,9 +1,9 @@
 """Augmented reality over the picture of a fake camera whose poses are known."""
 
 import asyncio
+import json
 import re
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from pathlib import Path
 
 import cv2
@@ -17,11 +17,9 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Box, Model3dType, ObjectModel
 from tests.editor import texts
 from tests.editor.ar_probe import overlay_errors
-from tests.editor.camera_video import CAMERA, MARKERS, MIDDLE, Shot, markers_file, write_video
+from tests.editor.camera_video import CAMERA, MARKERS, MIDDLE, Shot, marker_table, write_video
 from tests.editor.screen import VIEWPORTS, Screen, running_browser, screen_of
 from tests.server.core.serving import ServerProcess, running, talking
-
-pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 Point = tuple[float, float, float]
 ASIDE: list[Point] = [(0.69, 0.025, 0.0), (-0.31, 0.025, 0.0), (0.19, 0.525, 0.0), (0.19, 0.025, 0.3)]
@@ -39,27 +37,34 @@ RECORD_TRACKS = """{
     };
 }"""
 """Record the tracks of the camera in the page."""
+DARKEN = """() => {
+    const canvas = Object.assign(document.createElement("canvas"), { width: 1280, height: 720 });
+    const context = canvas.getContext("2d");
+    let step = 0;
+    setInterval(() => {  // only changes are sent
+        context.fillStyle = step++ % 2 ? "#000000" : "#050505";
+        context.fillRect(0, 0, canvas.width, canvas.height);
+    }, 30);
+    window.__camera = __ar.video.srcObject;
+    __ar.video.srcObject = canvas.captureStream(30);
+    __ar.video.play();
+}"""
+"""Replace the pictures of the camera by dark ones."""
 
 
-@asynccontextmanager
-async def open_cell(directory: Path, *arguments: str) -> AsyncIterator[ServerProcess]:
-    """A server with an open scene: a box between the markers."""
+@pytest_asyncio.fixture(scope="module", loop_scope="session")
+async def server(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -> AsyncIterator[ServerProcess]:
+    """A server with two markers and an open scene: a box between the markers."""
+    directory = tmp_path_factory.mktemp("ar")
+    (directory / "markers.yaml").write_text(json.dumps(marker_table()))  # YAML contains JSON
     box = ObjectModel(Model3dType.BOX, box=Box("box", 0.1, 0.06, 0.04))
-    async with running(directory / "data", *arguments) as process:
+    async with running(directory / "data", "--markers", str(directory / "markers.yaml")) as process:
         async with talking(process.url, "preparer") as talker:
             await talker.granted("NewScene", {"name": "Cell"})
             at = Pose(Position(0.19, 0.14, 0.02))
             await talker.granted(
                 "AddVirtualCollisionObjectToScene", to_builtins({"name": "box", "pose": at, "model": box})
             )
-        yield process
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="session")
-async def server(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -> AsyncIterator[ServerProcess]:
-    directory = tmp_path_factory.mktemp("ar")
-    (directory / "markers.yaml").write_text(markers_file())
-    async with open_cell(directory, "--markers", str(directory / "markers.yaml")) as process:
         yield process
 
 
@@ -83,6 +88,7 @@ async def until_fitting(
     raise AssertionError(f"the overlay is {1000 * worst:.2f} mm off")
 
 
+@pytest.mark.asyncio(loop_scope="session")
 async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp_path: Path) -> None:
     shots = write_video(tmp_path / "camera.mjpeg")
     async with (
@@ -94,6 +100,13 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         await screen.join("Eva")
         await screen.until("() => window.__engine?.ids().length > 0")
         before = await page.evaluate("window.__engine.view.viewpoint")
+        # Without markers, the reason and the next step are shown.
+        await page.route("**/api/calibration/markers", lambda route: route.fulfill(body='{"markers": []}'))
+        await page.get_by_role("button", name="Augmented reality (AR)").click()
+        await screen.sees("No markers are configured.")
+        assert await page.get_by_role("button", name="Start AR").count() == 0
+        await page.get_by_role("dialog").get_by_role("button", name="Close").click()
+        await page.unroute("**/api/calibration/markers")
         await page.get_by_role("button", name="Augmented reality (AR)").click()
         await screen.sees("Pictures stay on this device.")
         assert await screen.barriers() == []
@@ -109,6 +122,12 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         await expect(page.locator(".ar-markers polygon.seen")).to_have_count(2)
         await screen.picture("ar ipad")
         await outlines.click()
+        # Without markers in sight, the reason is shown, and the view is found again.
+        await page.evaluate(DARKEN)
+        await screen.sees("It is too dark for the camera.")
+        await screen.picture("ar lost")
+        await page.evaluate("() => { __ar.video.srcObject = __camera; __ar.video.play(); }")
+        await until_fitting(screen, shots, ASIDE, MAX_ASIDE)
         # A frozen picture is not drawn again, and the editor works over it.
         await screen.press("Freeze")
         await screen.sees("Frozen")
@@ -152,13 +171,12 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         assert await page.get_by_role("button", name=texts.SETTINGS).is_visible()
 
 
-async def test_ar_without_markers_says_what_to_do(tmp_path: Path, built_editor: Path) -> None:
-    async with (
-        open_cell(tmp_path) as server,
-        running_browser(*CAMERA) as browser,
-        screen_of(browser, server.url) as screen,
-    ):
-        await screen.join("Eva")
-        await screen.page.get_by_role("button", name="Augmented reality (AR)").click()
-        await screen.sees("No markers are configured.")
-        assert await screen.page.get_by_role("button", name="Start AR").count() == 0
+def test_codes_of_markers_are_those_of_opencv() -> None:
+    source = (Path(__file__).parents[2] / "editor" / "src" / "ar" / "codes.ts").read_text()
+    written = "".join(re.findall(r'^  "([0-9a-f]{100})"', source, re.MULTILINE))
+    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_250)
+    for number in range(250):
+        cells = cv2.aruco.generateImageMarker(dictionary, number, 6)[1:5, 1:5] > 128
+        assert int(written[4 * number : 4 * number + 4], 16) == int(
+            "".join(str(int(cell)) for cell in cells.ravel()), 2
+        )

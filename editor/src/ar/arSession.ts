@@ -188,8 +188,13 @@ export class ArSession {
     if (this.waiting.width !== width) this.waiting.width = width;
     if (this.waiting.height !== height) this.waiting.height = height;
     this.waitingContext?.drawImage(this.video, 0, 0);
-    const bitmap = await createImageBitmap(this.waiting);
-    this.send({ bitmap }, [bitmap]);
+    try {
+      const bitmap = await createImageBitmap(this.waiting);
+      this.send({ bitmap }, [bitmap]);
+    } catch {
+      this.busy = false; // the browser is short of memory
+      requestAnimationFrame(() => this.next());
+    }
   }
 
   private take({ found, ms }: FromWorker): void {

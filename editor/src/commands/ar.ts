@@ -18,6 +18,13 @@ declare module "../store/runtime" {
   }
 }
 
+declare global {
+  interface Window {
+    /** The running AR view, for tests and the browser console. */
+    __ar?: ArSession | undefined;
+  }
+}
+
 /** Request the configured markers. */
 export async function loadMarkers(): Promise<Layout> {
   return layoutOf((await (await rest("/api/calibration/markers")).json()) as MarkerTable);
@@ -48,7 +55,7 @@ export async function startAr(layout: Layout, onEnd: (obstacle: Obstacle) => voi
       onEnd("ended");
     },
   });
-  now().runtime.ar = session;
+  use(session);
   setUi({ ar: initialAr() });
   await session.start().catch(() => {
     leaveAr();
@@ -58,10 +65,14 @@ export async function startAr(layout: Layout, onEnd: (obstacle: Obstacle) => voi
 
 /** Leave AR and stop the camera. `stay`: continue in the 3D view from the same viewpoint. */
 export function leaveAr(stay = false): void {
-  const { runtime } = now();
-  runtime.ar?.stop(stay);
-  runtime.ar = undefined;
+  now().runtime.ar?.stop(stay);
+  use(undefined);
   if (now().ui.ar) setUi({ ar: null });
+}
+
+function use(session: ArSession | undefined): void {
+  now().runtime.ar = session;
+  window.__ar = session;
 }
 
 export const freezeAr = (on: boolean): void => now().runtime.ar?.freeze(on);

@@ -1,0 +1,75 @@
+"""Measure augmented reality with a fake camera that moves around two markers, for `make bench-editor`."""
+
+import asyncio
+import json
+import time
+from pathlib import Path
+from typing import Any, Final
+
+from arcor2_server.web.editor import FILES
+from benchmarks.metrics import Metric, Report, median, percentile
+from tests.editor.ar_probe import overlay_errors
+from tests.editor.camera_video import CAMERA, MIDDLE, marker_table, write_video
+from tests.editor.screen import Screen, running_browser, screen_of
+from tests.editor.test_editor_size import needed
+
+STARTS: Final = 3
+PICTURES: Final = 60
+ASIDE: Final = [(0.69, 0.025, 0.0), (-0.31, 0.025, 0.0), (0.19, 0.525, 0.0), (0.19, 0.025, 0.3)]
+"""Points half a metre from the middle of the markers, m, and one above it."""
+LENS_WITHIN: Final = 60.0
+"""Time in which the focal length must be found, s."""
+
+
+def size(report: Report) -> None:
+    """Measure the size of the files that are loaded when AR starts, compressed with gzip."""
+    manifest = json.loads((FILES / ".vite" / "manifest.json").read_text())
+    own = {"src/ui/ar/StartAr.tsx", "src/ui/ar/ArView.tsx"}
+    loaded = {name for name, chunk in manifest.items() if chunk.get("isEntry") or chunk.get("isDynamicEntry")}
+    files = needed(manifest, *own) - needed(manifest, *(loaded - own))  # without parts that others load, too
+    files |= {str(file.relative_to(FILES)) for file in (FILES / "assets").glob("worker-*.js")}
+    total = sum((FILES / f"{name}.gz").stat().st_size for name in files)
+    report.add(Metric("ar_size_kb", total / 1e3, len(files), "files of AR with the worker"))
+
+
+async def augmented(report: Report, directory: Path, url: str) -> None:
+    """Measure registration, accuracy and latency in a browser of its own; the project stays open."""
+    video = directory / "camera.mjpeg"
+    shots = write_video(video)
+    table = json.dumps(marker_table())
+    starts = []
+    async with running_browser(*CAMERA, f"--use-file-for-fake-video-capture={video}") as browser:
+        for number in range(STARTS):
+            async with screen_of(browser, url, "ipad") as screen:
+                await screen.page.route("**/api/calibration/markers", lambda route: route.fulfill(body=table))
+                await screen.join(f"AR {number}")
+                await screen.until("() => window.__engine?.ids().length > 0")
+                await screen.page.get_by_role("button", name="Augmented reality (AR)").click()
+                start = screen.page.get_by_role("button", name="Start AR")
+                await start.wait_for()
+                began = time.perf_counter()
+                await start.click()
+                await screen.until("() => window.__engine.view.measured")
+                starts.append(time.perf_counter() - began)
+                if number < STARTS - 1:
+                    continue
+                near, aside, took = [], [], []
+                async with asyncio.timeout(LENS_WITHIN):
+                    await screen.until("() => window.__ar?.shown.found.checked")
+                for _ in range(PICTURES):
+                    shown = await _next_picture(screen)
+                    near += await overlay_errors(screen, shots, [MIDDLE])
+                    aside += await overlay_errors(screen, shots, ASIDE)
+                    took.append(shown["latency"])
+    report.add(Metric("ar_registration_s", max(starts), STARTS, "worst, with an unknown lens"))
+    for name, errors in (("near", near), ("aside", aside)):
+        note = f"p95; p50 {1e3 * median(errors):.2f} mm"
+        report.add(Metric(f"ar_{name}_mm", 1e3 * percentile(errors, 95), len(errors), note))
+    report.add(Metric("ar_picture_ms", percentile(took, 95), PICTURES, f"p95; p50 {median(took):.0f} ms"))
+
+
+async def _next_picture(screen: Screen) -> dict[str, Any]:
+    count = await screen.page.evaluate("window.__ar.shown.count")
+    after = "(count) => __ar.shown.count > count && { latency: __ar.shown.latency }"
+    found: dict[str, Any] = await screen.until(after, count)
+    return found
