@@ -128,6 +128,10 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         await screen.picture("ar lost")
         await page.evaluate("() => { __ar.video.srcObject = __camera; __ar.video.play(); }")
         await until_fitting(screen, shots, ASIDE, MAX_ASIDE)
+        await page.evaluate("() => { window.__worker = __ar.worker; }")
+        await screen.press("Recalibrate")
+        await screen.until("() => __ar.worker !== __worker && __ar.shown.found.checked")
+        await until_fitting(screen, shots, ASIDE, MAX_ASIDE)
         # A frozen picture is not drawn again, and the editor works over it.
         await screen.press("Freeze")
         await screen.sees("Frozen")
@@ -165,6 +169,8 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         await start_ar(screen)
         await until_fitting(screen, shots, ASIDE, MAX_ASIDE)
         assert "unchecked" not in await quality.inner_text()
+        await page.evaluate("() => { const now = Date.now(); Date.now = () => now + 31 * 60_000; }")
+        await screen.sees("You have used AR for half an hour.")
         await screen.press("Seat view")
         await page.get_by_role("button", name="Show all").wait_for()
         assert await page.evaluate("window.__engine.view.viewpoint") != before

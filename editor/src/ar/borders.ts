@@ -9,6 +9,9 @@ export type Border = readonly number[];
 /** Fewest and most points of a border. */
 const SHORTEST = 30;
 const LONGEST = 6000;
+/** Smallest distance between the two corners that are farthest from each other, and of others from a line, pixels. */
+const SHORTEST_SIDE = 10;
+const THINNEST = 3;
 /** Smallest area, pixels². */
 const SMALLEST = 60;
 /** Part of the border that may be away from the sides, for instance where something covers an edge. */
@@ -60,33 +63,37 @@ function follow(data: Uint8Array, width: number, startX: number, startY: number,
 
 /** Return the corners of a border with four straight sides, clockwise on the screen; null for other borders. */
 export function quadOf(border: Border): Quad | null {
-  const a = farthest(border, pointOf(border, 0));
-  const c = farthest(border, a);
-  const length = Math.hypot(c[0] - a[0], c[1] - a[1]);
-  if (length < 10) return null;
-  let [low, high]: [number, number] = [0, 0];
-  let [left, right]: [Point, Point] = [a, a];
-  for (let i = 0; i < border.length; i += 2) {
-    const p: Point = [border[i] as number, border[i + 1] as number];
-    const offset = ((c[0] - a[0]) * (p[1] - a[1]) - (c[1] - a[1]) * (p[0] - a[0])) / length;
-    if (offset < low) [low, left] = [offset, p];
-    if (offset > high) [high, right] = [offset, p];
-  }
-  if (high < 3 || low > -3) return null;
-  const around: Quad = [a, left, c, right];
-  const quad: Quad = area(around) < 0 ? [a, right, c, left] : around;
-  return area(quad) >= SMALLEST && isConvex(quad) && hasStraightSides(border, quad) ? quad : null;
+  // Each of these is a corner of a convex shape. The last one is opposite of the side of the triangle that it exceeds.
+  const a = farthest(border, (p) => distance(p, pointOf(border, 0)));
+  const b = farthest(border, (p) => distance(p, a));
+  if (distance(a, b) < SHORTEST_SIDE) return null;
+  const c = farthest(border, (p) => Math.abs(outside(p, a, b)));
+  const triangle = outside(c, a, b) > 0 ? [a, c, b] : [a, b, c];
+  const sides = triangle.map((p, k): [Point, Point] => [p, triangle[(k + 1) % 3] as Point]);
+  const beyond = (p: Point) => Math.max(...sides.map(([from, to]) => outside(p, from, to)));
+  const d = farthest(border, beyond);
+  if (Math.abs(outside(c, a, b)) < THINNEST || beyond(d) < THINNEST) return null;
+  const quad = sides.flatMap(([from, to]) => (outside(d, from, to) === beyond(d) ? [from, d] : [from]));
+  const found = quad as unknown as Quad;
+  return area(found) >= SMALLEST && isConvex(found) && hasStraightSides(border, found) ? found : null;
 }
 
 const pointOf = (border: Border, i: number): Point => [border[i] as number, border[i + 1] as number];
 
-function farthest(border: Border, from: Point): Point {
-  let best = from;
-  let most = -1;
+const distance = (p: Point, q: Point) => Math.hypot(p[0] - q[0], p[1] - q[1]);
+
+/** Return the distance of a point from a line, positive on its left side on the screen: outside of a clockwise shape. */
+const outside = (p: Point, from: Point, to: Point) =>
+  ((to[1] - from[1]) * (p[0] - from[0]) - (to[0] - from[0]) * (p[1] - from[1])) / distance(from, to);
+
+/** Return the point of a border with the largest measure. */
+function farthest(border: Border, measure: (point: Point) => number): Point {
+  let best = pointOf(border, 0);
+  let most = Number.NEGATIVE_INFINITY;
   for (let i = 0; i < border.length; i += 2) {
-    const p = pointOf(border, i);
-    const distance = (p[0] - from[0]) ** 2 + (p[1] - from[1]) ** 2;
-    if (distance > most) [most, best] = [distance, p];
+    const point = pointOf(border, i);
+    const value = measure(point);
+    if (value > most) [most, best] = [value, point];
   }
   return best;
 }

@@ -1,0 +1,56 @@
+import { expect, test } from "vitest";
+import type { Ar } from "../../store/ui";
+import { adviceOf, gradeOf, qualityOf } from "./words";
+
+const GOOD: Ar = {
+  phase: "registered",
+  frozen: false,
+  markers: false,
+  grade: "good",
+  error: 0.004,
+  used: [10, 11, 12],
+  contradicting: [],
+  undecided: false,
+  checked: true,
+  seenAt: 100_000,
+  loss: "unseen",
+  corrected: 0,
+  startedAt: 0,
+};
+
+test("the quality has error, markers and age", () => {
+  expect(qualityOf(GOOD, 112_000)).toBe("±4 mm, 3 markers, 12 s ago");
+  expect(qualityOf({ ...GOOD, used: [10], error: 0.0003 }, 100_400)).toBe("±1 mm, 1 marker, now");
+  expect(qualityOf({ ...GOOD, checked: false, error: 0.0502 }, 100_000)).toBe("±50 mm, unchecked, 3 markers, now");
+});
+
+test("every grade has a word and a shape", () => {
+  const states: Partial<Ar>[] = [
+    {},
+    { grade: "fair" },
+    { grade: "rough" },
+    { phase: "lost" },
+    { phase: "looking" },
+    { frozen: true },
+  ];
+  const grades = states.map((each) => gradeOf({ ...GOOD, ...each }));
+  expect(new Set(grades.map(({ word }) => word)).size).toBe(states.length);
+  expect(new Set(grades.map(({ shape }) => shape)).size).toBe(states.length);
+});
+
+test.each([
+  [{}, ""],
+  [{ phase: "looking" }, "Point the camera at a marker."],
+  [{ phase: "lost", loss: "dark" }, "It is too dark for the camera. Switch on the light."],
+  [{ phase: "lost", loss: "blurred" }, "The picture is blurred. Move more slowly."],
+  [{ used: [10], grade: "rough", checked: false }, "Show a second marker."],
+  [{ checked: false }, "The lens is not known yet. Walk around the markers with two or more in view."],
+  [{ contradicting: [12] }, "Marker 12 is not where it should be, and is left out. Measure it again."],
+  [
+    { used: [10, 11], undecided: true },
+    "Markers 10, 11 contradict each other. Show another marker, or measure them again.",
+  ],
+  [{ corrected: 0.035 }, "The overlay was corrected by 35 mm."],
+] as [Partial<Ar>, string][])("%j: what to do", (state, advice) => {
+  expect(adviceOf({ ...GOOD, ...state })).toBe(advice);
+});

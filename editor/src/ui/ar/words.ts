@@ -1,0 +1,44 @@
+/** What AR says about its quality, and what to do. */
+
+import { plural, t } from "@lingui/core/macro";
+import { decimal } from "../../formats";
+import type { Ar } from "../../store/ui";
+
+/** Return the quality in words: expected error, number of markers, age. */
+export function qualityOf({ error, used, seenAt, checked }: Ar, present = Date.now()): string {
+  const age = Math.round((present - seenAt) / 1000);
+  const size = decimal(Math.max(1, error * 1000), 0);
+  const markers = plural(used.length, { one: "# marker", other: "# markers" });
+  const when = age < 1 ? t`now` : t`${age} s ago`;
+  return checked ? t`±${size} mm, ${markers}, ${when}` : t`±${size} mm, unchecked, ${markers}, ${when}`;
+}
+
+/** Return the grade as a word, a shape and a look. */
+export function gradeOf(ar: Ar): { word: string; shape: string; look: string } {
+  if (ar.frozen) return { word: t`Frozen`, shape: "❚❚", look: "fair" };
+  if (ar.phase === "starting" || ar.phase === "looking")
+    return { word: t`Looking for markers`, shape: "○", look: "rough" };
+  if (ar.phase === "lost" || ar.phase === "bridging") return { word: t`No marker in sight`, shape: "◇", look: "rough" };
+  if (ar.grade === "good") return { word: t`Good`, shape: "●", look: "good" };
+  if (ar.grade === "fair") return { word: t`Fair`, shape: "◐", look: "fair" };
+  return { word: t`Rough`, shape: "△", look: "rough" };
+}
+
+/** Return what the user can do for a better registration, most important first; an empty string if it is good. */
+export function adviceOf(ar: Ar): string {
+  const { phase, loss, used, contradicting, undecided, checked, corrected, grade } = ar;
+  if (phase === "lost" || phase === "looking") {
+    if (loss === "dark") return t`It is too dark for the camera. Switch on the light.`;
+    if (loss === "blurred") return t`The picture is blurred. Move more slowly.`;
+    return t`Point the camera at a marker.`;
+  }
+  if (corrected > 0) return t`The overlay was corrected by ${decimal(corrected * 1000, 0)} mm.`;
+  if (undecided)
+    return t`Markers ${used.join(", ")} contradict each other. Show another marker, or measure them again.`;
+  if (contradicting.length > 0) {
+    return t`Marker ${contradicting.join(", ")} is not where it should be, and is left out. Measure it again.`;
+  }
+  if (used.length === 1 && grade !== "good") return t`Show a second marker.`;
+  if (!checked) return t`The lens is not known yet. Walk around the markers with two or more in view.`;
+  return "";
+}
