@@ -44,7 +44,7 @@ async def augmented(report: Report, directory: Path, url: str) -> None:
                 await screen.page.route("**/api/calibration/markers", lambda route: route.fulfill(body=table))
                 await screen.join(f"AR {number}")
                 await screen.until("() => window.__engine?.ids().length > 0")
-                await screen.page.get_by_role("button", name="Augmented reality (AR)").click()
+                await screen.page.get_by_role("button", name="AR", exact=True).click()
                 start = screen.page.get_by_role("button", name="Start AR")
                 await start.wait_for()
                 began = time.perf_counter()

@@ -69,7 +69,7 @@ async def server(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -
 
 
 async def start_ar(screen: Screen) -> None:
-    await screen.page.get_by_role("button", name="Augmented reality (AR)").click()
+    await screen.page.get_by_role("button", name="AR", exact=True).click()
     await screen.press("Start AR")
 
 
@@ -102,12 +102,12 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         before = await page.evaluate("window.__engine.view.viewpoint")
         # Without markers, the reason and the next step are shown.
         await page.route("**/api/calibration/markers", lambda route: route.fulfill(body='{"markers": []}'))
-        await page.get_by_role("button", name="Augmented reality (AR)").click()
+        await page.get_by_role("button", name="AR", exact=True).click()
         await screen.sees("No markers are configured.")
         assert await page.get_by_role("button", name="Start AR").count() == 0
         await page.get_by_role("dialog").get_by_role("button", name="Close").click()
         await page.unroute("**/api/calibration/markers")
-        await page.get_by_role("button", name="Augmented reality (AR)").click()
+        await page.get_by_role("button", name="AR", exact=True).click()
         await screen.sees("Pictures stay on this device.")
         assert await screen.barriers() == []
         await screen.picture("ar start")

@@ -162,7 +162,9 @@ def _permits(authority: x509.Certificate, names: list[x509.GeneralName]) -> bool
     except x509.ExtensionNotFound:
         return True
     suffixes = [limit.value for limit in limits if isinstance(limit, x509.DNSName)]
-    networks = [limit.value for limit in limits if isinstance(limit, x509.IPAddress)]
+    networks = [
+        limit.value for limit in limits if isinstance(limit.value, ipaddress.IPv4Network | ipaddress.IPv6Network)
+    ]
     return all(
         any(name.value in network for network in networks)
         if isinstance(name, x509.IPAddress)

@@ -173,7 +173,12 @@ class Listener:
         Close the socket if it fails. Raise OSError if the client sends nothing.
         """
         readable: asyncio.Future[None] = self._loop.create_future()
-        self._loop.add_reader(accepted, lambda: readable.done() or readable.set_result(None))
+
+        def ready() -> None:
+            if not readable.done():
+                readable.set_result(None)
+
+        self._loop.add_reader(accepted, ready)
         try:
             async with asyncio.timeout(self._handshake_timeout):
                 await readable

@@ -108,7 +108,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
           <Button icon="zoom" aria-label={t`Show all`} onPress={() => engine.focus()} />
           <Cube engine={engine} onLook={look} />
           <More label={t`Views`} icon="eye" look="" choices={choices} />
-          <Button icon="camera" aria-label={t`Augmented reality (AR)`} onPress={() => setStarting(true)}>
+          <Button icon="camera" onPress={() => setStarting(true)}>
             {t`AR`}
           </Button>
         </div>
