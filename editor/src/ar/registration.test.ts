@@ -1,4 +1,4 @@
-import { expect, test } from "vitest";
+import { expect, test, vi } from "vitest";
 import { detect } from "./detector";
 import type { Vec3 } from "./geometry";
 import { KNOWN, lensOf } from "./lens";
@@ -7,6 +7,9 @@ import { fitView, type Lens, projected, type View } from "./pose";
 import { jumpBetween, register } from "./registration";
 import { type Drawing, drawn, looking, overlayError } from "./testing";
 import { type Found, Tracker } from "./tracker";
+
+// Drawing pictures takes long on a busy machine.
+vi.setConfig({ testTimeout: 60_000 });
 
 const half = Math.SQRT1_2;
 const FLAT = { x: 0, y: 0, z: 0, w: 1 };
