@@ -82,7 +82,7 @@ const pointOf = (border: Border, i: number): Point => [border[i] as number, bord
 
 const distance = (p: Point, q: Point) => Math.hypot(p[0] - q[0], p[1] - q[1]);
 
-/** Return the distance of a point from a line, positive on its left side on the screen: outside of a clockwise shape. */
+/** Return the distance of a point from a line, positive on its left side: outside of a clockwise shape. */
 const outside = (p: Point, from: Point, to: Point) =>
   ((to[1] - from[1]) * (p[0] - from[0]) - (to[0] - from[0]) * (p[1] - from[1])) / distance(from, to);
 

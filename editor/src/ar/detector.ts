@@ -25,7 +25,7 @@ const CELLS = 6;
 /** Places at which a cell is sampled. */
 const SAMPLES = [0.35, 0.5, 0.65];
 
-/** Return the markers in a picture. `codes`: the 16 bits of each marker by id; bit 15 is the upper left cell, 1 is white. */
+/** Return the markers in a picture. `codes`: 16 bits by id; bit 15 is the upper left cell, 1 is white. */
 export function detect(picture: Grey, codes: ReadonlyMap<number, number>): Sighting[] {
   const small = half(picture);
   const found = new Map<number, Sighting & { contrast: number }>();

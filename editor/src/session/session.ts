@@ -140,9 +140,17 @@ export class Session {
 
   private unreachable(): string {
     if (!this.socketRefused) return t`The server cannot be reached.`;
-    return location.protocol === "https:"
-      ? t`The server answers, but the browser refuses the live connection. Install the certificate of the server from http://${location.host}/ on this device.`
-      : t`The server answers, but the live connection fails. Check the proxy or firewall between this device and the server.`;
+    const [problem, remedy] =
+      location.protocol === "https:"
+        ? [
+            t`The server answers, but the browser refuses the live connection.`,
+            t`Install the certificate of the server from http://${location.host}/ on this device.`,
+          ]
+        : [
+            t`The server answers, but the live connection fails.`,
+            t`Check the proxy or firewall between this device and the server.`,
+          ];
+    return `${problem} ${remedy}`;
   }
 
   /** Find out why a websocket cannot be opened: a browser may accept the certificate for the page only. */

@@ -13,13 +13,20 @@ import { Button, Waiting } from "../kit/kit";
 function reasonOf(obstacle: Obstacle, dictionary: string): string {
   switch (obstacle) {
     case "insecure":
-      return t`Browsers allow the camera only on pages that they trust. Open http://${location.host}/ and install the certificate of the server, then open this page with https.`;
+      return [
+        t`Browsers allow the camera only on pages that they trust.`,
+        t`Open http://${location.host}/, install the certificate of the server, and open this page with https.`,
+      ].join(" ");
     case "browser":
       return t`This browser has no access to a camera. Update it, or use a current Safari, Chrome, Edge or Firefox.`;
     case "markers":
-      return t`No markers are configured. A technician prints markers, sticks them into the workplace and stores their poses with: arcor2-hw calibrate online markers`;
+      return [
+        t`No markers are configured.`,
+        t`A technician sticks printed markers into the workplace and stores their poses with:`,
+        "arcor2-hw calibrate online markers",
+      ].join(" ");
     case "dictionary":
-      return t`AR detects markers of the dictionaries 4x4_50, 4x4_100 and 4x4_250, and the workplace has markers of ${dictionary}. Print markers of 4x4_50.`;
+      return t`AR does not detect the markers of this workplace (${dictionary}). Print markers of 4x4_50.`;
     case "refused":
       return t`The camera was not allowed. Allow it for this page in the settings of the browser, then try again.`;
     case "missing":
@@ -69,7 +76,8 @@ export default function StartAr({ onClose }: { onClose: () => void }) {
             {t`The 3D view appears over the picture of the camera. Markers in the workplace tell where the camera is.`}
           </p>
           <p className="quiet">
-            {t`The browser asks for the camera, and on an iPad also for the motion sensor. Pictures stay on this device.`}
+            {t`The browser asks for the camera, and on an iPad also for the motion sensor.`}{" "}
+            {t`Pictures stay on this device.`}
           </p>
         </>
       )}

@@ -18,7 +18,7 @@ export function gradeOf(ar: Ar): { word: string; shape: string; look: string } {
   if (ar.frozen) return { word: t`Frozen`, shape: "❚❚", look: "fair" };
   if (ar.phase === "starting" || ar.phase === "looking")
     return { word: t`Looking for markers`, shape: "○", look: "rough" };
-  if (ar.phase === "lost" || ar.phase === "bridging") return { word: t`No marker in sight`, shape: "◇", look: "rough" };
+  if (ar.phase !== "registered") return { word: t`No marker in sight`, shape: "◇", look: "rough" };
   if (ar.grade === "good") return { word: t`Good`, shape: "●", look: "good" };
   if (ar.grade === "fair") return { word: t`Fair`, shape: "◐", look: "fair" };
   return { word: t`Rough`, shape: "△", look: "rough" };
