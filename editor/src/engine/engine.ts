@@ -1,7 +1,8 @@
 /** The 3D view: shows items, follows robots, reports taps. It does not use React, and draws only after changes. */
 
-import { type Box3, Fog, Scene, type Vector3, type WebGLRenderer } from "three";
+import { Fog, Scene, type Vector3, type WebGLRenderer } from "three";
 import type { Telemetry } from "../store/telemetry";
+import { checkAges } from "./ages";
 import { Animation } from "./animation";
 import { Batches } from "./batches";
 import { View } from "./camera";
@@ -24,7 +25,7 @@ import { type Probe, probe } from "./probe";
 import { rendererOf } from "./renderer";
 import { Resolution } from "./resolution";
 import type { LowQuality, Quality } from "./surface";
-import { boundsOf, type Context, type Thing } from "./thing";
+import type { Context, Thing } from "./thing";
 import { make } from "./things/make";
 import { type JointLimit, RobotThing } from "./things/robot";
 
@@ -44,9 +45,6 @@ export interface EngineOptions {
 const SMALL: ReadonlySet<Item["kind"]> = new Set(["point", "orientation", "action", "logic"]);
 /** Time between two frames, s. */
 const PERIODS: Record<Quality, number> = { low: 1 / 30, high: 1 / 60 };
-
-/** Time between two checks of the age of reports, ms. */
-const CHECKED = 250;
 
 export class Engine {
   readonly view: View;
@@ -77,7 +75,6 @@ export class Engine {
   private width = 1;
   private height = 1;
   private hovered = "";
-  private checkedAt = 0;
   private readonly fitting: Fitting;
   private readonly notes = new Map<string, string>();
   /** Text shown next to an item while it is moved, instead of its height. */
@@ -138,8 +135,7 @@ export class Engine {
     this.setDark(options.dark);
     this.floorGrid.number(() => this.draw()).catch(() => {});
     this.ends.push(options.telemetry.subscribe((id) => this.reported(id)));
-    const ageTimer = setInterval(() => this.checkAges(), CHECKED);
-    this.ends.push(() => clearInterval(ageTimer));
+    this.ends.push(checkAges(this.things, () => this.invalidate()));
     const watch = new ResizeObserver(() => this.resize());
     watch.observe(canvas.parentElement ?? canvas);
     this.ends.push(() => watch.disconnect());
@@ -247,11 +243,6 @@ export class Engine {
     this.fitting.focus(id === undefined ? id : [id].flat(), best);
   }
 
-  /** Return the box around an item in the world. */
-  bounds(thing: Thing): Box3 {
-    return boundsOf(thing);
-  }
-
   private loaded(id: string): void {
     this.dirty = true;
     this.place();
@@ -326,14 +317,6 @@ export class Engine {
     if (!(thing instanceof RobotThing) || !thing.moved()) return;
     this.movedRobots.add(thing);
     this.draw();
-  }
-
-  /** Mark robots whose reports are old. After a pause of the page, reports that wait are handled first. */
-  private checkAges(now = performance.now()): void {
-    const paused = now - this.checkedAt > 2 * CHECKED;
-    this.checkedAt = now;
-    if (paused) return;
-    for (const thing of this.things.values()) if (thing instanceof RobotThing && thing.checkAge()) this.invalidate();
   }
 
   private resize(): void {

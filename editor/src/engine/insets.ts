@@ -4,6 +4,7 @@ import { type Object3D, Vector2, Vector3 } from "three";
 import type { ViewName } from "./camera";
 import type { Engine } from "./engine";
 import type { Rect } from "./labels";
+import { boundsOf } from "./thing";
 
 export type Side = Exclude<ViewName, "home">;
 
@@ -40,7 +41,7 @@ export function nearestSide(position: Vector3, target: Vector3): Side {
 export function regionOf(engine: Engine, id: string): Region {
   const thing = engine.shown().things.get(id);
   if (!thing) return { middle: engine.view.target.clone(), half: 0.5 };
-  const box = engine.bounds(thing);
+  const box = boundsOf(thing);
   const size = box.getSize(new Vector3());
   return { middle: box.getCenter(new Vector3()), half: AROUND + PART * Math.max(size.x, size.y, size.z) };
 }

@@ -1,11 +1,11 @@
-/** Labels of clusters of objects: far away, objects that crowd have one label with their number; a tap zooms to them. */
+/** Labels of clusters: far away, crowded objects have one label with their number; a tap zooms to them. */
 
 import { plural, t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { Vector3 } from "three";
 import { boxOf, type Cluster, clustersOf, type Spot } from "../../engine/clusters";
 import type { Engine } from "../../engine/engine";
-import type { Thing } from "../../engine/thing";
+import { boundsOf, type Thing } from "../../engine/thing";
 import { taken } from "../aim/OffScreen";
 
 /** Names in the label for screen readers. */
@@ -15,7 +15,7 @@ const at = new Vector3();
 export function Clusters({ engine }: { engine: Engine }) {
   const [clusters, setClusters] = useState<Cluster[]>([]);
   useEffect(() => {
-    const radii = new Radii(engine);
+    const radii = new Radii();
     let shown = "";
     engine.arrange = (labels) => {
       const spots = spotsOf(engine, radii);
@@ -73,13 +73,11 @@ function spotsOf(engine: Engine, radii: Radii): Spot[] {
 class Radii {
   private readonly known = new WeakMap<Thing, { radius: number; until: number }>();
 
-  constructor(private readonly engine: Engine) {}
-
   of(thing: Thing): number {
     const time = performance.now();
     const known = this.known.get(thing);
     if (known && time < known.until) return known.radius;
-    const radius = this.engine.bounds(thing).getSize(new Vector3()).length() / 2;
+    const radius = boundsOf(thing).getSize(new Vector3()).length() / 2;
     this.known.set(thing, { radius, until: time + 2000 });
     return radius;
   }
