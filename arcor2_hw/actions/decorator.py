@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Final, TypeVar, overload
 
 from arcor2_hw.data.base import UNSET
-from arcor2_hw.data.object_type import ActionMetadata
+from arcor2_hw.data.object_type import ActionMetadata, Again
 
 DEFAULT_DEADLINE: Final = 120.0
 """Time limit of an action, s; longer than any single motion of the demo cell."""
@@ -52,6 +52,7 @@ def action(
     icon: str = "",
     renamed: Mapping[str, str] = NOTHING_RENAMED,
     verdict: bool = False,
+    again: str = Again.ASK,
 ) -> Callable[[F], F]: ...
 
 
@@ -67,6 +68,7 @@ def action(
     icon: str = "",  # noqa: ARG001
     renamed: Mapping[str, str] = NOTHING_RENAMED,
     verdict: bool = False,
+    again: str = Again.ASK,
 ) -> F | Callable[[F], F]:
     """Mark a method as an action.
 
@@ -80,10 +82,13 @@ def action(
         icon: Icon in the editor; default: that of the type.
         renamed: Present names of parameters by former names, which older projects and scripts use.
         verdict: Whether the returned boolean says that a part is good. Good and bad parts of a run are counted.
+        again: "safe" if repeating it after it has failed does no harm, so that a program may retry it: it only reads,
+            scans or measures. "never" if it must not be repeated, else "ask".
     """
+    repeated = UNSET if again == Again.ASK else Again(again)
 
     def mark(function: F) -> F:
-        function.__action__ = ActionMetadata(composite, hidden, verdict=verdict or UNSET)  # type: ignore[attr-defined]
+        function.__action__ = ActionMetadata(composite, hidden, verdict=verdict or UNSET, again=repeated)  # type: ignore[attr-defined]
         function.__deadline__ = deadline  # type: ignore[attr-defined]
         function.__quick__ = quick  # type: ignore[attr-defined]
         function.__renamed__ = renamed  # type: ignore[attr-defined]

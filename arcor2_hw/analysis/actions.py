@@ -18,12 +18,12 @@ from arcor2_hw.analysis.source import Broken, sendable
 from arcor2_hw.analysis.symbols import External, framework_name
 from arcor2_hw.analysis.units import unit_in
 from arcor2_hw.data.base import UNSET, Unset
-from arcor2_hw.data.object_type import ActionMetadata, ObjectAction, ParameterMeta
+from arcor2_hw.data.object_type import ActionMetadata, Again, ObjectAction, ParameterMeta
 from arcor2_hw.exceptions import InvalidData
 
 _LITERALS: Final = {"boolean": bool, "integer": int, "double": float, "string": str}
 NUMBERS: Final = ("integer", "double")
-_METADATA: Final = ("composite", "hidden", "verdict")
+_METADATA: Final = ("composite", "hidden", "verdict", "again")
 _NOT_ORDINARY: Final = ("builtins.staticmethod", "builtins.classmethod", "builtins.property")
 
 
@@ -53,8 +53,13 @@ class ActionReader:
     def _metadata(self, owner: ClassInfo, call: ast.Call) -> ActionMetadata:
         given: dict[str, Any] = dict(zip(("composite", "hidden"), call.args, strict=False))
         given |= {keyword.arg: keyword.value for keyword in call.keywords if keyword.arg in _METADATA}
-        values = {name: bool(constant(value, owner.module, owner, self._resolver)) for name, value in given.items()}
-        return ActionMetadata(**values)
+        values = {name: constant(value, owner.module, owner, self._resolver) for name, value in given.items()}
+        again = values.pop("again", Again.ASK)
+        if again not in list(Again):
+            known = ", ".join(Again)
+            raise owner.problem("again must be one of {known}, not {value!r}", call, known=known, value=again)
+        flags: dict[str, bool] = {name: bool(value) for name, value in values.items()}
+        return ActionMetadata(**flags, again=UNSET if again == Again.ASK else Again(again))
 
     def actions(self, info: ClassInfo, seen_from: ClassInfo) -> dict[str, ObjectAction]:
         """Return the actions that `info` itself defines, by name, with attributes as seen from `seen_from`.

@@ -63,12 +63,14 @@ from arcor2_hw.data.project import (
     BareProject,
     Flow,
     LogicItem,
+    LogicWhen,
     NamedOrientation,
     Project,
     ProjectFunction,
     ProjectLogicIf,
     ProjectParameter,
     ProjectRobotJoints,
+    Retry,
 )
 from arcor2_hw.data.robot import Joint, RobotArg, RobotMeta
 from arcor2_hw.data.rpc.calibrations import ListCalibrationsData
@@ -123,6 +125,7 @@ class Requests(ABC):
         parameters: Sequence[ActionParameter] = (),
         flows: Sequence[Flow] = (),
         error_output: str | Unset = UNSET,
+        retry: Retry | Unset = UNSET,
         dry_run: bool = False,
         timeout: float | None = None,
     ) -> None:
@@ -213,6 +216,7 @@ class Requests(ABC):
         end: str,
         condition: ProjectLogicIf | Unset = UNSET,
         error_kinds: list[str] | Unset = UNSET,
+        when: LogicWhen | Unset = UNSET,
         dry_run: bool = False,
         timeout: float | None = None,
     ) -> None:
@@ -236,7 +240,14 @@ class Requests(ABC):
         """AddOverride. Needs the role advanced user."""
 
     async def add_project_parameter(
-        self, *, name: str, type: str, value: str, dry_run: bool = False, timeout: float | None = None
+        self,
+        *,
+        name: str,
+        type: str,
+        value: str,
+        variable: bool | Unset = UNSET,
+        dry_run: bool = False,
+        timeout: float | None = None,
     ) -> None:
         """AddProjectParameter. Needs the role advanced user."""
 
@@ -1021,6 +1032,7 @@ class Requests(ABC):
         parameters: list[ActionParameter] | Unset = UNSET,
         flows: list[Flow] | Unset = UNSET,
         error_output: str | Unset = UNSET,
+        retry: Retry | Unset = UNSET,
         dry_run: bool = False,
         timeout: float | None = None,
     ) -> None:
@@ -1090,6 +1102,7 @@ class Requests(ABC):
         end: str,
         condition: ProjectLogicIf | Unset = UNSET,
         error_kinds: list[str] | Unset = UNSET,
+        when: LogicWhen | Unset = UNSET,
         dry_run: bool = False,
         timeout: float | None = None,
     ) -> None:

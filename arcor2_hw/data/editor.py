@@ -170,13 +170,22 @@ class CounterValue(Data, frozen=True):
     value: int
 
 
+class VariableValue(Data, frozen=True):
+    """The present value of a variable of the project, JSON in a string."""
+
+    id: str
+    name: str
+    value: str
+
+
 class RunStatistics(Data, frozen=True):
     """What a run has produced so far.
 
     cycles: completed passes of the program from its start to its end. last_cycle, mean_cycle: durations of the last
     cycle and of all cycles, s, without cycles during which the program was paused; omitted before the first one. good,
     bad: results of actions that judge a part (`verdict`); omitted if the program has no such action. counters: counters
-    that the program has used.
+    that the program has used. variables: all variables of the
+    project; omitted if it has none.
     """
 
     cycles: int = 0
@@ -185,6 +194,7 @@ class RunStatistics(Data, frozen=True):
     good: int | Unset = UNSET
     bad: int | Unset = UNSET
     counters: list[CounterValue] = field(default_factory=list)
+    variables: list[VariableValue] | Unset = UNSET
 
 
 class RunStatisticsData(RunStatistics, frozen=True, kw_only=True):
@@ -235,7 +245,8 @@ class TraceEntry(TranslatableData, frozen=True):
     number: number of the action in the run from 1, in the order of their start. started: time of the start. duration:
     s, without a pause before it; omitted while it runs. parameters, results: as in ActionStateBefore and
     ActionStateAfter. error: why it failed, with `key` and `values`. thread_id: omitted in the main thread of the
-    script. call: number of the call of the function that contains the action; omitted in the program itself.
+    script. call: number of the call of the function that contains the action; omitted in the program itself. attempt:
+    number of the attempt of a retried action; omitted for the first one.
     """
 
     run: int
@@ -248,6 +259,7 @@ class TraceEntry(TranslatableData, frozen=True):
     results: list[str] | Unset = UNSET
     error: str | Unset = UNSET
     thread_id: int | Unset = UNSET
+    attempt: int | Unset = UNSET
     call: int | Unset = UNSET
 
 

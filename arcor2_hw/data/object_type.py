@@ -130,16 +130,26 @@ class ParameterMeta(Data, frozen=True):
     found_by: str | Unset = UNSET
 
 
+class Again(enum.StrEnum):
+    """Whether an action may be repeated after it has failed: always, if a person agrees, or never."""
+
+    SAFE = "safe"
+    ASK = "ask"
+    NEVER = "never"
+
+
 class ActionMetadata(Data, frozen=True):
     """How an action is executed. `composite` actions may call others; `hidden` ones are not offered to users.
 
-    verdict (not in ARCOR2): whether the returned boolean says that a part is good.
+    verdict (not in ARCOR2): whether the returned boolean says that a part is good. again (not in ARCOR2): whether the
+    action may be repeated after it has failed; ask if it is omitted.
     """
 
     composite: bool = False
     hidden: bool = False
     cancellable: bool = False
     verdict: bool | Unset = UNSET
+    again: Again | Unset = UNSET
 
 
 class Disableable(TranslatableData, frozen=True, kw_only=True):

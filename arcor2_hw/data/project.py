@@ -23,6 +23,12 @@ CALL: Final = "call"
 """The action of a function in the type of an action that calls it: `<function id>/call`."""
 
 
+MAX_RETRIES: Final = 100
+"""Maximum number of repetitions of an action."""
+MAX_RETRY_PAUSE: Final = 3600.0
+"""Maximum pause before a repetition, s."""
+
+
 class FlowTypes(enum.StrEnum):
     """Kinds of flow that leave an action."""
 
@@ -64,15 +70,24 @@ class BareAction(Data, frozen=True):
     id: str = ""
 
 
+class Retry(Data, frozen=True):
+    """How often an action is repeated at most after it has failed, and the pause before each repetition, s."""
+
+    count: int
+    pause: float = 0.0
+
+
 class Action(BareAction, frozen=True):
     """An action on an action point, or of a function.
 
-    `error_output` names the error for the actions after an error exit; without it, the error is not stored.
+    `error_output` names the error for the actions after an error exit; without it, the error is not stored. `retry`
+    repeats an action that is safe to repeat.
     """
 
     parameters: list[ActionParameter] = field(default_factory=list)
     flows: list[Flow] = field(default_factory=list)
     error_output: str | Unset = UNSET
+    retry: Retry | Unset = UNSET
 
     def parse_type(self) -> tuple[str, str]:
         """Return the object id and the name of the method. Raises ValueError when `type` is not of that form."""
@@ -140,6 +155,48 @@ class ProjectLogicIf(Data, frozen=True):
         return parse_link(self.what)
 
 
+class Operator(enum.StrEnum):
+    """Operators of comparisons. A range is an interval: `[` and `]` include the limit, `(` and `)` do not."""
+
+    EQUAL = "=="
+    DIFFERENT = "!="
+    LESS = "<"
+    LESS_EQUAL = "<="
+    GREATER = ">"
+    GREATER_EQUAL = ">="
+    CLOSED = "[]"
+    RIGHT_OPEN = "[)"
+    LEFT_OPEN = "(]"
+    OPEN = "()"
+
+
+class Match(enum.StrEnum):
+    """Whether all comparisons have to be true, or any of them."""
+
+    ALL = "all"
+    ANY = "any"
+
+
+class LogicComparison(Data, frozen=True):
+    """A comparison of a value with a constant.
+
+    `what` is `<action id>/default/<output index>`, or the id of a project parameter. `value`, and `upper` of a range,
+    are JSON in a string.
+    """
+
+    what: str
+    operator: Operator
+    value: str
+    upper: str | Unset = UNSET
+
+
+class LogicWhen(Data, frozen=True):
+    """A condition of one or several comparisons."""
+
+    comparisons: list[LogicComparison]
+    match: Match = Match.ALL
+
+
 def parse_link(link: str) -> tuple[str, str, int]:
     """Split `<action id>/<flow>/<output index>`. Raises ValueError when the text is not of that form."""
     parts = link.split("/")
@@ -151,7 +208,8 @@ def parse_link(link: str) -> tuple[str, str, int]:
 class LogicItem(Data, frozen=True):
     """A step from one action to the next, taken when its condition holds.
 
-    With `error_kinds` it is an error exit: it is taken when the action fails with an error of one of these kinds.
+    `when` is a condition that compares several values; next to it, there is no `condition`. With `error_kinds` it is an
+    error exit: it is taken when the action fails with an error of one of these kinds.
     """
 
     start: str
@@ -159,6 +217,24 @@ class LogicItem(Data, frozen=True):
     condition: ProjectLogicIf | Unset = UNSET
     id: str = ""
     error_kinds: list[str] | Unset = UNSET
+    when: LogicWhen | Unset = UNSET
+
+    @property
+    def has_condition(self) -> bool:
+        """Whether the step depends on a condition."""
+        return not isinstance(self.condition, Unset) or self.has_comparisons
+
+    @property
+    def has_comparisons(self) -> bool:
+        """Whether the step depends on comparisons. Without any, it has no condition."""
+        return not isinstance(self.when, Unset) and bool(self.when.comparisons)
+
+    def used(self) -> set[str]:
+        """Return the ids of the actions and project parameters whose values the condition compares."""
+        links = [] if isinstance(self.condition, Unset) else [self.condition.what]
+        if not isinstance(self.when, Unset):
+            links += [one.what for one in self.when.comparisons]
+        return {link.partition("/")[0] for link in links}
 
     @property
     def is_error_exit(self) -> bool:
@@ -167,12 +243,16 @@ class LogicItem(Data, frozen=True):
 
 
 class ProjectParameter(Parameter, frozen=True):
-    """A constant of the project."""
+    """A constant of the project, or a variable, whose value at the start of a run it is.
+
+    Actions store results in a variable by giving the result its name.
+    """
 
     range: Range | Unset = UNSET
     display_name: str | Unset = UNSET
     description: str | Unset = UNSET
     id: str = ""
+    variable: bool | Unset = UNSET
 
 
 class FunctionReturns(Data, frozen=True):

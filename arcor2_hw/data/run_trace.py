@@ -15,7 +15,7 @@ class Span(Data, frozen=True):
     the first action of the run, s. duration: s. branch: value of the condition after which the action followed the one
     before it, as JSON; omitted without a condition. error: why the action failed. thread_id: omitted in the main thread
     of the script. call: number of the call of the function that contains the action; omitted in the program itself. The
-    span of a call has no device.
+    span of a call has no device. attempt: number of the attempt of a retried action; omitted for the first one.
     """
 
     number: int
@@ -28,6 +28,7 @@ class Span(Data, frozen=True):
     error: str | Unset = UNSET
     thread_id: int | Unset = UNSET
     call: int | Unset = UNSET
+    attempt: int | Unset = UNSET
 
 
 class TracedDevice(Data, frozen=True):

@@ -49,11 +49,11 @@ class Camera(CollisionObject):
         self.color_camera_params: CameraParameters | None = None
 
     @abc.abstractmethod
-    @action
+    @action(again="safe")
     def color_image(self, *, an: str | None = None) -> "Image.Image":
         """Capture a colour image."""
 
-    @action
+    @action(again="safe")
     def depth_image(self, averaged_frames: int = 1, *, an: str | None = None) -> "Image.Image":
         """Capture a depth image: 16 bit, mm, 0 = invalid, in the view of the colour camera.
 

@@ -109,7 +109,7 @@ class PointActions(abc.ABC):
         return self.edge_listeners.add(name, listener)
 
     # -------------------------------------------------------------------------------- actions
-    @action
+    @action(again="safe")
     def read_digital(self, name: str, *, an: str | None = None) -> bool:
         """Read a digital input or output.
 
@@ -118,7 +118,7 @@ class PointActions(abc.ABC):
         self.require_point(name, PointKind.DIGITAL)
         return bool(self._good_value(name))
 
-    @action
+    @action(again="safe")
     def read_analog(self, name: str, *, an: str | None = None) -> float:
         """Read an analogue input or output, in its unit.
 
@@ -163,7 +163,7 @@ class PointActions(abc.ABC):
         self.require_point(name, PointKind.ANALOG)
         self.write(name, value)
 
-    @action(deadline=LONGEST_WAIT + MARGIN)
+    @action(deadline=LONGEST_WAIT + MARGIN, again="safe")
     def wait_for(self, name: str, value: bool, timeout: float, *, an: str | None = None) -> None:
         """Wait until a digital point has the value.
 

@@ -292,10 +292,13 @@ class Host:
         call: int = 0,
         frames: Sequence[Frame] = (),
         branch: str = MAIN_BRANCH,
+        attempt: int = 1,
     ) -> None:
         """Send an encoded event of the program. Wait up to EVENT_WAIT for a server that does not keep up."""
         self.link.wait_for_room(EVENT_WAIT)
-        self.link.post(m.ProgramEvent(name, encoded, number, action, time, device, waited, call, list(frames), branch))
+        self.link.post(
+            m.ProgramEvent(name, encoded, number, action, time, device, waited, call, list(frames), branch, attempt)
+        )
 
     def changed(self, state: str) -> None:
         """Report that the program is running or paused."""

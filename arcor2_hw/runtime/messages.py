@@ -304,6 +304,7 @@ class ProgramEvent(ToServer, frozen=True):
     (ActionStateBefore). waited: time between ActionStateBefore and the start of the action, s, for which the program
     was paused (ActionStateAfter). call: number of the call of the function that contains the action, 0 for the program
     itself. frames: the position of the program (ActionStateBefore). branch: the branch, or thread, of the script.
+    attempt: number of the attempt of an action that is retried, from 1 (ActionStateBefore).
     """
 
     event: str
@@ -316,6 +317,7 @@ class ProgramEvent(ToServer, frozen=True):
     call: int = 0
     frames: list[Frame] = []
     branch: str = MAIN_BRANCH
+    attempt: int = 1
 
 
 class ActionFailed(ToServer, frozen=True):

@@ -113,6 +113,12 @@ class Gate:
             self._running -= 1
             self._wait()
 
+    def sleep(self, seconds: float) -> None:
+        """Wait for a time between two actions. Raises ProgramStopped as soon as the program is stopped."""
+        with self._changed:
+            if self._changed.wait_for(lambda: self._stopped, seconds):
+                raise ProgramStopped
+
     def _wait(self) -> None:
         while self._mode is _Mode.PAUSE and not self._stopped:
             self._report_paused()

@@ -1,5 +1,6 @@
 """A running program: reporting of its actions, pause and stop."""
 
+import contextvars
 import itertools
 import threading
 import time
@@ -43,6 +44,9 @@ ACTION_POINT_ATTRIBUTE: Final = "action_point_id"
 STANDSTILL_TIMEOUT: Final = 2.0
 """Time that a device has to come to standstill after the action before a pause, s."""
 
+ATTEMPT: Final = contextvars.ContextVar("attempt", default=1)
+"""Number of the attempt of an action that is retried, from 1."""
+
 _encode = msgspec.json.Encoder().encode
 
 
@@ -61,6 +65,7 @@ class Channel(Protocol):
         call: int = 0,
         frames: Sequence[Frame] = (),
         branch: str = MAIN_BRANCH,
+        attempt: int = 1,
     ) -> None:
         """Send an encoded event. The other arguments describe the call of an action, see ProgramEvent."""
 
@@ -252,6 +257,7 @@ class Program:
             call=action.call,
             frames=[*(call.frame for call in calls), frame],
             branch=MAIN_BRANCH if thread is None else f"thread {thread}",
+            attempt=ATTEMPT.get(),
         )
         announced = time.monotonic()
         # The action that uses a pose pauses at its action point, not the call that passes it on.
@@ -297,6 +303,17 @@ class Program:
         duration = time.monotonic() - action.began
         self.channel.action_over(action.number, duration, message_of(error), action.waited)
         self.gate.after()
+
+    def pause_before_retry(self, seconds: float) -> None:
+        """Wait before an action is repeated. Raises ProgramStopped if the program is stopped."""
+        main = self.in_main_thread
+        if main:
+            self.inside = True
+        try:
+            self.gate.sleep(seconds)
+        finally:
+            if main:
+                self.inside = False
 
     def record_error_source(self, device: Device, error: BaseException) -> None:
         """Record the device that raised an error, so that the report of the error names it."""

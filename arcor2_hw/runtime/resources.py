@@ -2,7 +2,7 @@
 
 import types
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from arcor2_hw.data.cell import overlay
 from arcor2_hw.data.events import PackageInfoData
@@ -10,13 +10,17 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.project import ActionPoint, Project, ProjectRobotJoints
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, ProgramFinished, ProgramStopped
+from arcor2_hw.objects import Generic
 from arcor2_hw.runtime.cell import SceneFault, recipes
 from arcor2_hw.runtime.creation import find_type, prepare_for_sources
 from arcor2_hw.runtime.functions import F, function_of
 from arcor2_hw.runtime.package import PackageData, WorldPoints, package_name, put_on_path
 from arcor2_hw.runtime.program import ActionError, Program, current
 from arcor2_hw.runtime.proxy import proxy
+from arcor2_hw.runtime.retrying import Retrying
 from arcor2_hw.runtime.standalone import Standalone
+
+T = TypeVar("T", bound=Generic)
 
 # A script that is run by hand imports this module first, then its object types, and only then calls something here.
 prepare_for_sources()
@@ -85,6 +89,19 @@ class Resources:
     def caught(self, error: Arcor2Error) -> ActionError:
         """Return device, kind and text of the error of an action. Raises errors that always end the program."""
         return self._program.caught(error)
+
+    def retry(self, device: T, count: int, *, pause: float = 0.0) -> T:
+        """Return a device whose actions are repeated after they have failed: `res.retry(reader, 3).scan(an="scan")`.
+
+        Args:
+            device: the device.
+            count: maximum number of repetitions.
+            pause: time before each repetition, s.
+
+        Raises:
+            InvalidData: an action is used that its driver does not declare safe to repeat.
+        """
+        return cast("T", Retrying(device, self._program, count, pause))
 
     def function(self, body: F) -> F:
         """Let calls of a function of the script be announced, stepped into and traced: the decorator of functions."""

@@ -48,7 +48,7 @@ class Oven(Generic):
         """
         assert 0.0 <= power <= 900.0
 
-    @action(verdict=True)
+    @action(verdict=True, again="safe")
     def done(self, *, an: str | None = None) -> bool:
         """Return whether it is done."""
 
@@ -104,6 +104,7 @@ def test_category_and_icon_come_from_the_class(library: Library) -> None:
         "close": (UNSET, UNSET),
     }
     assert {action.name for action in oven.actions if action.meta.verdict is True} == {"done"}
+    assert {action.name: action.meta.again for action in oven.actions if action.meta.again} == {"done": "safe"}
     (close,) = [action for action in oven.actions if action.name == "close"]
     assert close.disabled
     assert "'Door Open' is not a valid icon" in str(close.problem)

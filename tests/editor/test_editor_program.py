@@ -433,6 +433,59 @@ async def test_step_in_the_view_and_integer_condition_with_else(work: Work) -> N
     await work.panel.get_by_text("else").wait_for()
 
 
+async def test_a_condition_of_several_comparisons(work: Work) -> None:
+    """A range of a number, and a result of an earlier action: in the panel of the connection, without code."""
+    page = work.screen.page
+    check = await work.add("check_door", "robot/get_digital_input", "good", "closed", number=number(1))
+    count = await work.add("how_many_parts", "counter/value", "bad", "parts")
+    few = await work.add("few", "flow/wait", "good")
+    rest = await work.add("all_others", "flow/wait", "fixture")
+    for start, end in ((check, count), (count, rest), (count, few)):
+        condition = rpc.ProjectLogicIf(f"{count}/default/0", "0") if end == few else UNSET
+        await work.client.call("AddLogicItem", rpc.AddLogicItemArgs(start, end, condition))
+    step = (await work.told("LogicItemChanged", lambda event: event.data.end == few)).data
+    await work.select("how_many_parts")
+    await work.panel.get_by_role("button", name="few").first.click()
+
+    async def changed() -> Any:
+        event = await work.told("LogicItemChanged", lambda event: event.change_type is ChangeType.UPDATE)
+        assert event.data.id == step.id
+        return event.data
+
+    await work.panel.get_by_label("Comparison", exact=True).select_option(label="from … to below …")
+    assert (await changed()).when.comparisons[0].upper == "1"
+    for label, text in (("To", "7"), ("From", "3")):
+        field = work.panel.get_by_label(label, exact=True)
+        await field.fill(text)
+        await field.press("Enter")
+        await changed()
+    await work.tap_button("Add a comparison", work.panel)
+    await changed()
+    second = work.panel.get_by_role("group", name="Comparison 2")
+    await second.get_by_label("Comparison 2", exact=True).select_option(label="closed of check_door")
+    when = (await changed()).when
+    assert [(one.what, one.operator, one.value, one.upper) for one in when.comparisons] == [
+        (f"{count}/default/0", "[)", "3", "7"),
+        (f"{check}/default/0", "==", "true", UNSET),
+    ]
+    # An empty range is refused at the field.
+    field = work.panel.get_by_label("To", exact=True)
+    await field.fill("3")
+    await field.press("Enter")
+    await expect(work.panel.get_by_role("alert").first).to_have_text("the range of parts from 3 to 3 is empty.")
+    await field.press("Escape")
+    await work.screen.picture("program condition")
+    await work.panel.get_by_label("True if").select_option(label="at least one is true")
+    assert (await changed()).when.match == "any"
+    await work.select("how_many_parts")
+    await work.panel.get_by_text("3 ≤ parts < 7 or closed = yes").wait_for()
+    await work.panel.get_by_text("else").wait_for()
+    await work.screen.close_panels()
+    await work.mode("Flow")
+    await page.get_by_role("region", name=texts.GRAPH).get_by_text("3 ≤ parts < 7 or closed = yes").wait_for()
+    await work.screen.picture("program condition in the graph")
+
+
 async def test_program_fault_is_listed_and_leads_to_its_action(work: Work) -> None:
     lonely = await work.add("lonely", "flow/wait", "bad")
     await work.tool(texts.PROGRAM)

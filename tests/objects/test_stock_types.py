@@ -114,6 +114,8 @@ def test_logic() -> None:
         assert logic.integer_equals(a, b) is (a == b)
     assert [logic.within(x, 1.0, 2.0) for x in (0.9, 1.0, 2.0, 2.1)] == [False, True, True, False]
     assert [logic.integer_within(x, 1, 2) for x in (0, 1, 2, 3)] == [False, True, True, False]
+    assert (logic.integer(3), logic.number(0.5), logic.text("a"), logic.boolean(True)) == (3, 0.5, "a", True)
+    assert (logic.add_integers(3), logic.add_integers(3, -5), logic.add_numbers(0.5, 1.0)) == (4, -2, 1.5)
     assert logic.string_equals("a", "a")
     assert not logic.string_equals("a", "A")
     assert logic.string_contains("board 7", "7")

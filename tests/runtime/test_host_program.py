@@ -98,6 +98,14 @@ class Arm(Robot):
     def fail(self, kind: str, *, an: str | None = None) -> None:
         raise {"lost": ConnectionLost("cable cut"), "odd": ValueError("odd"), "full": Refused("the box is full")}[kind]
 
+    @action(again="safe")
+    def flaky(self, kind: str, failures: int, *, an: str | None = None) -> int:
+        self.tries = getattr(self, "tries", 0) + 1
+        self.note(f"try {self.tries}")
+        if self.tries <= failures:
+            self.fail(kind)
+        return self.tries
+
     @action
     def finish(self, *, an: str | None = None) -> None:
         raise ProgramFinished()
@@ -210,6 +218,47 @@ def test_an_error_exit_is_taken(run: Run) -> None:
     assert [event["action_id"] for event in run.data_of("ActionStateBefore")] == ["act_a1", "act_a2", "act_a3"]
     [raised] = run.data_of("ProjectException")
     assert (raised["type"], raised["action_id"]) == ("ConnectionLost", "act_a3")
+
+
+def test_a_safe_action_is_retried(run: Run) -> None:
+    run.start(
+        """
+        from arcor2_hw.exceptions import InvalidData, Refused
+        assert res.retry(arm, 2, pause=0.01).flaky("full", 2, an="a1") == 3
+        arm.tries = 0
+        try:
+            res.retry(arm, 1).flaky("full", 5, an="a2")
+        except Refused as error:
+            res.caught(error)
+        assert arm.tries == 2
+        try:
+            res.retry(arm, 1).fail("full", an="a3")
+        except InvalidData as error:
+            assert str(error) == "arm: fail cannot be retried, because repeating it may do harm.", error
+        arm.tries = 0
+        res.retry(arm, 5).flaky("lost", 5, an="a4")
+        """
+    )
+    run.host.expect_state("stopped")
+    assert run.host.gone() == 0
+    announced = [e for e in run.host.seen if isinstance(e, m.ProgramEvent) and e.event == "ActionStateBefore"]
+    attempts = [("a1", 1), ("a1", 2), ("a1", 3), ("a2", 1), ("a2", 2), ("a4", 1)]
+    assert [(event.name, event.attempt) for event in announced] == attempts
+    [raised] = run.data_of("ProjectException")
+    assert (raised["type"], raised["action_id"]) == ("ConnectionLost", "act_a4"), (
+        "a lost device ends the program at once"
+    )
+
+
+def test_pause_and_stop_work_between_two_attempts(run: Run) -> None:
+    run.start('res.retry(arm, 5, pause=1000).flaky("full", 5, an="a1")')
+    run.host.expect(m.ActionFailed)
+    run.host.send(m.Pause())
+    run.host.expect_state("paused")
+    run.host.send(m.StopProgram())
+    run.host.expect_state("stopped")
+    assert run.host.gone() == 0
+    assert run.notes().count("try 2") == 0
 
 
 def test_events_of_a_complete_run(run: Run) -> None:

@@ -5,7 +5,7 @@ from typing import Final
 from msgspec import field
 
 from arcor2_hw.data.base import UNSET, Data, Unset
-from arcor2_hw.data.project import ActionParameter, BareProject, Flow, Project, ProjectLogicIf
+from arcor2_hw.data.project import ActionParameter, BareProject, Flow, LogicWhen, Project, ProjectLogicIf, Retry
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc.envelope import Rpc
 from arcor2_hw.data.rpc.general import IdArgs
@@ -13,7 +13,7 @@ from arcor2_hw.messages import Message
 
 
 class AddActionArgs(Data, frozen=True):
-    """Arguments of AddAction; `error_output` names its error."""
+    """Arguments of AddAction; `error_output` names its error, `retry` repeats it after it has failed."""
 
     action_point_id: str
     name: str
@@ -21,23 +21,26 @@ class AddActionArgs(Data, frozen=True):
     parameters: list[ActionParameter] = field(default_factory=list)
     flows: list[Flow] = field(default_factory=list)
     error_output: str | Unset = UNSET
+    retry: Retry | Unset = UNSET
 
 
 class AddLogicItemArgs(Data, frozen=True):
-    """Arguments of AddLogicItem; `error_kinds` make the item an error exit."""
+    """Arguments of AddLogicItem; `error_kinds` make the item an error exit, `when` is a condition of comparisons."""
 
     start: str
     end: str
     condition: ProjectLogicIf | Unset = UNSET
     error_kinds: list[str] | Unset = UNSET
+    when: LogicWhen | Unset = UNSET
 
 
 class AddProjectParameterArgs(Data, frozen=True):
-    """Arguments of AddProjectParameter."""
+    """Arguments of AddProjectParameter; actions can change a `variable`."""
 
     name: str
     type: str
     value: str
+    variable: bool | Unset = UNSET
 
 
 class CloseProjectArgs(Data, frozen=True):
@@ -109,16 +112,21 @@ class UpdateActionArgs(Data, frozen=True):
     parameters: list[ActionParameter] | Unset = UNSET
     flows: list[Flow] | Unset = UNSET
     error_output: str | Unset = UNSET
+    retry: Retry | Unset = UNSET
 
 
 class UpdateLogicItemArgs(Data, frozen=True):
-    """Arguments of UpdateLogicItem; without `error_kinds` these stay as they are, and an empty list removes them."""
+    """Arguments of UpdateLogicItem; without `error_kinds` or `when` these stay as they are, and empty ones remove them.
+
+    A `condition` removes `when`.
+    """
 
     logic_item_id: str
     start: str
     end: str
     condition: ProjectLogicIf | Unset = UNSET
     error_kinds: list[str] | Unset = UNSET
+    when: LogicWhen | Unset = UNSET
 
 
 class UpdateProjectDescriptionArgs(Data, frozen=True):

@@ -143,3 +143,54 @@ class LogicActions(Generic):
         :param value: value to negate
         """
         return not value
+
+    # ------------------------------------------------------------------------------------ values for variables
+    @action
+    def integer(self, value: int, *, an: str | None = None) -> int:
+        """Return an integer, to store it in a variable.
+
+        :param value: the integer
+        """
+        return value
+
+    @action
+    def number(self, value: float, *, an: str | None = None) -> float:
+        """Return a number, to store it in a variable.
+
+        :param value: the number
+        """
+        return value
+
+    @action
+    def text(self, value: str, *, an: str | None = None) -> str:
+        """Return a text, to store it in a variable.
+
+        :param value: the text
+        """
+        return value
+
+    @action
+    def boolean(self, value: bool, *, an: str | None = None) -> bool:
+        """Return a boolean, to store it in a variable.
+
+        :param value: the boolean
+        """
+        return value
+
+    @action
+    def add_integers(self, value: int, by: int = 1, *, an: str | None = None) -> int:
+        """Return the sum of two integers.
+
+        :param value: first integer
+        :param by: second integer
+        """
+        return value + by
+
+    @action
+    def add_numbers(self, value: float, by: float, *, an: str | None = None) -> float:
+        """Return the sum of two numbers.
+
+        :param value: first number
+        :param by: second number
+        """
+        return value + by

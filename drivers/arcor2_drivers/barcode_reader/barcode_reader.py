@@ -163,7 +163,7 @@ class BarcodeReader(LineDevice, Reader):
         return self.ask(command.encode("ascii") + lines.CR, found, command, timeout)
 
     # -------------------------------------------------------------------------------- actions
-    @action(deadline=LONGEST_SCAN + MARGIN)
+    @action(deadline=LONGEST_SCAN + MARGIN, again="safe")
     def scan(self, timeout: float = 2.0, *, an: str | None = None) -> str:
         """Read the code in front of the reader; it is an error if there is none.
 
@@ -181,7 +181,7 @@ class BarcodeReader(LineDevice, Reader):
             )
         return code.text
 
-    @action(deadline=LONGEST_SCAN + MARGIN)
+    @action(deadline=LONGEST_SCAN + MARGIN, again="safe")
     def code_present(self, timeout: float = 1.0, *, an: str | None = None) -> bool:
         """Return whether a code is in front of the reader; last_code then returns it, once.
 

@@ -397,7 +397,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
         self._motion.fault_reset(go_on)
         self._unit.forget()
 
-    @action
+    @action(again="safe")
     def belt_position(self, *, an: str | None = None) -> float:
         """Return the position of the belt, m."""
         return self._units.metres(self.fresh().position)

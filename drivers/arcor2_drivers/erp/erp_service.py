@@ -262,7 +262,7 @@ class ErpService(Connected, Generic):
         self._check_text("reason", reason)
         self._store("/orders/close", order_id, {"order": order_id, "reason": reason}, last=True)
 
-    @action
+    @action(again="safe")
     def results_waiting(self, *, an: str | None = None) -> int:
         """Return how many results the service has not received yet."""
         return self.outbox().value.waiting

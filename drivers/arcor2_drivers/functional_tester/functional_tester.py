@@ -219,17 +219,17 @@ class FunctionalTester(Tester, Machine, CollisionObject):
             )
         return after.result == 1
 
-    @action
+    @action(again="safe")
     def supply_voltage(self, *, an: str | None = None) -> float:
         """Return the supply voltage of the last tested board, V."""
         return self._measured("supply_voltage").supply_voltage
 
-    @action
+    @action(again="safe")
     def supply_current(self, *, an: str | None = None) -> float:
         """Return the supply current of the last tested board, A."""
         return self._measured("supply_current").supply_current
 
-    @action
+    @action(again="safe")
     def contact_resistance(self, *, an: str | None = None) -> float:
         """Return the contact resistance of the last tested board, Ω."""
         return self._measured("contact_resistance").contact_resistance
@@ -245,7 +245,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
             )
         return inputs
 
-    @action
+    @action(again="safe")
     def board_present(self, *, an: str | None = None) -> bool:
         """Return whether a board is in the fixture."""
         return self.fresh().board_present

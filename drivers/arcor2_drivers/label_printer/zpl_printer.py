@@ -208,12 +208,12 @@ class ZplPrinter(LineDevice, Printer):
             self._settle()
             return counted == 1
 
-    @action
+    @action(again="safe")
     def labels_printed(self, *, an: str | None = None) -> int:
         """Return the number of labels that the printer has ever printed."""
         return self.counter()
 
-    @action
+    @action(again="safe")
     def ready(self, *, an: str | None = None) -> bool:
         """Return whether it would print a label now."""
         return self.status() == "ready" and self._unconfirmed is None

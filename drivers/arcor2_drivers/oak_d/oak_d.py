@@ -113,7 +113,7 @@ class OakD(ImageStream, Camera):
         self.stop_waiting()
 
     # -------------------------------------------------------------------------------- actions
-    @action
+    @action(again="safe")
     def color_image(self, *, an: str | None = None) -> "Image.Image":
         """Capture a colour image whose exposure starts after the action does."""
         from PIL import Image
@@ -123,7 +123,7 @@ class OakD(ImageStream, Camera):
         self._check_light(color, shot)
         return self._note(shot).put_on(Image.fromarray(color))
 
-    @action
+    @action(again="safe")
     def depth_image(self, averaged_frames: int = 1, *, an: str | None = None) -> "Image.Image":
         """Capture a depth image: 16 bit, mm, 0 = invalid, in the view of the colour camera.
 

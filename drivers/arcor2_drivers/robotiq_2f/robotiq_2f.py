@@ -352,7 +352,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
                 "{device}: release ended at {opened:.4f} m: the fingers are blocked", device=self.who, opened=opened
             )
 
-    @action
+    @action(again="safe")
     def part_held(self, *, an: str | None = None) -> bool:
         """Return whether a part is held; false after a gripped part was lost."""
         self.fresh()

@@ -179,7 +179,7 @@ class MtSicsScale(LineDevice, Scale):
         return [Observation(translatable("Net weight"), newest.value, "kg", quality)]
 
     # -------------------------------------------------------------------------------- actions
-    @action(deadline=DEADLINE)
+    @action(deadline=DEADLINE, again="safe")
     def weight(self, stable: bool = True, *, an: str | None = None) -> float:
         """Return the net weight in kg.
 
@@ -187,7 +187,7 @@ class MtSicsScale(LineDevice, Scale):
         """
         return self.weigh(stable).value
 
-    @action(deadline=DEADLINE)
+    @action(deadline=DEADLINE, again="safe")
     def weight_within(self, lowest: float, highest: float, *, an: str | None = None) -> bool:
         """Wait for a stable weight and return whether the net weight is between two limits, both included.
 

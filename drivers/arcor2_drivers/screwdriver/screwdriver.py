@@ -169,7 +169,7 @@ class OpenProtocolScrewdriver(PolledControl[State], Generic):
         self._controller.enable(False)
         return after.results_since(before)[:count]
 
-    @action(quick=True)
+    @action(quick=True, again="safe")
     def last_result(self, *, an: str | None = None) -> tuple[bool, float, float]:
         """Return whether the last tightening is OK, its torque in N m and its angle in °."""
         state = self.current()
@@ -178,7 +178,7 @@ class OpenProtocolScrewdriver(PolledControl[State], Generic):
         last = state.results[-1]
         return last.ok, last.torque, last.angle_degrees
 
-    @action(quick=True)
+    @action(quick=True, again="safe")
     def ready(self, *, an: str | None = None) -> bool:
         """Return whether no alarm blocks the controller or the tool."""
         return self.current().ready

@@ -50,7 +50,7 @@ class DigitalIO:
         assert 0 <= output <= 17
         self._switch(output, value)
 
-    @action
+    @action(again="safe")
     def get_digital_input(self, number: int, *, an: str | None = None) -> bool:
         """Read a digital input.
 
@@ -59,7 +59,7 @@ class DigitalIO:
         assert 0 <= number <= 17
         return bool(self._observer.sample().inputs >> number & 1)
 
-    @action(deadline=None)
+    @action(deadline=None, again="safe")
     def wait_for_input(self, number: int, value: bool, timeout: float = 10.0, *, an: str | None = None) -> None:
         """Wait until a digital input has a value.
 

@@ -220,18 +220,18 @@ class SuctionGripper(Connected, Suction):
             self.detach_part()
             self._switch_off(go_on)
 
-    @action
+    @action(again="safe")
     def is_part_held(self, *, an: str | None = None) -> bool:
         """Return whether a part is held now."""
         return self.part_held()
 
-    @action
+    @action(again="safe")
     def check_part(self, *, an: str | None = None) -> None:
         """Fail unless the part is held, and has been since it was gripped."""
         if self._part_lost or not self.part_held():
             raise DeviceFault("{gripper} has lost its part.", "", PART_LOST, gripper=self.name)
 
-    @action
+    @action(again="safe")
     def measure_vacuum(self, *, an: str | None = None) -> float:
         """Measure the vacuum below ambient pressure, Pa."""
         return self.vacuum().value

@@ -1,8 +1,9 @@
-/** The program: actions, parameters, connections, project parameters and overrides. */
+/** The program: actions, their parameters, and connections. */
 
 import { t } from "@lingui/core/macro";
 import { compared } from "../formats";
 import { insertion, type Slot } from "../program/chain";
+import { fieldsOf } from "../program/comparisons";
 import { cannotLead, END, freeStep, incoming, outgoing } from "../program/logic";
 import { actionNames, freeName, newOutputs } from "../program/naming";
 import { initial } from "../program/values";
@@ -10,12 +11,13 @@ import type { CallOptions } from "../protocol/client";
 import type {
   Action,
   ActionParameter,
+  LogicWhen,
   ObjectAction,
   Orientation,
-  Parameter,
   Position,
   ProjectLogicIf,
   Requests,
+  Retry,
 } from "../protocol/types";
 import { call } from "../session/connection";
 import { whyUnavailable } from "../store/permissions";
@@ -244,6 +246,10 @@ export const nameResults = (actionId: string, outputs: string[]): Promise<string
     held(actionId, () => call("UpdateAction", { action_id: actionId, flows: [{ type: "default", outputs }] })),
   );
 
+/** Set how often an action is repeated after it has failed; 0 removes the retry. Return why it was refused. */
+export const setRetry = (actionId: string, retry: Retry): Promise<string> =>
+  refusal(() => held(actionId, () => call("UpdateAction", { action_id: actionId, retry })));
+
 export const renameAction = (action_id: string, new_name: string): Promise<string> =>
   refusal(() => held(action_id, () => call("RenameAction", { action_id, new_name })));
 
@@ -343,11 +349,17 @@ export const updateStep = (
 ) => ask("UpdateLogicItem", { logic_item_id, start, end, condition }, options);
 
 /** Like `updateStep`, for a form. */
-export const setCondition = (id: string, condition: ProjectLogicIf | undefined): Promise<string> =>
+export const setCondition = (id: string, when: LogicWhen): Promise<string> =>
   refusal(() => {
-    const step = now().doc?.logic[id];
+    const { doc, types } = now();
+    const step = doc?.logic[id];
     if (!step) throw new Error(t`The connection no longer exists.`);
-    return call("UpdateLogicItem", { logic_item_id: id, start: step.start, end: step.end, condition });
+    return call("UpdateLogicItem", {
+      logic_item_id: id,
+      start: step.start,
+      end: step.end,
+      ...fieldsOf(doc, types, when),
+    });
   });
 
 export const removeStep = (logic_item_id: string) => ask("RemoveLogicItem", { logic_item_id });
@@ -370,26 +382,3 @@ export async function placePuck(id: string, position: Position | null): Promise<
   if (!(await ask("SetViewState", { scope: "shared", document, values: { [`place/${id}`]: position } })))
     showPuck(id, before);
 }
-
-// ------------------------------------------------------------------------------------------------ parameters
-
-export const addParameter = (name: string, type: string, value: string): Promise<string> =>
-  refusal(() => call("AddProjectParameter", { name, type, value }));
-export const updateParameter = (id: string, change: { name?: string; value?: string }): Promise<string> =>
-  refusal(() => held(id, () => call("UpdateProjectParameter", { id, ...change })));
-export const removeParameter = (id: string) => ask("RemoveProjectParameter", { id });
-
-/** Override a device setting in the project; `value` undefined removes the override. */
-export const override = (
-  objectId: string,
-  setting: Omit<Parameter, "value">,
-  value: string | undefined,
-): Promise<string> =>
-  refusal(() =>
-    held(objectId, async () => {
-      const known = now().doc?.overrides[objectId]?.[setting.name];
-      if (value === undefined) {
-        if (known) await call("DeleteOverride", { id: objectId, override: known });
-      } else await call(known ? "UpdateOverride" : "AddOverride", { id: objectId, override: { ...setting, value } });
-    }),
-  );

@@ -2,7 +2,18 @@
 
 import type { ObjectAction, ProjectLogicIf } from "../protocol/types";
 import type { OpenDocument, State } from "../store/state";
-import { conditionsOf, END, errorExits, isErrorExit, linkTo, nextSteps, placeOf, START } from "./logic";
+import {
+  conditionsOf,
+  END,
+  errorExits,
+  hasComparisons,
+  isConditional,
+  isErrorExit,
+  linkTo,
+  nextSteps,
+  placeOf,
+  START,
+} from "./logic";
 
 const IN_SPACE: ReadonlySet<string> = new Set(["pose", "position", "joints", "relative_pose"]);
 
@@ -27,15 +38,16 @@ function slotsAfter(doc: OpenDocument, types: State["types"], after: string): Sl
 
 function regular(doc: OpenDocument, types: State["types"], after: string): Slot[] {
   const steps = nextSteps(doc, after);
-  const plain = steps.find((each) => !each.condition);
+  const plain = steps.find((each) => !isConditional(each));
   const taken = steps.flatMap(({ condition }): Slot[] => (condition ? [{ after, condition }] : []));
   const own = conditionsOf(doc, types, after).find((each) => each.action.id === after && each.type === "boolean");
-  const free = own
-    ? ["false", "true"]
-        .filter((value) => !taken.some((each) => each.condition?.value === value))
-        .map((value) => ({ after, condition: { what: linkTo(own), value } }))
-    : [];
-  if (!plain) return steps.length === 0 ? [{ after }, ...free] : [...free, ...taken];
+  const free =
+    own && !steps.some(hasComparisons)
+      ? ["false", "true"]
+          .filter((value) => !taken.some((each) => each.condition?.value === value))
+          .map((value) => ({ after, condition: { what: linkTo(own), value } }))
+      : [];
+  if (!plain) return steps.length === 0 || steps.some(hasComparisons) ? [{ after }, ...free] : [...free, ...taken];
   // What already follows becomes the other branch; an action before End is usually continued instead.
   return placeOf(plain.end) === END ? [{ after }, ...free] : [...free, { after }];
 }
@@ -78,10 +90,11 @@ export function insertion(doc: OpenDocument, { after, condition, exit }: Slot): 
   if (exit !== undefined) return { redirect: exit, to: doc.logic[exit]?.end ?? END };
   const steps = nextSteps(doc, after);
   const same = steps.find(
-    (each) => each.condition?.what === condition?.what && each.condition?.value === condition?.value,
+    (each) =>
+      !hasComparisons(each) && each.condition?.what === condition?.what && each.condition?.value === condition?.value,
   );
   if (same) return { redirect: same.id, to: same.end };
-  const plain = steps.find((each) => !each.condition);
+  const plain = steps.find((each) => !isConditional(each));
   if (!condition || !plain) return { to: END };
   return {
     branch: { id: plain.id, condition: { what: condition.what, value: condition.value === "true" ? "false" : "true" } },

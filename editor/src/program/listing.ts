@@ -2,7 +2,7 @@
 
 import type { LogicItem } from "../protocol/types";
 import type { OpenDocument } from "../store/state";
-import { END, incoming, isErrorExit, nextSteps, outgoing, placeOf, START } from "./steps";
+import { END, incoming, isConditional, isErrorExit, nextSteps, outgoing, placeOf, START } from "./steps";
 
 /**
  * A row: an action; the head of a branch; or where a branch continues, if that is not the next row of a lower depth.
@@ -49,7 +49,7 @@ export function listingOf(doc: OpenDocument): Row[] {
       incoming(doc, placeOf(item.end)).length === 1 && parents.get(placeOf(item.end)) === id;
     const joins = (children.get(id) ?? []).filter((each) => incoming(doc, each).length > 1);
     const first = joins[0] ?? next;
-    const only = steps.length === 1 && !steps[0]?.condition ? steps[0] : undefined;
+    const only = steps.length === 1 && steps[0] && !isConditional(steps[0]) ? steps[0] : undefined;
     for (const item of exits) {
       later.push({ kind: "branch", item, depth: depth + 1 });
       follow(item, id, depth + 2, only ? placeOf(only.end) : null, true);

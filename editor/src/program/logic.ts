@@ -1,14 +1,37 @@
 /** What can follow an action of a program: results, conditions and free branches. */
 
-import { t } from "@lingui/core/macro";
-import type { Action, LogicItem, ObjectAction, ProjectLogicIf } from "../protocol/types";
+import { plural, t } from "@lingui/core/macro";
+import { decimal } from "../formats";
+import type {
+  Action,
+  LogicComparison,
+  LogicItem,
+  LogicWhen,
+  ObjectAction,
+  Operator,
+  ProjectLogicIf,
+  ProjectParameter,
+} from "../protocol/types";
 import type { Of, OpenDocument, State } from "../store/state";
+import { decoded } from "./decoded";
 import { errorWords } from "./errorKinds";
-import { END, errorExits, incoming, isErrorExit, nextSteps, outgoing, placeOf, START } from "./steps";
+import {
+  END,
+  errorExits,
+  hasComparisons,
+  incoming,
+  isConditional,
+  isErrorExit,
+  nextSteps,
+  outgoing,
+  placeOf,
+  START,
+} from "./steps";
 
 export * from "./steps";
 
-const BRANCHABLE: ReadonlySet<string> = new Set(["boolean", "integer", "integer_enum", "string_enum"]);
+/** Types of results that a condition of all clients can test. */
+export const BRANCHABLE: ReadonlySet<string> = new Set(["boolean", "integer", "integer_enum", "string_enum"]);
 
 /** Return the description of an action by its type; undefined if unknown. */
 export function metaOf(
@@ -46,13 +69,17 @@ export interface Result {
   type: string;
 }
 
-/** Return the stored results of an action. */
+/** Return the variable with a name, in which actions store results. */
+export const variableNamed = (doc: OpenDocument, name: string): ProjectParameter | undefined =>
+  Object.values(doc.parameters).find((each) => each.variable && each.name === name);
+
+/** Return the results of an action that are stored under their own names, not in variables. */
 export function resultsOf(doc: OpenDocument, types: State["types"], action: Of<Action>): Result[] {
   const returns = metaOf(types, doc, action)?.returns ?? [];
   const outputs = action.flows.find((flow) => flow.type === "default")?.outputs ?? [];
   return returns.flatMap((type, index) => {
     const name = outputs[index];
-    return name === undefined ? [] : [{ action, index, name, type }];
+    return name === undefined || variableNamed(doc, name) ? [] : [{ action, index, name, type }];
   });
 }
 
@@ -86,15 +113,82 @@ export function resultAt(doc: OpenDocument, types: State["types"], link: string)
   return action && resultsOf(doc, types, action).find((each) => each.index === Number(index));
 }
 
-/** Return the results that a connection from an action can depend on: its own first, then earlier ones. */
-export function conditionsOf(doc: OpenDocument, types: State["types"], id: string): Result[] {
+/** Return the actions whose results a connection from an action can depend on: itself first, then earlier ones. */
+export function conditionActions(doc: OpenDocument, id: string): Of<Action>[] {
   const own = doc.actions[id];
   if (!own) return [];
   const earlier = before(doc, id);
-  const others = Object.values(doc.actions).filter((each) => earlier.has(each.id) && !canHaveFailed(doc, each.id, id));
-  return [own, ...others].flatMap((each) => resultsOf(doc, types, each)).filter((each) => BRANCHABLE.has(each.type));
+  const others = Object.values(doc.actions).filter(
+    (each) => each.id !== id && earlier.has(each.id) && !canHaveFailed(doc, each.id, id),
+  );
+  return [own, ...others];
 }
 
+/** Return the results that a condition of all clients can test, for a connection from an action. */
+export function conditionsOf(doc: OpenDocument, types: State["types"], id: string): Result[] {
+  return conditionActions(doc, id)
+    .flatMap((each) => resultsOf(doc, types, each))
+    .filter((each) => BRANCHABLE.has(each.type));
+}
+
+// ------------------------------------------------------------------------------------------------ comparisons
+/** A value that a condition can compare: a result or a variable of the project. */
+export interface Operand {
+  what: string;
+  name: string;
+  type: string;
+  /** Id of the action whose result it is; empty for a variable. */
+  actionId: string;
+}
+
+/** Signs of operators that are not their own text. */
+export const SIGNS: Partial<Record<Operator, string>> = { "==": "=", "!=": "≠", "<=": "≤", ">=": "≥" };
+/** Longest condition that is shown in full at a connection, characters. */
+const LONGEST = 32;
+
+/** Return the condition of a connection as comparisons; empty without one. */
+export function whenOf({ condition, when }: Pick<LogicItem, "condition" | "when">): LogicWhen {
+  if (when && when.comparisons.length > 0) return when;
+  if (!condition) return { match: "all", comparisons: [] };
+  return { match: "all", comparisons: [{ what: condition.what, operator: "==", value: condition.value }] };
+}
+
+export const isRange = (operator: Operator): boolean => "[(".includes(operator[0] ?? "-");
+
+/** Return the value that a comparison names. */
+export function operandAt(doc: OpenDocument, types: State["types"], what: string): Operand | undefined {
+  const parameter = doc.parameters[what];
+  if (parameter) return { what, name: parameter.name, type: parameter.type, actionId: "" };
+  const result = what.includes("/") ? resultAt(doc, types, what) : undefined;
+  return result && { what, name: result.name, type: result.type, actionId: result.action.id };
+}
+
+function valueWords(json: string | undefined): string {
+  const value = decoded(json);
+  if (typeof value === "boolean") return value ? t`yes` : t`no`;
+  if (typeof value === "number") return decimal(value);
+  return value === "" ? '""' : String(value);
+}
+
+/** Return a comparison as text: "3 ≤ n < 7", "passed = yes". */
+export function comparisonWords(doc: OpenDocument, types: State["types"], one: LogicComparison): string {
+  const name = operandAt(doc, types, one.what)?.name ?? t`result`;
+  if (!isRange(one.operator)) return `${name} ${SIGNS[one.operator] ?? one.operator} ${valueWords(one.value)}`;
+  const [below, above] = [one.operator[0] === "[" ? "≤" : "<", one.operator[1] === "]" ? "≤" : "<"];
+  return `${valueWords(one.value)} ${below} ${name} ${above} ${valueWords(one.upper)}`;
+}
+
+/** Return comparisons as text. Of a long text, only the first comparison and the number of the others are shown. */
+export function whenWords(doc: OpenDocument, types: State["types"], { match, comparisons }: LogicWhen): string {
+  const [first = "", ...others] = comparisons.map((each) => comparisonWords(doc, types, each));
+  const all = others.reduce((text, each) => (match === "all" ? t`${text} and ${each}` : t`${text} or ${each}`), first);
+  if (all.length <= LONGEST || others.length === 0) return all;
+  return match === "all"
+    ? plural(others.length, { one: `${first} and # more`, other: `${first} and # more` })
+    : plural(others.length, { one: `${first} or # more`, other: `${first} or # more` });
+}
+
+// ------------------------------------------------------------------------------------------------ branches
 /** What a new connection from an action has to be to go with the existing ones. */
 export interface NewStep {
   condition?: ProjectLogicIf;
@@ -106,9 +200,11 @@ export interface NewStep {
 export function freeStep(doc: OpenDocument, types: State["types"], from: string): NewStep | string {
   const siblings = nextSteps(doc, from);
   if (siblings.length === 0) return {};
+  // Next to comparisons, a connection without a condition is for all other values.
+  if (siblings.some(hasComparisons) && siblings.every(isConditional)) return {};
   if (from === START) return t`A program has one first action. Move the connection from Start instead.`;
   const asked = siblings.find((each) => each.condition)?.condition;
-  const plain = siblings.find((each) => !each.condition);
+  const plain = siblings.find((each) => !isConditional(each));
   const own = asked ? resultAt(doc, types, asked.what) : conditionsOf(doc, types, from)[0];
   const name = doc.actions[from]?.name ?? t`This action`;
   if (!own) return t`${name} already has a next step, and no result to branch on.`;
@@ -156,6 +252,7 @@ export function cannotLead(
 export function conditionWords(doc: OpenDocument, types: State["types"], item: LogicItem): string {
   const { condition } = item;
   if (isErrorExit(item)) return errorWords(item.error_kinds);
+  if (hasComparisons(item)) return whenWords(doc, types, whenOf(item));
   if (!condition) return nextSteps(doc, placeOf(item.start)).length > 1 ? t`else` : "";
   const result = resultAt(doc, types, condition.what);
   const own = result?.action.id === placeOf(item.start);

@@ -23,12 +23,14 @@ export function actionNames(doc: OpenDocument): string[] {
   return Object.values(doc.actions).map((each) => each.name);
 }
 
-/** Return the names of all stored results and errors, which have to be unique. */
+/** Return the names of all variables, and of stored results and errors, which have to be unique. */
 export function outputNames(doc: OpenDocument): string[] {
-  return Object.values(doc.actions).flatMap(({ flows, error_output }) => [
+  const variables = Object.values(doc.parameters).flatMap((each) => (each.variable ? [each.name] : []));
+  const stored = Object.values(doc.actions).flatMap(({ flows, error_output }) => [
     ...flows.flatMap((flow) => flow.outputs),
     ...(error_output ? [error_output] : []),
   ]);
+  return [...variables, ...stored];
 }
 
 /** Return names for the results of a new action. */

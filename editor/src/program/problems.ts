@@ -3,21 +3,27 @@
 import { t } from "@lingui/core/macro";
 import type { Action } from "../protocol/types";
 import type { Of, OpenDocument, State } from "../store/state";
+import { isComplete } from "./comparisons";
 import { decoded } from "./decoded";
 import { errorAt, hasFailed, linkToError, partNames } from "./errorExits";
 import {
   after,
   canHaveFailed,
   END,
+  hasComparisons,
   incoming,
+  isConditional,
   linkTo,
   metaOf,
   nextSteps,
+  operandAt,
   outgoing,
   placeOf,
   resultAt,
   resultsOf,
   START,
+  variableNamed,
+  whenOf,
 } from "./logic";
 import { reachOfAction } from "./reach";
 
@@ -61,6 +67,7 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
   if (outgoing(doc, START).length === 0) error(START, t`Start has no next step. Connect it to the first action.`);
   for (const action of Object.values(doc.actions)) {
     const steps = nextSteps(doc, action.id);
+    const { name } = action;
     if (!used.has(action.id)) {
       const loose = incoming(doc, action.id).length === 0;
       warn(
@@ -75,6 +82,11 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
       error(action.id, t`${action.name} has no next step. Connect it to an action or to End.`);
       continue;
     }
+    if (steps.some(hasComparisons)) {
+      if (steps.every(isConditional) && isComplete(doc, types, steps.map(whenOf)) === false)
+        error(action.id, t`${name}: no next step if none of the conditions is met.`);
+      continue;
+    }
     const conditions = steps.flatMap((step) => (step.condition ? [step.condition] : []));
     const otherwise = steps.length > conditions.length;
     const first = conditions[0];
@@ -83,7 +95,6 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
     const both = conditions.some((each) => each.value === "true") && conditions.some((each) => each.value === "false");
     if (!both) {
       const bool = first.value === "true" || first.value === "false";
-      const name = action.name;
       const output = result?.name ?? t`its result`;
       error(
         action.id,
@@ -96,7 +107,8 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
     }
   }
   for (const item of Object.values(doc.logic)) {
-    if (item.condition && !resultAt(doc, types, item.condition.what) && typesKnown(doc, types)) {
+    const missing = whenOf(item).comparisons.some(({ what }) => !operandAt(doc, types, what));
+    if (missing && typesKnown(doc, types)) {
       error(
         item.id,
         t`${doc.actions[placeOf(item.start)]?.name ?? ""}: a step depends on a result that no longer exists.`,
@@ -183,7 +195,10 @@ function failedProblem(doc: OpenDocument, action: Of<Action>, parameter: string,
   return t`${action.name}: ${parameter} uses a result of ${source.name}, which can have failed before it.`;
 }
 
-/** Return the names of the actions that use a project parameter, a result, or the error of an action. */
+/**
+ * Return the ids of the actions that use a project parameter, a result, or the error of an action, and of the
+ * connections that compare a project parameter.
+ */
 export function usersOf(
   doc: OpenDocument,
   types: State["types"],
@@ -204,7 +219,12 @@ export function usersOf(
       const id = String(decoded(value));
       return "parameter" in of ? type === "project_parameter" && id === of.parameter : type === "link" && links.has(id);
     });
-    if (uses) users.push(action.id);
+    const { name } = "parameter" in of ? (doc.parameters[of.parameter] ?? { name: "" }) : { name: "" };
+    const stores = variableNamed(doc, name) && action.flows.some((flow) => flow.outputs.includes(name));
+    if (uses || stores) users.push(action.id);
+  }
+  for (const item of Object.values(doc.logic)) {
+    if ("parameter" in of && whenOf(item).comparisons.some(({ what }) => what === of.parameter)) users.push(item.id);
   }
   return users;
 }

@@ -1,7 +1,7 @@
 /** Sequences of actions that can be folded. Pure functions. */
 
 import type { OpenDocument } from "../store/state";
-import { END, incoming, outgoing, placeOf } from "./logic";
+import { branchKind, incoming, outgoing, placeOf } from "./steps";
 
 /** Fewest actions of a sequence that can be folded. */
 export const LEAST_FOLDED = 3;
@@ -10,11 +10,10 @@ export const LEAST_FOLDED = 3;
 export function runsOf(doc: OpenDocument): string[][] {
   /** Return the only successor of an action, if the action is its only predecessor. */
   const onlyNext = (id: string): string | undefined => {
-    const steps = outgoing(doc, id);
-    const next = placeOf(steps[0]?.end ?? END);
-    return steps.length === 1 && !steps[0]?.condition && next in doc.actions && incoming(doc, next).length === 1
-      ? next
-      : undefined;
+    const [step, ...others] = outgoing(doc, id);
+    if (!step || others.length > 0 || branchKind(step) !== "always") return undefined;
+    const next = placeOf(step.end);
+    return next in doc.actions && incoming(doc, next).length === 1 ? next : undefined;
   };
   const found: string[][] = [];
   for (const id of Object.keys(doc.actions)) {

@@ -43,11 +43,19 @@ export const nextSteps = (doc: OpenDocument, id: string): LogicItem[] =>
 /** Return the connections that are followed when an action fails. */
 export const errorExits = (doc: OpenDocument, id: string): ErrorExit[] => outgoing(doc, id).filter(isErrorExit);
 
+/** Return whether a connection has a condition that is more than one result being equal to a value. */
+export const hasComparisons = ({ when }: Pick<LogicItem, "when">): boolean => (when?.comparisons.length ?? 0) > 0;
+
+/** Return whether a connection has a condition. */
+export const isConditional = (item: Pick<LogicItem, "condition" | "when">): boolean =>
+  item.condition !== undefined || hasComparisons(item);
+
 /** How a connection is drawn. */
 export type BranchKind = "always" | "true" | "false" | "value" | "error";
 
-export function branchKind(item: Pick<LogicItem, "condition" | "error_kinds">): BranchKind {
+export function branchKind(item: Pick<LogicItem, "condition" | "error_kinds" | "when">): BranchKind {
   if (isErrorExit(item)) return "error";
+  if (hasComparisons(item)) return "value";
   const { value } = item.condition ?? {};
   return value === undefined ? "always" : value === "true" || value === "false" ? value : "value";
 }

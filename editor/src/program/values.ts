@@ -51,6 +51,9 @@ export function withoutUnit(description: string, type: string, extra: Extra): st
 
 export type Source = "value" | "link" | "project_parameter";
 
+/** Project parameters that the server maintains for scripts. */
+export const OWN_PARAMETERS: ReadonlySet<string> = new Set(["scene_id", "project_id"]);
+
 /** Types that a project parameter may have. */
 export const SIMPLE = ["integer", "double", "boolean", "string"] as const;
 export type Simple = (typeof SIMPLE)[number];

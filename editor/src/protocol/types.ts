@@ -13,7 +13,8 @@ export interface AcknowledgeStopArgs {
 /**
  * An action on an action point, or of a function.
  *
- * `error_output` names the error for the actions after an error exit; without it, the error is not stored.
+ * `error_output` names the error for the actions after an error exit; without it, the error is not stored. `retry`
+ * repeats an action that is safe to repeat.
  */
 export interface Action {
   name: string;
@@ -22,6 +23,7 @@ export interface Action {
   parameters: ActionParameter[];
   flows: Flow[];
   error_output?: string;
+  retry?: Retry;
 }
 
 /** The source of the duration of an action. count: number of executions of which it is the median. */
@@ -39,13 +41,15 @@ export interface ActionExecutionData {
 /**
  * How an action is executed. `composite` actions may call others; `hidden` ones are not offered to users.
  *
- * verdict (not in ARCOR2): whether the returned boolean says that a part is good.
+ * verdict (not in ARCOR2): whether the returned boolean says that a part is good. again (not in ARCOR2): whether the
+ * action may be repeated after it has failed; ask if it is omitted.
  */
 export interface ActionMetadata {
   composite: boolean;
   hidden: boolean;
   cancellable: boolean;
   verdict?: boolean;
+  again?: Again;
 }
 
 /** An action of a run; `name` is empty when the project does not contain it. */
@@ -114,7 +118,7 @@ export interface ActionTimes {
   total: number;
 }
 
-/** Arguments of AddAction; `error_output` names its error. */
+/** Arguments of AddAction; `error_output` names its error, `retry` repeats it after it has failed. */
 export interface AddActionArgs {
   action_point_id: string;
   name: string;
@@ -122,6 +126,7 @@ export interface AddActionArgs {
   parameters?: ActionParameter[];
   flows?: Flow[];
   error_output?: string;
+  retry?: Retry;
 }
 
 /** Arguments of AddActionPoint. */
@@ -186,12 +191,13 @@ export interface AddFunctionResultArgs {
   link: string;
 }
 
-/** Arguments of AddLogicItem; `error_kinds` make the item an error exit. */
+/** Arguments of AddLogicItem; `error_kinds` make the item an error exit, `when` is a condition of comparisons. */
 export interface AddLogicItemArgs {
   start: string;
   end: string;
   condition?: ProjectLogicIf;
   error_kinds?: string[];
+  when?: LogicWhen;
 }
 
 /** Arguments of AddObjectToScene. */
@@ -208,11 +214,12 @@ export interface AddOverrideArgs {
   override: Parameter;
 }
 
-/** Arguments of AddProjectParameter. */
+/** Arguments of AddProjectParameter; actions can change a `variable`. */
 export interface AddProjectParameterArgs {
   name: string;
   type: string;
   value: string;
+  variable?: boolean;
 }
 
 /** Arguments of AddVirtualCollisionObjectToScene. */
@@ -221,6 +228,9 @@ export interface AddVirtualCollisionObjectToSceneArgs {
   pose: Pose;
   model: ObjectModel;
 }
+
+/** Whether an action may be repeated after it has failed: always, if a person agrees, or never. */
+export type Again = "safe" | "ask" | "never";
 
 /**
  * A condition that needs attention; `remedy` says what to do.
@@ -1039,9 +1049,23 @@ export interface LockHolder {
 export type LockType = "TREE" | "OBJECT";
 
 /**
+ * A comparison of a value with a constant.
+ *
+ * `what` is `<action id>/default/<output index>`, or the id of a project parameter. `value`, and `upper` of a range,
+ * are JSON in a string.
+ */
+export interface LogicComparison {
+  what: string;
+  operator: Operator;
+  value: string;
+  upper?: string;
+}
+
+/**
  * A step from one action to the next, taken when its condition holds.
  *
- * With `error_kinds` it is an error exit: it is taken when the action fails with an error of one of these kinds.
+ * `when` is a condition that compares several values; next to it, there is no `condition`. With `error_kinds` it is an
+ * error exit: it is taken when the action fails with an error of one of these kinds.
  */
 export interface LogicItem {
   start: string;
@@ -1049,6 +1073,13 @@ export interface LogicItem {
   condition?: ProjectLogicIf;
   id: string;
   error_kinds?: string[];
+  when?: LogicWhen;
+}
+
+/** A condition of one or several comparisons. */
+export interface LogicWhen {
+  comparisons: LogicComparison[];
+  match: Match;
 }
 
 /** Values of WhatEnum in ShowMainScreen. */
@@ -1082,6 +1113,9 @@ export interface MarkersCornersArgs {
   camera_parameters: CameraParameters;
   image: string;
 }
+
+/** Whether all comparisons have to be true, or any of them. */
+export type Match = "all" | "any";
 
 /** A mesh stored as an asset, with focus points for aiming with a robot. */
 export interface Mesh {
@@ -1366,6 +1400,9 @@ export interface OpenSceneData {
   scene: Scene;
 }
 
+/** Operators of comparisons. A range is an interval: `[` and `]` include the limit, `(` and `)` do not. */
+export type Operator = "==" | "!=" | "<" | "<=" | ">" | ">=" | "[]" | "[)" | "(]" | "()";
+
 /**
  * A unit quaternion x, y, z, w, normalized at construction.
  *
@@ -1573,7 +1610,11 @@ export interface ProjectMeta {
   modified: string;
 }
 
-/** A constant of the project. */
+/**
+ * A constant of the project, or a variable, whose value at the start of a run it is.
+ *
+ * Actions store results in a variable by giving the result its name.
+ */
 export interface ProjectParameter {
   name: string;
   type: string;
@@ -1582,6 +1623,7 @@ export interface ProjectParameter {
   display_name?: string;
   description?: string;
   id: string;
+  variable?: boolean;
 }
 
 /** Joint values of one robot, stored at an action point; rad, m where prismatic. */
@@ -1786,6 +1828,12 @@ export interface RestoreRevisionData {
   revision: number;
 }
 
+/** How often an action is repeated at most after it has failed, and the pause before each repetition, s. */
+export interface Retry {
+  count: number;
+  pause: number;
+}
+
 /** Arguments of RetryObject. */
 export interface RetryObjectArgs {
   object_id: string;
@@ -1960,7 +2008,8 @@ export interface RunPackageArgs {
  * cycles: completed passes of the program from its start to its end. last_cycle, mean_cycle: durations of the last
  * cycle and of all cycles, s, without cycles during which the program was paused; omitted before the first one. good,
  * bad: results of actions that judge a part (`verdict`); omitted if the program has no such action. counters: counters
- * that the program has used.
+ * that the program has used. variables: all variables of the
+ * project; omitted if it has none.
  */
 export interface RunStatistics {
   cycles: number;
@@ -1969,6 +2018,7 @@ export interface RunStatistics {
   good?: number;
   bad?: number;
   counters: CounterValue[];
+  variables?: VariableValue[];
 }
 
 /** Data of the event RunStatistics; `run` is the number of the run. */
@@ -1979,6 +2029,7 @@ export interface RunStatisticsData {
   good?: number;
   bad?: number;
   counters: CounterValue[];
+  variables?: VariableValue[];
   run: number;
 }
 
@@ -2092,7 +2143,7 @@ export interface ShowMainScreenData {
  * the first action of the run, s. duration: s. branch: value of the condition after which the action followed the one
  * before it, as JSON; omitted without a condition. error: why the action failed. thread_id: omitted in the main thread
  * of the script. call: number of the call of the function that contains the action; omitted in the program itself. The
- * span of a call has no device.
+ * span of a call has no device. attempt: number of the attempt of a retried action; omitted for the first one.
  */
 export interface Span {
   number: number;
@@ -2105,6 +2156,7 @@ export interface Span {
   error?: string;
   thread_id?: number;
   call?: number;
+  attempt?: number;
 }
 
 /** A sphere around its origin, m. */
@@ -2269,7 +2321,8 @@ export interface TemporaryPackageArgs {
  * number: number of the action in the run from 1, in the order of their start. started: time of the start. duration:
  * s, without a pause before it; omitted while it runs. parameters, results: as in ActionStateBefore and
  * ActionStateAfter. error: why it failed, with `key` and `values`. thread_id: omitted in the main thread of the
- * script. call: number of the call of the function that contains the action; omitted in the program itself.
+ * script. call: number of the call of the function that contains the action; omitted in the program itself. attempt:
+ * number of the attempt of a retried action; omitted for the first one.
  */
 export interface TraceEntry {
   run: number;
@@ -2282,6 +2335,7 @@ export interface TraceEntry {
   results?: string[];
   error?: string;
   thread_id?: number;
+  attempt?: number;
   call?: number;
   key?: string;
   values?: Record<string, string | Message>;
@@ -2335,6 +2389,7 @@ export interface UpdateActionArgs {
   parameters?: ActionParameter[];
   flows?: Flow[];
   error_output?: string;
+  retry?: Retry;
 }
 
 /** Arguments of UpdateActionPointJoints. */
@@ -2400,13 +2455,18 @@ export interface UpdateLockArgs {
   new_type: LockType;
 }
 
-/** Arguments of UpdateLogicItem; without `error_kinds` these stay as they are, and an empty list removes them. */
+/**
+ * Arguments of UpdateLogicItem; without `error_kinds` or `when` these stay as they are, and empty ones remove them.
+ *
+ * A `condition` removes `when`.
+ */
 export interface UpdateLogicItemArgs {
   logic_item_id: string;
   start: string;
   end: string;
   condition?: ProjectLogicIf;
   error_kinds?: string[];
+  when?: LogicWhen;
 }
 
 /** Arguments of UpdateObjectModel. */
@@ -2477,6 +2537,13 @@ export interface UserPresenceData {
   online: boolean;
   role: string;
   presence?: Presence;
+}
+
+/** The present value of a variable of the project, JSON in a string. */
+export interface VariableValue {
+  id: string;
+  name: string;
+  value: string;
 }
 
 /** Scope of a part of the view state. */

@@ -4,8 +4,9 @@ import { t } from "@lingui/core/macro";
 import type { Item, LinkItem, RobotItem } from "../engine/items";
 import { decimal } from "../formats";
 import { errorWords } from "../program/errorKinds";
+import { whenOf, whenWords } from "../program/logic";
 import { reachOfAction, worse } from "../program/reach";
-import { type BranchKind, branchKind } from "../program/steps";
+import { type BranchKind, branchKind, hasComparisons } from "../program/steps";
 import { takenExit } from "../program/taken";
 import type { LogicItem, Pose, Position, Reach } from "../protocol/types";
 import { isRunning } from "../store/selectors";
@@ -131,8 +132,9 @@ export class ItemMaker {
       const inside = from !== undefined && from === to && !moved && !open(from);
       const pale = dim(item.id);
       const taken = item.id === exit;
-      add(item.id, [item, inside, pale, taken, ...notify(item.id)], () => ({
-        ...link(item, common(item.id, "")),
+      const compared = hasComparisons(item) ? whenWords(doc, state.types, whenOf(item)) : "";
+      add(item.id, [item, inside, pale, taken, compared, ...notify(item.id)], () => ({
+        ...link(item, compared, common(item.id, "")),
         inside,
         dim: pale && !taken,
         taken,
@@ -268,14 +270,14 @@ function bestReach(state: State): Record<string, Reach> {
 
 type Own = "kind" | "from" | "to" | "inside" | "condition" | "branch" | "taken";
 
-function link(item: LogicItem, base: Omit<LinkItem, Own>): Omit<LinkItem, "inside"> {
+function link(item: LogicItem, compared: string, base: Omit<LinkItem, Own>): Omit<LinkItem, "inside"> {
   const branch = branchKind(item);
-  return { ...base, kind: "logic", from: item.start, to: item.end, condition: wordsOf(item, branch), branch };
+  return { ...base, kind: "logic", from: item.start, to: item.end, condition: wordsOf(item, compared, branch), branch };
 }
 
-function wordsOf({ condition, error_kinds = [] }: LogicItem, branch: BranchKind): string {
+function wordsOf({ condition, error_kinds = [] }: LogicItem, compared: string, branch: BranchKind): string {
   if (branch === "error") return errorWords(error_kinds);
-  return branch === "true" ? t`yes` : branch === "false" ? t`no` : condition ? plain(condition.value) : "";
+  return branch === "true" ? t`yes` : branch === "false" ? t`no` : condition ? plain(condition.value) : compared;
 }
 
 /** Return a value as text: JSON strings have quotes. */

@@ -1,7 +1,9 @@
 """Converts the logic of a project to the statements of the script's loop."""
 
 import ast
-from typing import Final
+import json
+from collections.abc import Sequence
+from typing import ClassVar, Final
 
 from arcor2_hw.actions.parameter_types import PARAMETER_TYPES, read_reference
 from arcor2_hw.data.base import Unset
@@ -10,22 +12,38 @@ from arcor2_hw.data.project import (
     CALL,
     ERROR_FLOW,
     ERROR_PARTS,
+    Action,
     ActionParameter,
     ActionParameterType,
     FlowTypes,
+    Retry,
     parse_link,
 )
 from arcor2_hw.exceptions import ERROR_KINDS, Arcor2Error, InvalidData, InvalidProject
 from arcor2_hw.messages import Message
 from arcor2_server.build import expressions
 from arcor2_server.build.error_exits import nodes_of
-from arcor2_server.build.frame import ERROR, NEXT_ACTION, REFERENCES, Frame, References
+from arcor2_server.build.frame import ERROR, NEXT_ACTION, REFERENCES, ActionCall, Frame, References
 from arcor2_server.build.layout import arrange
 from arcor2_server.build.naming import Names
-from arcor2_server.documents.logic_graph import BRANCHABLE, END_NODE, Condition, Flow
+from arcor2_server.documents.checks.actions import check_retry
+from arcor2_server.documents.comparisons import Comparisons, Reference, cases_of, comparison_problem
+from arcor2_server.documents.logic_graph import (
+    BRANCHABLE,
+    END_NODE,
+    Condition,
+    Edge,
+    Flow,
+    Test,
+    as_comparisons,
+    never_taken,
+)
 
 CAUGHT: Final = expressions.dotted("res", ("caught",))
 """The method that returns what happened, for an error exit."""
+
+RETRY: Final = expressions.dotted("res", ("retry",))
+"""The method that returns a device whose actions are repeated after they have failed."""
 
 Block = list[ast.stmt]
 Stack = list[tuple[int, Block]]
@@ -36,6 +54,9 @@ class Cycle:
 
     Actions are numbered in the order of `flow`.
     """
+
+    stores: ClassVar = True
+    """Whether actions store results in the variables of the project. Those of functions do not."""
 
     def __init__(self, frame: Frame, flow: Flow) -> None:
         self.frame, self.flow = frame, flow
@@ -66,7 +87,22 @@ class Cycle:
                 method=method,
                 other_count=len(returns),
             )
-        return [self.names.claim(output) for output in outputs]
+        return [self._variable(action, output, kind) for output, kind in zip(outputs, returns, strict=False)]
+
+    def _variable(self, action: Action, output: str, kind: str) -> str:
+        """Return the Python variable for a result: that of the project's variable with its name, or a new one."""
+        stored = self.frame.variables.get(output) if self.stores else None
+        if stored is None:
+            return self.names.claim(output)
+        if stored.type != kind:
+            raise InvalidProject(
+                "action {name!r} stores {type} in the variable {variable}, which is {stored_type}",
+                name=action.name,
+                type=kind,
+                variable=stored.name,
+                stored_type=stored.type,
+            )
+        return self.frame.parameters[stored.id]
 
     # ------------------------------------------------------------------------------------------------ blocks
     def _name(self, node: int) -> str:
@@ -150,7 +186,9 @@ class Cycle:
             self._continue_at(node, targets.pop(), block, stack, placed.follow)
             return
         follow = placed.follow if placed.last == END_NODE else placed.last
-        branches: list[tuple[Condition | None, Block, bool]] = []
+        if any(isinstance(edge.condition, Comparisons) for edge in edges):
+            self._check_complete(node, edges)
+        branches: list[tuple[Test | None, Block, bool]] = []
         for edge in edges:
             inside: Block = []
             waiting = len(stack)
@@ -163,8 +201,10 @@ class Cycle:
             return
         if len(edges) == 2 and not branches[0][2]:
             (first, _, _), (condition, inside, _) = branches
-            # An edge without a condition is followed if the condition of the other edge does not hold.
-            test = self._test(node, condition) if condition else self._test(node, first, negated=True)
+            # An edge without a condition is followed if the condition of the other edge does not hold. Comparisons may
+            # overlap, so that the first one decides.
+            simple = isinstance(first, Condition) and isinstance(condition, Condition)
+            test = self._test(node, condition) if simple else self._test(node, first, negated=True)
             block.append(ast.If(test, inside, []))
             return
         above: ast.If | None = None
@@ -192,6 +232,12 @@ class Cycle:
                 name=consumer.name,
                 producer_name=producer.name,
             )
+        if self.stores and producer.outputs()[output] in self.frame.variables:
+            raise InvalidProject(
+                "action {name!r} uses a result that {producer_name!r} stores in a variable; use the variable",
+                name=consumer.name,
+                producer_name=producer.name,
+            )
         if returns[output] != kind:
             name = producer.outputs()[output]
             raise InvalidProject(
@@ -204,8 +250,11 @@ class Cycle:
             )
         return names[output]
 
-    def _test(self, node: int, condition: Condition | None, *, negated: bool = False) -> ast.expr:
+    def _test(self, node: int, condition: Test | None, *, negated: bool = False) -> ast.expr:
         assert condition is not None, "only the last of several edges has no condition"
+        if isinstance(condition, Comparisons):
+            variables = [self._compared(node, one.what)[0] for one in condition.comparisons]
+            return expressions.compares(variables, condition, negated=negated)
         source, number = condition.action, self.nodes.actions[node]
         if not self.nodes.has_results(self.natural, source, node):
             raise self._too_early(number, source)
@@ -232,6 +281,54 @@ class Cycle:
                 value=condition.value,
             )
         return (expressions.differs if negated else expressions.equals)(variable, condition.value)
+
+    def _compared(self, node: int, what: Reference) -> tuple[str, str]:
+        """Return the variable and the type of a compared value."""
+        if what.parameter:
+            return self.frame.parameters[what.parameter], self.frame.index.parameter(what.parameter).type
+        number = self.nodes.actions[node]
+        if not self.nodes.has_results(self.natural, what.action, node):
+            raise self._too_early(number, what.action)
+        returns = self.calls[what.action].meta.returns
+        kind = returns[what.output] if what.output < len(returns) else ""
+        return self._result(number, what.action, what.output, kind), kind
+
+    def _check_complete(self, node: int, edges: Sequence[Edge]) -> None:
+        """Raise InvalidProject unless exactly one of several edges applies for any values."""
+        user = self.flow.actions[self.nodes.actions[node]]
+        kinds: dict[Reference, str] = {}
+        conditions = [as_comparisons(edge.condition) for edge in edges if edge.condition is not None]
+        for condition in conditions:
+            for one in condition.comparisons:
+                variable, kind = self._compared(node, one.what)
+                problem = comparison_problem(variable, kind, one.operator, one.value, one.upper)
+                if problem is not None:
+                    raise InvalidProject("action {name!r}: {reason}", name=user.name, reason=problem)
+                kinds[one.what] = kind
+        cases = cases_of(conditions, kinds)
+        if cases.unused:
+            raise never_taken(user, edges[cases.unused[0]], [self.flow.actions[one] for one in self.nodes.actions])
+        otherwise = edges[-1].condition is None
+        if otherwise and cases.known and cases.gap is None:
+            raise never_taken(user, edges[-1], [self.flow.actions[one] for one in self.nodes.actions])
+        if otherwise:
+            return
+        if not cases.known:
+            raise InvalidProject(
+                "action {name!r}: its conditions are too many to prove that one of them always holds; add a connection"
+                " without a condition",
+                name=user.name,
+            )
+        if cases.gap is not None:
+            values = ", ".join(
+                f"{self._compared(node, what)[0]} = {json.dumps(value, ensure_ascii=False)}"
+                for what, value in cases.gap.items()
+            )
+            raise InvalidProject(
+                "action {name!r}: no action follows it when {when}; add a connection without a condition",
+                name=user.name,
+                when=values,
+            )
 
     def _too_early(self, user: int, source: int) -> InvalidProject:
         consumer, producer = self.flow.actions[user].name, self.flow.actions[source].name
@@ -345,6 +442,16 @@ class Cycle:
             )
         return positional, keywords
 
+    def _retried(self, action: Action, retry: Retry, call: ActionCall) -> ast.expr:
+        """Return the method of an action that is repeated after it has failed, as in `res.retry(reader, 3).scan`."""
+        try:
+            check_retry(action, call.meta)
+        except InvalidData as error:
+            raise InvalidProject("action {name!r}: {reason}", name=action.name, reason=error) from error
+        pause = [ast.keyword("pause", ast.Constant(retry.pause))] if retry.pause else []
+        device = expressions.name(self.frame.objects[call.object_id])
+        return ast.Attribute(ast.Call(RETRY, [device, ast.Constant(retry.count)], pause), call.method, ast.Load())
+
     def _call(self, number: int) -> ast.stmt:
         """Return the statement that runs an action and stores its results."""
         action = self.flow.actions[number]
@@ -360,6 +467,8 @@ class Cycle:
             called: ast.expr = expressions.name(self.frame.functions[object_id])
         else:
             called = expressions.dotted(self.frame.objects[object_id], (method,))
+        if not isinstance(action.retry, Unset):
+            called = self._retried(action, action.retry, self.calls[number])
         call = ast.Call(called, positional, keywords)
         match self.results[number]:
             case []:

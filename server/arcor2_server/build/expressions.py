@@ -1,8 +1,12 @@
 """Syntax tree nodes of generated scripts. Nodes are cached and shared: never modify them."""
 
 import ast
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Final
+
+from arcor2_hw.data.project import Match, Operator
+from arcor2_server.documents.comparisons import RANGES, Comparison, Comparisons, Value, inverse
 
 _LOAD: Final = ast.Load()
 _STORE: Final = ast.Store()
@@ -24,6 +28,11 @@ def assign(name: str, value: ast.expr) -> ast.Assign:
     return ast.Assign([target(name)], value, lineno=0)
 
 
+def annotated(name: str, kind: str, value: ast.expr) -> ast.AnnAssign:
+    """Return `name: kind = value`."""
+    return ast.AnnAssign(target(name), ast.Name(kind, _LOAD), value, 1)
+
+
 @lru_cache(maxsize=4096)
 def dotted(first: str, parts: tuple[str, ...]) -> ast.expr:
     """Return `first.part.part`."""
@@ -35,6 +44,42 @@ def dotted(first: str, parts: tuple[str, ...]) -> ast.expr:
 def equals(variable: str, value: bool | int | str) -> ast.expr:
     """Return `variable == value`."""
     return ast.Compare(name(variable), [ast.Eq()], [ast.Constant(value)])
+
+
+_AST: Final[dict[Operator, type[ast.cmpop]]] = {
+    Operator.EQUAL: ast.Eq,
+    Operator.DIFFERENT: ast.NotEq,
+    Operator.LESS: ast.Lt,
+    Operator.LESS_EQUAL: ast.LtE,
+    Operator.GREATER: ast.Gt,
+    Operator.GREATER_EQUAL: ast.GtE,
+}
+
+
+def _comparison(variable: str, one: Comparison) -> ast.expr:
+    if isinstance(one.value, bool):
+        return name(variable) if one.value else ast.UnaryOp(ast.Not(), name(variable))
+    if one.operator in RANGES:
+        above, below = (_AST[operator]() for operator in RANGES[one.operator])
+        return ast.Compare(_number(one.value), [above, below], [name(variable), _number(one.upper)])
+    return ast.Compare(name(variable), [_AST[one.operator]()], [_number(one.value)])
+
+
+def _number(value: Value | None) -> ast.expr:
+    """Return a literal; one of a negative number as Python reads it."""
+    if isinstance(value, int | float) and value < 0:
+        return ast.UnaryOp(ast.USub(), ast.Constant(-value))
+    return ast.Constant(value)
+
+
+def compares(variables: Sequence[str], condition: Comparisons, *, negated: bool = False) -> ast.expr:
+    """Return a condition such as `3 <= n < 7 and passed`; `variables` are the variables of its comparisons."""
+    if negated and (other := inverse(condition)) is not None:
+        return compares(variables, other)
+    tests = [_comparison(*pair) for pair in zip(variables, condition.comparisons, strict=True)]
+    connective = ast.And() if condition.match is Match.ALL else ast.Or()
+    test = tests[0] if len(tests) == 1 else ast.BoolOp(connective, tests)
+    return ast.UnaryOp(ast.Not(), test) if negated else test
 
 
 def differs(variable: str, value: bool | int | str) -> ast.expr:

@@ -30,6 +30,8 @@ ERROR: Final = "error"
 """Variable with the caught error in an `except` block."""
 REFERENCES: Final = frozenset({"pose", "position", "joints"})
 """Parameter types whose value is an id in the project."""
+_ANNOTATIONS: Final = {"boolean": "bool", "integer": "int", "double": "float", "string": "str"}
+"""The types of variables in Python."""
 _RESERVED: Final = ("ActionPoints", "Resources", "aps", ERROR, "main", "print_exception", "res", NEXT_ACTION)
 _FRAME: Final = """
 def main(res: Resources) -> None:
@@ -94,6 +96,8 @@ class Frame:
         self.functions = {function.id: self.names.claim(function.name) for function in project.functions}
         self.function_facts: dict[str, TypeFacts] = {}
         """The functions as types with one action, as far as they are called."""
+        self.variables = {parameter.name: parameter for parameter in project.parameters if parameter.variable}
+        """The variables of the project, by name. Actions of the program store results in them."""
         self.comments: dict[ast.stmt, str] = {}
 
     def _facts(self, type_name: str) -> TypeFacts:
@@ -122,8 +126,22 @@ class Frame:
         constants: list[ast.stmt] = [
             expressions.assign(self.parameters[parameter.id], self._constant(parameter))
             for parameter in self.project.parameters
+            if not parameter.variable
         ]
-        parts = ((objects, "Objects of the scene"), (constants, "Project parameters"), (functions or [], "Functions"))
+        variables: list[ast.stmt] = [
+            expressions.annotated(self.parameters[one.id], _ANNOTATIONS[one.type], self._constant(one))
+            for one in self.variables.values()
+            if one.type in _ANNOTATIONS
+        ]
+        if len(variables) < len(self.variables):
+            one = next(one for one in self.variables.values() if one.type not in _ANNOTATIONS)
+            raise InvalidProject("the variable {name!r} cannot be of type {type!r}", name=one.name, type=one.type)
+        parts = (
+            (objects, "Objects of the scene"),
+            (constants, "Project parameters"),
+            (variables, "Variables"),
+            (functions or [], "Functions"),
+        )
         for part, title in parts:
             if part:
                 self.comments[part[0]] = title

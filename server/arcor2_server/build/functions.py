@@ -1,7 +1,7 @@
 """Converts the functions of a project to functions of the script, nested in `main`."""
 
 import ast
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Final
 
 from arcor2_hw.data.object_type import ParameterMeta
@@ -35,6 +35,8 @@ _DECORATOR: Final = expressions.dotted("res", ("function",))
 class FunctionCycle(Cycle):
     """The body of a function."""
 
+    stores = False
+
     def __init__(self, frame: Frame, flow: Flow, function: ProjectFunction) -> None:
         self.function = function
         self.parameters: dict[str, str] = {}
@@ -51,6 +53,7 @@ class FunctionCycle(Cycle):
             for parameter in action.parameters
             if parameter.type == ActionParameterType.PROJECT_PARAMETER
         }
+        used |= {target for item in self.function.logic for target in item.used()}
         hidden = {variable for key, variable in self.frame.parameters.items() if key not in used}
         for each in self.function.parameters:
             claim = self.names.shadow if each.name in hidden else self.names.claim
@@ -156,6 +159,7 @@ def called_functions(project: Project, program: Flow) -> list[tuple[ProjectFunct
         InvalidProject: a function is invalid, or calls itself.
     """
     known = {function.id: function for function in project.functions}
+    parameters = {parameter.id for parameter in project.parameters}
 
     def callees(flow: Flow) -> Iterator[ProjectFunction]:
         for action in flow.actions:
@@ -176,16 +180,20 @@ def called_functions(project: Project, program: Flow) -> list[tuple[ProjectFunct
         elif function.id in open_:
             raise InvalidProject("function {name!r} calls itself", name=function.name)
         elif function.id not in found:
-            open_[function.id] = (function, flow_of(function))
+            open_[function.id] = (function, flow_of(function, parameters))
             stack.append(callees(open_[function.id][1]))
     _check_names([program, *(flow for _, flow in found.values())])
     return list(found.values())
 
 
-def flow_of(function: ProjectFunction) -> Flow:
-    """Return the logic of a function. Raise InvalidProject if it is invalid."""
+def flow_of(function: ProjectFunction, parameters: Collection[str]) -> Flow:
+    """Return the logic of a function, whose conditions may compare project parameters.
+
+    Raises:
+        InvalidProject: the logic is invalid.
+    """
     try:
-        return logic_graph.read(function)
+        return logic_graph.read(function, parameters)
     except InvalidProject as error:
         raise InvalidProject("function {name!r}: {reason}", name=function.name, reason=error) from error
 
@@ -207,6 +215,6 @@ def cycles_of(frame: Frame, project: Project) -> tuple[Cycle, list[FunctionCycle
         InvalidProject: an action or the logic is invalid.
         NotFound: an object type is unknown.
     """
-    program = logic_graph.read(project)
+    program = logic_graph.read(project, frame.parameters)
     functions = called_functions(project, program)
     return Cycle(frame, program), [FunctionCycle(frame, flow, function) for function, flow in functions]

@@ -52,13 +52,43 @@ def _expression(node: ast.Expr) -> str:
     return _unparse(node.value)
 
 
+_SYMBOLS: Final[dict[type[ast.cmpop], str]] = {
+    ast.Eq: "==",
+    ast.NotEq: "!=",
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+}
+
+
+def _compare(node: ast.Compare) -> str:
+    rest = zip(node.ops, node.comparators, strict=True)
+    return " ".join([_unparse(node.left), *(f"{_SYMBOLS[type(op)]} {_unparse(right)}" for op, right in rest)])
+
+
+def _combined(node: ast.BoolOp) -> str:
+    """Return comparisons combined by `and` or `or`, which need no parentheses."""
+    return (" and " if isinstance(node.op, ast.And) else " or ").join(map(_unparse, node.values))
+
+
+def _unary(node: ast.UnaryOp) -> str:
+    operand = _unparse(node.operand)
+    if isinstance(node.op, ast.Not):
+        return f"not ({operand})" if isinstance(node.operand, ast.BoolOp) else f"not {operand}"
+    return f"-{operand}"
+
+
 _FREQUENT: Final[dict[type[ast.AST], Callable[[Any], str]]] = {
     ast.Assign: _assign,
     ast.Attribute: _attribute,
+    ast.BoolOp: _combined,
     ast.Call: _call,
+    ast.Compare: _compare,
     ast.Constant: _constant,
     ast.Expr: _expression,
     ast.Name: _name,
+    ast.UnaryOp: _unary,
     ast.keyword: _keyword,
 }
 """Writers of the nodes in a generated loop. `ast.unparse` supports all nodes, but is ten times slower."""
@@ -97,6 +127,21 @@ def _simple(node: ast.stmt, indent: str) -> list[str]:
         *(f"{indent}{_INDENT}{_unparse(argument)}," for argument in arguments),
         f"{indent})",
     ]
+
+
+def _condition(word: str, test: ast.expr, indent: str) -> list[str]:
+    """Return the lines of `if` or `elif`. A condition that is too long has one comparison per line."""
+    text = f"{indent}{word} {_unparse(test)}:"
+    negated = isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not)
+    combined = test.operand if isinstance(test, ast.UnaryOp) and negated else test
+    if len(text) <= LINE or not isinstance(combined, ast.BoolOp):
+        return [text]
+    connective = "and " if isinstance(combined.op, ast.And) else "or "
+    parts = [
+        f"{indent}{_INDENT}{connective if number else ''}{_unparse(value)}"
+        for number, value in enumerate(combined.values)
+    ]
+    return [f"{indent}{word}{' not' if negated else ''} (", *parts, f"{indent}):"]
 
 
 def _signature(node: ast.FunctionDef, indent: str) -> list[str]:
@@ -164,7 +209,7 @@ class Writer:
                 word = "if"
                 branch = node
                 while True:
-                    self._lines.append(f"{indent}{word} {_unparse(branch.test)}:")
+                    self._lines += _condition(word, branch.test, indent)
                     self._block(branch.body, deeper)
                     match branch.orelse:
                         case [ast.If() as branch]:

@@ -80,7 +80,13 @@ def _check_name(document: Document, change: Change) -> None:
         (change.kind, change.after.name, change.parent if change.kind in _NAMED_IN_POINT else "")
     ]
     if change.kind is Kind.ACTION:
-        names += [(OUTPUT, output, document.function_of(change.id)) for output in change.after.names()]
+        function = document.function_of(change.id)
+        outputs = change.after.outputs()
+        names += [
+            (OUTPUT, output, function)
+            for output in change.after.names()
+            if output not in outputs or document.variable(output, function) is None
+        ]
     for kind, name, parent in names:
         other = document.named(kind, name, parent)
         if other is not None and other != change.id:
@@ -173,9 +179,7 @@ def _check_step(document: Document, item: LogicItem, types: Types) -> None:
         siblings = {other.id for other in document.outgoing(action_of(item.start), scope_of(document, item))} - {
             item.id
         }
-        if not isinstance(item.condition, Unset):
-            places.add(action_of(item.condition.what))
-        raise Inconsistent(error.message, places | siblings) from None
+        raise Inconsistent(error.message, places | siblings | item.used()) from None
 
 
 def _check_loops(document: Document, steps: list[LogicItem]) -> None:

@@ -351,6 +351,26 @@ class Document:
             forward = not forward
         return False
 
+    def variable(self, name: str, function: str = "") -> ProjectParameter | None:
+        """Return the variable with a name, in which actions of the program store results, None if there is none.
+
+        Actions of a function do not store results in variables.
+        """
+        key = None if function else self.named(Kind.PARAMETER, name)
+        parameter = None if key is None else self.parameter(key)
+        return parameter if parameter is not None and parameter.variable else None
+
+    def naming(self, output: str) -> Action | None:
+        """Return an action of the program or a function that names a result or its error so, None if there is none."""
+        return next((self.action(key) for key in self._indexes.names.get((OUTPUT, output), ())), None)
+
+    def storing(self, parameter: ProjectParameter) -> list[Action]:
+        """Return the actions that store a result in a variable."""
+        if not parameter.variable:
+            return []
+        found = [key for key in self._indexes.names.get((OUTPUT, parameter.name), ()) if not self.function_of(key)]
+        return [action for key in found if parameter.name in (action := self.action(key)).outputs()]
+
     def users_of(self, target_id: str) -> list[Action | LogicItem | ProjectFunction]:
         """Return the actions with a parameter that refers to this id, and the logic items with a condition on it.
 

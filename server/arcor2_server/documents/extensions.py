@@ -2,34 +2,51 @@
 
 from msgspec.structs import replace
 
-from arcor2_hw.data.base import Unset
+from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.project import Action, LogicItem, Project
 
 
 def keep_extensions(sent: Project, stored: Project) -> Project:
-    """Return a sent project with the functions, names of errors and error exits that it lacks, by the ids of its items.
+    """Return a sent project with the functions and fields that it lacks, by the ids of its items.
 
-    An empty name or list removes an error.
+    These fields are the names of errors, retries, error exits, comparisons, and which parameters are variables. An
+    empty name or list removes them, and so does the count 0 of a retry. A condition replaces comparisons.
     """
     present = {function.id for function in sent.functions}
     functions = [*sent.functions, *(function for function in stored.functions if function.id not in present)]
     logic = [*stored.logic, *(item for function in stored.functions for item in function.logic)]
     errors = {action.id: action.error_output for action in stored.all_actions() if action.error_output}
-    exits = {item.id: item.error_kinds for item in logic if item.is_error_exit}
+    retries = {action.id: action.retry for action in stored.all_actions() if action.retry}
+    variables = {parameter.id for parameter in stored.parameters if parameter.variable}
+    steps = {item.id: item for item in logic if item.is_error_exit or item.has_comparisons}
 
     def action(one: Action) -> Action:
-        missing = isinstance(one.error_output, Unset) and one.id in errors
-        return replace(one, error_output=errors[one.id]) if missing else one
+        if isinstance(one.error_output, Unset) and one.id in errors:
+            one = replace(one, error_output=errors[one.id])
+        if isinstance(one.retry, Unset) and one.id in retries:
+            one = replace(one, retry=retries[one.id])
+        elif one.retry and one.retry.count == 0:
+            one = replace(one, retry=UNSET)
+        return one
 
     def item(one: LogicItem) -> LogicItem:
-        missing = isinstance(one.error_kinds, Unset) and one.id in exits
-        return replace(one, error_kinds=exits[one.id]) if missing else one
+        if (known := steps.get(one.id)) is None:
+            return one
+        kinds = known.error_kinds if isinstance(one.error_kinds, Unset) else one.error_kinds
+        missing = isinstance(one.when, Unset) and isinstance(one.condition, Unset)
+        return replace(one, error_kinds=kinds, when=known.when if missing else one.when)
 
-    if errors:
+    if variables:
+        parameters = [
+            replace(one, variable=True) if isinstance(one.variable, Unset) and one.id in variables else one
+            for one in sent.parameters
+        ]
+        sent = replace(sent, parameters=parameters)
+    if errors or retries:
         points = [replace(point, actions=[action(one) for one in point.actions]) for point in sent.action_points]
         functions = [replace(one, actions=[action(each) for each in one.actions]) for one in functions]
         sent = replace(sent, action_points=points)
-    if exits:
+    if steps:
         functions = [replace(one, logic=[item(each) for each in one.logic]) for one in functions]
         sent = replace(sent, logic=[item(one) for one in sent.logic])
     return replace(sent, functions=functions)

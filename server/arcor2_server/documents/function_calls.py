@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from msgspec import UNSET
 from msgspec.structs import replace
 
-from arcor2_hw.data.base import Unset, new_id
+from arcor2_hw.data.base import new_id
 from arcor2_hw.data.project import (
     END,
     START,
@@ -148,8 +148,8 @@ class _Copies:
             if action_of(item.end) != END:
                 steps.append(replace(step, end=self._ids[action_of(item.end)], id=new_id("lit")))
                 continue
-            branches = any(not isinstance(each.condition, Unset) for each in following)
-            if branches and (step.is_error_exit or not isinstance(step.condition, Unset)):
+            branches = any(each.has_condition for each in following)
+            if branches and (step.is_error_exit or step.has_condition):
                 raise RequestRefused(
                     "{name} is followed by a branch, and the function {function} ends in a branch. "
                     "Put an action between them first.",
@@ -157,8 +157,10 @@ class _Copies:
                     function=self._function.name,
                 )
             for each in following:
-                condition = each.condition if branches else step.condition
-                steps.append(replace(step, end=each.end, condition=condition, id=new_id("lit")))
+                decides = each if branches else step
+                steps.append(
+                    replace(step, end=each.end, condition=decides.condition, when=decides.when, id=new_id("lit"))
+                )
         return steps
 
 

@@ -84,20 +84,32 @@ def with_links(action: Action, changed: Callable[[tuple[str, str, int]], str | N
 
 
 def with_condition(item: LogicItem, changed: Callable[[tuple[str, str, int]], str | None]) -> LogicItem:
-    """Return a logic item with a condition on another result, if `changed` returns one."""
-    tested = tested_by(item)
-    what = None if tested is None else changed(tested)
-    if what is None or isinstance(item.condition, Unset):
-        return item
-    return replace(item, condition=ProjectLogicIf(what, item.condition.value))
+    """Return a logic item with a condition on other results, as far as `changed` returns one."""
 
+    def link(what: str) -> str:
+        try:
+            return changed(parse_link(what)) or what
+        except ValueError:
+            return what  # a project parameter, or malformed, which the checks report
 
-def tested_by(item: LogicItem) -> tuple[str, str, int] | None:
-    """Return the result that the condition of a logic item tests, None without a condition or if it is malformed."""
     if not isinstance(item.condition, Unset):
+        item = replace(item, condition=ProjectLogicIf(link(item.condition.what), item.condition.value))
+    if not isinstance(item.when, Unset):
+        comparisons = [replace(one, what=link(one.what)) for one in item.when.comparisons]
+        item = replace(item, when=replace(item.when, comparisons=comparisons))
+    return item
+
+
+def tested_by(item: LogicItem) -> list[tuple[str, str, int]]:
+    """Return the results that the condition of a logic item tests, without malformed links."""
+    links = [] if isinstance(item.condition, Unset) else [item.condition.what]
+    if not isinstance(item.when, Unset):
+        links += [one.what for one in item.when.comparisons]
+    found: list[tuple[str, str, int]] = []
+    for link in links:
         with contextlib.suppress(ValueError):
-            return item.condition.parse_what()
-    return None
+            found.append(parse_link(link))
+    return found
 
 
 def used_by(user: Action | LogicItem | ProjectFunction) -> list[tuple[str, str, int]]:
@@ -106,7 +118,7 @@ def used_by(user: Action | LogicItem | ProjectFunction) -> list[tuple[str, str, 
         case Action():
             return list(links(user))
         case LogicItem():
-            return [] if (tested := tested_by(user)) is None else [tested]
+            return tested_by(user)
         case ProjectFunction():
             return [link for each in user.returns if (link := link_of(each)) is not None]
 

@@ -82,6 +82,14 @@ class _Selection:
             starts, ends = action_of(item.start) in self.actions, action_of(item.end) in self.actions
             if starts or ends:
                 (self.inside if starts and ends else self.leaving if starts else self.arriving).append(item)
+        for action in self.actions.values():
+            for output in action.outputs():
+                if document.variable(output, self.scope) is not None:
+                    raise NoFunction(
+                        "{name}: only the program changes the variable {output}. Do not select this action.",
+                        name=action.name,
+                        output=output,
+                    )
         self.entry = self._entry()
         self.exit = self._exit()
         self._check_conditions()
@@ -128,8 +136,8 @@ class _Selection:
 
     def _check_conditions(self) -> None:
         for item in (*self.inside, *self.leaving):
-            tested = tested_by(item)
-            if tested is not None and tested[0] not in self.actions:
+            outside = [tested for tested in tested_by(item) if tested[0] not in self.actions]
+            for tested in outside[:1]:
                 raise NoFunction(
                     "A condition of {name} uses a result of {tested}, which is not selected. Select {tested}, too.",
                     name=self._named([action_of(item.start)]),

@@ -128,5 +128,5 @@ class ItemIndexes:
             case Kind.LOGIC:
                 yield self.leaving, place_of(value.start, item.parent)
                 yield self.arriving, action_of(value.end)
-                if value.condition:
-                    yield self.users, action_of(value.condition.what)
+                for used in value.used():
+                    yield self.users, used

@@ -6,9 +6,10 @@ import msgspec
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction
-from arcor2_hw.data.project import END, START, Action, LogicItem, ProjectLogicIf
+from arcor2_hw.data.project import END, START, Action, LogicComparison, LogicItem, ProjectLogicIf, parse_link
 from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.messages import Message, translatable
+from arcor2_server.documents.comparisons import check_when, condition_key, of_result
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.item_indexes import action_of
 from arcor2_server.documents.logic_graph import BRANCHABLE, error_kinds_problem
@@ -36,6 +37,8 @@ def check_logic_item(
         raise InvalidData("{name} cannot lead to itself.", name=_name(document, start))
     for place in {start, end} - {START, END}:
         document.action(place)
+    if item.has_comparisons and not isinstance(item.condition, Unset):
+        raise InvalidData("A step has either a condition or comparisons, not both.")
     function = scope_of(document, item)
     if end != END and document.function_of(end) != function:
         raise InvalidData(
@@ -54,11 +57,15 @@ def check_logic_item(
         _check_error_exit(document, start, item, siblings)
     else:
         _check_otherwise(document, start, [item, *(other for other in siblings if not other.is_error_exit)])
-    if not isinstance(item.condition, Unset):
+    if item.has_condition:
         if start == START:
             raise InvalidData("The step from START cannot have a condition, because no action has a result yet.")
-        _check_condition(document, meta_of, item.condition, function)
-        if any(_same(item.condition, other.condition) for other in siblings):
+        if not isinstance(item.condition, Unset):
+            _check_condition(document, meta_of, item.condition, function)
+        if not isinstance(item.when, Unset):
+            check_when(item.when, lambda one: _compared(document, meta_of, one, function))
+        key = condition_key(item)
+        if any(condition_key(other) == key for other in siblings):
             raise InvalidData("Another step from {name} has the same condition.", name=_name(document, start))
     if loops and start != START and end != END and document.leads_to(end, start, item.id):
         raise InvalidData(
@@ -77,7 +84,7 @@ def scope_of(document: Document, item: LogicItem) -> str:
 def _check_error_exit(document: Document, start: str, item: LogicItem, siblings: list[LogicItem]) -> None:
     if start == START:
         raise InvalidData("The step from START cannot be an error exit, because START is not an action.")
-    if not isinstance(item.condition, Unset):
+    if item.has_condition:
         raise InvalidData("An error exit of {name} cannot have a condition.", name=_name(document, start))
     kinds = item.error_kinds or []
     if (problem := error_kinds_problem(kinds)) is not None:
@@ -91,10 +98,10 @@ def _check_error_exit(document: Document, start: str, item: LogicItem, siblings:
 
 def _check_otherwise(document: Document, start: str, items: list[LogicItem]) -> None:
     """Refuse an unconditional connection next to others, except next to conditions that are not boolean."""
-    conditions = [item.condition for item in items if not isinstance(item.condition, Unset)]
-    without = len(items) - len(conditions)
+    without = sum(not item.has_condition for item in items)
     if len(items) == 1 or not without:
         return
+    conditions = [item.condition for item in items if not isinstance(item.condition, Unset)]
     if any(isinstance(msgspec.json.decode(condition.value), bool) for condition in conditions if _is_json(condition)):
         raise InvalidData("Each of several steps from {name} needs a condition.", name=_name(document, start))
     if without > 1:
@@ -147,12 +154,6 @@ def _name(document: Document, place: str) -> str:
     return place if place in (START, END) else document.action(place).name
 
 
-def _same(one: ProjectLogicIf, other: ProjectLogicIf | Unset) -> bool:
-    if isinstance(other, Unset):
-        return False
-    return one.what == other.what and msgspec.json.decode(one.value) == msgspec.json.decode(other.value)
-
-
 def _check_condition(
     document: Document, meta_of: Callable[[Action], ObjectAction], condition: ProjectLogicIf, function: str
 ) -> None:
@@ -160,23 +161,14 @@ def _check_condition(
         action_id, flow, index = condition.parse_what()
     except ValueError as error:
         raise InvalidData("The condition is malformed: {reason}.", reason=error) from None
-    action = document.action(action_id)
-    if document.function_of(action_id) != function:
-        raise InvalidData(
-            "The condition uses a result of {name}, an action of another function or of the program.", name=action.name
-        )
-    outputs, returns = action.outputs(), meta_of(action).returns
-    if flow != "default" or index >= len(outputs) or index >= len(returns):
-        raise InvalidData(
-            "Action {name} has no named result number {index}: name its results first.", name=action.name, index=index
-        )
-    kind = BRANCHABLE.get(returns[index])
+    output, returned = _result(document, meta_of, (action_id, flow, index), function)
+    kind = BRANCHABLE.get(returned)
     if kind is None:
         raise InvalidData(
             "The result {output} of {name} is {return_value}. Conditions test booleans, integers and enumerations.",
-            output=outputs[index],
-            name=action.name,
-            return_value=returns[index],
+            output=output,
+            name=document.action(action_id).name,
+            return_value=returned,
         )
     try:
         value = msgspec.json.decode(condition.value)
@@ -187,7 +179,45 @@ def _check_condition(
         wanted = Message.of(translatable(expected)[kind])
         raise InvalidData(
             "A condition on {output} compares with {wanted}, not with {value}.",
-            output=outputs[index],
+            output=output,
             wanted=wanted,
             value=condition.value[:40],
         )
+
+
+def _result(
+    document: Document, meta_of: Callable[[Action], ObjectAction], link: tuple[str, str, int], function: str
+) -> tuple[str, str]:
+    """Return the name and the type of a result that an item of the logic of `function` uses."""
+    action_id, flow, index = link
+    action = document.action(action_id)
+    if document.function_of(action_id) != function:
+        raise InvalidData(
+            "The condition uses a result of {name}, an action of another function or of the program.", name=action.name
+        )
+    outputs, returns = action.outputs(), meta_of(action).returns
+    if flow != "default" or index >= len(outputs) or index >= len(returns):
+        raise InvalidData(
+            "Action {name} has no named result number {index}: name its results first.", name=action.name, index=index
+        )
+    if document.variable(outputs[index], function) is not None:
+        raise InvalidData(
+            "{name} stores its result in the variable {output}: use the variable.",
+            name=action.name,
+            output=outputs[index],
+        )
+    return outputs[index], returns[index]
+
+
+def _compared(
+    document: Document, meta_of: Callable[[Action], ObjectAction], comparison: LogicComparison, function: str
+) -> tuple[str, str]:
+    """Return the name and the type of a compared value."""
+    if not of_result(comparison):
+        parameter = document.parameter(comparison.what)
+        return parameter.name, parameter.type
+    try:
+        link = parse_link(comparison.what)
+    except ValueError as error:
+        raise InvalidData("The condition is malformed: {reason}.", reason=error) from None
+    return _result(document, meta_of, link, function)

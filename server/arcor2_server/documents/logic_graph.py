@@ -1,7 +1,7 @@
 """The logic of a project as a graph: the successors of each action and their conditions."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple, TypeGuard
 
@@ -11,13 +11,17 @@ from arcor2_hw.data.project import (
     START,
     Action,
     LogicItem,
+    LogicWhen,
+    Match,
+    Operator,
     Project,
     ProjectFunction,
     ProjectLogicIf,
     parse_link,
 )
-from arcor2_hw.exceptions import ERROR_KINDS, Arcor2Error, InvalidProject
+from arcor2_hw.exceptions import ERROR_KINDS, Arcor2Error, InvalidData, InvalidProject
 from arcor2_hw.messages import Message
+from arcor2_server.documents.comparisons import Comparison, Comparisons, Reference, decoded, what_of
 
 END_NODE: Final = -1
 """The number of END, next to the numbers of actions."""
@@ -34,11 +38,22 @@ class Condition(NamedTuple):
     value: bool | int | str
 
 
+Test = Condition | Comparisons
+"""A condition of an edge."""
+
+
+def as_comparisons(test: Test) -> Comparisons:
+    """Return a condition as comparisons."""
+    if isinstance(test, Comparisons):
+        return test
+    return Comparisons((Comparison(Reference(test.action, test.output), Operator.EQUAL, test.value),))
+
+
 class Edge(NamedTuple):
     """A connection to action number `target` (or END_NODE). Without a condition it is the only or the default one."""
 
     target: int
-    condition: Condition | None
+    condition: Test | None
 
 
 class ErrorExit(NamedTuple):
@@ -53,6 +68,7 @@ class Flow:
     """The reachable actions in topological order: every edge leads to a higher number, 0 is the first.
 
     `edges[n]` is one unconditional edge, or several that are tested in order. The last one applies if no other does.
+    Whether edges with comparisons are complete is not checked, because this depends on the types of the values.
     `exits[n]` are the error exits in the order in which they apply.
     """
 
@@ -73,36 +89,81 @@ def _node(reference: str, item: LogicItem, known: dict[str, int]) -> int:
         ) from None
 
 
-def _condition(
-    condition: ProjectLogicIf, source: Action, actions: Sequence[Action], known: dict[str, int]
-) -> Condition:
+def _condition(condition: ProjectLogicIf, name: str, known: Mapping[str, int]) -> Condition:
     try:
         action_id, flow, output = parse_link(condition.what)
         value = json.loads(condition.value)
     except ValueError as error:
-        raise InvalidProject(
-            "action {name!r}: a condition cannot be read: {reason}", name=source.name, reason=error
-        ) from None
+        raise InvalidProject("action {name!r}: a condition cannot be read: {reason}", name=name, reason=error) from None
     if action_id not in known or flow != "default":
-        raise InvalidProject(
-            "action {name!r}: a condition refers to {what!r}, which does not exist",
-            name=source.name,
-            what=condition.what,
-        )
+        raise _missing(name, condition.what)
     if not isinstance(value, bool | int | str):
         raise InvalidProject(
             "action {name!r}: a condition compares with true, false, an integer or a text, not with {value}",
-            name=source.name,
+            name=name,
             value=condition.value,
         )
-    tested = actions[known[action_id]]
-    if output >= len(tested.outputs()):
-        raise InvalidProject(
-            "action {name!r}: a condition refers to a result that {tested_name!r} does not name",
-            name=source.name,
-            tested_name=tested.name,
-        )
     return Condition(known[action_id], output, value)
+
+
+def _missing(name: str, what: str) -> InvalidProject:
+    return InvalidProject("action {name!r}: a condition refers to {what!r}, which does not exist", name=name, what=what)
+
+
+def _comparisons(when: LogicWhen, name: str, known: Mapping[str, int], parameters: Collection[str]) -> Comparisons:
+    found: list[Comparison] = []
+    for one in when.comparisons:
+        try:
+            what = what_of(one.what)
+            value, upper = decoded(one)
+        except (ValueError, InvalidData) as error:
+            raise InvalidProject(
+                "action {name!r}: a condition cannot be read: {reason}", name=name, reason=error
+            ) from None
+        if isinstance(what, str):
+            reference = Reference(END_NODE, 0, what)
+            missing = what not in parameters
+        else:
+            reference = Reference(known.get(what[0], END_NODE), what[1])
+            missing = what[0] not in known
+        if missing:
+            raise _missing(name, one.what)
+        found.append(Comparison(reference, one.operator, value, upper))
+    return Comparisons(tuple(found), when.match if len(found) > 1 else Match.ALL)
+
+
+def test_of(item: LogicItem, name: str, known: Mapping[str, int], parameters: Collection[str]) -> Test | None:
+    """Return the condition of a logic item of the action `name`, None if it has none.
+
+    Args:
+        item: the logic item.
+        name: the name of the action, for errors.
+        known: the numbers of actions by id.
+        parameters: the ids of project parameters.
+
+    Raises:
+        InvalidProject: the condition is malformed or refers to something that does not exist.
+    """
+    if not isinstance(item.when, Unset) and item.when.comparisons:
+        if not isinstance(item.condition, Unset):
+            raise InvalidProject("action {name!r}: a connection has two conditions", name=name)
+        return _comparisons(item.when, name, known, parameters)
+    return None if isinstance(item.condition, Unset) else _condition(item.condition, name, known)
+
+
+def _check_named(test: Test | None, source: Action, actions: Sequence[Action]) -> None:
+    """Raise InvalidProject if a condition refers to a result without a name."""
+    if test is None:
+        return
+    places = [test] if isinstance(test, Condition) else [one.what for one in test.comparisons if not one.what.parameter]
+    for place in places:
+        tested = actions[place.action]
+        if place.output >= len(tested.outputs()):
+            raise InvalidProject(
+                "action {name!r}: a condition refers to a result that {tested_name!r} does not name",
+                name=source.name,
+                tested_name=tested.name,
+            )
 
 
 def _ordered(edges: list[Edge], source: Action, actions: Sequence[Action]) -> tuple[Edge, ...]:
@@ -116,19 +177,18 @@ def _ordered(edges: list[Edge], source: Action, actions: Sequence[Action]) -> tu
     if unconditional and len(edges) == 1:
         return tuple(edges)
     conditional = [edge for edge in edges if edge.condition is not None]
-    if len(unconditional) > 1 or (unconditional and any(_is_boolean(edge.condition) for edge in conditional)):
+    if len(unconditional) > 1 or (unconditional and any(is_boolean(edge.condition) for edge in conditional)):
         raise InvalidProject("action {name!r}: one of its connections has no condition", name=source.name)
+    if any(isinstance(edge.condition, Comparisons) for edge in conditional):
+        return (*conditional, *unconditional)
     tested: set[Condition] = set()
     covered = False
     for edge in conditional:
-        assert edge.condition is not None
+        assert isinstance(edge.condition, Condition)
         if covered or edge.condition in tested:
-            where = Message.of("the end") if edge.target == END_NODE else repr(actions[edge.target].name)
-            raise InvalidProject(
-                "action {name!r}: the connection to {place} is never taken", name=source.name, place=where
-            )
+            raise never_taken(source, edge, actions)
         tested.add(edge.condition)
-        covered = _is_boolean(edge.condition) and edge.condition._replace(value=not edge.condition.value) in tested
+        covered = is_boolean(edge.condition) and edge.condition._replace(value=not edge.condition.value) in tested
     if not covered and not unconditional:
         [one, *more] = tested
         result = actions[one.action].outputs()[one.output]
@@ -140,8 +200,14 @@ def _ordered(edges: list[Edge], source: Action, actions: Sequence[Action]) -> tu
             when = Message.of("{result} is not {value}", result=result, value=_shown(one.value))
         raise InvalidProject("action {name!r}: no action follows it when {when}", name=source.name, when=when)
     if len(conditional) == 2 and not unconditional:
-        conditional.sort(key=lambda edge: _is_boolean(edge.condition) and edge.condition.value is False)
+        conditional.sort(key=lambda edge: is_boolean(edge.condition) and edge.condition.value is False)
     return (*conditional, *unconditional)
+
+
+def never_taken(source: Action, edge: Edge, actions: Sequence[Action]) -> InvalidProject:
+    """Return the error for an edge whose condition never decides."""
+    where = Message.of("the end") if edge.target == END_NODE else repr(actions[edge.target].name)
+    return InvalidProject("action {name!r}: the connection to {place} is never taken", name=source.name, place=where)
 
 
 def error_kinds_problem(kinds: Sequence[str]) -> Message | None:
@@ -170,7 +236,7 @@ def _exits(failing: list[tuple[int, LogicItem]], source: Action) -> tuple[ErrorE
         kinds = [] if isinstance(item.error_kinds, Unset) else item.error_kinds
         if (problem := error_kinds_problem(kinds)) is not None:
             raise InvalidProject("action {name!r}: {reason}", name=source.name, reason=problem)
-        if not isinstance(item.condition, Unset):
+        if item.has_condition:
             raise InvalidProject("action {name!r}: an error exit has a condition", name=source.name)
         if shared := seen.intersection(kinds):
             raise InvalidProject(
@@ -182,8 +248,9 @@ def _exits(failing: list[tuple[int, LogicItem]], source: Action) -> tuple[ErrorE
     return tuple(sorted(found, key=lambda one: order.index(one.kinds[0])))
 
 
-def _is_boolean(condition: Condition | None) -> TypeGuard[Condition]:
-    return condition is not None and isinstance(condition.value, bool)
+def is_boolean(condition: Test | None) -> TypeGuard[Condition]:
+    """Return whether a condition tests a boolean by itself."""
+    return isinstance(condition, Condition) and isinstance(condition.value, bool)
 
 
 def _shown(value: bool | int | str) -> str:
@@ -215,8 +282,10 @@ def _number(first: int, edges: list[list[int]], actions: Sequence[Action]) -> li
     return done
 
 
-def read(logic_of: Project | ProjectFunction) -> Flow:
+def read(logic_of: Project | ProjectFunction, parameters: Collection[str] = ()) -> Flow:
     """Return the graph of the logic of a project or function.
+
+    `parameters`: the ids of the project parameters, which conditions may compare.
 
     Raises:
         InvalidProject: the logic is invalid; the message names the action.
@@ -251,13 +320,12 @@ def read(logic_of: Project | ProjectFunction) -> Flow:
     exits: list[tuple[ErrorExit, ...]] = []
     for old, source in zip(order, reached, strict=True):
         outgoing = [
-            Edge(
-                new_numbers[target],
-                None if isinstance(item.condition, Unset) else _condition(item.condition, source, reached, reached_ids),
-            )
+            Edge(new_numbers[target], test_of(item, source.name, reached_ids, parameters))
             for target, item in items[old]
             if not item.is_error_exit
         ]
+        for edge in outgoing:
+            _check_named(edge.condition, source, reached)
         edges.append(_ordered(outgoing, source, reached))
         failing = [(new_numbers[target], item) for target, item in items[old] if item.is_error_exit]
         exits.append(_exits(failing, source) if failing else ())

@@ -3,7 +3,15 @@
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.project import ERROR_FLOW, Action, BareActionPoint, FlowTypes, LogicItem, ProjectFunction
+from arcor2_hw.data.project import (
+    ERROR_FLOW,
+    Action,
+    BareActionPoint,
+    FlowTypes,
+    LogicItem,
+    ProjectFunction,
+    parse_link,
+)
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.checks.actions import action_meta
@@ -66,13 +74,29 @@ def require_results_unused(document: Document, before: Action, after: Action) ->
                 user=user.name if isinstance(user, Action) else "",
                 name=before.name,
             )
-        if FlowTypes.DEFAULT not in flows or not before.outputs() or after.outputs():
+        function = document.function_of(before.id)
+        stored = {n for n, output in enumerate(after.outputs()) if document.variable(output, function) is not None}
+        lost = not after.outputs() or not stored.isdisjoint(_used_results(user, before.id))
+        if FlowTypes.DEFAULT not in flows or not before.outputs() or not lost:
             continue
         raise RequestRefused(
             "{user} uses a result of {name}, so its results must keep their names.",
             user=title_of(user),
             name=before.name,
         )
+
+
+def _used_results(user: Action | LogicItem | ProjectFunction, action_id: str) -> set[int]:
+    """Return the indexes of the results of an action that an action or a condition uses."""
+    if isinstance(user, Action):
+        return {index for source, flow, index in links(user) if source == action_id and flow == FlowTypes.DEFAULT}
+    if isinstance(user, ProjectFunction):
+        return {index for source, _, index in (parse_link(one.link) for one in user.returns) if source == action_id}
+    compared = [] if isinstance(user.condition, Unset) else [user.condition.what]
+    if not isinstance(user.when, Unset):
+        compared += [one.what for one in user.when.comparisons]
+    found = [parse_link(what) for what in compared if "/" in what]
+    return {index for source, _, index in found if source == action_id}
 
 
 def neighbours(document: Document, action_id: str) -> set[str]:
@@ -89,7 +113,7 @@ def bypass(document: Document, types: Types, action: Action) -> list[Change]:
     """
     changes = [document.remove(Kind.LOGIC, item.id) for item in document.outgoing(action.id)]
     outgoing = [item for item in document.outgoing(action.id) if not item.is_error_exit]
-    end = outgoing[0].end if len(outgoing) == 1 and isinstance(outgoing[0].condition, Unset) else None
+    end = outgoing[0].end if len(outgoing) == 1 and not outgoing[0].has_condition else None
     for item in document.incoming(action.id):
         redirected = None if end is None else replace(item, end=end)
         if redirected is not None and _is_valid(document, types, redirected):

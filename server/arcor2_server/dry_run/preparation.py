@@ -77,7 +77,7 @@ def prepare(
         NotFound: the requested action is not part of the program.
         InvalidData: a requested branch does not exist.
     """
-    flow = logic_graph.read(project)
+    flow = logic_graph.read(project, {parameter.id for parameter in project.parameters})
     index = ProjectIndex(scene, project)
     calls = {function.id for function in project.functions}
     steps = [
@@ -116,7 +116,8 @@ def _step(action: Action, edges: Sequence[logic_graph.Edge], exits: bool, functi
 
 def _edge(edge: logic_graph.Edge) -> Edge:
     target = END_STEP if edge.target == logic_graph.END_NODE else edge.target
-    value = UNSET if edge.condition is None else msgspec.json.encode(edge.condition.value).decode()
+    tested = edge.condition
+    value = msgspec.json.encode(tested.value).decode() if isinstance(tested, logic_graph.Condition) else UNSET
     return Edge(target, value)
 
 

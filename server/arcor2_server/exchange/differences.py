@@ -12,6 +12,7 @@ from msgspec import UNSET
 from arcor2_hw.data.base import Data, Unset
 from arcor2_hw.data.object_type import ObjectTypeSource
 from arcor2_hw.data.project import END, START
+from arcor2_server.documents.comparisons import text_of
 from arcor2_server.exchange.archive import Archive
 
 TIMES: Final = frozenset({"created", "modified", "int_modified"})
@@ -94,8 +95,15 @@ def _names(archive: Archive) -> dict[str, str]:
         for function in project.functions:
             names[function.id] = function.name
             names |= {action.id: action.name for action in function.actions}
+        results = {
+            f"{action.id}/default/{index}": output
+            for action in project.all_actions()
+            for index, output in enumerate(action.outputs())
+        }
         for item in (*project.logic, *(item for function in project.functions for item in function.logic)):
             branch = "" if isinstance(item.condition, Unset) else f" if {item.condition.value}"
+            if not isinstance(item.when, Unset) and item.when.comparisons:
+                branch = f" if {text_of(item.when, lambda what: results.get(what) or names.get(what, what))}"
             if item.error_kinds:
                 branch = f" on {', '.join(item.error_kinds)}"
             start, end = (names.get(key.partition("/")[0], key) for key in (item.start, item.end))

@@ -103,7 +103,7 @@ class ProgramRun:
             case "ActionStateBefore":
                 if not message.call:
                     self.action = message.encoded
-                changed = statistics is not None and statistics.handle_start(message.encoded)
+                changed = statistics is not None and statistics.handle_start(message.encoded, message.attempt)
             case "ActionStateAfter":
                 if not message.call:
                     self.action = None

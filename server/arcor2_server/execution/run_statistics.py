@@ -1,14 +1,14 @@
 """What a run has produced: cycles and their durations, good and bad parts, counters."""
 
 import time
-from collections.abc import Callable, Set
+from collections.abc import Callable, Sequence, Set
 from typing import Final
 
 import msgspec
 from msgspec import UNSET
 
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.editor import CounterValue, RunStatistics
+from arcor2_hw.data.editor import CounterValue, RunStatistics, VariableValue
 from arcor2_hw.data.events import ActionStateAfterData, ActionStateBeforeData, PackageInfoData
 from arcor2_hw.data.scene import SceneObject
 
@@ -66,6 +66,14 @@ class RunStatisticsCollector:
         self._judged = {True: 0, False: 0}
         self._values: dict[str, int] = {}
         self._given: dict[str, list[str]] = {}
+        self._variables = {one.name: one for one in info.project.parameters if one.variable}
+        self._present = {name: one.value for name, one in self._variables.items()}
+        self._outputs = {
+            action.id: action.outputs()
+            for point in info.project.action_points
+            for action in point.actions
+            if not self._variables.keys().isdisjoint(action.outputs())
+        }
 
     def statistics(self) -> RunStatistics:
         """Return the present statistics."""
@@ -76,14 +84,15 @@ class RunStatisticsCollector:
             self._judged[True] if self._verdicts else UNSET,
             self._judged[False] if self._verdicts else UNSET,
             [CounterValue(each, self._counters[each].name, value) for each, value in self._values.items()],
+            [VariableValue(one.id, name, self._present[name]) for name, one in self._variables.items()] or UNSET,
         )
 
     def handle_paused(self) -> None:
         """Exclude the present cycle from the durations, because the program is paused."""
         self._paused = True
 
-    def handle_start(self, encoded: bytes) -> bool:
-        """Handle ActionStateBefore. Return whether the statistics have changed."""
+    def handle_start(self, encoded: bytes, attempt: int = 1) -> bool:
+        """Handle ActionStateBefore; a repeated action starts no cycle. Return whether the statistics have changed."""
         data = msgspec.json.decode(encoded, type=_Before).data
         if isinstance(data.action_id, Unset):
             return False
@@ -92,7 +101,7 @@ class RunStatisticsCollector:
         if not isinstance(data.thread_id, Unset):  # another thread of a script
             return False
         self._first = self._first or data.action_id
-        if data.action_id != self._first:
+        if data.action_id != self._first or attempt > 1:
             return False
         complete = self._complete()
         self._began, self._paused = self._clock(), False
@@ -102,17 +111,27 @@ class RunStatisticsCollector:
         """Handle ActionStateAfter. Return whether the statistics have changed."""
         data = msgspec.json.decode(encoded, type=_After).data
         results = [] if isinstance(data.results, Unset) else data.results
+        stored = self._store(data.action_id, results)
         if data.action_id in self._verdicts and results in (["true"], ["false"]):
             self._judged[results == ["true"]] += 1
             return True
         object_id, method = self._methods.get(data.action_id, ("", ""))
         if object_id not in self._counters:
-            return False
+            return stored
         before = self._values.get(object_id)
         value = self._counted(object_id, method, self._given.pop(data.action_id, []) or results, results)
         if value is not None:
             self._values[object_id] = value
-        return value != before
+        return stored or value != before
+
+    def _store(self, action_id: str, results: Sequence[str]) -> bool:
+        """Store the results of an action in variables. Return whether one of these has changed."""
+        changed = False
+        for output, value in zip(self._outputs.get(action_id, ()), results, strict=False):
+            if output in self._variables and self._present[output] != value:
+                self._present[output] = value
+                changed = True
+        return changed
 
     def handle_finished(self) -> None:
         """Count a run that finished in its first cycle."""

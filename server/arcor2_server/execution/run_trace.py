@@ -85,6 +85,7 @@ class RunTraceCollector:
                 error,
                 data.thread_id,
                 before.call or UNSET,
+                before.attempt if before.attempt > 1 else UNSET,
             )
         )
 

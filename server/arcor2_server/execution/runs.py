@@ -64,6 +64,7 @@ class _Call:
             announced.name,
             parameters=before.parameters,
             thread_id=before.thread_id,
+            attempt=announced.attempt if announced.attempt > 1 else UNSET,
             call=announced.call or UNSET,
         )
         match end:

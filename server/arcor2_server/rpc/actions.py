@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.base import UNSET, Unset, new_id
 from arcor2_hw.data.events import ChangeType
-from arcor2_hw.data.project import Action, BareAction, LogicItem
+from arcor2_hw.data.project import Action, BareAction, LogicItem, Retry
 from arcor2_hw.data.rpc import AddActionArgs, RemoveActionArgs, RenameActionArgs, UpdateActionArgs
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.collaboration.locks import Locks
@@ -18,6 +18,8 @@ from arcor2_server.documents.checks.actions import (
     check_outputs_unique,
     check_parameters,
     check_recursion,
+    check_retry,
+    check_stored,
     complete_parameters,
 )
 from arcor2_server.documents.removal import bypass, neighbours, require_results_unused, title_of
@@ -26,6 +28,10 @@ from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.rpc.change_events import emit_functions
 from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.registry import Context, rpc
+
+
+def _given(retry: Retry | Unset) -> Retry | Unset:
+    return UNSET if isinstance(retry, Unset) or retry.count == 0 else retry
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +58,12 @@ class ActionRequests:
                 document.action_point(args.action_point_id)
             self._check_name(args.name)
             action = Action(args.name, args.type, new_id("act"), list(args.parameters), list(args.flows))
-            action = replace(action, error_output=args.error_output or UNSET)
+            action = replace(action, error_output=args.error_output or UNSET, retry=_given(args.retry))
             meta = action_meta(action, document, self._types)
             check_flows(action, meta)
+            check_retry(action, meta)
             check_outputs_unique(document, action, "" if function is None else function.id)
+            check_stored(document, action, meta, "" if function is None else function.id)
             action = complete_parameters(action, meta)
             check_parameters(action, meta, document, self._types, function)
             if function is not None:
@@ -64,7 +72,7 @@ class ActionRequests:
 
     @rpc("UpdateAction")
     async def update_action(self, context: Context, args: UpdateActionArgs) -> None:
-        """Replace the parameters, the flows or the name of the error of an action."""
+        """Replace the parameters, the flows, the name of the error or the retry of an action."""
         document = self._session.require_project_open()
         action = document.action(args.action_id)
         function = document.find_function(document.function_of(action.id))
@@ -74,9 +82,13 @@ class ActionRequests:
             updated = replace(updated, flows=list(args.flows))
         if not isinstance(args.error_output, Unset):
             updated = replace(updated, error_output=args.error_output or UNSET)
+        if not isinstance(args.retry, Unset):
+            updated = replace(updated, retry=_given(args.retry))
         if updated is not action:
             check_flows(updated, meta)
+            check_retry(updated, meta)
             check_outputs_unique(document, updated, "" if function is None else function.id)
+            check_stored(document, updated, meta, "" if function is None else function.id)
             require_results_unused(document, action, updated)
         if not isinstance(args.parameters, Unset):
             updated = complete_parameters(replace(updated, parameters=list(args.parameters)), meta)

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.base import UNSET, Unset, new_id
 from arcor2_hw.data.events import LockData
-from arcor2_hw.data.project import LogicItem
+from arcor2_hw.data.project import LogicItem, LogicWhen
 from arcor2_hw.data.rpc import AddLogicItemArgs, RemoveLogicItemArgs, UpdateLogicItemArgs
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.documents import Session
@@ -20,6 +20,10 @@ from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.registry import Context, rpc
+
+
+def _compares(when: LogicWhen | Unset) -> bool:
+    return not isinstance(when, Unset) and bool(when.comparisons)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +58,7 @@ class LogicRequests:
         places = tuple(dict.fromkeys((action_of(args.start), action_of(args.end))))
         async with self._locks.auto_skip_held(context.user, *places):
             item = LogicItem(args.start, args.end, args.condition, new_id("lit"), args.error_kinds or UNSET)
+            item = replace(item, when=args.when if _compares(args.when) else UNSET)
             self._check(document, item)
             change = document.add(Kind.LOGIC, item.id, item, scope_of(document, item))
             if not await self._editing.commit_one(context, change):
@@ -66,7 +71,16 @@ class LogicRequests:
         document = self._require_logic()
         item = document.logic_item(args.logic_item_id)
         kinds = item.error_kinds if isinstance(args.error_kinds, Unset) else args.error_kinds or UNSET
-        changed = replace(item, start=args.start, end=args.end, condition=args.condition, error_kinds=kinds)
+        # Clients of the original do not know comparisons; a condition that they set replaces these.
+        when = args.when if args.condition or not isinstance(args.when, Unset) else item.when
+        changed = replace(
+            item,
+            start=args.start,
+            end=args.end,
+            condition=args.condition,
+            error_kinds=kinds,
+            when=when if _compares(when) else UNSET,
+        )
         self._check(document, changed)
         if scope_of(document, changed) != scope_of(document, item):
             raise RequestRefused("A step cannot be moved into a function or out of it.")

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from msgspec.structs import replace
 
-from arcor2_hw.data.base import Unset, new_id
+from arcor2_hw.data.base import UNSET, Unset, new_id
 from arcor2_hw.data.events import ChangeType
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import Action, ProjectParameter
@@ -37,6 +37,22 @@ def _index(overrides: list[Parameter], name: str) -> int:
     raise NotFound("The setting {name} is not overridden.", name=name)
 
 
+def _with_output(action: Action, before: str, after: str) -> Action:
+    flows = [
+        replace(flow, outputs=[after if output == before else output for output in flow.outputs])
+        for flow in action.flows
+    ]
+    return replace(action, flows=flows)
+
+
+def _require_no_result(document: Document, parameter: ProjectParameter) -> None:
+    """Raise InvalidData if a result of an action has the name of a variable, which would be stored in it."""
+    if parameter.variable and (action := document.naming(parameter.name)) is not None:
+        raise InvalidData(
+            "{name} names a result {output} already: choose another name.", name=action.name, output=parameter.name
+        )
+
+
 @dataclass(frozen=True, slots=True)
 class ParameterRequests:
     """Requests about project parameters and overridden settings (protocol, 7.3, 7.4 and 10.5)."""
@@ -51,9 +67,11 @@ class ParameterRequests:
         """Add a project parameter, a constant for its actions."""
         document = self._session.require_project_open()
         async with self._locks.auto(context.user, PROJECT):
-            parameter = ProjectParameter(args.name, args.type, args.value, id=new_id("pco"))
+            variable = args.variable or UNSET
+            parameter = ProjectParameter(args.name, args.type, args.value, id=new_id("pco"), variable=variable)
             check_project_parameter(parameter)
             self._editing.require_name_free(Kind.PARAMETER, args.name, "a project parameter")
+            _require_no_result(document, parameter)
             await self._editing.commit_one(context, document.add(Kind.PARAMETER, parameter.id, parameter))
 
     @rpc("UpdateProjectParameter")
@@ -69,7 +87,17 @@ class ParameterRequests:
         if not isinstance(args.value, Unset):
             updated = replace(updated, value=args.value)
         check_project_parameter(updated)
-        if await self._editing.commit_one(context, document.update(Kind.PARAMETER, args.id, updated)):
+        # The actions that store results in a variable name it.
+        renamed: list[Action] = []
+        if updated.name != parameter.name:
+            _require_no_result(document, updated)
+            renamed = [_with_output(one, parameter.name, updated.name) for one in document.storing(parameter)]
+        changes = [document.update(Kind.PARAMETER, args.id, updated)]
+        changes += [document.update(Kind.ACTION, action.id, action) for action in renamed]
+        if await self._editing.commit(context, changes):
+            context.emit("ProjectParameterChanged", updated, ChangeType.UPDATE)
+            for action in renamed:
+                context.emit("ActionChanged", action, ChangeType.UPDATE)
             self._editing.unlock(context, args.id)
 
     @rpc("RemoveProjectParameter")
@@ -79,10 +107,17 @@ class ParameterRequests:
         async with self._locks.auto_skip_held(context.user, args.id):
             parameter = document.parameter(args.id)
             for user in document.users_of(args.id):
-                name = user.name if isinstance(user, Action) else ""
+                if not isinstance(user, Action):
+                    raise RequestRefused("A condition uses the project parameter {name}.", name=parameter.name)
                 raise RequestRefused(
                     "The action {name} uses the project parameter {parameter_name}.",
-                    name=name,
+                    name=user.name,
+                    parameter_name=parameter.name,
+                )
+            for action in document.storing(parameter):
+                raise RequestRefused(
+                    "The action {name} stores a result in the variable {parameter_name}.",
+                    name=action.name,
                     parameter_name=parameter.name,
                 )
             if await self._editing.commit_one(context, document.remove(Kind.PARAMETER, args.id)):

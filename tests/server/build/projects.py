@@ -1,6 +1,7 @@
 """Projects made for the tests of Build, and a direct walk through a project's logic to compare programs with."""
 
 import builtins
+import contextlib
 import copy
 import itertools
 import json
@@ -8,11 +9,14 @@ import random
 import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from operator import eq, ge, gt, le, lt, ne
 from typing import Any
+
+from msgspec.structs import replace
 
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.geometry import Position
-from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ParameterMeta
+from arcor2_hw.data.object_type import ActionMetadata, Again, ObjectAction, ObjectTypeMeta, ParameterMeta
 from arcor2_hw.data.project import (
     END,
     START,
@@ -20,9 +24,15 @@ from arcor2_hw.data.project import (
     ActionParameter,
     ActionPoint,
     Flow,
+    LogicComparison,
     LogicItem,
+    LogicWhen,
+    Match,
+    Operator,
     Project,
     ProjectLogicIf,
+    ProjectParameter,
+    Retry,
     parse_link,
 )
 from arcor2_hw.data.robot import RobotMeta
@@ -32,11 +42,34 @@ from arcor2_hw.runtime.program import ActionError
 from arcor2_server.build.frame import TypeFacts
 from arcor2_server.build.script import from_logic
 from arcor2_server.documents.changes import Kind
+from arcor2_server.documents.comparisons import (
+    OPERATORS,
+    RANGES,
+    Comparison,
+    Comparisons,
+    Reference,
+    cases_of,
+    decoded,
+)
 from arcor2_server.documents.consistency import check_consistent
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.functions import NoFunction, make_function
 
 OBJECT = "obj_1"
+PARAMETERS = [
+    ProjectParameter("limit", "integer", "1", id="pco_n"),
+    ProjectParameter("ratio", "double", "0.8", id="pco_x"),
+    ProjectParameter("enabled", "boolean", "false", id="pco_b"),
+    ProjectParameter("label", "string", '"middle"', id="pco_s"),
+]
+INVERSES = {
+    Operator.LESS: Operator.GREATER_EQUAL,
+    Operator.GREATER_EQUAL: Operator.LESS,
+    Operator.GREATER: Operator.LESS_EQUAL,
+    Operator.LESS_EQUAL: Operator.GREATER,
+    Operator.EQUAL: Operator.DIFFERENT,
+    Operator.DIFFERENT: Operator.EQUAL,
+}
 Way = tuple[str, str, bool | int | str] | None
 """Condition: the action asked, its output's name, the value."""
 SORTS = ("low", "middle", "high")
@@ -46,6 +79,8 @@ DECLARED = {
     "ask": ObjectAction("ask", returns=["boolean"]),
     "count": ObjectAction("count", returns=["integer"]),
     "sort": ObjectAction("sort", returns=["string_enum"]),
+    "measure": ObjectAction("measure", returns=["double"], meta=ActionMetadata(again=Again.SAFE)),
+    "read": ObjectAction("read", returns=["string"], meta=ActionMetadata(again=Again.SAFE)),
     "ask2": ObjectAction("ask2", returns=["boolean", "boolean"]),
     "tell": ObjectAction("tell", parameters=[ParameterMeta("text", "string")]),
     "use": ObjectAction("use", parameters=[ParameterMeta("flag", "boolean"), ParameterMeta("x", "double")]),
@@ -65,6 +100,13 @@ class Draft:
     exits: list[tuple[str, str, list[str]]] = field(default_factory=list)
     errors: dict[str, str] = field(default_factory=dict)
     told: dict[str, tuple[str, int]] = field(default_factory=dict)
+    retries: dict[str, Retry] = field(default_factory=dict)
+    variables: set[str] = field(default_factory=set)
+    """The names of the project parameters that actions change."""
+    reading: dict[str, str] = field(default_factory=dict)
+    """The id of the project parameter that an action uses, by its name."""
+    whens: dict[int, LogicWhen] = field(default_factory=dict)
+    """Comparisons instead of the condition of a way, by its number."""
 
     def action(self, name: str, *results: str) -> "Draft":
         self.actions[name] = list(results)
@@ -100,11 +142,16 @@ class Draft:
             method = "use"
             link = ActionParameter("flag", "link", json.dumps(f"id_{source}/default/{output}"))
             parameters = [link, ActionParameter("x", "double", "0.5")]
+        if name in self.reading:
+            method = "use"
+            constant = ActionParameter("flag", "project_parameter", json.dumps(self.reading[name]))
+            parameters = [constant, ActionParameter("x", "double", "0.5")]
         if name in self.told:
             source, part = self.told[name]
             method, parameters = "tell", [ActionParameter("text", "link", json.dumps(f"id_{source}/error/{part}"))]
         flows = [Flow(outputs=results)]
-        return Action(name, f"{OBJECT}/{method}", f"id_{name}", parameters, flows, self.errors.get(name, UNSET))
+        error, retry = self.errors.get(name, UNSET), self.retries.get(name, UNSET)
+        return Action(name, f"{OBJECT}/{method}", f"id_{name}", parameters, flows, error, retry)
 
     def project(self) -> Project:
         logic = []
@@ -114,12 +161,21 @@ class Draft:
                 asked, result, value = condition
                 when = ProjectLogicIf(f"id_{asked}/default/{self.actions[asked].index(result)}", json.dumps(value))
             begin = START if start == START else f"id_{start}"
-            logic.append(LogicItem(begin, END if end == END else f"id_{end}", when, f"lit_{number}"))
+            end = END if end == END else f"id_{end}"
+            if number in self.whens:
+                logic.append(LogicItem(begin, end, id=f"lit_{number}", when=self.whens[number]))
+            else:
+                logic.append(LogicItem(begin, end, when, f"lit_{number}"))
         for number, (start, end, kinds) in enumerate(self.exits):
             target = END if end == END else f"id_{end}"
             logic.append(LogicItem(f"id_{start}", target, id=f"exit_{number}", error_kinds=kinds))
         point = ActionPoint("ap", Position(), id="acp_1", actions=[self._action(name) for name in self.actions])
-        return Project("project", "scn_1", id="pro_1", action_points=[point], logic=logic)
+        parameters = [
+            replace(one, variable=True) if one.name in self.variables else one
+            for one in PARAMETERS
+            if self.whens or self.variables
+        ]
+        return Project("project", "scn_1", id="pro_1", action_points=[point], logic=logic, parameters=parameters)
 
     def script(self) -> str:
         return from_logic(SCENE, self.project(), TYPES)
@@ -160,9 +216,28 @@ def given(method: str, drawn: tuple[bool, ...]) -> tuple[Any, ...]:
     match method:
         case "count":
             return (sum(drawn),)
-        case "sort":
+        case "sort" | "read":
             return (SORTS[sum(drawn)],)
+        case "measure":
+            return (sum(drawn) * 0.75,)
     return drawn[: len(DECLARED[method].returns)]
+
+
+def _compared(what: str, results: dict[tuple[str, str], tuple[Any, ...]], variables: dict[str, Any]) -> Any:
+    if "/" not in what:
+        return variables[what]
+    source, flow, output = parse_link(what)
+    return results[source, flow][output]
+
+
+def _met(one: LogicComparison, value: Any) -> bool:
+    limit = json.loads(one.value)
+    if isinstance(one.upper, str):
+        upper = json.loads(one.upper)
+        above = limit <= value if one.operator[0] == "[" else limit < value
+        return above and (value <= upper if one.operator[1] == "]" else value < upper)
+    tests = {"==": eq, "!=": ne, "<": lt, "<=": le, ">": gt, ">=": ge}
+    return bool(tests[one.operator](value, limit))
 
 
 def walk(project: Project, oracle: Oracle, count: int) -> list[tuple[str, tuple[Any, ...]]]:
@@ -170,9 +245,12 @@ def walk(project: Project, oracle: Oracle, count: int) -> list[tuple[str, tuple[
     actions = {action.id: action for point in project.action_points for action in point.actions}
     exits = exits_of(project)
     done: list[tuple[str, tuple[Any, ...]]] = []
+    variables = {parameter.id: json.loads(parameter.value) for parameter in project.parameters}
+    stored = {parameter.name: parameter.id for parameter in project.parameters if parameter.variable}
     while True:
         results: dict[tuple[str, str], tuple[Any, ...]] = {}
         at = next(item.end for item in project.logic if item.start == START)
+        attempts = 0
         while at != END:
             if len(done) == count:
                 return done
@@ -182,19 +260,28 @@ def walk(project: Project, oracle: Oracle, count: int) -> list[tuple[str, tuple[
                 if parameter.type == "link":
                     source, flow, output = parse_link(json.loads(parameter.value))
                     values.append(results[source, flow][output])
+                elif parameter.type == "project_parameter":
+                    values.append(variables[json.loads(parameter.value)])
                 else:
                     values.append(json.loads(parameter.value))
             drawn = oracle(action.name, len(done))
             error = failure(exits, action.name, len(done), drawn)
             done.append((action.name, tuple(values)))
+            attempts += 1
+            if error is not None and isinstance(action.retry, Retry) and attempts <= action.retry.count:
+                continue
+            attempts = 0
             if error is not None:
                 results[at, "error"] = ("thing", error.code, str(error))
                 at = next(i.end for i in project.logic if i.start == at and error.code in (i.error_kinds or ()))
                 continue
             results[at, "default"] = given(action.parse_type()[1], drawn)
+            for output, value in zip(action.outputs(), results[at, "default"], strict=False):
+                if output in stored:
+                    variables[stored[output]] = value
             ways = [item for item in project.logic if item.start == at and not item.error_kinds]
             # The one without a condition is for when none holds, wherever it stands.
-            ways.sort(key=lambda way: not isinstance(way.condition, ProjectLogicIf))
+            ways.sort(key=lambda way: not way.has_condition)
             while len(ways) > 1 and ways[-2].end == ways[-1].end:
                 ways.pop(-2)
             for item in ways:
@@ -202,10 +289,29 @@ def walk(project: Project, oracle: Oracle, count: int) -> list[tuple[str, tuple[
                     source, _, output = parse_link(item.condition.what)
                     if results[source, "default"][output] != json.loads(item.condition.value):
                         continue
+                if isinstance(item.when, LogicWhen) and item is not ways[-1]:
+                    values = [_compared(one.what, results, variables) for one in item.when.comparisons]
+                    met = [_met(one, value) for one, value in zip(item.when.comparisons, values, strict=True)]
+                    if not (all(met) if item.when.match == "all" else any(met)):
+                        continue
                 at = item.end
                 break
             else:
                 raise AssertionError(f"nothing follows {at}")
+
+
+class _Retrying:
+    def __init__(self, thing: "_Thing", count: int, pause: float = 0.0) -> None:
+        self._thing, self._count = thing, count
+
+    def __getattr__(self, method: str) -> Callable[..., Any]:
+        def call(*arguments: Any, an: str) -> Any:
+            for _ in range(self._count):
+                with contextlib.suppress(Arcor2Error):
+                    return getattr(self._thing, method)(*arguments, an=an)
+            return getattr(self._thing, method)(*arguments, an=an)
+
+        return call
 
 
 class _Thing:
@@ -242,7 +348,9 @@ def run(source: str, oracle: Oracle, count: int, exits: Exits | None = None) -> 
     exec(compile(source, "script.py", "exec"), names)
     try:
         caught = lambda error: ActionError("thing", error.code, str(error))  # noqa: E731
-        names["main"](types.SimpleNamespace(objects={OBJECT: thing}, caught=caught, function=lambda body: body))
+        names["main"](
+            types.SimpleNamespace(objects={OBJECT: thing}, caught=caught, retry=_Retrying, function=lambda body: body)
+        )
     except Enough:
         return thing.done
     raise AssertionError("a generated program must not end by itself")
@@ -346,6 +454,111 @@ def with_choices(draft: Draft, rng: random.Random) -> Draft:
     if rng.random() < 0.5:
         # Where the way without a condition stands among the others makes no difference.
         draft.ways.sort(key=lambda way: way[2] is not None)
+    return draft
+
+
+LIMITS: dict[str, tuple[Any, ...]] = {
+    "boolean": (True, False),
+    "integer": (-1, 0, 1, 2, 3),
+    "double": (-0.5, 0, 0.75, 0.8, 1.5, 2),
+    "string": (*SORTS, "other"),
+}
+METHODS = {"count": "integer", "measure": "double", "read": "string", "ask": "boolean"}
+
+
+def _comparison(rng: random.Random, what: str, kind: str) -> LogicComparison:
+    limits = LIMITS[kind]
+    if kind in ("integer", "double") and rng.random() < 0.3:
+        lower, upper = sorted(rng.sample(limits, 2))
+        closed = Operator.CLOSED if upper - lower <= 1 else rng.choice(list(RANGES))
+        return LogicComparison(what, closed, json.dumps(lower), json.dumps(upper))
+    operator = rng.choice([one for one in OPERATORS[kind] if one not in RANGES])
+    return LogicComparison(what, operator, json.dumps(rng.choice(limits)))
+
+
+def _proven(whens: list[LogicWhen], kinds: dict[str, str], *, otherwise: bool) -> bool:
+    """Return whether Build accepts these conditions, tested in order."""
+    numbers = {what: Reference(number, 0) for number, what in enumerate(kinds)}
+    tests = [
+        Comparisons(tuple(Comparison(numbers[o.what], o.operator, *decoded(o)) for o in when.comparisons), when.match)
+        for when in whens
+    ]
+    if any(len(set(test.comparisons)) != len(test.comparisons) for test in tests):
+        return False
+    cases = cases_of(tests, {numbers[what]: kind for what, kind in kinds.items()})
+    return cases.known and not cases.unused and (cases.gap is not None) == otherwise
+
+
+def with_comparisons(draft: Draft, rng: random.Random) -> Draft:
+    """Turn branchings on truth values into branchings on comparisons of several results and project parameters."""
+    linked = {source for source, _ in draft.links.values()}
+    draft.methods |= {
+        name: rng.choice(list(METHODS))
+        for name, results in draft.actions.items()
+        if len(results) == 1 and name not in linked
+    }
+    groups: dict[str, list[int]] = {}
+    for number, (start, _, condition) in enumerate(draft.ways):
+        if condition is not None:
+            groups.setdefault(start, []).append(number)
+    for numbers in groups.values():
+        kinds = {one.id: one.type for one in PARAMETERS}
+        for number in numbers:
+            asked, result, _ = draft.ways[number][2]  # type: ignore[misc]
+            link = f"id_{asked}/default/{draft.actions[asked].index(result)}"
+            kinds[link] = METHODS.get(draft.methods.get(asked, ""), "boolean")
+        for attempt in range(12):
+            otherwise = rng.random() < 0.6
+            whens = [
+                LogicWhen(
+                    [_comparison(rng, what, kinds[what]) for what in rng.choices(list(kinds), k=count)],
+                    rng.choice(list(Match)) if count > 1 else Match.ALL,
+                )
+                for _ in numbers[otherwise:]
+                for count in [rng.choice((1, 1, 2, 3))]
+            ]
+            if not otherwise and len(whens) == 2 and attempt > 3:
+                [one, *_] = whens[0].comparisons
+                if kinds[one.what] in ("integer", "string") and (opposite := INVERSES.get(one.operator)):
+                    whens = [LogicWhen([one]), LogicWhen([replace(one, operator=opposite)])]
+            if _proven(whens, kinds, otherwise=otherwise):
+                break
+        else:
+            otherwise = True
+            whens = [LogicWhen([LogicComparison("pco_n", Operator.EQUAL, str(n))]) for n, _ in enumerate(numbers[1:])]
+        rng.shuffle(numbers)
+        for number in numbers:
+            draft.ways[number] = (*draft.ways[number][:2], None)
+        for number, when in zip(sorted(numbers[: len(whens)]), whens, strict=True):
+            draft.whens[number] = when
+    return draft
+
+
+def with_variables(draft: Draft, rng: random.Random) -> Draft:
+    """Store results that nothing else uses in variables, and use these as parameters."""
+    used = {source for source, _ in draft.links.values()}
+    used |= {condition[0] for _, _, condition in draft.ways if condition is not None}
+    for when in draft.whens.values():
+        used |= {parse_link(one.what)[0].removeprefix("id_") for one in when.comparisons if "/" in one.what}
+    kinds = {one.type: one for one in PARAMETERS}
+    for name, results in draft.actions.items():
+        if len(results) == 1 and name not in used and rng.random() < 0.6:
+            method = draft.methods.setdefault(name, rng.choice(list(METHODS)))
+            if method in METHODS:
+                draft.actions[name] = [kinds[METHODS[method]].name]
+                draft.variables.add(kinds[METHODS[method]].name)
+        elif not results and name not in draft.links and rng.random() < 0.3:
+            draft.reading[name] = "pco_b"
+    if draft.reading:
+        draft.variables.add("enabled")
+    return draft
+
+
+def with_retries(draft: Draft, rng: random.Random) -> Draft:
+    """Retry some of the actions that are safe to repeat."""
+    for name, method in draft.methods.items():
+        if DECLARED[method].meta.again == Again.SAFE and rng.random() < 0.6:
+            draft.retries[name] = Retry(rng.randint(1, 3), rng.choice((0.0, 0.5)))
     return draft
 
 

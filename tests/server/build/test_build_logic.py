@@ -1,5 +1,6 @@
 """Programs do what their logic defines: random graphs are run both ways, and typical shapes compared as text."""
 
+import json
 import random
 import sys
 from types import FrameType
@@ -9,8 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.object_type import ObjectAction
-from arcor2_hw.data.project import END, START
+from arcor2_hw.data.project import END, START, LogicComparison, LogicWhen, Match, Operator, Retry
 from arcor2_hw.exceptions import InvalidProject
 from arcor2_server.build.frame import TypeFacts
 from arcor2_server.build.layout import MAX_NESTING, Tree
@@ -418,3 +420,127 @@ def test_branching_requires_a_supported_result_type() -> None:
     }
     with pytest.raises(InvalidProject, match="r is double, which a condition cannot use"):
         from_logic(SCENE, project, types)
+
+
+# ------------------------------------------------------------------------------------------------ comparisons
+N, X, P, LIMIT = "id_a/default/0", "id_x/default/0", "id_p/default/0", "pco_n"
+
+
+def compared(what: str, operator: str, value: object, upper: object = UNSET) -> LogicComparison:
+    limit = UNSET if upper is UNSET else json.dumps(upper)
+    return LogicComparison(what, Operator(operator), json.dumps(value), limit)
+
+
+def comparing(*conditions: list[LogicComparison] | None, match: Match = Match.ALL) -> Draft:
+    """Give a project whose action a leads to b0, b1 ... by comparisons of the results of x, p and a, joining in z."""
+    draft = Draft(methods={"a": "count", "x": "measure", "p": "ask"})
+    draft.action("x", "x").action("p", "passed").action("a", "n").chain(START, "x", "p", "a")
+    for number, comparisons in enumerate(conditions):
+        draft.action(f"b{number}").way("a", f"b{number}")
+        if comparisons is not None:
+            draft.whens[len(draft.ways) - 1] = LogicWhen(comparisons, match)
+        draft.chain(f"b{number}", "z")
+    return draft.chain("z", END)
+
+
+def test_comparisons_read_well() -> None:
+    draft = comparing(
+        [compared(N, "[)", 3, 7), compared(P, "==", True)],
+        [compared(X, "<", -0.5)],
+        [compared(LIMIT, "!=", 2), compared(P, "==", False)],
+        None,
+    )
+    assert loop(draft.script()).splitlines()[3:11] == [
+        "if 3 <= n < 7 and passed:",
+        '    thing.do(an="b0")',
+        "elif x < -0.5:",
+        '    thing.do(an="b1")',
+        "elif limit != 2 and not passed:",
+        '    thing.do(an="b2")',
+        "else:",
+        '    thing.do(an="b3")',
+    ]
+    same_runs(draft, _oracle(1), 60)
+
+
+def test_many_comparisons_are_written_one_per_line() -> None:
+    ranges = [compared(N, "[]", first, first + 3) for first in range(100000, 100100, 10)]
+    lines = loop(comparing(ranges, None, match=Match.ANY).script()).splitlines()
+    assert lines[3:6] == ["if (", "    100000 <= n <= 100003", "    or 100010 <= n <= 100013"]
+    assert lines[14] == "):"
+
+
+def test_complete_comparisons_need_no_default_branch() -> None:
+    draft = comparing([compared(N, "<=", 0)], [compared(N, "==", 1)], [compared(N, ">=", 2)])
+    assert "else:" in draft.script()
+    same_runs(draft, _oracle(2), 60)
+    passed, failed = [compared(P, "==", True)], [compared(P, "==", False), compared(LIMIT, ">", 0)]
+    comparing(passed, failed, [compared(LIMIT, "<", 1)]).script()
+    # Overlapping conditions apply in their order, also when the first one leads to the next action of the program.
+    overlapping = Draft(methods={"a": "count"}).action("a", "n").chain(START, "a").action("b").action("z")
+    overlapping.way("a", "z").way("a", "b").chain("b", "z", END)
+    overlapping.whens = {1: LogicWhen([compared(N, "<", 2)]), 2: LogicWhen([compared(N, ">=", 1)])}
+    assert "if not n < 2:" in overlapping.script()
+    same_runs(overlapping, _oracle(3), 60)
+
+
+@pytest.mark.parametrize(
+    ("draft", "text"),
+    [
+        (comparing([compared(N, "<", 3)], [compared(N, ">", 3)]), "no action follows it when n = 3"),
+        (comparing([compared(X, "<=", 3)], [compared(X, ">=", 4)]), "no action follows it when x = 3.5"),
+        (comparing([compared(N, "<", 3), compared(P, "==", True)], [compared(N, ">=", 3)]), "n = 2, passed = false"),
+        (comparing([compared(N, "<", 3)], [compared(N, "<", 2)], None), "the connection to 'b1' is never taken"),
+        (comparing([compared(N, "<", 3)], [compared(N, ">=", 3)], None), "the connection to 'b2' is never taken"),
+        (comparing([compared(N, "[)", 3, 3)], None), "the range of n from 3 to 3 is empty"),
+        (comparing([compared(N, "()", 3, 4)], None), "the range of n from 3 to 4 is empty"),
+        (comparing([compared(N, "<", 0.5)], None), "n is integer and cannot be compared with 0.5"),
+        (comparing([compared(N, "<", True)], None), "n is integer and cannot be compared with True"),
+        (comparing([compared(X, "==", 0.5)], None), "x is a measured number"),
+        (comparing([compared(P, "<", True)], None), "passed is boolean, which cannot be compared by <"),
+        (comparing([compared(N, "[]", 3)], None), "A range has two limits"),
+        (comparing([compared(N, "<", [3])], None), "A comparison has an invalid value: [3]."),
+        (comparing([compared("id_b0/default/0", "<", 3)], None), "refers to a result that 'b0' does not name"),
+        (comparing([compared("pco_none", "<", 3)], None), "a condition refers to 'pco_none', which does not exist"),
+        (comparing([compared("id_a/error/0", "<", 3)], None), "a condition cannot be read"),
+        (comparing([compared(N, "==", n) for n in range(2001)], [compared(N, "<", 5)]), "too many to prove"),
+    ],
+)
+def test_invalid_comparisons_are_refused(draft: Draft, text: str) -> None:
+    with pytest.raises(InvalidProject) as caught:
+        draft.script()
+    assert str(caught.value).startswith("action 'a': ")
+    assert text in str(caught.value)
+
+
+def test_a_compared_result_is_set_on_all_paths() -> None:
+    draft = Draft(methods={"c": "count"}).action("a", "r").chain(START, "a").branch("a", "c", "d")
+    draft.action("c", "n").chain("c", "d").action("d").way("d", "e").way("d", END).chain("e", END)
+    draft.whens = {len(draft.ways) - 3: LogicWhen([compared("id_c/default/0", "<", 3)])}
+    with pytest.raises(InvalidProject, match="'d' uses a result of 'c', which does not run before it on all paths"):
+        draft.script()
+
+
+# ------------------------------------------------------------------------------------------------ retries
+def test_a_retry_is_part_of_the_call() -> None:
+    draft = Draft(methods={"a": "measure", "b": "measure"}).action("a", "x").action("b").chain(START, "a", "b", END)
+    draft.retries = {"a": Retry(3, 0.5), "b": Retry(1)}
+    assert loop(draft.script()).splitlines() == [
+        'x = res.retry(thing, 3, pause=0.5).measure(an="a")',
+        'res.retry(thing, 1).measure(an="b")',
+    ]
+
+
+@pytest.mark.parametrize(
+    ("method", "retry", "text"),
+    [
+        ("count", Retry(1), "'a': a: count cannot be retried, because repeating it may do harm"),
+        ("measure", Retry(101), "'a': a: a retry has a count from 1 to 100 and a pause of 0 to 3600 s"),
+        ("measure", Retry(1, -1.0), "a pause of 0 to 3600 s"),
+    ],
+)
+def test_invalid_retries_are_refused(method: str, retry: Retry, text: str) -> None:
+    draft = Draft(methods={"a": method}).action("a", "x").chain(START, "a", END)
+    draft.retries = {"a": retry}
+    with pytest.raises(InvalidProject, match=text):
+        draft.script()

@@ -12,8 +12,8 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.geometry import Pose, Position
-from arcor2_hw.data.object_type import ObjectAction
-from arcor2_hw.data.project import END, START, Action, ActionPoint, Flow, Project
+from arcor2_hw.data.object_type import ActionMetadata, Again, ObjectAction
+from arcor2_hw.data.project import END, START, Action, ActionPoint, Flow, Project, Retry
 from arcor2_hw.data.scene import SceneObject
 from arcor2_server.build.frame import TypeFacts
 from arcor2_server.build.reading import NotUnderstood, from_script
@@ -33,8 +33,11 @@ from tests.server.build.projects import (
     run,
     walk,
     with_choices,
+    with_comparisons,
     with_exits,
     with_functions,
+    with_retries,
+    with_variables,
     without_doubles,
 )
 
@@ -54,15 +57,19 @@ def _oracle(seed: int) -> Any:
     st.sampled_from([0.0, 0.2, 0.5, 0.9]),
     st.sampled_from([0.0, 0.1, 0.3]),
     st.sampled_from([1, 2, 3, 20]),
+    st.sampled_from(["", "choices", "comparisons"]),
     st.booleans(),
     st.booleans(),
 )
 def test_a_script_round_trips_to_the_same_project(
-    seed: int, size: int, joining: float, ending: float, window: int, choices: bool, exits: bool
+    seed: int, size: int, joining: float, ending: float, window: int, conditions: str, variables: bool, exits: bool
 ) -> None:
     draft = random_draft(random.Random(seed), size, joining, ending, window)
-    if choices:
-        draft = with_choices(draft, random.Random(seed))
+    if conditions:
+        change = with_choices if conditions == "choices" else with_comparisons
+        draft = change(draft, random.Random(seed))
+    if variables:
+        draft = with_retries(with_variables(draft, random.Random(seed)), random.Random(seed))
     if exits:
         draft = with_exits(draft, random.Random(seed))
     project = draft.project()
@@ -88,15 +95,18 @@ def test_a_script_round_trips_to_the_same_project(
     st.sampled_from([0.0, 0.2, 0.5, 0.9]),
     st.sampled_from([0.0, 0.1]),
     st.integers(1, 6),
+    st.sampled_from(["", "choices", "comparisons"]),
     st.booleans(),
 )
 def test_functions_round_trip_and_do_what_their_actions_did(
-    seed: int, size: int, joining: float, ending: float, count: int, choices: bool
+    seed: int, size: int, joining: float, ending: float, count: int, conditions: str, variables: bool
 ) -> None:
     rng = random.Random(seed)
     draft = without_doubles(random_draft(rng, size, joining, ending, 3))
-    if choices:
-        draft = with_choices(draft, rng)
+    if conditions:
+        draft = with_choices(draft, rng) if conditions == "choices" else with_comparisons(draft, rng)
+    if variables:
+        draft = with_retries(with_variables(draft, rng), rng)
     flat = with_exits(draft, rng).project()
     steps = [(item.start, item.end, item.is_error_exit) for item in flat.logic]
     assume(len(steps) == len(set(steps)))  # no editor makes two steps from one action to the same one
@@ -378,8 +388,55 @@ def test_numbers_and_texts_with_an_else() -> None:
         ("count", "known?", ""),
         ("count", "pack", "3"),
     ]
-    with pytest.raises(NotUnderstood, match="n is integer and cannot be True"):
+    with pytest.raises(NotUnderstood, match="n is integer and cannot be compared with True"):
         steps("        if n:\n" + pack)
+
+
+def test_results_are_stored_in_variables() -> None:
+    """A new name with a type hint is a variable, and so is a parameter to which a result is assigned."""
+    project = read(
+        ("    boards = 2\n", '    boards = 2\n    last: str = ""\n    seen = ""\n'),
+        ("        code = reader.scan(2.5, Mode.TWICE, ", "        last = reader.scan(2.5, Mode.TWICE, "),
+        ("reader.known(code, ", "reader.known(last, "),
+        (BACK, BACK + '        seen = reader.scan(1.0, an="again")\n'),
+        (IF_KNOWN, '        if known and last != "":\n'),
+    )
+    _, *_, last, seen = project.parameters
+    assert [(one.name, one.type, one.value, one.variable) for one in (last, seen)] == [
+        ("last", "string", '""', True),
+        ("seen", "string", '""', True),
+    ]
+    assert actions_of(project)["scan code"].outputs() == ["last"]
+    assert values_of(project, "known?") == {"code": ("project_parameter", f'"{last.id}"')}
+    source = from_logic(workplace.scene(), project, workplace.FACTS)
+    assert '    # Variables\n    last: str = ""\n    seen: str = ""\n' in source
+    assert '        seen = reader.scan(1.0, an="again")\n' in source
+    assert 'if known and last != "":' in source
+    assert from_script(source, workplace.scene(), project, workplace.FACTS) == project
+    with pytest.raises(NotUnderstood, match="the variable boards is integer, the result is string"):
+        read((BACK, BACK + '        boards = reader.scan(1.0, an="again")\n'))
+
+
+def test_retries_are_read() -> None:
+    facts = {**workplace.FACTS}
+    reader = facts["AcmeReader"]
+    scan = replace(reader.actions["scan"], meta=ActionMetadata(again=Again.SAFE))
+    facts["AcmeReader"] = dataclasses.replace(reader, actions={**reader.actions, "scan": scan})
+
+    def scanned(call: str) -> Project:
+        source = edited(("code = reader.scan(2.5", f"code = {call}.scan(2.5"))
+        return from_script(source, workplace.scene(), workplace.project(), facts)
+
+    project = scanned("res.retry(reader, 3, pause=0.5)")
+    assert actions_of(project)["scan code"].retry == Retry(3, 0.5)
+    source = from_logic(workplace.scene(), project, facts)
+    assert "code = res.retry(reader, 3, pause=0.5).scan(2.5" in source
+    assert from_script(source, workplace.scene(), project, facts) == project
+    for call in ("res.retry(reader)", "res.retry(reader, 0)", "res.retry(reader, 2, 0.5)", "res.retry(reader, n)"):
+        with pytest.raises(NotUnderstood, match="a retry has a count from 1 to 100"):
+            scanned(call)
+    with pytest.raises(NotUnderstood, match="pick cannot be retried"):
+        read(("robot.pick(", "res.retry(robot, 3).pick("))
 
 
 def test_a_script_of_the_original_is_read() -> None:
@@ -442,11 +499,15 @@ def test_a_script_of_the_original_is_read() -> None:
         (ABOVE, '        list = reader.scan(1.0, an="x")  #!\n', "list is not a valid name of a result"),
         (ABOVE, '        x[0] = reader.scan(1.0, an="x")  #!\n', "must be assigned to variables"),
         (ABOVE, '        reader.known(fresh, an="x")  #!\n', "unknown name fresh"),
-        (IF_KNOWN, "        if known > 1:  #!\n", "known > 1"),
-        (IF_KNOWN, "        if known == 1:  #!\n", "known is boolean and cannot be 1"),
-        (IF_KNOWN, '        if code == "x":  #!\n', "code is string"),
+        (IF_KNOWN, "        if known > 1:  #!\n", "known is boolean, which cannot be compared by >"),
+        (IF_KNOWN, "        if known == 1:  #!\n", "known is boolean and cannot be compared with 1"),
+        (IF_KNOWN, '        if code > "x":  #!\n', "code is string, which cannot be compared by >"),
+        (IF_KNOWN, "        if 3 <= code < 7:  #!\n", "code is string, which cannot be compared by [)"),
+        (IF_KNOWN, "        if 7 <= boards < 3:  #!\n", "the range of boards from 7 to 3 is empty"),
+        (IF_KNOWN, "        if 3 <= boards > 7:  #!\n", "3 <= boards > 7"),
+        (IF_KNOWN, "        if known and known:  #!\n", "known and known contains a comparison twice"),
         (IF_KNOWN, "        if fresh == True:  #!\n", "fresh is not a result"),
-        (IF_KNOWN, "        if known == True and left == True:  #!\n", "known == True and left == True"),
+        (IF_KNOWN, "        if known and (left or boards > 1):  #!\n", "left or boards > 1"),
         (GOOD, "            if left == True:  #!\n    " + GOOD, "an action is required"),
         (BACK, '        next_action = "x"\n        if next_action == "y":  #!\n    ' + BACK, "is never true"),
         (BACK, '        if next_action == "y":  #!\n    ' + BACK, "not set on all paths"),
@@ -553,7 +614,7 @@ def test_unusual_scripts_are_read_or_refused() -> None:
     for changes, line in (
         ((PICK, f'        robot.pick(aps.feeder.poses.default, {sums}, an="pick")\n'), "is not a bool"),
         ((PICK, f"        {sums}\n"), "the loop contains only calls"),
-        ((IF_KNOWN, f"        if {sums} == 1:\n"), "a condition must be"),
+        ((IF_KNOWN, f"        if {sums} == 1:\n"), "a condition compares a result"),
     ):
         with pytest.raises(NotUnderstood, match=line):
             read(changes)

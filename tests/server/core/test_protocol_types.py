@@ -13,13 +13,15 @@ from tests.protocol import PROTOCOL
 
 TRANSLATION = {"key", "values"}
 ADDED = {
-    "Action": {"error_output"},
-    "ActionMetadata": {"verdict"},
-    "AddAction.Request.Args": {"error_output"},
-    "AddLogicItem.Request.Args": {"error_kinds"},
-    "LogicItem": {"error_kinds"},
-    "UpdateAction.Request.Args": {"error_output"},
-    "UpdateLogicItem.Request.Args": {"error_kinds"},
+    "Action": {"error_output", "retry"},
+    "ActionMetadata": {"again", "verdict"},
+    "AddAction.Request.Args": {"error_output", "retry"},
+    "AddLogicItem.Request.Args": {"error_kinds", "when"},
+    "AddProjectParameter.Request.Args": {"variable"},
+    "ProjectParameter": {"variable"},
+    "LogicItem": {"error_kinds", "when"},
+    "UpdateAction.Request.Args": {"error_output", "retry"},
+    "UpdateLogicItem.Request.Args": {"error_kinds", "when"},
     "ObjectTypeMeta": {"category", "display_name", "icon", "observable", "shadows"} | TRANSLATION,
     "ParameterMeta": {"address", "for_control", "former_names", "found_by", "secret"},
     "ObjectAction": {"category", "former_names", "icon"} | TRANSLATION,

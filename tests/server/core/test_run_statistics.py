@@ -3,11 +3,11 @@
 import msgspec
 
 from arcor2_hw.data.base import UNSET
-from arcor2_hw.data.editor import CounterValue, RunStatistics
+from arcor2_hw.data.editor import CounterValue, RunStatistics, VariableValue
 from arcor2_hw.data.events import ActionStateAfterData, ActionStateBeforeData, Event, PackageInfoData
 from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.parameter import Parameter
-from arcor2_hw.data.project import Action, ActionPoint, LogicItem, Project
+from arcor2_hw.data.project import Action, ActionPoint, Flow, LogicItem, Project, ProjectParameter
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_server.execution.run_statistics import RunStatisticsCollector
 
@@ -43,9 +43,9 @@ class Run:
         info = PackageInfoData("pkg_1", "package", scene, project)
         self.collector = RunStatisticsCollector(info, {"test"} if verdicts else set(), lambda: self.now)
 
-    def start(self, action: str, *parameters: str, thread: int | None = None) -> bool:
+    def start(self, action: str, *parameters: str, thread: int | None = None, attempt: int = 1) -> bool:
         data = ActionStateBeforeData(action, [*parameters] or UNSET, thread_id=UNSET if thread is None else thread)
-        return self.collector.handle_start(msgspec.json.encode(Event("ActionStateBefore", data=data)))
+        return self.collector.handle_start(msgspec.json.encode(Event("ActionStateBefore", data=data)), attempt)
 
     def end(self, action: str, *results: str) -> bool:
         data = ActionStateAfterData(action, [*results] or UNSET)
@@ -66,6 +66,7 @@ def test_a_cycle_lasts_from_the_first_action_to_the_next_start_of_it() -> None:
     assert run.start("first")
     assert (run.statistics.cycles, run.statistics.last_cycle, run.statistics.mean_cycle) == (1, 4.0, 4.0)
     assert not run.start("first", thread=5), "an action of another thread starts no cycle"
+    assert not run.start("first", attempt=2), "a repeated action starts no cycle"
     run.now += 2.0
     run.start("first")
     assert (run.statistics.cycles, run.statistics.last_cycle, run.statistics.mean_cycle) == (2, 2.0, 3.0)
@@ -135,3 +136,22 @@ def test_counters_are_followed() -> None:
     run.start("reset")
     assert run.end("reset")
     assert value()[0].value == 7
+
+
+def test_variables_have_their_start_values_until_actions_store_results_in_them() -> None:
+    parameters = [
+        ProjectParameter("last", "string", '""', id="pco_1", variable=True),
+        ProjectParameter("limit", "integer", "3", id="pco_2"),
+    ]
+    flows = [Flow(outputs=["last"])]
+    actions = [Action("scan", "obj_reader/scan", "scan", flows=flows), Action("other", "obj_reader/scan", "other")]
+    point = ActionPoint("p", Position(), id="acp_1", actions=actions)
+    project = Project("project", "scn_1", id="pro_1", action_points=[point], parameters=parameters)
+    run = Run()
+    run.collector = RunStatisticsCollector(PackageInfoData("p", "p", Scene("cell", id="scn_1"), project), set())
+    assert run.statistics.variables == [VariableValue("pco_1", "last", '""')]
+    assert not run.end("other", '"x"')
+    assert run.end("scan", '"A1"')
+    assert not run.end("scan", '"A1"')
+    assert run.statistics.variables == [VariableValue("pco_1", "last", '"A1"')]
+    assert Run().statistics.variables is UNSET

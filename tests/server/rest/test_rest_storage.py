@@ -149,6 +149,31 @@ async def test_error_exits_survive_a_client_that_does_not_know_them(http: httpx.
     granted(await http.delete("/projects/pro_e"))
 
 
+async def test_comparisons_survive_a_client_that_does_not_know_them(http: httpx.AsyncClient) -> None:
+    granted(await http.put("/scenes", json=scene("scn_w", "FlowActions")))
+    point = {"id": "acp_1", "name": "point", "position": POSE["position"]}
+    action = {"id": "act_1", "name": "end", "type": "obj_0/end"}
+    known = {"id": "lit_1", "start": "act_1", "end": "END"}
+    when = {"match": "all", "comparisons": [{"what": "pco_1", "operator": ">=", "value": "3"}]}
+    sent = project("pro_w", "scn_w") | {"actionPoints": [point | {"actions": [action]}], "logic": [known]}
+    granted(await http.put("/projects", json=sent | {"logic": [known | {"when": when}]}))
+    granted(await http.put("/projects", json=sent))
+    assert granted(await http.get("/projects/pro_w"))["logic"] == [known | {"when": when}]
+    condition = {"what": "act_1/default/0", "value": "true"}
+    granted(await http.put("/projects", json=sent | {"logic": [known | {"condition": condition}]}))
+    assert granted(await http.get("/projects/pro_w"))["logic"] == [known | {"condition": condition}]
+    parameter = {"id": "pco_1", "name": "last", "type": "integer", "value": "0"}
+    granted(await http.put("/projects", json=sent | {"parameters": [parameter | {"variable": True}]}))
+    granted(await http.put("/projects", json=sent | {"parameters": [parameter]}))
+    assert granted(await http.get("/projects/pro_w"))["parameters"] == [parameter | {"variable": True}]
+    retried = point | {"actions": [action | {"retry": {"count": 2, "pause": 0.5}}]}
+    granted(await http.put("/projects", json=sent | {"actionPoints": [retried]}))
+    granted(await http.put("/projects", json=sent))
+    [stored] = granted(await http.get("/projects/pro_w"))["actionPoints"]
+    assert stored["actions"][0]["retry"] == {"count": 2, "pause": 0.5}
+    granted(await http.delete("/projects/pro_w"))
+
+
 async def test_a_project_is_stored_and_deleted_with_its_parts(http: httpx.AsyncClient) -> None:
     granted(await http.put("/scenes", json=scene("scn_p")))
     refused(await http.put("/projects", json=project("pro_a", "scn_nowhere")), 404, "NotFound", "scn_nowhere")

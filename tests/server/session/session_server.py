@@ -17,7 +17,14 @@ import msgspec
 
 from arcor2_hw.data.events import SceneStateEnum
 from arcor2_hw.data.geometry import Orientation, Pose, Position
-from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObjectTypeSource, ParameterMeta
+from arcor2_hw.data.object_type import (
+    ActionMetadata,
+    Again,
+    ObjectAction,
+    ObjectTypeMeta,
+    ObjectTypeSource,
+    ParameterMeta,
+)
 from arcor2_hw.data.robot import Joint, RobotMeta, RobotType
 from arcor2_hw.exceptions import NotFound
 from arcor2_server.access.admission import Access
@@ -69,7 +76,7 @@ class RecordedTypes:
             "TimeActions": [ObjectAction("sleep", parameters=[double]), ObjectAction("say", parameters=[text])],
             "RandomActions": [
                 ObjectAction("random_bool", parameters=[ParameterMeta("probability", "double")], returns=["boolean"]),
-                ObjectAction("random_double", returns=["double"]),
+                ObjectAction("random_double", returns=["double"], meta=ActionMetadata(again=Again.SAFE)),
             ],
         }
         self.revision = 1

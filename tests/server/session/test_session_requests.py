@@ -71,6 +71,78 @@ async def test_an_error_exit_survives_a_client_that_does_not_know_it(work: Work,
         await alice.ask("UpdateLogicItem", logic_item_id=item["id"], start=one, end="END", error_kinds=[])
 
 
+async def test_comparisons_survive_a_client_that_does_not_know_them(work: Work, alice: Person) -> None:
+    await work.project("p")
+    one = await work.add_action(work.point("p"), "one")
+    two = await work.add_action(work.point("p"), "two")
+    await alice.ask("AddProjectParameter", name="limit", type="integer", value="3")
+    limit = next(one for one in work.session.project.parameters if one.name == "limit")
+    when = {"match": "any", "comparisons": [{"what": limit.id, "operator": "[)", "value": "3", "upper": "7"}]}
+    alice.take()
+    await alice.ask("AddLogicItem", start=one, end=two, when=when)
+    [_, changed, *_] = alice.take()
+    item = changed["data"]
+    assert item["when"] == when
+    assert "condition" not in item
+    await alice.ask("UpdateLogicItem", logic_item_id=item["id"], start=one, end="END")
+    assert msgspec.to_builtins(work.session.document.logic_item(item["id"]).when) == when
+    with pytest.raises(Refused, match="A condition uses the project parameter limit"):
+        await alice.ask("RemoveProjectParameter", id=limit.id)
+    less = {"comparisons": [{"what": limit.id, "operator": "<", "value": "true"}]}
+    with pytest.raises(Refused, match="cannot be compared with True"):
+        await alice.ask("UpdateLogicItem", logic_item_id=item["id"], start=one, end="END", when=less)
+    await alice.ask("UpdateLogicItem", logic_item_id=item["id"], start=one, end="END", when={"comparisons": []})
+    assert "when" not in msgspec.to_builtins(work.session.document.logic_item(item["id"]))
+    await alice.ask("RemoveProjectParameter", id=limit.id)
+
+
+async def test_actions_store_results_in_a_variable(work: Work, alice: Person) -> None:
+    await work.project("p")
+    await alice.ask("AddProjectParameter", name="last", type="double", value="0.0", variable=True)
+    last = next(one for one in work.session.project.parameters if one.name == "last")
+    assert last.variable is True
+    stored = [{"type": "default", "outputs": ["last"]}]
+    rnd = work.object("rnd")
+    half = {"name": "probability", "type": "double", "value": "0.5"}
+    one = await work.add_action(work.point("p"), "one", type=f"{rnd}/random_double", parameters=[], flows=stored)
+    await work.add_action(work.point("p"), "two", type=f"{rnd}/random_double", parameters=[], flows=stored)
+    with pytest.raises(Refused, match="three: the variable last is double, the result is boolean"):
+        await work.add_action(work.point("p"), "three", type=f"{rnd}/random_bool", parameters=[half], flows=stored)
+    await alice.ask("AddLogicItem", start="START", end=one)
+    with pytest.raises(Refused, match="one stores its result in the variable last: use the variable"):
+        await alice.ask("AddLogicItem", start=one, end="END", condition={"what": f"{one}/default/0", "value": "3"})
+    with pytest.raises(Refused, match="The action one stores a result in the variable last"):
+        await alice.ask("RemoveProjectParameter", id=last.id)
+    await alice.lock(last.id)
+    await alice.ask("UpdateProjectParameter", id=last.id, name="newest")
+    assert [work.action(name).outputs() for name in ("one", "two")] == [["newest"], ["newest"]]
+    await alice.ask("Undo")
+    assert [work.action(name).outputs() for name in ("one", "two")] == [["last"], ["last"]]
+    await alice.lock(one)
+    await alice.ask("UpdateAction", action_id=one, flows=[{"type": "default", "outputs": ["n"]}])
+    with pytest.raises(Refused, match="one names a result n already"):
+        await alice.ask("AddProjectParameter", name="n", type="integer", value="0", variable=True)
+    when = {"comparisons": [{"what": f"{one}/default/0", "operator": ">", "value": "3"}]}
+    await alice.ask("AddLogicItem", start=one, end="END", when=when)
+    with pytest.raises(Refused, match="A condition of the logic uses a result of one"):
+        await alice.ask("UpdateAction", action_id=one, flows=stored)
+
+
+async def test_a_retry_needs_an_action_that_is_safe_to_repeat(work: Work, alice: Person) -> None:
+    await work.project("p")
+    with pytest.raises(Refused, match="one: sleep cannot be retried, because repeating it may do harm"):
+        await work.add_action(work.point("p"), "one", retry={"count": 3})
+    read = {"type": f"{work.object('rnd')}/random_double", "parameters": []}
+    with pytest.raises(Refused, match="two: a retry has a count from 1 to 100"):
+        await work.add_action(work.point("p"), "two", **read, retry={"count": -1, "pause": 0.5})
+    two = await work.add_action(work.point("p"), "two", **read, retry={"count": 3, "pause": 0.5})
+    await alice.lock(two)
+    await alice.ask("UpdateAction", action_id=two, flows=[{"type": "default", "outputs": []}])
+    assert msgspec.to_builtins(work.action("two").retry) == {"count": 3, "pause": 0.5}
+    await alice.ask("UpdateAction", action_id=two, retry={"count": 0})
+    assert "retry" not in msgspec.to_builtins(work.action("two"))
+
+
 async def test_logic_items_always_announce_unlocking(work: Work, alice: Person, bob: Person) -> None:
     await work.project("p")
     one = await work.add_action(work.point("p"), "one")
@@ -232,7 +304,7 @@ async def test_edits_of_many_users_at_once_keep_their_order(
 
     for n, person in enumerate(crowd):
         await person.ask("AddProjectParameter", name=f"p{n}", type="integer", value=str(n))
-    parameters = [p.id for p in work.session.require_project().parameters[2:]]
+    parameters = [p.id for p in work.session.project.parameters[2:]]
     for n, person in enumerate(crowd):
         await person.lock(parameters[n])
     alice.take()
@@ -467,7 +539,7 @@ async def test_a_dry_run_checks_and_changes_nothing(
     action = await work.add_action(p, "act")
     orientation = await work.add_orientation(q)
     await alice.ask("AddProjectParameter", name="n", type="integer", value="1")
-    parameter = work.session.require_project().parameters[-1].id
+    parameter = work.session.project.parameters[-1].id
     await alice.lock(p)
     await alice.lock(parameter)
     await alice.lock(action)

@@ -21,8 +21,11 @@ from arcor2_hw.data.project import (
     ActionParameter,
     ActionPoint,
     Flow,
+    LogicComparison,
     LogicItem,
+    LogicWhen,
     NamedOrientation,
+    Operator,
     Project,
     ProjectLogicIf,
     ProjectParameter,
@@ -138,6 +141,51 @@ def test_numbers_and_texts_may_have_a_default_branch() -> None:
     check_logic_item(document, meta_of, step("a", "c", "a/default/2", "7", key="a>c"))
     with pytest.raises(InvalidData, match="but one"):
         check_logic_item(document, meta_of, step("a", "d", key="a>d"))
+
+
+def when(
+    start: str, end: str, *comparisons: tuple[str, str, str] | tuple[str, str, str, str], key: str = ""
+) -> LogicItem:
+    tests = [LogicComparison(one[0], Operator(one[1]), *one[2:]) for one in comparisons]
+    return LogicItem(start, end, id=key or f"{start}>{end}", when=LogicWhen(tests))
+
+
+def test_comparisons_are_checked_by_the_types_of_their_values() -> None:
+    document = branching("a", "b", "c", "d", "e")
+    document.apply([document.add(Kind.PARAMETER, "pco", ProjectParameter("limit", "string", '"x"', id="pco"))])
+    add(document, step("START", "a"))
+    add(document, when("a", "b", ("a/default/2", "[)", "3", "7"), ("pco", "==", '"x"'), ("a/default/1", "<", "5")))
+    add(document, step("a", "c"))
+    number = "a/default/2"
+    for item, reason in (
+        (when("a", "d", ("a/default/1", "==", "5")), "use a range"),
+        (when("a", "d", (number, "<", '"x"')), "integer and cannot be compared with 'x'"),
+        (when("a", "d", ("a/default/3", "<", '"x"')), "string_enum, which cannot be compared by <"),
+        (when("a", "d", (number, "[]", "3")), "two limits"),
+        (when("a", "d", (number, "<", "3", "4")), "two limits"),
+        (when("a", "d", (number, "[]", "4", "3")), "range of a_i from 4 to 3 is empty"),
+        (when("a", "d", (number, "<", "3"), (number, "<", "3")), "given twice"),
+        (when("a", "d", (number, "<", "null")), "invalid value: null"),
+        (when("a", "d", ("gone", "<", "3")), "gone"),
+        (when("a", "d", ("a/default/4", "<", "3")), "result number 4"),
+        (when("START", "a", (number, "<", "3"), key="START>a"), "START cannot have a condition"),
+        (when("a", "c", (number, "<", "3"), key="a>b"), "a leads to c already"),
+        (replace(when("a", "d", (number, "<", "3")), error_kinds=["error"]), "error exit of a cannot have"),
+        (replace(when("a", "d", (number, "<", "3")), condition=ProjectLogicIf(number, "3")), "not both"),
+        (step("a", "d"), "but one needs a condition"),
+        (
+            when("a", "d", ("a/default/2", "[)", "3", "7.0"), ("pco", "==", '"x"')),
+            "cannot be compared with 7.0",
+        ),
+    ):
+        with pytest.raises(Arcor2Error, match=reason):
+            check_logic_item(document, meta_of, item)
+    add(document, step("a", "d", number, "9"))
+    for item in (step("a", "e", number, "9"), when("a", "e", (number, "==", "9"))):
+        with pytest.raises(InvalidData, match="same condition"):
+            check_logic_item(document, meta_of, item)
+    assert [user.id for user in document.users_of("pco")] == ["a>b"]
+    assert {user.id for user in document.users_of("a")} == {"a>b", "a>d"}
 
 
 def error_exit(start: str, end: str, *kinds: str, condition: str = "") -> LogicItem:

@@ -7,6 +7,8 @@ import {
   branchKind,
   conditionWords,
   END,
+  hasComparisons,
+  isConditional,
   nextSteps,
   placeOf,
   resultsOf,
@@ -150,7 +152,8 @@ export function branchesOf(doc: OpenDocument, types: State["types"], id: string)
     return [branches.length === 0 ? { id: "next", label: t`next` } : { id: "branch", label: t`branch` }];
   const what = `${id}/default/${result.index}`;
   const asked = (value: string) => branches.some((each) => each.condition?.value === value);
-  if (branches.some((each) => !each.condition)) return [{ id: "branch", label: t`branch` }];
+  if (branches.some((each) => !isConditional(each) || hasComparisons(each)))
+    return [{ id: "branch", label: t`branch` }];
   const free: Branch[] = [];
   if (!asked("true")) free.push({ id: "true", label: t`yes`, what });
   if (branches.length === 0) free.push({ id: "next", label: t`next` });

@@ -10,6 +10,8 @@ import {
   conditionsOf,
   conditionWords,
   END,
+  hasComparisons,
+  isConditional,
   linkTo,
   nextSteps,
   outgoing,
@@ -69,7 +71,7 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
         ))}
       </ul>
       <div className="row">
-        {(steps.length === 0 || (result && result.type !== "boolean")) && (
+        {(steps.length === 0 || steps.some(hasComparisons) || (result && result.type !== "boolean")) && (
           <Button icon="plus" why={why} onPress={() => startConnecting(id)}>
             {t`Connect`}
           </Button>
@@ -88,7 +90,7 @@ const Next: Section["Body"] = ({ selection: { id } }) => {
             )}
           </>
         )}
-        {result?.type === "boolean" && steps.length === 1 && !steps[0]?.condition && (
+        {result?.type === "boolean" && steps.length === 1 && steps[0] && !isConditional(steps[0]) && (
           <Button icon="plus" why={why} onPress={() => startConnecting(id)}>
             {t`Branch`}
           </Button>

@@ -3,14 +3,19 @@
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
 import { Button as AriaButton } from "react-aria-components";
-import { addParameter, notEditable, override, removeParameter, updateParameter } from "../../commands/program";
+import { addParameter, override, removeParameter, updateParameter } from "../../commands/parameters";
+import { notEditable } from "../../commands/program";
 import { byName } from "../../formats";
 import { words } from "../../program/naming";
 import { usersOf } from "../../program/problems";
-import { extraOf, read, SIMPLE, type Simple, textOf, typeName } from "../../program/values";
+import { lastRun } from "../../program/results";
+import { extraOf, OWN_PARAMETERS, read, SIMPLE, type Simple, textOf, typeName } from "../../program/values";
 import type { ParameterMeta } from "../../protocol/types";
+import { isRunning } from "../../store/selectors";
 import { select, useEditor } from "../../store/store";
+import { nameOf, selectionOf } from "../../viewmodel/names";
 import { Field } from "../kit/Field";
+import { OnOff } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { ValueField } from "./ValueField";
 
@@ -20,7 +25,7 @@ export function Parameters() {
     <>
       <p className="quiet small">{t`Variables are shared by all actions of the project.`}</p>
       {Object.values(parameters ?? {})
-        .filter((each) => !OWN.has(each.name))
+        .filter((each) => !OWN_PARAMETERS.has(each.name))
         .sort(byName)
         .map((each) => (
           <One key={each.id} id={each.id} />
@@ -30,9 +35,6 @@ export function Parameters() {
     </>
   );
 }
-
-/** The server maintains these for scripts. */
-const OWN: ReadonlySet<string> = new Set(["scene_id", "project_id"]);
 
 function One({ id }: { id: string }) {
   const state = useEditor((each) => each);
@@ -44,7 +46,7 @@ function One({ id }: { id: string }) {
   const { range } = parameter;
   const cannotRemove =
     notEditable(state, "RemoveProjectParameter") ||
-    (users.length > 0 ? t`Used by ${users.map((each) => doc.actions[each]?.name).join(", ")}.` : "");
+    (users.length > 0 ? t`Used by ${users.map((each) => nameOf(state, each)).join(", ")}.` : "");
   return (
     <section className="constant" aria-label={parameter.name}>
       <ValueField
@@ -53,7 +55,7 @@ function One({ id }: { id: string }) {
         type={parameter.type}
         json={parameter.value}
         extra={range && { minimum: range.min, maximum: range.max }}
-        hint={parameter.description || typeName(parameter.type)}
+        hint={parameter.description || (parameter.variable ? startWords(parameter.type) : typeName(parameter.type))}
         why={why}
         onSet={(value) => updateParameter(id, { value })}
       >
@@ -65,15 +67,35 @@ function One({ id }: { id: string }) {
           onPress={() => void removeParameter(id)}
         />
       </ValueField>
+      <Present id={id} />
       <p className="small used">
         {users.length === 0 ? <span className="quiet">{t`not used`}</span> : `${t`Used by`} `}
         {users.map((each) => (
-          <AriaButton key={each} className="chip" onPress={() => select({ kind: "action", id: each })}>
-            {doc.actions[each]?.name}
+          <AriaButton key={each} className="chip" onPress={() => select(selectionOf(state, each))}>
+            {nameOf(state, each)}
           </AriaButton>
         ))}
       </p>
     </section>
+  );
+}
+
+const startWords = (type: string): string => t`${typeName(type)} at the start of a run; actions change it`;
+
+/** The present value of a variable while the program runs, and its last one afterwards. */
+function Present({ id }: { id: string }) {
+  const known = useEditor((state) => {
+    const run = lastRun(state, state.doc?.project?.id);
+    return run?.statistics?.variables?.find((each) => each.id === id)?.value;
+  });
+  const running = useEditor(isRunning);
+  const type = useEditor((state) => state.doc?.parameters[id]?.type ?? "string");
+  if (known === undefined) return null;
+  const value = textOf(type, known) || '""';
+  return (
+    <p className="small" data-variable={id}>
+      {running ? t`Now: ${value}` : t`After the last run: ${value}`}
+    </p>
   );
 }
 
@@ -83,6 +105,7 @@ function NewParameter() {
   const [name, setName] = useState("");
   const [type, setType] = useState<Simple>("integer");
   const [text, setText] = useState("");
+  const [variable, setVariable] = useState(false);
   const [problem, setProblem] = useState("");
   if (!open) {
     return (
@@ -95,7 +118,7 @@ function NewParameter() {
     event.preventDefault();
     const value = read(type, text);
     if ("problem" in value) return setProblem(value.problem);
-    const refused = await addParameter(name.trim(), type, value.json);
+    const refused = await addParameter(name.trim(), type, value.json, variable);
     setProblem(refused);
     if (refused) return;
     setOpen(false);
@@ -125,6 +148,7 @@ function NewParameter() {
         onChange={setText}
         autoComplete="off"
       />
+      <OnOff isSelected={variable} onChange={setVariable}>{t`Actions change it`}</OnOff>
       {problem && (
         <p className="error" role="alert">
           {problem}

@@ -1,9 +1,9 @@
 /** Results of an action: their names, and the actions that use them. */
 
 import { t } from "@lingui/core/macro";
-import { useState } from "react";
+import { Fragment, useId, useState } from "react";
 import { nameResults, notEditable } from "../../commands/program";
-import { metaOf } from "../../program/logic";
+import { metaOf, variableNamed } from "../../program/logic";
 import { newOutputs } from "../../program/naming";
 import { usersOf } from "../../program/problems";
 import { typeName } from "../../program/values";
@@ -48,22 +48,41 @@ const Results: Section["Body"] = ({ selection: { id } }) => {
   const users = usersOf(doc, types, { action: id });
   return (
     <>
-      {returns.map((type, index) => (
-        <ValueField
-          key={`${id}/${index}`}
-          label={typeName(type)}
-          name={t`Name of result ${index + 1}`}
-          type="string"
-          json={JSON.stringify(outputs[index] ?? "")}
-          why={why}
-          onSet={(json) =>
-            nameResults(
-              id,
-              outputs.map((each, at) => (at === index ? (JSON.parse(json) as string) : each)),
-            )
-          }
-        />
-      ))}
+      {returns.map((type, index) => {
+        const output = outputs[index] ?? "";
+        const stored = variableNamed(doc, output);
+        const rename = (name: string) =>
+          nameResults(
+            id,
+            outputs.map((each, at) => (at === index ? name : each)),
+          );
+        const own = newOutputs(doc, action.type.split("/")[1] ?? action.name, 1)[0] ?? output;
+        return (
+          <Fragment key={`${id}/${index}`}>
+            {!stored && (
+              <ValueField
+                label={typeName(type)}
+                name={t`Name of result ${index + 1}`}
+                type="string"
+                json={JSON.stringify(output)}
+                why={why}
+                onSet={(json) => rename(JSON.parse(json) as string)}
+              />
+            )}
+            <StoredIn
+              type={type}
+              stored={stored?.name ?? ""}
+              why={why}
+              onSet={(name) => void rename(name || own).then(setProblem)}
+            />
+          </Fragment>
+        );
+      })}
+      {problem && (
+        <p className="error" role="alert">
+          {problem}
+        </p>
+      )}
       {users.length > 0 && (
         <p className="small">
           {t`Used by`}{" "}
@@ -78,3 +97,25 @@ const Results: Section["Body"] = ({ selection: { id } }) => {
   );
 };
 export default Results;
+
+/** Choice between a name of its own for a result, and the variables of its type. */
+function StoredIn(of: { type: string; stored: string; why: string; onSet: (name: string) => void }) {
+  const { type, stored, why, onSet } = of;
+  const id = useId();
+  const parameters = useEditor((state) => state.doc?.parameters);
+  const fitting = Object.values(parameters ?? {}).filter((each) => each.variable && each.type === type);
+  if (fitting.length === 0) return null;
+  return (
+    <div className="field">
+      <label htmlFor={id}>{t`Store in variable`}</label>
+      <select id={id} value={stored} disabled={why !== ""} onChange={(event) => onSet(event.target.value)}>
+        <option value="">{t`none: result of this action`}</option>
+        {fitting.map((each) => (
+          <option key={each.id} value={each.name}>
+            {each.name}
+          </option>
+        ))}
+      </select>
+    </div>
+  );
+}

@@ -3,12 +3,14 @@
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { notEditable, removeStep, setCondition, startConnecting } from "../../commands/program";
-import { conditionsOf, linkTo, nextSteps, placeOf, resultAt, START } from "../../program/logic";
+import { operandsOf } from "../../program/comparisons";
+import { nextSteps, placeOf, START, whenOf } from "../../program/logic";
+import type { LogicWhen } from "../../protocol/types";
 import { now, select, useEditor } from "../../store/store";
 import { nameOf, selectionOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/section";
-import { ValueField } from "./ValueField";
+import { Comparisons } from "./Comparisons";
 import "./program.css";
 
 const Step: Section["Body"] = ({ selection: { id } }) => {
@@ -20,17 +22,12 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
   const from = placeOf(step.start);
   const to = placeOf(step.end);
   const why = notEditable(state, "UpdateLogicItem");
-  const results = from === START ? [] : conditionsOf(doc, types, from);
-  const result = step.condition && resultAt(doc, types, step.condition.what);
+  const operands = from === START ? [] : operandsOf(doc, types, from);
   const alone = nextSteps(doc, from).length === 1;
-  const choose = async (what: string) => {
-    const chosen = results.find((each) => linkTo(each) === what);
-    setProblem(
-      await setCondition(
-        id,
-        chosen && { what, value: chosen.type === "boolean" ? "true" : chosen.type === "string_enum" ? '"value"' : "0" },
-      ),
-    );
+  const set = async (when: LogicWhen) => {
+    const refused = await setCondition(id, when);
+    setProblem(refused);
+    return refused;
   };
   return (
     <>
@@ -43,39 +40,23 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
           {nameOf(state, to)}
         </Button>
       </div>
-      {results.length > 0 ? (
-        <div className="field">
-          <label htmlFor="depends-on">{t`Condition`}</label>
-          <select
-            id="depends-on"
-            value={step.condition?.what ?? ""}
-            disabled={why !== ""}
-            onChange={(event) => void choose(event.target.value)}
-          >
-            <option value="">{alone ? t`none: always` : t`none: otherwise`}</option>
-            {results.map((each) => (
-              <option key={linkTo(each)} value={linkTo(each)}>
-                {each.action.id === from ? each.name : t`${each.name} of ${each.action.name}`}
-              </option>
-            ))}
-          </select>
-        </div>
+      {operands.length > 0 ? (
+        <Comparisons
+          doc={doc}
+          types={types}
+          when={whenOf(step)}
+          operands={operands}
+          from={from}
+          none={alone ? t`none: always` : t`none: otherwise`}
+          why={why}
+          onSet={set}
+        />
       ) : (
         <p className="quiet small">
           {from === START
             ? t`First step of the program.`
-            : t`${nameOf(state, from)} has no result to branch on (yes or no, whole number, choice).`}
+            : t`${nameOf(state, from)} has no result to branch on, and the project has no variable.`}
         </p>
-      )}
-      {step.condition && result && (
-        <ValueField
-          label={t`Value of ${result.name}`}
-          name={result.name}
-          type={result.type === "integer_enum" ? "integer" : result.type}
-          json={step.condition.value}
-          why={why}
-          onSet={(value) => setCondition(id, { what: step.condition?.what ?? "", value })}
-        />
       )}
       {problem && (
         <p className="error" role="alert">

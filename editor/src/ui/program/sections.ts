@@ -1,6 +1,7 @@
 /** Sections of the panel about actions, connections, START and END; their bodies are loaded when they are needed. */
 
 import { msg } from "@lingui/core/macro";
+import { metaOf } from "../../program/logic";
 import { isErrorExit } from "../../program/steps";
 import { lazyComponent } from "../kit/lazy";
 import type { Section } from "../workplace/section";
@@ -21,6 +22,16 @@ export const programSections: readonly Section[] = [
     applies: ({ kind, id }, state) =>
       state.doc?.project?.has_logic === true && (kind === "action" || (kind === "terminal" && id === "START")),
     Body: lazyComponent(() => import("./Next")),
+  },
+  {
+    id: "retry",
+    title: msg`Automatic retry`,
+    applies: ({ kind, id }, { doc, types }) => {
+      const action = kind === "action" ? doc?.actions[id] : undefined;
+      if (!doc || !action) return false;
+      return action.retry !== undefined || metaOf(types, doc, action)?.meta.again === "safe";
+    },
+    Body: lazyComponent(() => import("./Retry")),
   },
   { id: "results", title: msg`Results`, applies: isAction, Body: lazyComponent(() => import("./Results")) },
   {

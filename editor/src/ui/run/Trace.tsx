@@ -60,6 +60,7 @@ function Detail({ entry, onChoose }: { entry: TraceEntry; onChoose: (actionId: s
   const names = meta?.parameters.map((each) => words(each.name)) ?? [];
   return (
     <div className="trace-detail">
+      {entry.attempt !== undefined && <p className="small">{t`Attempt ${entry.attempt}`}</p>}
       {entry.error !== undefined && <p className="error">{entry.error}</p>}
       {entry.parameters && entry.parameters.length > 0 && <Values names={names} values={entry.parameters} />}
       {entry.results && entry.results.length > 0 && (

@@ -27,6 +27,8 @@ class FunctionReader(LoopReader):
         old: its parameters in the old project, by variable.
     """
 
+    stores = False
+
     def __init__(
         self,
         frame: Frame,
@@ -53,6 +55,9 @@ class FunctionReader(LoopReader):
             case [ast.Expr(ast.Constant(str())), *rest] if rest:
                 body = rest
         super().__init__(frame, script, values, shared, body)
+
+    def _is_hidden(self, name: str) -> bool:
+        return name in self._variables
 
     def _parameter(self, given: ast.arg, old: ActionParameter | None, values: Values) -> ActionParameter:
         name = given.arg if old is None else old.name

@@ -26,6 +26,7 @@ class Script:
         resources: the parameter of `main`.
         objects: ids of scene objects, by variable.
         constants: values of project parameters, by variable.
+        annotated: the variables of project parameters with a type hint.
         imports: the imported names, by their names in the script.
         functions: the functions, in their order.
         errors: the kinds of errors, by the names of their classes in the script.
@@ -37,6 +38,7 @@ class Script:
     resources: str = ""
     objects: dict[str, str] = field(default_factory=dict)
     constants: dict[str, ast.expr] = field(default_factory=dict)
+    annotated: set[str] = field(default_factory=set)
     functions: list[ast.FunctionDef] = field(default_factory=list)
     imports: dict[str, str] = field(default_factory=dict)
     errors: dict[str, str] = field(default_factory=dict)
@@ -130,6 +132,8 @@ def _main(script: Script, main: ast.FunctionDef) -> None:
             case ast.Assign([ast.Name(name)], value) | ast.AnnAssign(ast.Name(name), _, ast.expr() as value):
                 script.claim(name, node.lineno)
                 _set_up(script, name, value)
+                if isinstance(node, ast.AnnAssign) and name in script.constants:
+                    script.annotated.add(name)
             case ast.FunctionDef():
                 _check_function(script, node)
                 script.claim(node.name, node.lineno)

@@ -1,6 +1,5 @@
 """Converts the calls and paths of the program, or of one function, to actions and logic."""
 
-import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
@@ -15,18 +14,28 @@ from arcor2_hw.data.project import (
     ActionParameter,
     ActionParameterType,
     Flow,
+    LogicComparison,
     LogicItem,
+    LogicWhen,
     ProjectLogicIf,
 )
+from arcor2_hw.exceptions import InvalidProject
 from arcor2_server.build import layout
 from arcor2_server.build.error_exits import nodes_of
 from arcor2_server.build.reading.errors import NotUnderstood
 from arcor2_server.build.reading.paths import START_NODE, Call, LogicPath, LoopReader
 from arcor2_server.build.reading.values import Values, json_of
-from arcor2_server.documents.logic_graph import END_NODE, Condition, Edge, ErrorExit
-
-_ConditionKey = tuple[str, object] | None
-"""A condition in comparable form: the result and its value."""
+from arcor2_server.documents import logic_graph
+from arcor2_server.documents.comparisons import Comparisons, cases_of, condition_key, inverse
+from arcor2_server.documents.logic_graph import (
+    END_NODE,
+    Condition,
+    Edge,
+    ErrorExit,
+    Test,
+    as_comparisons,
+    is_boolean,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +45,8 @@ class Variables:
     results: dict[str, list[str]] = field(default_factory=dict)
     errors: dict[str, str] = field(default_factory=dict)
     parameters: dict[str, dict[str, str]] = field(default_factory=dict)
+    stored: dict[str, str] = field(default_factory=dict)
+    """The variables of the project by their names in the script."""
 
 
 class Part:
@@ -68,6 +79,8 @@ class Part:
         self._variables = variables
         self._paths = {number: _merged(found) for number, found in reader.paths.items()}
         self._exits = reader.exits
+        self._kinds = reader.kinds
+        self._stored = variables.stored if reader.stores else {}
         self._number_of = {call.name: number for number, call in enumerate(self.calls)}
         self._reached = reached(logic)
         self._check_uses(reader)
@@ -115,6 +128,8 @@ class Part:
             if action.id in self.unreachable:
                 continue
             for output in action.names():
+                if output in self._stored.values() and output in action.outputs():
+                    continue
                 if output in named:
                     raise NotUnderstood(
                         self.calls[self._number_of[action.name]].line,
@@ -151,6 +166,7 @@ class Part:
             [found[name] for name in order],
             self._flows(call, old),
             self._error_output(call, old),
+            call.retry,
         )
 
     def _error_output(self, call: Call, old: Action | None) -> str | Unset:
@@ -168,6 +184,9 @@ class Part:
         for place, variable in enumerate(call.outputs):
             if old is not None and place < len(before) and before[place] == variable:
                 outputs.append(old.outputs()[place])
+                continue
+            if variable in self._stored:
+                outputs.append(self._stored[variable])
                 continue
             if not is_valid_name(variable):
                 raise NotUnderstood(call.line, "{variable} is not a valid name of a result", variable=variable)
@@ -191,8 +210,9 @@ class Part:
             wanted += [self._exit(one) for one in self._exits.get(number, ())]
             same = {_key(item): item for item in old}
             keys = [_key(item) for item in wanted]
-            # The order of conditions matters; the edge without a condition is always the last.
-            ordered = len(paths) <= 2 or [key for key in same if key[1]] == [key for key in keys if key[1]]
+            # The order of conditions matters, except of two opposite ones; the edge without one is always the last.
+            opposite = len(paths) <= 2 and not any(item.has_comparisons for item in wanted)
+            ordered = opposite or [key for key in same if key[1]] == [key for key in keys if key[1]]
             if len(same) == len(old) == len(keys) and set(same) == set(keys) and ordered:
                 unchanged |= {id(item): item for item in old}
                 continue
@@ -214,20 +234,84 @@ class Part:
 
     def _steps(self, paths: list[LogicPath], old: list[LogicItem]) -> list[LogicItem]:
         """Return the ordinary steps of an action, without start and id."""
+        unchanged = self._known_steps(paths, [item for item in old if not item.is_error_exit])
+        if unchanged is not None:
+            return unchanged
         before = {_key(item) for item in old}
         steps: list[LogicItem] = []
         for path in paths:
             end = self._end(path.target)
             if path.taken is not None:
-                steps.append(LogicItem("", end, self._logic_if(path.taken)))
+                steps.append(self._step(end, path.taken))
                 continue
-            opposites = [
-                self._logic_if(one._replace(value=not one.value)) for one in path.tried if isinstance(one.value, bool)
-            ]
+            opposites = [self._logic_if(one._replace(value=not one.value)) for one in path.tried if is_boolean(one)]
             known = [one for one in opposites if _key(LogicItem("", end, one)) in before]
             chosen = [*known, *reversed(opposites)]
             steps.append(LogicItem("", end, chosen[0] if chosen else UNSET))
         return steps
+
+    def _known_steps(self, paths: list[LogicPath], old: list[LogicItem]) -> list[LogicItem] | None:
+        """Return the steps with the old conditions if these mean the same, else None.
+
+        The last of several conditions that are complete is not in the script, and a comparison by `!=` may be in the
+        script as `==` with the branches exchanged.
+        """
+        compared = [path.taken for path in paths if isinstance(path.taken, Comparisons)]
+        if len(paths) != len(old) or not (compared or any(item.has_comparisons for item in old)):
+            return None
+        ordered = [*(item for item in old if item.has_condition), *(item for item in old if not item.has_condition)]
+        found = [(path.taken, path.target) for path in paths]
+        candidates = [found]
+        if len(found) > 1 and found[-2][0] is not None and found[-1][0] is None:
+            exchanged = inverse(as_comparisons(found[-2][0]))
+            if exchanged is not None:
+                candidates.append([*found[:-2], (exchanged, found[-1][1]), (None, found[-2][1])])
+        *former, last = ordered
+        for candidate in candidates:
+            steps = [
+                LogicItem("", self._end(target)) if test is None else self._step("", test) for test, target in candidate
+            ]
+            if list(map(condition_key, steps[:-1])) != list(map(condition_key, former)):
+                continue
+            tests = [as_comparisons(test) for test, _ in candidate if test is not None]
+            same = condition_key(steps[-1]) == condition_key(last)
+            if same or (candidate[-1][0] is None and self._completes(tests, last)):
+                return [
+                    replace(item, start="", id="", end=self._end(target))
+                    for item, (_, target) in zip(ordered, candidate, strict=True)
+                ]
+        return None
+
+    def _completes(self, tests: list[Comparisons], last: LogicItem) -> bool:
+        """Return whether the condition of an old step is true whenever those of the others are not."""
+        numbers = {action_id: number for number, action_id in enumerate(self.ids)}
+        parameters = {key for key, _ in self._values.parameters.values()}
+        try:
+            test = logic_graph.test_of(last, "", numbers, parameters)
+        except InvalidProject:
+            return False
+        if test is None:
+            return False
+        conditions = [*tests, as_comparisons(test)]
+        try:
+            cases = cases_of(conditions, self._kinds(conditions))
+        except (LookupError, StopIteration):
+            return False
+        return cases.known and cases.gap is None
+
+    def _step(self, end: str, test: Test) -> LogicItem:
+        if isinstance(test, Condition):
+            return LogicItem("", end, self._logic_if(test))
+        comparisons = [
+            LogicComparison(
+                one.what.parameter or f"{self.ids[one.what.action]}/default/{one.what.output}",
+                one.operator,
+                json_of(one.value),
+                UNSET if one.upper is None else json_of(one.upper),
+            )
+            for one in test.comparisons
+        ]
+        return LogicItem("", end, when=LogicWhen(comparisons, test.match))
 
     def _logic_if(self, condition: Condition) -> ProjectLogicIf:
         return ProjectLogicIf(f"{self.ids[condition.action]}/default/{condition.output}", json_of(condition.value))
@@ -241,19 +325,8 @@ def _merged(paths: list[LogicPath]) -> list[LogicPath]:
     return [*others, last._replace(tried=tuple(path.taken for path in others if path.taken is not None))]
 
 
-def _condition_key(condition: ProjectLogicIf | Unset) -> _ConditionKey:
-    if isinstance(condition, Unset):
-        return None
-    try:
-        value = json.loads(condition.value)
-    except ValueError:
-        return condition.what, condition.value
-    return condition.what, (type(value).__name__, value)
-
-
-def _key(item: LogicItem) -> tuple[str, _ConditionKey, frozenset[str]]:
-    kinds = frozenset(item.error_kinds or ())
-    return item.end.partition("/")[0], _condition_key(item.condition), kinds
+def _key(item: LogicItem) -> tuple[str, object, frozenset[str]]:
+    return item.end.partition("/")[0], condition_key(item), frozenset(item.error_kinds or ())
 
 
 def reached(logic: Iterable[LogicItem]) -> set[str]:

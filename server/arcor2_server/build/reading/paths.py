@@ -7,26 +7,73 @@ exit of the call in the `try` block.
 """
 
 import ast
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from typing import ClassVar, Final, NamedTuple
 
-from arcor2_hw.data.object_type import ObjectAction, ParameterMeta, find_action
-from arcor2_hw.data.project import CALL, ERROR_FLOW, ERROR_PARTS, FlowTypes
+from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.object_type import Again, ObjectAction, ParameterMeta, find_action
+from arcor2_hw.data.project import (
+    CALL,
+    ERROR_FLOW,
+    ERROR_PARTS,
+    MAX_RETRIES,
+    MAX_RETRY_PAUSE,
+    FlowTypes,
+    Match,
+    Operator,
+    Retry,
+)
 from arcor2_server.build.frame import NEXT_ACTION, Frame
 from arcor2_server.build.reading.errors import NotUnderstood, excerpt
 from arcor2_server.build.reading.module import Script
 from arcor2_server.build.reading.values import Values
+from arcor2_server.documents.comparisons import (
+    RANGES,
+    Comparison,
+    Comparisons,
+    Reference,
+    Value,
+    comparison_problem,
+)
 from arcor2_server.documents.logic_graph import (
     BRANCHABLE,
     END_NODE,
     Condition,
     ErrorExit,
+    Test,
+    as_comparisons,
     error_kinds_problem,
     in_order_of_kinds,
+    is_boolean,
 )
 
 START_NODE: Final = -2
+_OPERATORS: Final[Mapping[type[ast.cmpop] | None, Operator]] = {
+    ast.Eq: Operator.EQUAL,
+    ast.Is: Operator.EQUAL,
+    ast.NotEq: Operator.DIFFERENT,
+    ast.IsNot: Operator.DIFFERENT,
+    ast.Lt: Operator.LESS,
+    ast.LtE: Operator.LESS_EQUAL,
+    ast.Gt: Operator.GREATER,
+    ast.GtE: Operator.GREATER_EQUAL,
+}
+_MIRRORED: Final[Mapping[Operator, Operator]] = {
+    Operator.EQUAL: Operator.EQUAL,
+    Operator.DIFFERENT: Operator.DIFFERENT,
+    Operator.LESS: Operator.GREATER,
+    Operator.LESS_EQUAL: Operator.GREATER_EQUAL,
+    Operator.GREATER: Operator.LESS,
+    Operator.GREATER_EQUAL: Operator.LESS_EQUAL,
+}
+"""The operators of comparisons with the constant on the left."""
+_RANGES: Final[Mapping[tuple[Operator | None, Operator | None], Operator]] = {
+    symbols: kind
+    for kind, (above, below) in RANGES.items()
+    for symbols in ((above, below), (_MIRRORED[below], _MIRRORED[above]))
+}
+"""The kinds of ranges by their operators, ascending as in `3 <= n < 7`, or descending as in `7 > n >= 3`."""
 
 
 @dataclass(slots=True)
@@ -56,22 +103,23 @@ class Call:
     """The parameters of the function around the call that its arguments pass on, by parameter."""
     error: str = ""
     """The variable for its error; empty if it is not stored."""
+    retry: Retry | Unset = UNSET
 
 
 class LogicPath(NamedTuple):
     """A path to `target`. Its condition is `taken`; without it, all conditions in `tried` are false."""
 
     target: int
-    tried: tuple[Condition, ...]
-    taken: Condition | None
+    tried: tuple[Test, ...]
+    taken: Test | None
 
 
 class _OpenPath(NamedTuple):
     """A path from call `source` whose end is not reached yet."""
 
     source: int
-    tried: tuple[Condition, ...] = ()
-    taken: Condition | None = None
+    tried: tuple[Test, ...] = ()
+    taken: Test | None = None
     next_action: str | None = None
     kinds: tuple[str, ...] = ()
     """The kinds of errors, if the path starts at an error exit of the call."""
@@ -104,6 +152,9 @@ class ScriptCalls:
 class LoopReader:
     """The calls of a loop in the order of the code, and the paths by the number of the call where they start."""
 
+    stores: ClassVar = True
+    """Whether calls may store results in variables of the project. Those of functions may not."""
+
     def __init__(
         self, frame: Frame, script: Script, values: Values, shared: ScriptCalls, body: Sequence[ast.stmt]
     ) -> None:
@@ -112,6 +163,8 @@ class LoopReader:
         self.exits: dict[int, list[ErrorExit]] = {}
         """The error exits by the number of the call."""
         self.uses: list[Use] = []
+        self.stored: set[str] = set()
+        """The project parameters in which results are stored."""
         self._frame, self._script, self._values = frame, script, values
         self._results: dict[str, tuple[int, int]] = {}
         self._errors: dict[str, int] = {}
@@ -266,10 +319,17 @@ class LoopReader:
         raise NotUnderstood(node.lineno, "{node} is not a call of an action", node=excerpt(node))
 
     def _call(self, node: ast.stmt, call: ast.Call, outputs: list[str], open_paths: list[_OpenPath]) -> list[_OpenPath]:
+        retry: Retry | Unset = UNSET
         match call.func:
             case ast.Attribute(ast.Name(variable), method) if variable in self._script.objects:
                 object_id = self._script.objects[variable]
                 type_name = self._frame.index.scene_object(object_id).type
+            case ast.Attribute(
+                ast.Call(ast.Attribute(ast.Name(resources), "retry"), [ast.Name(variable), *_]) as repeated, method
+            ) if resources == self._script.resources and variable in self._script.objects:
+                object_id = self._script.objects[variable]
+                type_name = self._frame.index.scene_object(object_id).type
+                retry = self._retry(repeated)
             case ast.Name(variable) if variable in self._shared.functions:
                 object_id = type_name = self._shared.functions[variable]
                 method = CALL
@@ -304,14 +364,59 @@ class LoopReader:
         number = len(self.calls)
         links = self._links(number, arguments, declared)
         passed = self._passed(arguments, declared)
-        self.calls.append(Call(call.lineno, name, object_id, type_name, declared, arguments, outputs, links, passed))
+        self.calls.append(
+            Call(call.lineno, name, object_id, type_name, declared, arguments, outputs, links, passed, retry=retry)
+        )
+        if retry and declared.meta.again != Again.SAFE:
+            raise NotUnderstood(
+                call.lineno, "{method} cannot be retried, because repeating it may do harm", method=method
+            )
         for place, output in enumerate(outputs):
+            if output in self._values.parameters and self.stores:
+                self._store(node, output, declared.returns[place])
+                continue
             self._claim(output, node.lineno)
             self._results[output] = (number, place)
         self.paths[number] = []
         for path in open_paths:
             self._arrive(path, number)
         return [_OpenPath(number)]
+
+    @staticmethod
+    def _retry(call: ast.Call) -> Retry:
+        """Read `res.retry(device, count, pause=seconds)`."""
+        pause: object = 0.0
+        match call.keywords:
+            case []:
+                pass
+            case [ast.keyword("pause", ast.Constant(int() | float() as pause))] if not isinstance(pause, bool):
+                pass
+            case _:
+                pause = None
+        match call.args:
+            case [_, ast.Constant(int() as count)] if isinstance(pause, int | float) and not isinstance(count, bool):
+                if 1 <= count <= MAX_RETRIES and 0.0 <= pause <= MAX_RETRY_PAUSE:
+                    return Retry(count, float(pause))
+        raise NotUnderstood(
+            call.lineno,
+            "a retry has a count from 1 to {count} and a pause of 0 to {pause} s, but this is {call}",
+            count=MAX_RETRIES,
+            pause=f"{MAX_RETRY_PAUSE:g}",
+            call=excerpt(call),
+        )
+
+    def _store(self, node: ast.stmt, variable: str, returned: str) -> None:
+        """Store that an action changes a variable."""
+        _, kind = self._values.parameters[variable]
+        if kind != returned:
+            raise NotUnderstood(
+                node.lineno,
+                "the variable {name} is {type}, the result is {return_value}",
+                name=variable,
+                type=kind,
+                return_value=returned,
+            )
+        self.stored.add(variable)
 
     def _name(self, call: ast.Call) -> str:
         for keyword in call.keywords:
@@ -381,7 +486,8 @@ class LoopReader:
     def _if(self, node: ast.If, open_paths: list[_OpenPath]) -> list[_OpenPath]:
         after: list[_OpenPath] = []
         while True:
-            holds, open_paths = self._split(node.test, open_paths)
+            more = len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If)
+            holds, open_paths = self._split(node.test, open_paths, more=more)
             if not holds:
                 raise NotUnderstood(node.lineno, "{test} is never true here", test=excerpt(node.test))
             after += self._block(node.body, holds)
@@ -393,8 +499,10 @@ class LoopReader:
                 return after + self._block(node.orelse, open_paths)
             node = node.orelse[0]
 
-    def _split(self, test: ast.expr, open_paths: list[_OpenPath]) -> tuple[list[_OpenPath], list[_OpenPath]]:
-        """Return the paths on which a condition is true, and those on which it is false."""
+    def _split(
+        self, test: ast.expr, open_paths: list[_OpenPath], *, more: bool
+    ) -> tuple[list[_OpenPath], list[_OpenPath]]:
+        """Return the paths on which a condition is true, and those on which it is false; `more` if `elif` follows."""
         match test:
             case ast.Compare(ast.Name(name), [ast.Eq()], [ast.Constant(str(next_action))]) if name == NEXT_ACTION:
                 if any(path.next_action is None for path in open_paths):
@@ -403,8 +511,8 @@ class LoopReader:
                     )
                 matching = [path for path in open_paths if path.next_action == next_action]
                 return matching, [path for path in open_paths if path.next_action != next_action]
-        condition, variable, negated = self._condition(test)
-        opposite = condition._replace(value=not condition.value) if isinstance(condition.value, bool) else None
+        condition, negated = self._condition(test, more=more)
+        opposite = condition._replace(value=not condition.value) if is_boolean(condition) else None
         holds: list[_OpenPath] = []
         others: list[_OpenPath] = []
         for path in open_paths:
@@ -412,14 +520,17 @@ class LoopReader:
                 raise NotUnderstood(test.lineno, "a condition needs the result of an action before it")
             if path.kinds:
                 raise NotUnderstood(test.lineno, "an action is required between an error and a condition")
-            self.uses.append(Use(path.source, condition.action, test.lineno, variable, in_condition=True))
+            for one in as_comparisons(condition).comparisons:
+                if not one.what.parameter:
+                    output = self.calls[one.what.action].outputs[one.what.output]
+                    self.uses.append(Use(path.source, one.what.action, test.lineno, output, in_condition=True))
             if path.taken is not None:
-                if path.taken[:2] != condition[:2]:
+                if path.taken != condition and not _same_result(path.taken, condition):
                     raise NotUnderstood(test.lineno, "an action is required between two conditions")
                 # The same result is compared again; its value on this path is known.
                 (holds if path.taken == condition else others).append(path)
                 continue
-            if opposite in path.tried:
+            if opposite is not None and opposite in path.tried:
                 holds.append(path)
             elif condition in path.tried:
                 others.append(path)
@@ -428,35 +539,81 @@ class LoopReader:
                 others.append(path._replace(tried=(*path.tried, condition)))
         return (others, holds) if negated else (holds, others)
 
-    def _condition(self, test: ast.expr) -> tuple[Condition, str, bool]:
-        """Return the value and the variable of a condition, and whether it is negated (`!=`)."""
-        negated = False
+    def _condition(self, test: ast.expr, *, more: bool) -> tuple[Test, bool]:
+        """Return a condition and whether it is negated: by `not`, or a single `!=` without another branch after it."""
+        match test:
+            case ast.UnaryOp(ast.Not(), operand) if not isinstance(operand, ast.Name):
+                condition, negated = self._condition(operand, more=False)
+                return condition, not negated
+            case ast.BoolOp(connective, values):
+                found = tuple(self._comparison(value) for value in values)
+                if len(set(found)) != len(found):
+                    raise NotUnderstood(test.lineno, "{test} contains a comparison twice", test=excerpt(test))
+                return Comparisons(found, Match.ALL if isinstance(connective, ast.And) else Match.ANY), False
+        one = self._comparison(test)
+        kind = self._kind(one.what)
+        if one.what.parameter or one.operator not in (Operator.EQUAL, Operator.DIFFERENT) or kind not in BRANCHABLE:
+            return Comparisons((one,)), False
+        if one.operator is Operator.DIFFERENT and more:
+            return Comparisons((one,)), False
+        assert not isinstance(one.value, float), "a double is not compared by =="
+        return Condition(one.what.action, one.what.output, one.value), one.operator is Operator.DIFFERENT
+
+    def _comparison(self, test: ast.expr) -> Comparison:
+        """Read one comparison, such as `passed`, `not passed`, `n > 3` or `3 <= n < 7`."""
+        value: Value
+        upper: Value | None = None
         match test:
             case ast.Name(variable):
-                value: bool | int | str = True
+                operator, value = Operator.EQUAL, True
             case ast.UnaryOp(ast.Not(), ast.Name(variable)):
-                value = False
-            case ast.Compare(ast.Name(variable), [ast.Eq() | ast.Is()], [right]):
-                value = self._values.compared(right)
-            case ast.Compare(ast.Name(variable), [ast.NotEq() | ast.IsNot()], [right]):
-                value, negated = self._values.compared(right), True
+                operator, value = Operator.EQUAL, False
+            case ast.Compare(ast.Name(variable), [symbol], [right]) if type(symbol) in _OPERATORS:
+                operator, value = _OPERATORS[type(symbol)], self._values.compared(right)
+            case ast.Compare(left, [symbol], [ast.Name(variable)]) if type(symbol) in _OPERATORS:
+                operator, value = _MIRRORED[_OPERATORS[type(symbol)]], self._values.compared(left)
+            case ast.Compare(lower, [first, second], [ast.Name(variable), right]) if (
+                symbols := (_OPERATORS.get(type(first)), _OPERATORS.get(type(second)))
+            ) in _RANGES:
+                operator = _RANGES[symbols]
+                value, upper = self._values.compared(lower), self._values.compared(right)
+                if symbols[0] in (Operator.GREATER, Operator.GREATER_EQUAL):
+                    value, upper = upper, value
             case _:
                 raise NotUnderstood(
-                    test.lineno, "a condition must be `result == value`, not {test}", test=excerpt(test)
+                    test.lineno,
+                    "a condition compares a result or a variable with values, and combines comparisons by `and` or by"
+                    " `or`, but this is {test}",
+                    test=excerpt(test),
                 )
-        if variable not in self._results:
+        if variable in self._results:
+            what = Reference(*self._results[variable])
+        elif variable in self._values.parameters and not self._is_hidden(variable):
+            what = Reference(END_NODE, 0, self._values.parameters[variable][0])
+        else:
             raise NotUnderstood(test.lineno, "{variable} is not a result of an action above", variable=variable)
-        source, output = self._results[variable]
-        kind = self.calls[source].declared.returns[output]
-        if kind not in BRANCHABLE:
-            raise NotUnderstood(
-                test.lineno,
-                "{variable} is {type}, which a condition cannot use",
-                variable=variable,
-                type=kind,
-            )
-        if type(value) is not BRANCHABLE[kind]:
-            raise NotUnderstood(
-                test.lineno, "{variable} is {type} and cannot be {value!r}", variable=variable, type=kind, value=value
-            )
-        return Condition(source, output, value), variable, negated
+        if isinstance(value, bool) and operator is Operator.DIFFERENT:
+            operator, value = Operator.EQUAL, not value
+        if isinstance(upper, bool | str):
+            raise NotUnderstood(test.lineno, "{test} is not a range of numbers", test=excerpt(test))
+        if (problem := comparison_problem(variable, self._kind(what), operator, value, upper)) is not None:
+            raise NotUnderstood(test.lineno, "{problem}", problem=problem)
+        return Comparison(what, operator, value, upper)
+
+    def _is_hidden(self, name: str) -> bool:  # noqa: ARG002 - for functions
+        """Return whether a parameter of the function has the name of a project parameter."""
+        return False
+
+    def _kind(self, what: Reference) -> str:
+        """Return the type of a compared value."""
+        if what.parameter:
+            return next(kind for key, kind in self._values.parameters.values() if key == what.parameter)
+        return self.calls[what.action].declared.returns[what.output]
+
+    def kinds(self, conditions: Iterable[Comparisons]) -> dict[Reference, str]:
+        """Return the types of the values that conditions compare."""
+        return {one.what: self._kind(one.what) for condition in conditions for one in condition.comparisons}
+
+
+def _same_result(one: Test, other: Test) -> bool:
+    return isinstance(one, Condition) and isinstance(other, Condition) and one[:2] == other[:2]

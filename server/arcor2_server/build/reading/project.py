@@ -3,6 +3,7 @@
 import ast
 from collections.abc import Iterable, Mapping
 
+from msgspec import UNSET
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import is_valid_name, new_id
@@ -67,6 +68,16 @@ class _Reading:
         shared = ScriptCalls()
         self._functions = self._read_functions(frame, shared, variables)
         loop = LoopReader(frame, self._script, self._values, shared, self._script.loop)
+        changed = {self._values.parameters[name][0] for name in loop.stored}
+        self._parameters = [
+            replace(one, variable=True) if one.id in changed and not one.variable else one for one in self._parameters
+        ]
+        variables.stored.update(
+            (name, one.name)
+            for one in self._parameters
+            for name, (key, _) in self._values.parameters.items()
+            if one.variable and key == one.id
+        )
         actions = [action for point in project.action_points for action in point.actions]
         self._program = Part(loop, self._values, actions, project.logic, variables)
 
@@ -81,7 +92,8 @@ class _Reading:
                 if not is_valid_name(name):
                     raise NotUnderstood(node.lineno, "{name} is not a valid name of a project parameter", name=name)
                 key = new_id("pco")
-                found[key] = ProjectParameter(name, PLAIN[type(value)], json_of(value), id=key)
+                variable = True if name in self._script.annotated else UNSET
+                found[key] = ProjectParameter(name, PLAIN[type(value)], json_of(value), id=key, variable=variable)
             else:
                 old = found[key]
                 value = of_type(value, old.type)

@@ -16,6 +16,7 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_server.build.frame import REFERENCES, Frame, TypeFacts
 from arcor2_server.build.reading.errors import NotUnderstood, excerpt
 from arcor2_server.build.reading.module import Script
+from arcor2_server.documents.comparisons import Value
 
 ENUMERATIONS: Final = ("string_enum", "integer_enum")
 PLAIN: Final[dict[type, str]] = {bool: "boolean", int: "integer", float: "double", str: "string"}
@@ -251,17 +252,12 @@ class Values:
                 return value
         raise NotUnderstood(node.lineno, "{name} has no member {named}", name=kind.name, named=named[1])
 
-    def compared(self, node: ast.expr) -> bool | int | str:
+    def compared(self, node: ast.expr) -> Value:
         """Return the value that a condition compares a result with: a literal, or a member of an enumeration."""
         named = self._named_member(node)
         if named is not None:
             if named not in self._members:
                 raise NotUnderstood(node.lineno, "unknown enumeration member {node}", node=excerpt(node))
             return self._members[named]
-        value = plain(node)
-        if isinstance(value, float):
-            raise NotUnderstood(
-                node.lineno, "a condition must compare with a bool, integer or string, not {value}", value=value
-            )
-        assert isinstance(value, bool | int | str)
+        value: Value = plain(node)
         return value

@@ -8,12 +8,14 @@ from msgspec.structs import replace
 
 from arcor2_hw.actions.parameter_types import PARAMETER_TYPES
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.object_type import ObjectAction, ParameterMeta
+from arcor2_hw.data.object_type import Again, ObjectAction, ParameterMeta
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import (
     CALL,
     ERROR_FLOW,
     ERROR_PARTS,
+    MAX_RETRIES,
+    MAX_RETRY_PAUSE,
     Action,
     ActionParameter,
     ActionParameterType,
@@ -40,6 +42,7 @@ def check_action(action: Action, lookup: ProjectLookup, types: Types, function: 
     """
     meta = action_meta(action, lookup, types)
     check_flows(action, meta)
+    check_retry(action, meta)
     complete = complete_parameters(action, meta)
     check_parameters(complete, meta, lookup, types, function)
     if function is not None:
@@ -174,18 +177,62 @@ def check_flows(action: Action, meta: ObjectAction) -> None:
         )
 
 
+def check_retry(action: Action, meta: ObjectAction) -> None:
+    """Raise InvalidData for a retry with invalid values, or of an action that is not safe to repeat."""
+    retry = action.retry
+    if isinstance(retry, Unset):
+        return
+    if meta.meta.again != Again.SAFE:
+        raise InvalidData(
+            "{name}: {meta_name} cannot be retried, because repeating it may do harm.",
+            name=action.name,
+            meta_name=meta.name,
+        )
+    if not (1 <= retry.count <= MAX_RETRIES and 0.0 <= retry.pause <= MAX_RETRY_PAUSE):
+        raise InvalidData(
+            "{name}: a retry has a count from 1 to {count} and a pause of 0 to {pause} s.",
+            name=action.name,
+            count=MAX_RETRIES,
+            pause=f"{MAX_RETRY_PAUSE:g}",
+        )
+
+
 def check_outputs_unique(document: Document, action: Action, function: str = "") -> None:
     """Raise InvalidData for a result name that another action of the program, or of the same function, uses.
 
-    Results become variables. function: the id of the function, empty for an action of the program.
+    Results become variables. Actions of the program may store results in a variable of the project by its name.
+    function: the id of the function, empty for an action of the program.
     """
     for output in action.names():
+        if document.variable(output) is not None:
+            if function:
+                raise InvalidData(
+                    "{name}: only the program changes the variable {output}. Let the function return the result.",
+                    name=action.name,
+                    output=output,
+                )
+            if output in action.outputs():
+                continue
         other = document.named(OUTPUT, output, function)
         if other is not None and other != action.id:
             raise InvalidData(
                 "{name} names a result {output} already: choose another name.",
                 name=document.action(other).name,
                 output=output,
+            )
+
+
+def check_stored(document: Document, action: Action, meta: ObjectAction, function: str = "") -> None:
+    """Raise InvalidData for a result that is stored in a variable of another type."""
+    for output, kind in zip(action.outputs(), meta.returns, strict=False):
+        variable = document.variable(output, function)
+        if variable is not None and variable.type != kind:
+            raise InvalidData(
+                "{name}: the variable {output} is {type}, the result is {return_value}.",
+                name=action.name,
+                output=output,
+                type=variable.type,
+                return_value=kind,
             )
 
 

@@ -1,0 +1,155 @@
+import { describe, expect, test } from "vitest";
+import type { LogicComparison, LogicWhen, Match, Operator } from "../protocol/types";
+import { fieldsOf, isComplete, newComparison, OPERATORS, operandsOf, withOperator } from "./comparisons";
+import { listingOf } from "./listing";
+import { branchKind, conditionWords, freeStep, operandAt, whenOf, whenWords } from "./logic";
+import { movableRuns } from "./moving";
+import { problemsOf, usersOf } from "./problems";
+import { runsOf } from "./runs";
+import { program, TYPES } from "./testing";
+
+const N = "a/default/0";
+const P = "b/default/0";
+const compared = (what: string, operator: Operator, value: string, upper?: string): LogicComparison => ({
+  what,
+  operator,
+  value,
+  ...(upper === undefined ? {} : { upper }),
+});
+const all = (...comparisons: LogicComparison[]): LogicWhen => ({ match: "all", comparisons });
+
+/** A program whose action b leads to c and d: by comparisons, or without a condition. */
+function comparing(first: LogicWhen, second?: LogicWhen) {
+  const doc = program({ a: "count", b: "ask", c: "act", d: "act" }, [
+    ["START", "a"],
+    ["a", "b"],
+    ["b", "c"],
+    ["b", "d"],
+    ["c", "END"],
+    ["d", "END"],
+  ]);
+  const { s2, s3 } = doc.logic;
+  if (!s2 || !s3) throw new Error("connections are missing");
+  s2.when = first;
+  if (second) s3.when = second;
+  return { doc, s2, s3 };
+}
+
+test("own results come first, then earlier ones and variables", () => {
+  const { doc } = comparing(all());
+  expect(operandsOf(doc, TYPES, "b").map((each) => each.name)).toEqual(["b_result", "a_result", "so_many"]);
+  expect(operandsOf(doc, TYPES, "a").map((each) => each.name)).toEqual(["a_result", "so_many"]);
+});
+
+test("a result that equals a value is sent as a condition of all clients", () => {
+  const { doc } = comparing(all());
+  const none = all();
+  expect(fieldsOf(doc, TYPES, all(compared(N, "==", "3")))).toEqual({ condition: { what: N, value: "3" }, when: none });
+  for (const when of [all(compared(N, "<", "3")), all(compared("par", "==", "3")), all(compared(N, "!=", "3"))])
+    expect(fieldsOf(doc, TYPES, when)).toEqual({ when });
+  expect(fieldsOf(doc, TYPES, none)).toEqual({ when: none });
+  expect(whenOf({ condition: { what: N, value: "3" } })).toEqual(all(compared(N, "==", "3")));
+});
+
+test("new comparisons differ from the others, and ranges start at the value", () => {
+  const operand = { what: N, name: "n", type: "integer", actionId: "a" };
+  const first = newComparison(operand, []);
+  expect(first).toEqual(compared(N, "==", "0"));
+  expect(newComparison(operand, [first])).toEqual(compared(N, "!=", "0"));
+  const double = { ...operand, type: "double" };
+  expect(newComparison(double, [])).toEqual(compared(N, "<", "0"));
+  expect(withOperator(compared(N, "<", "2.5"), "[)")).toEqual(compared(N, "[)", "2.5", "3.5"));
+  expect(withOperator(compared(N, "[)", "3", "7"), "()")).toEqual(compared(N, "()", "3", "7"));
+  expect(withOperator(compared(N, "[)", "3", "7"), ">")).toEqual(compared(N, ">", "3"));
+  expect(OPERATORS.double).not.toContain("==");
+});
+
+describe("words", () => {
+  const { doc, s2, s3 } = comparing(all(compared(N, "[)", "3", "7"), compared(P, "==", "true")));
+  test("of comparisons", () => {
+    expect(conditionWords(doc, TYPES, s2)).toBe("3 ≤ a_result < 7 and 1 more");
+    expect(conditionWords(doc, TYPES, s3)).toBe("else");
+    expect(branchKind(s2)).toBe("value");
+    const any: LogicWhen = { match: "any" as Match, comparisons: [compared("par", "!=", "3"), compared(N, ">=", "9")] };
+    expect(whenWords(doc, TYPES, any)).toBe("so_many ≠ 3 or a_result ≥ 9");
+    expect(operandAt(doc, TYPES, "gone/default/0")).toBeUndefined();
+  });
+});
+
+test("comparisons are complete if one of them is true for all values", () => {
+  const { doc } = comparing(all());
+  const complete = (...conditions: LogicWhen[]) => isComplete(doc, TYPES, conditions);
+  expect(complete(all(compared(N, "<=", "3")), all(compared(N, ">=", "4")))).toBe(true);
+  expect(complete(all(compared(N, "<", "3")), all(compared(N, ">", "3")))).toBe(false);
+  expect(complete(all(compared(N, "<", "3"), compared(P, "==", "true")), all(compared(N, ">=", "3")))).toBe(false);
+  expect(complete(all(compared(P, "==", "true")), all(compared(P, "==", "false")))).toBe(true);
+  expect(complete(all(compared("gone", "<", "3")))).toBeUndefined();
+});
+
+test("problems name incomplete comparisons and missing values", () => {
+  const incomplete = comparing(all(compared(N, "<", "3")), all(compared(N, ">", "3"))).doc;
+  expect(problemsOf(incomplete, TYPES).map((each) => each.text)).toEqual([
+    "b: no next step if none of the conditions is met.",
+  ]);
+  expect(problemsOf(comparing(all(compared(N, "<", "3"))).doc, TYPES)).toEqual([]);
+  const missing = comparing(all(compared("gone", "<", "3"))).doc;
+  expect(problemsOf(missing, TYPES).map((each) => each.text)).toEqual([
+    "b: a step depends on a result that no longer exists.",
+  ]);
+  expect(usersOf(comparing(all(compared("par", "<", "3"))).doc, TYPES, { parameter: "par" })).toEqual(["s2"]);
+});
+
+test("next to comparisons, a further connection is for all other values", () => {
+  const { doc } = comparing(all(compared(N, "<", "3")), all(compared(N, ">", "3")));
+  expect(freeStep(doc, TYPES, "b")).toEqual({});
+});
+
+test("a result that is stored in a variable is used as the variable", () => {
+  const { doc } = comparing(all());
+  const [action, parameter] = [doc.actions.a, doc.parameters.par];
+  if (!action || !parameter) throw new Error("the program has no action a, or no parameter");
+  doc.parameters.par = { ...parameter, variable: true };
+  doc.actions.a = { ...action, flows: [{ type: "default", outputs: ["so_many"] }] };
+  expect(operandsOf(doc, TYPES, "b").map((each) => each.name)).toEqual(["b_result", "so_many"]);
+  expect(usersOf(doc, TYPES, { parameter: "par" })).toEqual(["a"]);
+});
+
+test("a connection with comparisons is a branch in the list, and ends a sequence", () => {
+  const doc = program({ a: "count", b: "act", c: "act", d: "act" }, [
+    ["START", "a"],
+    ["a", "b"],
+    ["b", "c"],
+    ["c", "d"],
+    ["d", "END"],
+  ]);
+  const kinds = () => listingOf(doc).map((row) => row.kind);
+  expect([runsOf(doc), kinds()]).toEqual([[["a", "b", "c", "d"]], ["action", "action", "action", "action"]]);
+  if (doc.logic.s1) doc.logic.s1.when = all(compared(N, "<", "3"));
+  expect(runsOf(doc)).toEqual([["b", "c", "d"]]);
+  expect(kinds()).toEqual(["action", "branch", "action", "action", "action"]);
+  expect([...movableRuns(doc).keys()]).toEqual(["b", "c", "d"]);
+});
+
+test("error exits are no conditions, and their actions have no results to compare after them", () => {
+  const doc = program({ a: "count", b: "ask", c: "act" }, [
+    ["START", "a"],
+    ["a", "b"],
+    ["a", "c", "on error"],
+    ["c", "b"],
+    ["b", "END"],
+  ]);
+  const names = (id: string) => operandsOf(doc, TYPES, id).map((each) => each.name);
+  expect([names("a"), names("b")]).toEqual([
+    ["a_result", "so_many"],
+    ["b_result", "so_many"],
+  ]);
+  const { s1, s2 } = doc.logic;
+  if (!s1 || !s2) throw new Error("connections are missing");
+  s1.when = all(compared(N, "<", "3"));
+  expect([branchKind(s1), branchKind(s2)]).toEqual(["value", "error"]);
+  expect([conditionWords(doc, TYPES, s1), conditionWords(doc, TYPES, s2)]).toEqual(["a_result < 3", "on error"]);
+  expect(freeStep(doc, TYPES, "a")).toEqual({});
+  expect(problemsOf(doc, TYPES).map((each) => each.text)).toEqual([
+    "a: no next step if none of the conditions is met.",
+  ]);
+});

@@ -1,0 +1,156 @@
+/** Conditions of connections as comparisons: what can be compared, new ones, and whether they are complete. */
+
+import { t } from "@lingui/core/macro";
+import type { LogicComparison, LogicWhen, Operator, ProjectLogicIf } from "../protocol/types";
+import type { OpenDocument, State } from "../store/state";
+import { decoded } from "./decoded";
+import { BRANCHABLE, conditionActions, isRange, linkTo, type Operand, operandAt, resultsOf, SIGNS } from "./logic";
+import { OWN_PARAMETERS } from "./values";
+
+const EQUALITY: Operator[] = ["==", "!="];
+const ORDER: Operator[] = ["<", "<=", ">", ">="];
+const RANGES: Operator[] = ["[]", "[)", "(]", "()"];
+/** The operators for each type of value. A measured number is rarely equal to another one. */
+export const OPERATORS: Record<string, Operator[]> = {
+  boolean: ["=="],
+  integer: [...EQUALITY, ...ORDER, ...RANGES],
+  double: [...ORDER, ...RANGES],
+  integer_enum: EQUALITY,
+  string_enum: EQUALITY,
+  string: EQUALITY,
+};
+
+/**
+ * Return the fields of a connection for comparisons. A result that is equal to a value is a condition as all clients
+ * know it.
+ */
+export function fieldsOf(
+  doc: OpenDocument,
+  types: State["types"],
+  when: LogicWhen,
+): { condition?: ProjectLogicIf; when: LogicWhen } {
+  const [one] = when.comparisons;
+  const none: LogicWhen = { match: "all", comparisons: [] };
+  if (!one) return { when: none };
+  const simple = when.comparisons.length === 1 && one.operator === "==" && one.what.includes("/");
+  if (simple && BRANCHABLE.has(operandAt(doc, types, one.what)?.type ?? ""))
+    return { condition: { what: one.what, value: one.value }, when: none };
+  return { when };
+}
+
+/** Return the values that a connection from an action can depend on: its own results, earlier ones, and variables. */
+export function operandsOf(doc: OpenDocument, types: State["types"], id: string): Operand[] {
+  if (!(id in doc.actions)) return [];
+  const results = conditionActions(doc, id)
+    .flatMap((each) => resultsOf(doc, types, each))
+    .map((each): Operand => ({ what: linkTo(each), name: each.name, type: each.type, actionId: each.action.id }));
+  const variables = Object.values(doc.parameters)
+    .filter((each) => !OWN_PARAMETERS.has(each.name))
+    .map((each): Operand => ({ what: each.id, name: each.name, type: each.type, actionId: "" }));
+  return [...results, ...variables].filter((each) => each.type in OPERATORS);
+}
+
+/** Return a comparison of a value to start with, which is not among the others. */
+export function newComparison({ what, type }: Operand, others: LogicComparison[]): LogicComparison {
+  const operators = OPERATORS[type] ?? EQUALITY;
+  const values = type === "boolean" ? ["true", "false"] : type.startsWith("string") ? ['"value"'] : ["0", "1", "2"];
+  for (const value of values)
+    for (const operator of operators) {
+      if (isRange(operator)) continue;
+      const taken = others.some((each) => each.what === what && each.operator === operator && each.value === value);
+      if (!taken) return { what, operator, value };
+    }
+  return { what, operator: operators[0] ?? "==", value: values[0] ?? "0" };
+}
+
+/** Return a comparison with another operator. A new range starts at the value and has the width 1. */
+export function withOperator(one: LogicComparison, operator: Operator): LogicComparison {
+  const { what, value } = one;
+  if (!isRange(operator)) return { what, operator, value };
+  return { what, operator, value, upper: one.upper ?? JSON.stringify(Number(decoded(value)) + 1) };
+}
+
+/** Return an operator as the text of a choice. */
+export function operatorWords(operator: Operator): string {
+  switch (operator) {
+    case "[]":
+      return t`from … to …`;
+    case "[)":
+      return t`from … to below …`;
+    case "(]":
+      return t`above … to …`;
+    case "()":
+      return t`between … and …`;
+    default:
+      return SIGNS[operator] ?? operator;
+  }
+}
+
+// ------------------------------------------------------------------------------------------------ completeness
+type Value = boolean | number | string;
+/** Maximum number of combinations of values for which conditions are tested, as on the server. */
+const MOST_CASES = 2000;
+
+function holdsFor(one: LogicComparison, value: Value): boolean {
+  const limit = decoded(one.value) as Value;
+  switch (one.operator) {
+    case "==":
+      return value === limit;
+    case "!=":
+      return value !== limit;
+    case "<":
+      return value < limit;
+    case "<=":
+      return value <= limit;
+    case ">":
+      return value > limit;
+    case ">=":
+      return value >= limit;
+    default: {
+      const upper = decoded(one.upper) as Value;
+      const above = one.operator[0] === "[" ? value >= limit : value > limit;
+      return above && (one.operator[1] === "]" ? value <= upper : value < upper);
+    }
+  }
+}
+
+/** Return values that stand for all values of a type, which differ only in comparisons with the constants. */
+function samples(type: string, constants: Value[]): Value[] {
+  if (type === "boolean") return [true, false];
+  if (type.startsWith("string")) {
+    let other = "other";
+    while (constants.includes(other)) other += "_";
+    return [...new Set([...constants, other])];
+  }
+  const numbers = [...new Set(constants as number[])].sort((a, b) => a - b);
+  if (type !== "double") return [...new Set(numbers.flatMap((each) => [each, each - 1, each + 1]))];
+  const between = numbers.slice(1).map((each, index) => (each + (numbers[index] ?? 0)) / 2);
+  return [...numbers, ...between, (numbers[0] ?? 0) - 1, (numbers.at(-1) ?? 0) + 1];
+}
+
+/**
+ * Return whether one of several conditions is true for all values. Undefined if it is unknown: a value is missing, or
+ * there are too many.
+ */
+export function isComplete(doc: OpenDocument, types: State["types"], conditions: LogicWhen[]): boolean | undefined {
+  const constants = new Map<string, Value[]>();
+  for (const one of conditions.flatMap((each) => each.comparisons)) {
+    const limits = [decoded(one.value), decoded(one.upper)].filter((each) => each !== undefined) as Value[];
+    constants.set(one.what, [...(constants.get(one.what) ?? []), ...limits]);
+  }
+  let cases: Record<string, Value>[] = [{}];
+  for (const [what, limits] of constants) {
+    const type = operandAt(doc, types, what)?.type;
+    if (type === undefined) return undefined;
+    const values = samples(type, limits);
+    if (cases.length * values.length > MOST_CASES) return undefined;
+    cases = cases.flatMap((each) => values.map((value) => ({ ...each, [what]: value })));
+  }
+  return cases.every((values) =>
+    conditions.some(({ match, comparisons }) =>
+      match === "all"
+        ? comparisons.every((one) => holdsFor(one, values[one.what] as Value))
+        : comparisons.some((one) => holdsFor(one, values[one.what] as Value)),
+    ),
+  );
+}

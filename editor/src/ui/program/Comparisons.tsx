@@ -1,0 +1,184 @@
+/** The condition of a connection: one row for each comparison, and whether all or any of them have to be true. */
+
+import { t } from "@lingui/core/macro";
+import { useId } from "react";
+import { newComparison, OPERATORS, operatorWords, withOperator } from "../../program/comparisons";
+import { isRange, type Operand, operandAt } from "../../program/logic";
+import type { LogicComparison, LogicWhen, Match, Operator } from "../../protocol/types";
+import type { OpenDocument, State } from "../../store/state";
+import { Button } from "../kit/kit";
+import { ValueField } from "./ValueField";
+
+interface ComparisonsProps {
+  doc: OpenDocument;
+  types: State["types"];
+  when: LogicWhen;
+  operands: Operand[];
+  /** Id of the action from which the connection starts. */
+  from: string;
+  /** Text of the choice without a condition. */
+  none: string;
+  why: string;
+  /** Send the condition; return why it was refused. */
+  onSet: (when: LogicWhen) => Promise<string>;
+}
+
+export function Comparisons({ doc, types, when, operands, from, none, why, onSet }: ComparisonsProps) {
+  const { comparisons, match } = when;
+  const all = useId();
+  const put = (rows: LogicComparison[]) => onSet({ match: rows.length > 1 ? match : "all", comparisons: rows });
+  const first = operands[0];
+  const unused = operands.find((each) => !comparisons.some(({ what }) => what === each.what)) ?? first;
+  return (
+    <div className="comparisons">
+      {(comparisons.length > 0 ? comparisons : [undefined]).map((one, index) => (
+        <Row
+          key={index}
+          number={index}
+          one={one}
+          operand={one && operandAt(doc, types, one.what)}
+          operands={operands}
+          from={from}
+          nameOf={(id) => doc.actions[id]?.name ?? ""}
+          none={comparisons.length > 1 ? "" : none}
+          why={why}
+          onSet={(changed) =>
+            put(changed ? [...comparisons.slice(0, index), changed, ...comparisons.slice(index + 1)] : [])
+          }
+          onChoose={(operand) => {
+            const others = comparisons.filter((_, place) => place !== index);
+            const chosen = newComparison(operand, others);
+            return put([...comparisons.slice(0, index), chosen, ...comparisons.slice(index + 1)]);
+          }}
+          onRemove={comparisons.length > 1 ? () => put(comparisons.filter((_, place) => place !== index)) : undefined}
+        />
+      ))}
+      {comparisons.length > 1 && (
+        <div className="field">
+          <label htmlFor={all}>{t`True if`}</label>
+          <select
+            id={all}
+            value={match}
+            disabled={why !== ""}
+            onChange={(event) => void onSet({ comparisons, match: event.target.value as Match })}
+          >
+            <option value="all">{t`all comparisons are true`}</option>
+            <option value="any">{t`at least one is true`}</option>
+          </select>
+        </div>
+      )}
+      {comparisons.length > 0 && unused && (
+        <Button
+          look="plain"
+          icon="plus"
+          why={why}
+          onPress={() => void put([...comparisons, newComparison(unused, comparisons)])}
+        >
+          {t`Add a comparison`}
+        </Button>
+      )}
+    </div>
+  );
+}
+
+interface RowProps {
+  number: number;
+  /** Undefined without a condition. */
+  one: LogicComparison | undefined;
+  operand: Operand | undefined;
+  operands: Operand[];
+  from: string;
+  nameOf: (actionId: string) => string;
+  none: string;
+  why: string;
+  onSet: (one: LogicComparison | undefined) => Promise<string>;
+  onChoose: (operand: Operand) => Promise<string>;
+  onRemove: (() => Promise<string>) | undefined;
+}
+
+function Row({ number, one, operand, operands, from, nameOf, none, why, onSet, onChoose, onRemove }: RowProps) {
+  const id = useId();
+  const operators = OPERATORS[operand?.type ?? ""] ?? [];
+  const title = number === 0 ? t`Condition` : t`Comparison ${number + 1}`;
+  const type = operand?.type === "integer_enum" ? "integer" : (operand?.type ?? "string");
+  return (
+    <fieldset className="comparison" aria-label={title}>
+      <div className="field">
+        <div className="value-head">
+          <label htmlFor={id}>{title}</label>
+          {onRemove && (
+            <Button
+              look="plain"
+              icon="close"
+              aria-label={t`Remove comparison ${number + 1}`}
+              why={why}
+              onPress={() => void onRemove()}
+            />
+          )}
+        </div>
+        <select
+          id={id}
+          value={one?.what ?? ""}
+          disabled={why !== ""}
+          onChange={(event) => {
+            const chosen = operands.find((each) => each.what === event.target.value);
+            void (chosen ? onChoose(chosen) : onSet(undefined));
+          }}
+        >
+          {none && <option value="">{none}</option>}
+          {one && !operands.some((each) => each.what === one.what) && (
+            <option value={one.what}>{operand?.name ?? t`a result that no longer exists`}</option>
+          )}
+          {operands.map((each) => (
+            <option key={each.what} value={each.what}>
+              {each.actionId === from
+                ? each.name
+                : each.actionId
+                  ? t`${each.name} of ${nameOf(each.actionId)}`
+                  : t`${each.name} (variable)`}
+            </option>
+          ))}
+        </select>
+      </div>
+      {one && operand && (
+        <div className="comparison-values">
+          {operators.length > 1 && (
+            <div className="field">
+              <label htmlFor={`${id}-operator`}>{t`Comparison`}</label>
+              <select
+                id={`${id}-operator`}
+                value={one.operator}
+                disabled={why !== ""}
+                onChange={(event) => void onSet(withOperator(one, event.target.value as Operator))}
+              >
+                {operators.map((each) => (
+                  <option key={each} value={each}>
+                    {operatorWords(each)}
+                  </option>
+                ))}
+              </select>
+            </div>
+          )}
+          <ValueField
+            label={isRange(one.operator) ? t`From` : t`Value of ${operand.name}`}
+            name={operand.name}
+            type={type}
+            json={one.value}
+            why={why}
+            onSet={(value) => onSet({ ...one, value })}
+          />
+          {isRange(one.operator) && (
+            <ValueField
+              label={t`To`}
+              name={operand.name}
+              type={type}
+              json={one.upper}
+              why={why}
+              onSet={(upper) => onSet({ ...one, upper })}
+            />
+          )}
+        </div>
+      )}
+    </fieldset>
+  );
+}

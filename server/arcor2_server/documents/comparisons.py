@@ -1,0 +1,287 @@
+"""Conditions that compare several values: which comparisons are valid, and whether a list of conditions is complete."""
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Final, NamedTuple
+
+import msgspec
+
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.project import LogicComparison, LogicItem, LogicWhen, Match, Operator, parse_link
+from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.messages import Message
+
+Value = bool | int | float | str
+
+_EQUALITY: Final = (Operator.EQUAL, Operator.DIFFERENT)
+_ORDER: Final = (Operator.LESS, Operator.LESS_EQUAL, Operator.GREATER, Operator.GREATER_EQUAL)
+RANGES: Final[Mapping[Operator, tuple[Operator, Operator]]] = {
+    Operator.CLOSED: (Operator.LESS_EQUAL, Operator.LESS_EQUAL),
+    Operator.RIGHT_OPEN: (Operator.LESS_EQUAL, Operator.LESS),
+    Operator.LEFT_OPEN: (Operator.LESS, Operator.LESS_EQUAL),
+    Operator.OPEN: (Operator.LESS, Operator.LESS),
+}
+"""The operators before and after the compared value in each kind of range, as in `3 <= n < 7`."""
+OPERATORS: Final[Mapping[str, tuple[Operator, ...]]] = {
+    "boolean": (Operator.EQUAL,),
+    "integer": (*_EQUALITY, *_ORDER, *RANGES),
+    "double": (*_ORDER, *RANGES),
+    "integer_enum": _EQUALITY,
+    "string_enum": _EQUALITY,
+    "string": _EQUALITY,
+}
+"""The types of values that conditions can compare, with their operators. Doubles are rarely equal to a number."""
+_VALUES: Final[Mapping[str, tuple[type, ...]]] = {
+    "boolean": (bool,),
+    "integer": (int,),
+    "double": (int, float),
+    "integer_enum": (int,),
+    "string_enum": (str,),
+    "string": (str,),
+}
+MAX_CASES: Final = 2000
+"""Maximum number of combinations of values for which conditions are tested."""
+
+
+class Reference(NamedTuple):
+    """A compared value: result number `output` of action number `action`, or the project parameter `parameter`."""
+
+    action: int
+    output: int
+    parameter: str = ""
+
+
+class Comparison(NamedTuple):
+    """A comparison with a constant. In a range, `value` is the lower limit."""
+
+    what: Reference
+    operator: Operator
+    value: Value
+    upper: int | float | None = None
+
+
+class Comparisons(NamedTuple):
+    """A condition of at least one comparison. It is true if all of them are, or if any is."""
+
+    comparisons: tuple[Comparison, ...]
+    match: Match = Match.ALL
+
+
+def of_result(when: LogicComparison) -> bool:
+    """Return whether a comparison is about the result of an action, not about a project parameter."""
+    return "/" in when.what
+
+
+def decoded(one: LogicComparison) -> tuple[Value, int | float | None]:
+    """Return the value and the upper limit of a comparison.
+
+    Raises:
+        InvalidData: one of them is not JSON of a boolean, number or string, or there is no limit where one is needed.
+    """
+    try:
+        value = msgspec.json.decode(one.value, type=bool | int | float | str)
+        upper = None if isinstance(one.upper, Unset) else msgspec.json.decode(one.upper, type=int | float)
+    except msgspec.DecodeError:
+        raise InvalidData("A comparison has an invalid value: {value}.", value=one.value[:40]) from None
+    if (upper is None) == (one.operator in RANGES):
+        raise InvalidData("A range has two limits, any other comparison has one value.")
+    return value, upper
+
+
+def comparison_problem(name: str, kind: str, operator: Operator, value: Value, upper: float | None) -> Message | None:
+    """Return the problem of a comparison of the value `name` of the type `kind`, None if it is valid."""
+    if kind not in OPERATORS:
+        return Message.of("{name} is {type}, which a condition cannot use", name=name, type=kind or "nothing")
+    if kind == "double" and operator in _EQUALITY:
+        return Message.of("{name} is a measured number, which is rarely equal to another one: use a range", name=name)
+    if operator not in OPERATORS[kind]:
+        return Message.of(
+            "{name} is {type}, which cannot be compared by {operator}", name=name, type=kind, operator=operator
+        )
+    for one in (value, upper):
+        if one is not None and (type(one) not in _VALUES[kind] or one in (math.inf, -math.inf)):
+            return Message.of("{name} is {type} and cannot be compared with {value!r}", name=name, type=kind, value=one)
+    if upper is not None and isinstance(value, int | float):
+        above, below = RANGES[operator]
+        if kind == "integer":
+            empty = value + (above is Operator.LESS) > upper - (below is Operator.LESS)
+        else:
+            empty = value > upper or (value == upper and operator is not Operator.CLOSED)
+        if empty:
+            return Message.of(
+                "the range of {name} from {lower} to {upper} is empty", name=name, lower=value, upper=upper
+            )
+    return None
+
+
+def inverse(condition: Comparisons) -> Comparisons | None:
+    """Return the opposite of a single comparison for equality, None for other conditions."""
+    [one, *more] = condition.comparisons
+    if more or one.operator not in _EQUALITY:
+        return None
+    if isinstance(one.value, bool):
+        return Comparisons((one._replace(value=not one.value),))
+    opposite = Operator.DIFFERENT if one.operator is Operator.EQUAL else Operator.EQUAL
+    return Comparisons((one._replace(operator=opposite),))
+
+
+def check_when(when: LogicWhen, kind_of: Callable[[LogicComparison], tuple[str, str]]) -> None:
+    """Check the comparisons of a logic item.
+
+    Args:
+        when: the comparisons.
+        kind_of: returns the name and the type of a compared value.
+
+    Raises:
+        InvalidData: a comparison is invalid or is given twice.
+    """
+    seen: set[object] = set()
+    for one in when.comparisons:
+        value, upper = decoded(one)
+        if (problem := comparison_problem(*kind_of(one), one.operator, value, upper)) is not None:
+            raise InvalidData("{problem}.", problem=problem)
+        key = (one.what, one.operator, type(value), value, upper)
+        if key in seen:
+            raise InvalidData("A comparison is given twice.")
+        seen.add(key)
+
+
+def condition_key(item: LogicItem) -> object:
+    """Return the condition of an item in comparable form, None without one.
+
+    A condition and a single comparison by `==` have the same key.
+    """
+    parts: list[object] = []
+    if item.when is not None and not isinstance(item.when, Unset) and item.when.comparisons:
+        for one in item.when.comparisons:
+            try:
+                value, upper = decoded(one)
+            except InvalidData:
+                parts.append((one.what, one.operator, one.value, one.upper))
+                continue
+            parts.append((one.what, one.operator, isinstance(value, bool), value, upper))
+        return tuple(parts), item.when.match if len(parts) > 1 else Match.ALL
+    if isinstance(item.condition, Unset):
+        return None
+    try:
+        value = msgspec.json.decode(item.condition.value, type=bool | int | float | str)
+    except msgspec.DecodeError:
+        return item.condition.what, item.condition.value
+    return ((item.condition.what, Operator.EQUAL, isinstance(value, bool), value, None),), Match.ALL
+
+
+def text_of(when: LogicWhen, name: Callable[[str], str]) -> str:
+    """Return comparisons as text, such as `3 <= n < 7 and passed`; `name` returns the name of a compared value."""
+
+    def text(one: LogicComparison) -> str:
+        called = name(one.what)
+        if one.operator in RANGES:
+            above, below = RANGES[one.operator]
+            return f"{one.value} {above} {called} {below} {one.upper}"
+        return f"{called} {one.operator} {one.value}"
+
+    return (" and " if when.match is Match.ALL else " or ").join(map(text, when.comparisons))
+
+
+def what_of(text: str) -> tuple[str, int] | str:
+    """Return action id and output index of the result, or the id of the parameter, that a comparison is about.
+
+    Raises:
+        ValueError: the text is malformed.
+    """
+    if "/" not in text:
+        return text
+    action_id, flow, output = parse_link(text)
+    if flow != "default":
+        raise ValueError(f"{text!r} is not <action id>/default/<output index>")
+    return action_id, output
+
+
+# ------------------------------------------------------------------------------------------------ completeness
+def _holds(one: Comparison, value: Value) -> bool:
+    limit = one.value
+    match one.operator:
+        case Operator.EQUAL:
+            return value == limit
+        case Operator.DIFFERENT:
+            return value != limit
+    assert isinstance(value, int | float), "only numbers are ordered"
+    assert isinstance(limit, int | float), "only numbers are ordered"
+    match one.operator:
+        case Operator.LESS:
+            return value < limit
+        case Operator.LESS_EQUAL:
+            return value <= limit
+        case Operator.GREATER:
+            return value > limit
+        case Operator.GREATER_EQUAL:
+            return value >= limit
+    assert one.upper is not None, "a range has an upper limit"
+    above, below = RANGES[one.operator]
+    return (value > limit or (above is Operator.LESS_EQUAL and value == limit)) and (
+        value < one.upper or (below is Operator.LESS_EQUAL and value == one.upper)
+    )
+
+
+def holds(condition: Comparisons, values: Mapping[Reference, Value]) -> bool:
+    """Return whether a condition is true for some values."""
+    tested = (_holds(one, values[one.what]) for one in condition.comparisons)
+    return all(tested) if condition.match is Match.ALL else any(tested)
+
+
+def _samples(kind: str, constants: Sequence[Value]) -> list[Value]:
+    """Return values of a type that stand for all values, which differ only in comparisons with the constants."""
+    if kind == "boolean":
+        return [True, False]
+    texts = [one for one in constants if isinstance(one, str)]
+    if kind in ("string", "string_enum"):
+        other = next(text for number in itertools.count() if (text := "other" + "_" * number) not in texts)
+        return [*dict.fromkeys(texts), other]
+    numbers = sorted({one for one in constants if isinstance(one, int | float)})
+    if kind == "double":
+        between = [low + (high - low) / 2 for low, high in itertools.pairwise(numbers)]
+        outside = [numbers[0] - max(1.0, abs(numbers[0])), numbers[-1] + max(1.0, abs(numbers[-1]))]
+        return [*numbers, *between, *outside]
+    return list(dict.fromkeys(near for one in numbers for near in (one, one - 1, one + 1)))
+
+
+class Cases(NamedTuple):
+    """What conditions that are tested in order do for all values.
+
+    Args:
+        unused: the numbers of the conditions that never apply.
+        gap: values for which no condition is true; None if there are none.
+        known: whether all values were tested. There may be too many combinations.
+    """
+
+    unused: tuple[int, ...]
+    gap: Mapping[Reference, Value] | None
+    known: bool
+
+
+def _all_values(kinds: Mapping[Reference, str], conditions: Sequence[Comparisons]) -> Iterator[dict[Reference, Value]]:
+    constants: dict[Reference, list[Value]] = {}
+    for condition in conditions:
+        for one in condition.comparisons:
+            constants.setdefault(one.what, []).extend(limit for limit in (one.value, one.upper) if limit is not None)
+    samples = [_samples(kinds[what], values) for what, values in constants.items()]
+    if math.prod(map(len, samples)) > MAX_CASES:
+        return
+    for values in itertools.product(*samples):
+        yield dict(zip(constants, values, strict=True))
+
+
+def cases_of(conditions: Sequence[Comparisons], kinds: Mapping[Reference, str]) -> Cases:
+    """Return what valid conditions, tested in order, do for all values of the types `kinds`."""
+    unused = set(range(len(conditions)))
+    gap: dict[Reference, Value] | None = None
+    known = False
+    for values in _all_values(kinds, conditions):
+        known = True
+        taken = next((number for number, one in enumerate(conditions) if holds(one, values)), None)
+        if taken is not None:
+            unused.discard(taken)
+        elif gap is None:
+            gap = values
+    return Cases(tuple(sorted(unused)) if known else (), gap, known)
