@@ -111,7 +111,8 @@ test("the exit that a running program took is known until the next cycle", () =>
         run: 1,
         number,
         name: "",
-        action_id: text.replace("!", ""),
+        action_id: text.replace(/[!+]/g, ""),
+        ...(text.includes("+") && { attempt: 2 }),
         started: "2026-01-01T00:00:00Z",
         ...(text.endsWith("!") && { error: "failed" }),
       }),
@@ -125,4 +126,11 @@ test("the exit that a running program took is known until the next cycle", () =>
   expect(taken("scan!", "report", "drop")).toBe("s2");
   expect(taken("scan!", "report", "drop", "scan")).toBeUndefined();
   expect(taken("scan", "place", "drop", "scan!", "report")).toBe("s2");
+  // A failed attempt that is repeated takes no exit.
+  expect(taken("scan!", "scan+", "place")).toBeUndefined();
+  expect(taken("scan!", "scan+!", "report")).toBe("s2");
+  const ends = Object.values(doc.logic).find((each) => each.id === "s2");
+  if (ends) ends.end = "END";
+  expect(taken("scan!", "scan+")).toBeUndefined();
+  expect(taken("scan!", "scan")).toBe("s2");
 });

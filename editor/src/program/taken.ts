@@ -13,6 +13,7 @@ export function takenExit(state: State): LogicItem | undefined {
   const entry = program.trace[failed];
   if (!entry) return undefined;
   const later = program.trace.slice(failed + 1).filter((each) => each.thread_id === entry.thread_id);
+  if (later[0]?.attempt !== undefined) return undefined; // the action is repeated
   const first = placeOf(outgoing(doc, START)[0]?.end ?? "");
   const exits = errorExits(doc, entry.action_id);
   const next = later[0]?.action_id;

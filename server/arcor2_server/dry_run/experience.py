@@ -6,7 +6,7 @@ from typing import Final
 
 from arcor2_hw.compute.dry_run_tasks import KnownDuration
 from arcor2_hw.compute.program_walk import UsualBranch, usual_branches
-from arcor2_hw.data.base import Unset
+from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.dry_run import ActionDuration, DurationSource
 from arcor2_hw.data.run_trace import RunTrace
 
@@ -47,12 +47,11 @@ def durations(traces: Sequence[RunTrace], methods: Mapping[str, Method]) -> dict
 
 
 def branches(trace: RunTrace, edges: Mapping[str, list[str]]) -> dict[str, UsualBranch]:
-    """Return the branches that a run took most often, by id of the action.
+    """Return the branches that a run took most often, by id of the action. A repetition after an error is no branch.
 
     Args:
         trace: the trace of the run.
         edges: ids of the actions that may follow each action, or END.
     """
-    own = (span for span in trace.spans if isinstance(span.thread_id, Unset) and isinstance(span.call, Unset))
-    executed = [span.action_id for span in own]
+    executed = [span.action_id for span in trace.spans if span.thread_id is span.call is span.attempt is UNSET]
     return usual_branches(trace.run, executed, edges)

@@ -29,11 +29,12 @@ def test_durations_are_medians_of_the_action_or_of_its_method() -> None:
     }
 
 
-def test_actions_in_functions_and_other_threads_are_no_branches() -> None:
+def test_functions_other_threads_and_repetitions_are_no_branches() -> None:
     spans = [
-        Span(1, "a", "a", "lamp", 0.0, 1.0),
-        Span(2, "inside", "inside", "lamp", 1.0, 1.0, call=1),
-        Span(3, "other", "other", "lamp", 1.0, 1.0, thread_id=7),
-        Span(4, "c", "c", "belt", 2.0, 1.0),
+        Span(1, "a", "a", "lamp", 0.0, 1.0, error="It is dark."),
+        Span(2, "a", "a", "lamp", 1.0, 1.0, attempt=2),
+        Span(3, "inside", "inside", "lamp", 1.0, 1.0, call=1),
+        Span(4, "other", "other", "lamp", 1.0, 1.0, thread_id=7),
+        Span(5, "c", "c", "belt", 2.0, 1.0),
     ]
-    assert branches(RunTrace(6, spans=spans), {"a": ["b", "c"]}) == {"a": UsualBranch(6, "c")}
+    assert branches(RunTrace(6, spans=spans), {"a": ["b", "c", "END"]}) == {"a": UsualBranch(6, "c")}
