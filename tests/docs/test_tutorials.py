@@ -12,7 +12,12 @@ from pathlib import Path
 import pytest
 
 DOCS = Path(__file__).parents[2] / "docs"
-TUTORIALS = sorted([*(DOCS / "tutorials").glob("*.md"), *(DOCS / "how-to").glob("*.md")])
+TUTORIALS = sorted(
+    path
+    for folder in ("tutorials", "how-to")
+    for path in (DOCS / folder).glob("*.md")
+    if "```console" in path.read_text() or folder == "tutorials"
+)
 BLOCK = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 TIMEOUT = 150  # s, of a command; one runs the conformance suite, on a busy machine for more than a minute
 
