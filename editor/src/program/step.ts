@@ -94,7 +94,11 @@ export function valuesOf(doc: OpenDocument, types: State["types"], action: Of<Ac
 
 function shortValue(doc: OpenDocument, action: Of<Action>, { type, value }: ActionParameter, extra: Extra): string {
   const read = decoded(value);
-  if (type === "project_parameter") return doc.parameters[String(read)]?.name ?? "";
+  if (type === "project_parameter") {
+    const parameter = doc.parameters[String(read)];
+    if (!parameter) return "";
+    return parameter.variable ? parameter.name : shortValue(doc, action, parameter, extra);
+  }
   if (type === "link") {
     const part = errorAt(doc, String(read));
     if (part) return t`${part.name} of ${part.action.name}`;

@@ -35,7 +35,7 @@ test("nodes show the values of an action that its name and point do not tell", (
   const types = { ...TYPES, actions: { Device: TYPES.actions.Device?.map(inPieces) ?? [] } };
   const { boxes } = graphOf(doc, types);
   const of = (id: string) => boxes.find((each) => each.id === id);
-  expect([of("a")?.values, of("b")?.values, of("c")?.values]).toEqual(["by so_many", "by 3\u00a0pcs", ""]);
+  expect([of("a")?.values, of("b")?.values, of("c")?.values]).toEqual(["by 5\u00a0pcs", "by 3\u00a0pcs", ""]);
   expect((of("b")?.height ?? 0) - (of("c")?.height ?? 0)).toBeGreaterThan(10);
 });
 

@@ -25,8 +25,8 @@ export const endName = (end: RunEnd): string => i18n._(WORDS[end]);
 const TONES: Record<RunEnd, string> = { running: "good", finished: "good", stopped: "", failed: "bad", lost: "warn" };
 const SHOWN = 10;
 
-/** Show the newest runs of the open project, or of all projects if none is open. */
-export function History() {
+/** Show the newest runs of the open project, or of all projects if none is open; with `charts`, also their charts. */
+export function History({ charts = false }: { charts?: boolean }) {
   const runs = useEditor((state) => state.program.runs);
   const project = useEditor((state) => state.doc?.project?.id);
   useTicking();
@@ -43,7 +43,7 @@ export function History() {
               {each.started_by && <span className="quiet"> {t`by ${each.started_by}`}</span>}
             </span>
             <span className="quiet small">{summary(each)}</span>
-            {each.end !== "running" && each.actions > 0 && <RunChart number={each.number} />}
+            {charts && each.end !== "running" && each.actions > 0 && <RunChart number={each.number} />}
           </li>
         ))}
       </ul>

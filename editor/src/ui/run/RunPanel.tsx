@@ -92,7 +92,7 @@ export default function RunPanel() {
         }}
       />
       <DryRun />
-      <History />
+      <History charts />
       {asking && doc?.project && (
         <AskName
           title={t`Build a package`}
