@@ -587,8 +587,7 @@ async def test_code_is_edited_and_imported(work: Work) -> None:
         await page.keyboard.press("Backspace")
     # Its completion inserts the call with fields, and the signature is shown meanwhile.
     await page.keyboard.type("flow.wa")
-    await code.get_by_role("option", name="wait").wait_for()
-    await page.keyboard.press("Enter")
+    await code.get_by_role("option", name="wait").click()
     await expect(code.locator(".cm-signature strong")).to_contain_text("seconds")
     await page.keyboard.type("0.5")
     await page.keyboard.press("Tab")

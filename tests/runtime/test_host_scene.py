@@ -198,9 +198,16 @@ def test_twenty_devices_connect_concurrently(host: HostProcess, tmp_path: Path) 
 
 @pytest.mark.parametrize(("fail", "words"), [("refused", "192.0.2.1:30004"), ("odd", "ZeroDivisionError")])
 def test_one_failed_device_closes_the_others(host: HostProcess, tmp_path: Path, fail: str, words: str) -> None:
-    notes = str(tmp_path / "notes")
-    objects = [scene_object("good", "Device", file=notes), scene_object("bad", "Device", fail=fail, connect_takes=0.0)]
-    host.send(open_scene([type_code("Device", DEVICE)], *objects))
+    notes = tmp_path / "notes"
+    source = DEVICE.replace(
+        "connect(self, timeout: float = 5.0) -> None:\n",
+        f"""connect(self, timeout: float = 30.0) -> None:
+        while self.settings.fail and not Path({str(notes)!r}).exists():
+            time.sleep(0.01)
+""",
+    )
+    objects = [scene_object("good", "Device", file=str(notes)), scene_object("bad", "Device", fail=fail)]
+    host.send(open_scene([type_code("Device", source)], *objects))
     error = host.expect(m.SceneFailed).error
     assert error.object_id == "obj_bad"
     assert "bad" in error.message.text

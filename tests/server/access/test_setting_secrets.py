@@ -57,7 +57,7 @@ class VaultSettings(Settings):
 
 class Vault(Generic):
     """A vault that opens for the right code."""
-The passwords in `clear_secrets.zip`: of the saved scene and package, of overrides, of the open scene.
+
     _ABSTRACT = False
 
     def __init__(self, obj_id: str, name: str, settings: VaultSettings) -> None:
