@@ -44,7 +44,7 @@ def test_the_calibration_is_read_and_used_by_the_model(arm: UR5e, fake: FakeUr) 
     read = arm.kinematic_calibration()
     assert [each.theta for each in read.joints] == deltas[0]
     rows = rows_of(read)
-    rows[1], rows[2] = (rows[at]._replace(alpha=0.0) for at in (1, 2))  # offsets of 12 m need axes that are exactly parallel
+    rows[1], rows[2] = (rows[at]._replace(alpha=0.0) for at in (1, 2))  # exactly parallel
     model = calibrated(RobotModel.load(MODEL), "tcp", rows)
     q = np.array((0.4, -1.3, 1.1, 0.2, -0.7, 2.0))
     turned = np.diag((-1.0, -1.0, 1.0, 1.0))
