@@ -25,7 +25,7 @@ CHECK_PERIOD: Final = 0.5
 """Time between checks of the temperature and of frozen images, s."""
 HOT: Final = 90.0
 """Chip temperature that raises an alarm, °C. The chip switches itself off at 105 °C (assumed from the Myriad X)."""
-EXPOSURE_TIMEOUT: Final = 1.0
+EXPOSURE_TIMEOUT: Final = 3.0
 
 
 class ImageStream(Connected):
