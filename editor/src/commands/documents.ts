@@ -1,6 +1,8 @@
 /** Scenes, projects and packages: open, create, save, close, copy, rename, delete. */
 
 import { call } from "../session/connection";
+import { theEngine } from "../session/engine";
+import { openId } from "../store/selectors";
 import type { State } from "../store/state";
 import { now } from "../store/store";
 import { awaited } from "./awaited";
@@ -41,9 +43,14 @@ function listed(kind: "scene" | "project", name: string): Promise<string> {
 }
 
 export async function save() {
+  const document = openId(now());
+  // Taken now, since the document may be closed as soon as it is saved. In AR, the view shows the picture of the camera,
+  // which stays on this device.
+  const picture = now().ui.ar ? undefined : theEngine()?.picture();
   const saved = await (now().doc?.project ? ask("SaveProject") : ask("SaveScene"));
   // A missing picture is harmless.
-  if (saved) void import("./thumbnail").then(({ keepThumbnail }) => keepThumbnail()).catch(() => {});
+  if (saved && picture)
+    void import("./thumbnail").then(({ keepThumbnail }) => keepThumbnail(document, picture)).catch(() => {});
   return saved;
 }
 

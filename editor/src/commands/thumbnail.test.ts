@@ -3,7 +3,6 @@ import { now, store } from "../store/store";
 
 const call = vi.fn();
 vi.mock("../session/connection", () => ({ call, serves: () => true }));
-vi.mock("../session/engine", () => ({ theEngine: () => undefined }));
 const { loadThumbnailOnce } = await import("./thumbnail");
 
 const TAKEN = "data:image/webp;base64,AA";

@@ -2,10 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { call, serves } from "../session/connection";
-import { theEngine } from "../session/engine";
-import { whyUnavailable } from "../store/permissions";
 import { put } from "../store/records";
-import { openId } from "../store/selectors";
 import type { Thumbnail } from "../store/state";
 import { now, store } from "../store/store";
 import { refusal } from "./requests";
@@ -23,12 +20,9 @@ function setThumbnail(document: string, thumbnail: Thumbnail): void {
   store.setState(({ thumbnails }) => ({ thumbnails: put(thumbnails, document, thumbnail) }));
 }
 
-/** Take a thumbnail of the open document and store it, even if the document is closed meanwhile. */
-export async function keepThumbnail(): Promise<void> {
-  const document = openId(now());
-  // In AR, the view shows the picture of the camera, which stays on this device.
-  if (now().ui.ar) return;
-  const blob = whyUnavailable(now(), "SaveProject") || !serves("SetViewState") ? null : await theEngine()?.picture();
+/** Store a picture of the view as the thumbnail of a document, which may be closed meanwhile. */
+export async function keepThumbnail(document: string, picture: Promise<Blob | null>): Promise<void> {
+  const blob = serves("SetViewState") ? await picture : null;
   if (!blob) return;
   const thumbnail = await smaller(blob);
   if (!thumbnail) return;

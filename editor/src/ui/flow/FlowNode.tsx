@@ -32,7 +32,7 @@ export function FlowNode({ data, selected }: NodeProps<FlowNodeType>) {
         {breakpoint && <span className="breakpoint-dot" data-on="true" role="img" aria-label={t`pauses here`} />}
         <span className="flow-title">{box.name}</span>
         {box.kind === "action" && <ReachBadge id={box.id} />}
-        {running && <span className="tag good">{paused ? "next" : "runs"}</span>}
+        {running && <span className="tag good">{paused ? t`next` : t`runs`}</span>}
         {fault && (
           <span className="flow-fault" role="img" aria-label={fault} title={fault}>
             <Icon name="warn" size={16} />

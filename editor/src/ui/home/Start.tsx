@@ -16,7 +16,7 @@ export function Start() {
   if (!proposal) return null;
   if (proposal.kind === "empty")
     return (
-      <section className="start" aria-label={t`Start`}>
+      <section className="start-here" aria-label={t`Start`}>
         <p>{t`Create a workplace, add its devices, and program it.`}</p>
         <Button
           look="primary"
@@ -31,7 +31,7 @@ export function Start() {
   const { document, id, name } = proposal;
   const open = () => (document === "scene" ? documents.openScene(id) : documents.openProject(id));
   return (
-    <section className="start" aria-label={t`Start`}>
+    <section className="start-here" aria-label={t`Start`}>
       {proposal.kind === "continue" ? (
         <Button look="primary" icon="play" className="wraps" onPress={() => void open()}>
           {t`Continue with ${name}`}
