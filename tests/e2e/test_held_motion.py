@@ -315,7 +315,7 @@ async def _teach(place: Site) -> None:
     async with place.holding(place.teach):
         await until(lambda: place.fake.truth()["freedrive"], "the arm can be moved by hand")
     await until(lambda: not place.fake.truth()["freedrive"], "the arm is stiff again")
-    with pytest.raises(RequestFailed, match=r"motion has ended|not renewed"):
+    with pytest.raises(RequestFailed, match=r"(motion|hold) has ended|not renewed"):
         await place.teach()
 
 

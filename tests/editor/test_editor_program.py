@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import AsyncIterator, Awaitable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any
 
 import msgspec
@@ -447,23 +447,22 @@ async def test_a_condition_of_several_comparisons(work: Work) -> None:
     await work.select("how_many_parts")
     await work.panel.get_by_role("button", name="few").first.click()
 
-    async def changed() -> Any:
-        event = await work.told("LogicItemChanged", lambda event: event.change_type is ChangeType.UPDATE)
-        assert event.data.id == step.id
-        return event.data
+    async def changed(holds: Callable[[Any], bool]) -> Any:
+        event = await work.told("LogicItemChanged", lambda event: event.data.id == step.id and holds(event.data.when))
+        return event.data.when
 
     await work.panel.get_by_label("Comparison", exact=True).select_option(label="from … to below …")
-    assert (await changed()).when.comparisons[0].upper == "1"
-    for label, text in (("To", "7"), ("From", "3")):
+    await changed(lambda when: when.comparisons[0].upper == "1")
+    for label, text, name in (("To", "7", "upper"), ("From", "3", "value")):
         field = work.panel.get_by_label(label, exact=True)
         await field.fill(text)
         await field.press("Enter")
-        await changed()
+        await changed(lambda when, name=name, text=text: getattr(when.comparisons[0], name) == text)
     await work.tap_button("Add a comparison", work.panel)
-    await changed()
+    await changed(lambda when: len(when.comparisons) == 2)
     second = work.panel.get_by_role("group", name="Comparison 2")
     await second.get_by_label("Comparison 2", exact=True).select_option(label="closed of check_door")
-    when = (await changed()).when
+    when = await changed(lambda when: when.comparisons[1].what == f"{check}/default/0")
     assert [(one.what, one.operator, one.value, one.upper) for one in when.comparisons] == [
         (f"{count}/default/0", "[)", "3", "7"),
         (f"{check}/default/0", "==", "true", UNSET),
@@ -476,7 +475,7 @@ async def test_a_condition_of_several_comparisons(work: Work) -> None:
     await field.press("Escape")
     await work.screen.picture("program condition")
     await work.panel.get_by_label("True if").select_option(label="at least one is true")
-    assert (await changed()).when.match == "any"
+    await changed(lambda when: when.match == "any")
     await work.select("how_many_parts")
     await work.panel.get_by_text("3 ≤ parts < 7 or closed = yes").wait_for()
     await work.panel.get_by_text("else").wait_for()

@@ -66,9 +66,9 @@ def test_a_killed_process_stops_the_servos(fake: FakeProcess, owner: "subprocess
 def test_a_tripped_watchdog_is_named(fake: FakeProcess, ready: TwoAxisRobot) -> None:
     keep_alive = ready._observer._keep_alive
     assert keep_alive is not None
-    os.kill(keep_alive.pid, signal.SIGKILL)  # as if this computer had not scheduled it
     doing = BackgroundCall(ready.move_to_joints, FAR, 0.15)
     moving(fake)
+    os.kill(keep_alive.pid, signal.SIGKILL)  # as if this computer had not scheduled it
     stall(0.7)
     assert trips(fake) == 2
     with pytest.raises(NotInControl, match="this computer was too slow for the robot's watchdog"):
