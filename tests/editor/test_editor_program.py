@@ -218,7 +218,7 @@ async def test_error_exit_is_added_in_the_graph_and_its_error_used(work: Work) -
     assert named.error_output == "get_digital_input_error"
     await graph.locator('.react-flow__node[aria-label^="grab,"] .flow-name').click()
     await work.panel.locator(".next-step", has_text="on error").click()
-    # Its kinds are chosen in plain words, and the edge tells them.
+    # Its kinds are chosen in plain words, and the edge names them.
     for kind in ("Refused", "Not done in time"):
         await work.panel.locator(".kinds .chip", has_text=kind).click()
         changed = (await work.told("LogicItemChanged")).data

@@ -124,7 +124,7 @@ test("a misplaced marker is named and left out", () => {
   const found = register(seen, moved.places, LENS, CHECKED);
   expect(found).toMatchObject({ contradicting: [12], undecided: false });
   expect(overlayError(MIDDLE, [view, LENS], [found?.view as View, LENS])).toBeLessThan(0.001);
-  // Two markers that contradict each other: nothing tells which one is misplaced.
+  // Of two markers that contradict each other, the misplaced one cannot be found.
   const two = seen.filter(({ id }) => id === 10 || id === 12);
   expect(register(two, moved.places, LENS, CHECKED)).toMatchObject({ grade: "rough", undecided: true });
 });

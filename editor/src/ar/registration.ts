@@ -22,7 +22,7 @@ export interface Registration {
   used: number[];
   /** Markers that contradict the others and were not used. */
   contradicting: number[];
-  /** Two markers contradict each other, and nothing tells which one is misplaced. */
+  /** Two markers contradict each other. The misplaced one cannot be found. */
   undecided: boolean;
   /** Expected error of the overlay 0.5 m from the markers, m. */
   error: number;

@@ -21,7 +21,7 @@ test("the first obstacle is named", () => {
   });
 });
 
-test("errors of the camera are told apart", () => {
+test("errors of the camera are distinguished", () => {
   const named = (name: string) => obstacleOfError(Object.assign(new Error(), { name }));
   expect(["NotAllowedError", "NotReadableError", "NotFoundError"].map(named)).toEqual(["refused", "busy", "missing"]);
 });

@@ -130,7 +130,7 @@ test("a connection with comparisons is a branch in the list, and ends a sequence
   expect([...movableRuns(doc).keys()]).toEqual(["b", "c", "d"]);
 });
 
-test("error exits are no conditions, and their actions have no results to compare after them", () => {
+test("after an error exit, results of its action cannot be compared", () => {
   const doc = program({ a: "count", b: "ask", c: "act" }, [
     ["START", "a"],
     ["a", "b"],

@@ -28,7 +28,7 @@ const scanning = (parameters: Record<string, object> = {}): OpenDocument =>
   );
 const texts = (doc: OpenDocument) => problemsOf(doc, TYPES).map((each) => `${each.level} ${each.id}: ${each.text}`);
 
-test("an error exit is no condition and no second next step", () => {
+test("an error exit does not count as a condition or as a second next step", () => {
   const doc = scanning();
   const exit = doc.logic.s2;
   expect(exit && [branchKind(exit), conditionWords(doc, TYPES, exit)]).toEqual(["error", "on error: 2 kinds"]);

@@ -40,7 +40,7 @@ test("branches that join are indented, and their common rest is not", () => {
   ).toEqual(["a", "  ? a-b", "    b", "  ? a-c", "    c", "d"]);
 });
 
-test("an empty branch tells where it continues", () => {
+test("an empty branch names the step at which it continues", () => {
   expect(
     listed(acts("bd", { a: "ask" }), [
       ["START", "a"],
@@ -65,7 +65,7 @@ test("of branches that never join, the longest one is not indented", () => {
   ).toEqual(["a", "  ? a-d", "    d", "    > d-END", "? a-b", "b", "c"]);
 });
 
-test("error exits are indented after their action, and tell where they continue", () => {
+test("error exits are indented after their action and name the step at which they continue", () => {
   expect(
     listed(acts("abcde"), [
       ["START", "a"],

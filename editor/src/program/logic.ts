@@ -227,7 +227,7 @@ function firstFree(type: string, taken: string[]): string | undefined {
 /**
  * Return why a connection cannot lead to an item; an empty string if it can. The server decides in the end.
  *
- * `item` is the connection if it exists, `error` tells whether it is an error exit.
+ * `item` is the connection if it exists, `error`: whether it is an error exit.
  */
 export function cannotLead(
   doc: OpenDocument,

@@ -47,7 +47,7 @@ def durations(traces: Sequence[RunTrace], methods: Mapping[str, Method]) -> dict
 
 
 def branches(trace: RunTrace, edges: Mapping[str, list[str]]) -> dict[str, UsualBranch]:
-    """Return the branches that a run took most often, by id of the action. A repetition after an error is no branch.
+    """Return the branches that a run took most often, by id of the action. Repetitions after an error do not count.
 
     Args:
         trace: the trace of the run.

@@ -1,4 +1,4 @@
-"""Prepares the task of a dry run from a project: the graph, the motions, and what earlier runs tell."""
+"""Prepares the task of a dry run from a project: the graph, the motions, and data of earlier runs."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -47,7 +47,7 @@ class Device(Struct, frozen=True):
 
 
 class Experience(Struct, frozen=True):
-    """What earlier runs tell.
+    """Data of earlier runs.
 
     Args:
         traces: the traces of the newest runs of the project, the newest first.
@@ -69,7 +69,7 @@ def prepare(
         scene: the scene.
         project: the project.
         devices: the objects of the scene, by id.
-        earlier: what earlier runs tell.
+        earlier: data of earlier runs.
         args: the arguments of the request.
 
     Raises:

@@ -224,7 +224,7 @@ class DryRuns:
         return defaults | self._robots.settings_of(obj)
 
     async def _earlier(self, scene: Scene, project: Project) -> Experience:
-        """Return what the newest runs of a project tell."""
+        """Return the data of the newest runs of a project."""
         traces: list[RunTrace] = []
         unchanged: list[RunTrace] = []
         edited = max((at for at in (scene.modified, project.modified) if not isinstance(at, Unset)), default="")

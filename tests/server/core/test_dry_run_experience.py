@@ -1,4 +1,4 @@
-"""What earlier runs tell a dry run: durations of actions, and usual branches."""
+"""Data of earlier runs for a dry run: durations of actions, and usual branches."""
 
 from arcor2_hw.compute.dry_run_tasks import KnownDuration
 from arcor2_hw.compute.program_walk import UsualBranch
