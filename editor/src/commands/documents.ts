@@ -44,8 +44,8 @@ function listed(kind: "scene" | "project", name: string): Promise<string> {
 
 export async function save() {
   const document = openId(now());
-  // Taken now, since the document may be closed as soon as it is saved. In AR, the view shows the picture of the camera,
-  // which stays on this device.
+  // Taken now, since the document may be closed as soon as it is saved. In AR, the view shows the picture of the
+  // camera, which stays on this device.
   const picture = now().ui.ar ? undefined : theEngine()?.picture();
   const saved = await (now().doc?.project ? ask("SaveProject") : ask("SaveScene"));
   // A missing picture is harmless.
