@@ -134,6 +134,7 @@ class ControlProgram:
             **{name: self._speed(getattr(control, name)) for name in SPEEDS},
             "own": self._begin_own,
             "control": self._end_own,
+            "respond": lambda: True,
             "resume": self._resume,
             "stop": self._stop,
         }

@@ -208,7 +208,7 @@ class Paths:
             if plays or not ours or gone_since is None:
                 gone_since = sample.timestamp
             if sample.timestamp - gone_since > PROGRAM_GONE + (REST_WITHIN if state in ENDED else 0.0):
-                session.end(session.left_remote_control())
+                session.end(session.program_gone())
                 continue
             if guard.stopped() and stopped_at is None:
                 stopped_at = now

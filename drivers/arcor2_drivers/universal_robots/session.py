@@ -327,17 +327,14 @@ class ControlSession:
     # -------------------------------------------------------------------------------- from the control process
     def _on_exit(self, status: int) -> DeviceError:
         detail = f"The control process of {self.who} ended with status {status}."
-        error = ConnectionLost(detail)
-        if status in _TOO_SLOW:
-            self.too_slow = True
-            error = ConnectionLost(
-                "{device}: {too_slow}",
-                f"{_TOO_SLOW[status]}. {detail}",
-                device=self.who,
-                too_slow=TOO_SLOW.format("robot"),
-            )
+        cause = _TOO_SLOW.get(status)
+        error = ConnectionLost(detail) if cause is None else self._too_slow(f"{cause}. {detail}")
         self.end(error)
         return self.ended or error
+
+    def _too_slow(self, detail: str) -> ConnectionLost:
+        self.too_slow = True
+        return ConnectionLost("{device}: {too_slow}", detail, device=self.who, too_slow=TOO_SLOW.format("robot"))
 
     def _on_output(self, line: bytes) -> None:
         text = line.decode("utf-8", "replace").strip()
@@ -361,18 +358,20 @@ class ControlSession:
                 gone_since = None
             elif gone_since is None:  # the controller's clock: an old sample was taken before the program was sent
                 gone_since = newest.timestamp
-            elif newest.timestamp - gone_since > timing.PROGRAM_GONE and not once_within(
-                self._ending.is_set, timing.PROCESS_ENDS, timing.GUARD_PERIOD
-            ):
-                self.end(self.left_remote_control())
+            elif newest.timestamp - gone_since > timing.PROGRAM_GONE:
+                self.end(self.program_gone())
             if not self._ending.is_set() and (now := time.monotonic()) >= due:
                 due = now + PULSE_PERIOD
                 process.write(pulse())
             self._ending.wait(timing.GUARD_PERIOD)
         self._last_stop()
 
-    def left_remote_control(self) -> NotInControl:
-        """Return the error for a program that was stopped at the controller."""
+    def program_gone(self) -> DeviceError:
+        """Return why our program is not playing, after the control process had time to report a reason of its own."""
+        assert self._process is not None
+        response = self._process.request("respond", ())
+        if not once_within(self._ending.is_set, timing.PROCESS_ENDS, timing.GUARD_PERIOD) and not response.done():
+            return self._too_slow("the control process did not respond")
         return NotInControl(
             "{device} left remote control. Check the pendant, then retry.",
             "the program was stopped at the controller",
