@@ -32,7 +32,7 @@ def test_host_status_is_read() -> None:
 @pytest.mark.parametrize(
     "data", [b"", ONE, ONE + TWO, TWO + ONE + THREE, ONE + TWO + THREE[:-1], ONE.replace(b",0,0,1245", b",x,0,1245")]
 )
-def test_incomplete_answers_are_no_status(data: bytes) -> None:
+def test_an_incomplete_answer_is_not_a_status(data: bytes) -> None:
     assert status(data) is None
 
 

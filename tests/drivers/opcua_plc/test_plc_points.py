@@ -158,7 +158,7 @@ def test_a_node_that_is_missing_or_of_another_type_is_named(
     assert plc.connection is Connection.FAILED
 
 
-def test_without_a_handshake_there_is_no_control(fake: FakeProcess, make: Callable[..., OpcUaPlc]) -> None:
+def test_control_requires_a_handshake(fake: FakeProcess, make: Callable[..., OpcUaPlc]) -> None:
     plc = make(fake.ready["url"], handshake="")
     plc.connect()
     with pytest.raises(Refused, match="the setting handshake is empty"):

@@ -35,7 +35,7 @@ def test_a_line_is_read(line: bytes, meaning: Answer) -> None:
 @pytest.mark.parametrize(
     "line", [b"S S nan g", b"S S 1e5 g", b"S S 100,00 g", b"S S 1 0 g", b"S S 10.00", b"S S g", b"X S 1.0 g", b""]
 )
-def test_invalid_lines_are_no_answer(line: bytes) -> None:
+def test_invalid_lines_are_not_answers(line: bytes) -> None:
     assert answers(line + b"\r\n") == []
 
 

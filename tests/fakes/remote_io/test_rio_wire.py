@@ -76,7 +76,7 @@ def test_watchdog_over_the_wire(fake: Any, host: Any, wait_for: Callable[..., An
     assert host.read_holding_registers(80, count=10, device_id=1).registers == [150, 0, 0, 3, 3, 2, 0, 0, 0, 0]
 
 
-def test_a_trigger_of_the_own_running_watchdog_is_no_write(fake: Any, host: Any) -> None:
+def test_triggering_the_running_watchdog_is_not_a_write(fake: Any, host: Any) -> None:
     host.write_registers(80, [60_000, 4711], device_id=1)
     started = fake.truth()["writes"]
     host.write_registers(81, [4711], device_id=1)

@@ -610,7 +610,7 @@ class TypesOfTests:
         return self._facts[type_name].actions[name]
 
     def robot_meta(self, name: str) -> RobotMeta:
-        raise NotFound(f"{name} is no robot")
+        raise NotFound(f"{name} is not a robot")
 
 
 def with_functions(project: Project, rng: random.Random, count: int) -> Project:

@@ -238,7 +238,7 @@ def test_single_compiled_modules_have_a_distribution() -> None:
     }
 
 
-def test_our_modules_in_older_sources_are_no_foreign_dependency(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_our_modules_in_older_sources_are_not_a_foreign_dependency(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(package_versions, "_distributions", lambda: {"arcor2": "pymodbus", "arcor2_web": "pymodbus"})
     assert package_versions.present({"arcor2", "arcor2_web", "arcor2_object_types"}).distributions == {}
 

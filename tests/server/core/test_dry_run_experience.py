@@ -29,7 +29,7 @@ def test_durations_are_medians_of_the_action_or_of_its_method() -> None:
     }
 
 
-def test_functions_other_threads_and_repetitions_are_no_branches() -> None:
+def test_functions_other_threads_and_repetitions_are_not_branches() -> None:
     spans = [
         Span(1, "a", "a", "lamp", 0.0, 1.0, error="It is dark."),
         Span(2, "a", "a", "lamp", 1.0, 1.0, attempt=2),

@@ -229,7 +229,7 @@ async def test_migrations_run_only_on_an_older_schema(
 
 
 # ------------------------------------------------------------------------------------------------ faults
-async def test_a_file_that_is_no_database_is_named(settings: ServerSettings) -> None:
+async def test_a_file_that_is_not_a_database_is_named(settings: ServerSettings) -> None:
     settings.documents_database.write_bytes(b"this is no database " * 500)
     with pytest.raises(StorageError, match=str(settings.documents_database)):
         await Storage.open(settings)

@@ -39,7 +39,7 @@ def test_fit_finds_any_pose_from_any_order_of_points(pose: Pose, order: list[int
     assert found.worst < 1e-9
 
 
-def test_fit_of_three_points_in_a_plane_is_no_reflection() -> None:
+def test_fit_of_three_points_in_a_plane_is_not_a_reflection() -> None:
     points = [Position(0, 0, 0), Position(1, 0, 0), Position(0, 2, 0)]
     pose = Pose(Position(1, 1, 1), Orientation.from_rotation_vector(math.pi, 0, 0))
     assert near(fit(points, [(pose * Pose(point)).position for point in points]).pose, pose)

@@ -385,7 +385,7 @@ CAMERA: dict[str, Any] = {"fx": 1, "fy": 1, "cx": 1, "cy": 1, "distCoefs": [0, 0
 
 
 @pytest.mark.parametrize("path", ["/calibrate/camera", "/markers/corners"])
-async def test_calibration_refuses_data_that_is_no_picture(server: ServerProcess, path: str) -> None:
+async def test_calibration_refuses_data_that_is_not_a_picture(server: ServerProcess, path: str) -> None:
     async with httpx.AsyncClient(base_url=base(server), timeout=30.0) as http:
         if path == "/calibrate/camera":
             refused(await http.put(path, params=CAMERA, files=PICTURE), 404, "NotFound", "No markers are configured")

@@ -134,7 +134,7 @@ class RecordedTypes:
 
     def robot_meta(self, name: str) -> RobotMeta:
         if not self.derives_from(name, "Robot"):
-            raise NotFound(f"{name} is no robot.")
+            raise NotFound(f"{name} is not a robot.")
         return RobotMeta(name, RobotType.ARTICULATED)
 
     async def add(self, source: ObjectTypeSource) -> ObjectTypeMeta:

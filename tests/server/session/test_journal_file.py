@@ -146,7 +146,7 @@ def test_the_log_is_reused_instead_of_growing(path: Path) -> None:
         assert connection.execute("select 1 from sqlite_master where name = 'extent'").fetchone() is None
 
 
-def test_no_room_for_the_log_is_no_error(
+def test_a_full_disk_is_not_an_error_for_the_log(
     path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with closing(JournalFile(path)) as file:
@@ -157,7 +157,7 @@ def test_no_room_for_the_log_is_no_error(
     assert numbers(reopened(path)[0])[-1] == 6
 
 
-def test_a_position_that_cannot_be_written_is_no_error(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_position_that_cannot_be_written_is_not_an_error(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with closing(JournalFile(path)) as file:
         file.open()
 

@@ -136,7 +136,7 @@ async def test_task_progress_is_throttled_except_its_end() -> None:
     board.close()
 
 
-async def test_a_disabled_object_is_no_obstacle(tmp_path: Path) -> None:
+async def test_a_disabled_object_is_not_an_obstacle(tmp_path: Path) -> None:
     async with open_stage(tmp_path, "Part", "Plain") as stage:
         alice = await stage.person("alice")
         await stage.place(alice, part="Part", plain="Plain")
