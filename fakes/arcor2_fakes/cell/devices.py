@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from arcor2_fakes.cell import sight
+from arcor2_fakes.cell import seen_objects
 from arcor2_fakes.cell.boards import Board
 from arcor2_fakes.cell.layout import Layout
 from arcor2_fakes.cell.things import Inputs, Printed, Robot
@@ -95,7 +95,7 @@ class FakeDevices:
         """Set the objects in front of the camera; only changes are sent."""
         if self._camera is None:
             return
-        others, moved = sight.changes(self._seen, seen)
+        others, moved = seen_objects.changes(self._seen, seen)
         if others:
             await self._do(self._camera, "scene", things=list(seen.values()))
         elif moved:

@@ -10,7 +10,7 @@ import numpy as np
 from transforms3d.affines import compose
 from transforms3d.euler import euler2mat
 
-from arcor2_fakes.cell import arm, sight
+from arcor2_fakes.cell import arm, seen_objects
 from arcor2_fakes.cell.boards import Board
 from arcor2_fakes.cell.labelling import LabelNest
 from arcor2_fakes.cell.layout import Layout, Matrix
@@ -349,7 +349,7 @@ class World:
         camera = self._layout.camera
         if camera is None:
             return {}
-        found = {thing["name"]: thing for thing in sight.fixed(camera)}
+        found = {thing["name"]: thing for thing in seen_objects.fixed(camera)}
         robot = self._layout.robot
         if robot.model is not None and self._robot is not None and len(self._robot.q) == 6:
             found |= arm.things(robot.model, robot.base.matrix(), self._robot.q, self._flange_from_tip)
@@ -361,7 +361,7 @@ class World:
                 pose = pose.copy()
                 pose[2, 3] += piles[thing.place] * camera.board[2]
                 piles[thing.place] += 1
-            found[thing.board.code] = sight.board(camera, thing.board.code, pose, thing.label is not None)
+            found[thing.board.code] = seen_objects.board(camera, thing.board.code, pose, thing.label is not None)
         return found
 
     def _stations(self) -> dict[str, Any]:

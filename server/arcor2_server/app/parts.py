@@ -41,8 +41,8 @@ from arcor2_server.online.cameras import Cameras
 from arcor2_server.online.connection_check import ConnectionCheck
 from arcor2_server.online.motion import RobotMotion
 from arcor2_server.online.online_scene import OnlineScene
-from arcor2_server.online.opening import SceneOpening
 from arcor2_server.online.scene_calibration import SceneCalibration
+from arcor2_server.online.scene_opening import SceneOpening
 from arcor2_server.online.undo import Undo
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage

@@ -17,7 +17,7 @@ from arcor2_server.errors import RequestRefused
 from arcor2_server.hosts.pool import CellHosts
 from arcor2_server.hosts.process import CellError, CellHost
 from arcor2_server.hosts.session import READ_TIMEOUT
-from arcor2_server.online.opening import SceneOpening
+from arcor2_server.online.scene_opening import SceneOpening
 
 CHECK_WITHIN: Final = 30.0
 """Time limit for importing the object type and connecting the device, s; the host has a shorter limit."""

@@ -27,8 +27,8 @@ from arcor2_server.hosts.session import READ_TIMEOUT, HostSession
 from arcor2_server.hosts.streams import RobotStreams
 from arcor2_server.online.actions import LastStop, RunningAction
 from arcor2_server.online.hold_to_run import HoldToRun
-from arcor2_server.online.opening import SceneOpening
 from arcor2_server.online.progress import SceneTask
+from arcor2_server.online.scene_opening import SceneOpening
 from arcor2_server.workspace.robot_calibrations import RobotCalibrations
 from arcor2_server.workspace.robots import SceneRobots
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from transforms3d.quaternions import quat2mat
 
-from arcor2_fakes.cell import arm, sight
+from arcor2_fakes.cell import arm, seen_objects
 from arcor2_fakes.cell.layout import Camera, Marker, Pose, from_rotation_vector
 from arcor2_fakes.oak_d.scene import Thing
 from arcor2_fakes.ur.kinematics import Chain, to_pose
@@ -63,7 +63,7 @@ def test_neighbouring_links_touch(q: tuple[float, ...]) -> None:
 
 def test_the_camera_receives_links_and_markers() -> None:
     camera = Camera(BASE, (0.08, 0.06, 0.002), markers=[Marker(7, Pose((0.1, 0.2, 0.05)), 0.06)])
-    encoded = [*arm.things("ur5e", BASE.matrix(), JOINTS[0], TIP.matrix()).values(), *sight.fixed(camera)]
+    encoded = [*arm.things("ur5e", BASE.matrix(), JOINTS[0], TIP.matrix()).values(), *seen_objects.fixed(camera)]
     things = [msgspec.convert(msgspec.to_builtins(each), Thing) for each in encoded]
     marker = things[-1]
     assert marker.marker is not None
@@ -76,7 +76,7 @@ def test_the_camera_receives_links_and_markers() -> None:
 def test_only_moved_links_are_sent() -> None:
     before = arm.things("ur5e", BASE.matrix(), JOINTS[0], TIP.matrix())
     q = (*JOINTS[0][:2], JOINTS[0][2] + 0.1, *JOINTS[0][3:])
-    others, moved = sight.changes(before, arm.things("ur5e", BASE.matrix(), q, TIP.matrix()))
+    others, moved = seen_objects.changes(before, arm.things("ur5e", BASE.matrix(), q, TIP.matrix()))
     assert not others
     assert "robot forearm" in moved
     assert "robot upper arm" not in moved

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import arcor2_fakes.cell
-from arcor2_fakes.cell import sight
+from arcor2_fakes.cell import seen_objects
 from arcor2_fakes.cell.boards import Board
 from arcor2_fakes.cell.layout import Layout
 from arcor2_fakes.cell.supply import BoardBelt
@@ -357,15 +357,15 @@ async def test_only_changes_are_sent_to_the_camera() -> None:
     await cell.world.begin()
     await cell.run(0.7)
     before = cell.world.seen()
-    assert sight.changes(before, cell.world.seen()) == (False, {})
+    assert seen_objects.changes(before, cell.world.seen()) == (False, {})
     await cell.at(*STOP)
     await cell.grip(True)
     await cell.at(0.4, -0.2, 0.2)
-    others, moved = sight.changes(before, cell.world.seen())
+    others, moved = seen_objects.changes(before, cell.world.seen())
     assert (others, set(moved)) == (False, {"A"})
     assert moved["A"]["position"] == pytest.approx([0.4, -0.2, 0.199])
     await cell.at(*NEST)
     await cell.grip(False)
     before = cell.world.seen()
     await cell.print("A")
-    assert sight.changes(before, cell.world.seen()) == (True, {})
+    assert seen_objects.changes(before, cell.world.seen()) == (True, {})

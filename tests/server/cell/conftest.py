@@ -36,7 +36,7 @@ from arcor2_server.hosts.session import HostSession
 from arcor2_server.online.connection_check import ConnectionCheck
 from arcor2_server.online.motion import RobotMotion
 from arcor2_server.online.online_scene import OnlineScene
-from arcor2_server.online.opening import SceneOpening
+from arcor2_server.online.scene_opening import SceneOpening
 from arcor2_server.rpc.registry import Context
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore
