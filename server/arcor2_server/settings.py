@@ -112,6 +112,11 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return self.data_dir / "analysis.msgpack"
 
     @property
+    def audit_file(self) -> Path:
+        """The file of the audit trail."""
+        return self.data_dir / "audit.sqlite"
+
+    @property
     def history_dir(self) -> Path:
         """The directory of the histories of closed documents."""
         return self.data_dir / "history"

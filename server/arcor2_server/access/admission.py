@@ -10,13 +10,13 @@ from litestar.connection import ASGIConnection
 from litestar.exceptions import NotAuthorizedException, PermissionDeniedException, TooManyRequestsException
 from litestar.handlers import BaseRouteHandler, WebsocketRouteHandler
 
+from arcor2_hw.data.audit import AuditOutcome
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.access.connection_limits import CONNECTION
 from arcor2_server.access.route_options import AS_ROLE, OPEN, PERSON, ROLE
 from arcor2_server.access.tokens import FILE, Token, TokenFile
-from arcor2_server.log import audit
 from arcor2_server.settings import ServerSettings
 
 log = structlog.get_logger(__name__)
@@ -184,12 +184,11 @@ def role_needed(connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRou
     connection.state[AS_ROLE] = role
     needed = handler.opt.get(ROLE, Role.PROGRAMMER)
     if role < needed:
-        audit.note(
-            "forbidden",
+        connection.app.state.audit.note(
+            AuditOutcome.FORBIDDEN,
             f"{connection.scope.get('method', '')} {connection.url.path}",
             user=connection.state.get(PERSON, ""),
             role=role,
             address=address_of(connection),
-            target="",
         )
         raise PermissionDeniedException(f"This needs the role {needed.name.lower()} or a higher one.")

@@ -3,6 +3,7 @@
 from arcor2_server.app.parts import Server
 from arcor2_server.rest.api_page import ApiPageOperations
 from arcor2_server.rest.assets import AssetOperations
+from arcor2_server.rest.audit_trail import AuditOperations
 from arcor2_server.rest.build import BuildOperations
 from arcor2_server.rest.calibration_methods import CalibrationMethodOperations
 from arcor2_server.rest.calibration_records import CalibrationRecordOperations
@@ -119,6 +120,7 @@ def rest_groups(s: Server) -> list[object]:
     return [
         ApiPageOperations(),
         AssetOperations(s.assets, s.type_notifications),
+        AuditOperations(s.audit),
         BuildOperations(s.storage, s.build, s.package_import),
         CameraOperations(s.session, s.online, s.cameras),
         CalibrationServiceOperations(s.calibration, s.robots),

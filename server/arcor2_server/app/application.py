@@ -58,7 +58,7 @@ def endpoints(server: Server) -> tuple[Endpoint, Endpoint]:
     table = routes(handlers.by_request, handlers.cached)
 
     def endpoint(service: Service) -> Endpoint:
-        return Endpoint(service, server.settings, server.access, server.hub, server.users, server.damage)
+        return Endpoint(service, server.settings, server.access, server.hub, server.users, server.damage, server.audit)
 
     execution = execution_service(table, server.execution.state_and_info)
     return endpoint(Service(table, server.greeting)), endpoint(execution)
@@ -68,7 +68,7 @@ def create_app(server: Server) -> Litestar:
     """Return the application that serves the running parts."""
     endpoint, execution_endpoint = endpoints(server)
     app = Application(
-        route_handlers=[sockets, *rest_routes(rest_groups(server), server.tasks), *editor_routes()],
+        route_handlers=[sockets, *rest_routes(rest_groups(server), server.tasks, server.audit), *editor_routes()],
         guards=[own_pages_only, role_needed],
         before_send=[add_headers],
         openapi_config=None,
@@ -77,6 +77,7 @@ def create_app(server: Server) -> Litestar:
         logging_config=None,
     )
     app.state.access = server.access
+    app.state.audit = server.audit
     app.state.endpoint = endpoint
     app.state.execution = execution_endpoint
     app.state.host_names = HostNames.of(server.settings)

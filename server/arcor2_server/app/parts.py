@@ -6,6 +6,7 @@ from typing import Protocol, TypeVar
 
 from arcor2_hw.data.events import Event
 from arcor2_server.access.admission import Access
+from arcor2_server.audit.trail import AuditTrail
 from arcor2_server.build.importing import PackageImport
 from arcor2_server.build.script_editing import ScriptEditing
 from arcor2_server.build.service import BuildService
@@ -99,6 +100,9 @@ class Server:
             damage.report(problem)
         secrets.store.load(damage)
         REDACTION.hide(lambda: secrets.store.values)
+        audit = self.audit = closed(AuditTrail(settings.audit_file, REDACTION.in_text))
+        if problem := await audit.open():
+            damage.report(problem)
         packages = Packages(settings.packages_dir, secrets.hide_in_package)
         await migrate_secrets(storage, packages, secrets)
         shared = SharedData(storage)

@@ -14,6 +14,7 @@ from arcor2_hw.data.project import BareProject, Project
 from arcor2_hw.data.scene import BareScene, Scene
 from arcor2_hw.exceptions import NotFound, StorageError
 from arcor2_hw.messages import Message
+from arcor2_server.audit.changes import record
 from arcor2_server.documents.changes import OF_SCENE, Change, Edit, EditKind, Kind
 from arcor2_server.documents.checks.scene import scene_problems
 from arcor2_server.documents.closed_history import ClosedHistories
@@ -188,6 +189,7 @@ class Session(OpenDocument):
         if self._number - self._based_on >= self._limit:
             self._shorten()
         await asyncio.shield(stored)  # the edit is valid even if the caller is cancelled
+        record(edit.changes)
 
     def _apply(self, edit: Edit) -> None:
         self.document.apply(edit.changes)

@@ -1,4 +1,4 @@
-"""Logging: configuration, redaction of secrets, recent lines in memory, audit log."""
+"""Logging: configuration, redaction of secrets, recent lines in memory."""
 
 import sys
 

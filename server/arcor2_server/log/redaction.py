@@ -63,6 +63,10 @@ class LogRedaction:
         """Hide the secrets that a function returns. The log exists before the secrets are read."""
         self._secrets = secrets
 
+    def in_text(self, text: str) -> str:
+        """Return a text without secrets."""
+        return clean(text, set(self._secrets()))
+
     def __call__(self, _logger: Any, _name: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
         """Return an event without secrets."""
         secrets = [secret for secret in self._secrets() if len(secret) >= MIN_LENGTH]

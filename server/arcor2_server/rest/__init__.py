@@ -5,12 +5,14 @@ from typing import Final
 
 from litestar.handlers import HTTPRouteHandler
 
+from arcor2_server.audit.trail import AuditTrail
 from arcor2_server.collaboration.tasks import Tasks
 
 # Imported for their operations.
 from arcor2_server.rest import (  # noqa: F401
     api_page,
     assets,
+    audit_trail,
     build,
     calibration_methods,
     calibration_records,
@@ -32,14 +34,15 @@ from arcor2_server.rest import (  # noqa: F401
 from arcor2_server.rest.operations import OPERATIONS, bound, route
 
 
-def routes(groups: Iterable[object], tasks: Tasks) -> list[HTTPRouteHandler]:
+def routes(groups: Iterable[object], tasks: Tasks, audit: AuditTrail) -> list[HTTPRouteHandler]:
     """Return the routes of all operations.
 
     Args:
         groups: the objects whose methods are the operations.
         tasks: the tasks, for the progress of uploads.
+        audit: the audit trail.
     """
-    return [route(declared, tasks) for declared in bound(OPERATIONS, groups)]
+    return [route(declared, tasks, audit) for declared in bound(OPERATIONS, groups)]
 
 
 __all__: Final = ["OPERATIONS", "routes"]

@@ -5,7 +5,7 @@ import inspect
 import math
 import secrets
 import typing
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import IO, Any, Final, Literal, TypeVar
 from urllib.parse import quote
@@ -19,12 +19,15 @@ from litestar.exceptions import HTTPException
 from litestar.handlers import HTTPRouteHandler
 from litestar.response import Stream
 
+from arcor2_hw.data.audit import AuditOutcome
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.texts import check_texts
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_server.access.route_options import AS_ROLE, OPEN, PERSON, ROLE
+from arcor2_server.audit.changes import Change, collecting
+from arcor2_server.audit.commands import MAX_TARGET
+from arcor2_server.audit.trail import AuditTrail
 from arcor2_server.collaboration.tasks import Tasks
-from arcor2_server.log import audit
 from arcor2_server.rest.field_names import camelized, camelized_names, snake, snaked
 from arcor2_server.rest.responses import SERVICE, InternalError, Unsupported, refusal
 from arcor2_server.rest.uploads import receiving
@@ -152,23 +155,41 @@ def bound(operations: Iterable[Operation], groups: Iterable[object]) -> Iterator
         yield replace(declared, handler=getattr(by_class[owner], method))
 
 
-def route(declared: Operation, tasks: Tasks) -> HTTPRouteHandler:
+def route(declared: Operation, tasks: Tasks, audit: AuditTrail) -> HTTPRouteHandler:
     """Return the route of an operation.
 
     Args:
         declared: the operation, with a bound handler.
         tasks: the tasks, for the progress of uploads.
+        audit: the audit trail.
     """
+
+    def note(
+        outcome: AuditOutcome, request: Request[Any, Any, Any], reason: str = "", changes: Sequence[Change] = ()
+    ) -> None:
+        """Note an operation, unless it only reads."""
+        if declared.method == "GET":
+            return
+        audit.note(
+            outcome,
+            f"{declared.method} {declared.path}",
+            target=", ".join(str(request.path_params[name]) for name in declared.path_names)[:MAX_TARGET],
+            user=request.state.get(PERSON, ""),
+            role=request.state.get(AS_ROLE),
+            address=request.client.host if request.client else "",
+            reason=reason,
+            changes=changes,
+        )
 
     async def handle(request: Request[Any, Any, Any]) -> Response[Any]:
         uploads: list[UploadFile] = []
         try:
-            with receiving(request, tasks, declared.title, declared.shown_from):
+            with receiving(request, tasks, declared.title, declared.shown_from), collecting() as changes:
                 done = await declared.handler(**await _arguments(declared, request, uploads))
-            _note("done", declared, request)
+            note(AuditOutcome.DONE, request, changes=changes)
             return await _response(declared, request, done)
         except Arcor2Error as error:
-            _note("refused", declared, request)
+            note(AuditOutcome.REFUSED, request, str(error))
             if error.detail:
                 log.info("request refused", path=declared.path, reason=str(error)[:1000], detail=error.detail[:1000])
             return refusal(declared.service, error)
@@ -180,6 +201,7 @@ def route(declared: Operation, tasks: Tasks) -> HTTPRouteHandler:
             error_inside = InternalError(
                 "An error inside the server: see its log, reference {reference}.", reference=reference
             )
+            note(AuditOutcome.REFUSED, request, str(error_inside))
             return refusal(declared.service, error_inside)
         finally:
             for upload in uploads:
@@ -196,20 +218,6 @@ def route(declared: Operation, tasks: Tasks) -> HTTPRouteHandler:
         request_max_body_size=declared.limit,
         include_in_schema=False,
     )(handle)
-
-
-def _note(outcome: str, declared: Operation, request: Request[Any, Any, Any]) -> None:
-    """Log an operation, unless it only reads."""
-    if declared.method == "GET":
-        return
-    audit.note(
-        outcome,
-        f"{declared.method} {declared.path}",
-        user=request.state.get(PERSON, ""),
-        role=request.state.get(AS_ROLE),
-        address=request.client.host if request.client else "",
-        target=", ".join(str(request.path_params[name]) for name in declared.path_names)[: audit.MAX_TARGET],
-    )
 
 
 async def _arguments(declared: Operation, request: Request[Any, Any, Any], uploads: list[UploadFile]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 import logging
 import secrets
+from collections.abc import Sequence
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -9,13 +10,16 @@ import msgspec
 import structlog
 from msgspec import UNSET
 
+from arcor2_hw.data.audit import AuditOutcome
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import Request, Rpc
 from arcor2_hw.data.texts import SHORTEST, check_texts
 from arcor2_hw.exceptions import Arcor2Error, TextTooLong
 from arcor2_hw.messages import Message
+from arcor2_server.audit import commands
+from arcor2_server.audit.changes import Change, collecting
+from arcor2_server.audit.trail import AuditTrail
 from arcor2_server.errors import RequestRefused
-from arcor2_server.log import audit
 from arcor2_server.websocket.answers import Head, answer, refusal, shortened
 from arcor2_server.websocket.client import Client
 from arcor2_server.websocket.hub import Hub
@@ -36,10 +40,11 @@ def refuse(client: Client, request: "Request | Head", message: str | Message, co
 class Dispatcher:
     """Calls the handlers of requests and answers them."""
 
-    def __init__(self, hub: Hub) -> None:
+    def __init__(self, hub: Hub, audit: AuditTrail) -> None:
         self._hub = hub
+        self._audit = audit
         self._holds: WeakKeyDictionary[Client, tuple[str, str, int, str]] = WeakKeyDictionary()
-        """The last logged hold-to-run request of each client."""
+        """The last noted hold-to-run request of each client."""
 
     def answer_from_cache(self, client: Client, request: Request, route: Route) -> bool:
         """Send the cached answer if there is one; return whether it was sent."""
@@ -64,13 +69,22 @@ class Dispatcher:
             log.exception("request failed", request=request.request, reference=reference, user=client.user)
             message = f"An error inside the server: see its log, reference {reference}."
             refuse(client, request, message, "internal")
+            if commands.is_command(route.rpc):
+                self._audit.note(
+                    AuditOutcome.REFUSED,
+                    request.request,
+                    user=client.name,
+                    role=client.role,
+                    address=client.address,
+                    reason=message,
+                )
 
     async def _run(self, client: Client, request: Request, route: Route) -> None:
         rpc = route.rpc
         if client.role < rpc.role:
             needed = f"{rpc.name} needs the role {Role(rpc.role).name.lower()} or a higher one."
             refuse(client, request, needed, "forbidden")
-            self._note("forbidden", client, rpc, UNSET)
+            self._note(AuditOutcome.FORBIDDEN, client, rpc, UNSET)
             return
         args = route.default
         if route.decode is not None:
@@ -93,31 +107,50 @@ class Dispatcher:
             refuse(client, request, f"{rpc.name} is not available in this version.", "not_available")
             return
         context = Context(client, request.dry_run and rpc.dry_run, rpc.name, request.codes, request.step)
-        try:
-            data = await route.handler(context, args)
-        except Arcor2Error as error:
-            if error.detail:
-                log.info("request refused", request=rpc.name, reason=shortened(str(error)), detail=error.detail)
-            if isinstance(error, RequestRefused) and error.data is not UNSET:  # a part of the request was done
-                self._send(client, refusal(request, error.message, error.code, error.data), context)
-            else:
-                refuse(client, request, error.message, error.code)
-            self._note("refused", client, rpc, args, dry_run=context.dry_run)
-            return
+        with collecting() as changes:
+            try:
+                data = await route.handler(context, args)
+            except Arcor2Error as error:
+                if error.detail:
+                    log.info("request refused", request=rpc.name, reason=shortened(str(error)), detail=error.detail)
+                if isinstance(error, RequestRefused) and error.data is not UNSET:  # a part of the request was done
+                    self._send(client, refusal(request, error.message, error.code, error.data), context)
+                else:
+                    refuse(client, request, error.message, error.code)
+                if not context.dry_run:
+                    self._note(AuditOutcome.REFUSED, client, rpc, args, str(error), changes)
+                return
         self._send(client, answer(request, UNSET if data is None else data), context)
-        self._note("done", client, rpc, args, dry_run=context.dry_run)
+        if not context.dry_run:
+            self._note(AuditOutcome.DONE, client, rpc, args, changes=changes)
 
-    def _note(self, outcome: str, client: Client, rpc: Rpc, args: Any, *, dry_run: bool = False) -> None:
-        """Log a command, or any request refused by role. A hold-to-run request is logged once, not on each renewal."""
-        if outcome != "forbidden" and (dry_run or not audit.is_command(rpc)):
+    def _note(
+        self,
+        outcome: AuditOutcome,
+        client: Client,
+        rpc: Rpc,
+        args: Any,
+        reason: str = "",
+        changes: Sequence[Change] = (),
+    ) -> None:
+        """Note a command, or any request refused by role. A hold-to-run request is noted once, not on each renewal."""
+        if outcome is not AuditOutcome.FORBIDDEN and not commands.is_command(rpc):
             return
         if (hold := getattr(args, "hold", None)) is not None:
-            logged = (rpc.name, args.robot_id, hold, outcome)
-            if self._holds.get(client) == logged:
+            noted = (rpc.name, args.robot_id, hold, outcome.value)
+            if self._holds.get(client) == noted:
                 return
-            self._holds[client] = logged
-        target = audit.target_of(args)
-        audit.note(outcome, rpc.name, user=client.name, role=client.role, address=client.address, target=target)
+            self._holds[client] = noted
+        self._audit.note(
+            outcome,
+            rpc.name,
+            target=commands.target_of(args),
+            user=client.name,
+            role=client.role,
+            address=client.address,
+            reason=reason,
+            changes=changes,
+        )
 
     def _send(self, client: Client, message: bytes, context: Context) -> None:
         """Send an answer with the events of its request."""

@@ -11,6 +11,7 @@ from arcor2_hw.data.rpc import Request
 from arcor2_hw.exceptions import StorageError
 from arcor2_hw.messages import Message
 from arcor2_server.access.admission import Access, AccessRefused, address_of
+from arcor2_server.audit.trail import AuditTrail
 from arcor2_server.background import BackgroundTasks
 from arcor2_server.collaboration.users import Users
 from arcor2_server.settings import ServerSettings
@@ -63,6 +64,7 @@ class Endpoint:
         hub: Hub,
         users: Users,
         damage: DataDamage,
+        audit: AuditTrail,
     ) -> None:
         self.service = service
         self._settings = settings
@@ -70,7 +72,7 @@ class Endpoint:
         self._hub = hub
         self._users = users
         self._damage = damage
-        self._dispatcher = Dispatcher(hub)
+        self._dispatcher = Dispatcher(hub, audit)
         self._requests = BackgroundTasks()
         self._watch: asyncio.Task[None] | None = None
 

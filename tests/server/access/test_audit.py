@@ -1,5 +1,6 @@
-"""Every command and every refusal by role is one line in the audit log."""
+"""Every command and every refusal by role is one entry of the audit trail, and one line in the log."""
 
+import csv
 import json
 from pathlib import Path
 from typing import Any
@@ -9,13 +10,14 @@ import httpx
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS
 from arcor2_server.access.tokens import TokenFile
-from arcor2_server.log import audit
+from arcor2_server.audit import commands
+from arcor2_server.audit.chain import AuditFile
 from tests.server.core.serving import running, talking
 
 SECRET = "swordfish-4711"
 
 
-async def test_commands_and_refusals_are_logged_once(tmp_path: Path) -> None:
+async def test_commands_and_refusals_are_noted_once(tmp_path: Path) -> None:
     tokens = TokenFile(tmp_path / "data")
     eva, ivo = (tokens.add(name, role)[1] for name, role in (("eva", Role.PROGRAMMER), ("ivo", Role.OPERATOR)))
     async with running(tmp_path / "data") as server:
@@ -39,6 +41,11 @@ async def test_commands_and_refusals_are_logged_once(tmp_path: Path) -> None:
             assert (await http.get("/scenes", headers=headers)).status_code == 200
             forbidden = await http.delete("/scenes/other", headers={"Authorization": f"Bearer {ivo}"})
             assert forbidden.status_code == 403
+            checked = (await http.get("/api/audit/check", headers=headers)).json()
+            assert checked["problem"] == ""
+            found = (await http.get("/api/audit", params={"text": "arms"}, headers=headers)).json()
+            exported = (await http.get("/api/audit/export", headers=headers)).text
+            assert (await http.get("/api/audit", headers={"Authorization": f"Bearer {ivo}"})).status_code == 403
     printed = (tmp_path / "data.log").read_text()
     lines: list[dict[str, Any]] = [json.loads(line) for line in printed.splitlines() if line.startswith("{")]
     fields = ("outcome", "request", "target", "user", "role", "address")
@@ -49,12 +56,24 @@ async def test_commands_and_refusals_are_logged_once(tmp_path: Path) -> None:
         ("refused", "AddObjectToScene", "arms", "ann", "programmer", "127.0.0.1"),
         ("refused", "DELETE /scenes/{scene_id}", "none", "eva", "programmer", "127.0.0.1"),
         ("forbidden", "DELETE /scenes/other", "", "ivo", "operator", "127.0.0.1"),
+        ("forbidden", "GET /api/audit", "", "ivo", "operator", "127.0.0.1"),
     ]
-    assert SECRET not in printed
-    assert eva not in printed
+    refused, added = found
+    assert (refused["outcome"], "another name" in refused["reason"], refused["changes"]) == ("refused", True, [])
+    (change,) = added["changes"]
+    assert (change["kind"], change["before"], change["after"]["name"]) == ("object", None, "arms")
+    rows = list(csv.DictReader(exported.splitlines()))
+    assert [row["request"] for row in rows[:3]] == ["SaveScene", "NewScene", "AddObjectToScene"]
+    file = AuditFile(tmp_path / "data" / "audit.sqlite")
+    assert [entry.request for entry in file.all()][-1] == "GET /api/audit"
+    assert file.check().problem == ""
+    stored = file.path.read_bytes() + (tmp_path / "data" / "audit.sqlite.head").read_bytes()
+    for text in (printed, exported, stored.decode(errors="replace")):
+        assert SECRET not in text
+        assert eva not in text
 
 
-def test_requests_excluded_from_the_audit_log_exist() -> None:
-    """Otherwise a renamed request would silently be excluded or logged."""
-    assert {*RPCS, "Version"} >= audit.READING | audit.CLIENT_STATE
-    assert {name for name, rpc in RPCS.items() if rpc.dry_run and not audit.is_command(rpc)} == set()
+def test_requests_excluded_from_the_audit_trail_exist() -> None:
+    """Otherwise a renamed request would silently be excluded or included."""
+    assert {*RPCS, "Version"} >= commands.READING | commands.CLIENT_STATE
+    assert {name for name, rpc in RPCS.items() if rpc.dry_run and not commands.is_command(rpc)} == set()

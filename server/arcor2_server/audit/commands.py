@@ -1,13 +1,8 @@
-"""The audit log: one line for each command that moves or changes something, and for each request refused by role."""
+"""Which requests the audit trail contains, and what they concern."""
 
 from typing import Any, Final
 
-import structlog
-
-from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import Rpc
-
-log = structlog.get_logger(__name__)
 
 READING: Final = frozenset(
     {
@@ -54,7 +49,7 @@ _TARGETS: Final = (
 )
 """Argument fields that identify the target of a request, most specific first. Their values are not secret."""
 MAX_TARGET: Final = 100
-"""Maximum length of a logged target."""
+"""Maximum length of the target of an entry."""
 
 
 def is_command(rpc: Rpc) -> bool:
@@ -73,10 +68,3 @@ def target_of(args: Any) -> str:
     if isinstance(args, set | frozenset):
         return ", ".join(sorted(map(str, args)))[:MAX_TARGET]
     return ""
-
-
-def note(outcome: str, request: str, *, user: str, role: Role | None, address: str, target: str) -> None:
-    """Log a request. The outcome is done, refused or forbidden."""
-    write = log.warning if outcome == "forbidden" else log.info
-    name = "none" if role is None else role.name.lower()
-    write("command", outcome=outcome, request=request, target=target, user=user, role=name, address=address)

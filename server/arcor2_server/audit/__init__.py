@@ -1,0 +1,1 @@
+"""The audit trail: who changed or commanded what, when and from where, in a file that reveals later edits."""
