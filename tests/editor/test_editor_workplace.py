@@ -272,6 +272,23 @@ async def test_online_without_a_device_and_retry(place: Place, browser: Browser)
         assert not await screen.faults()
         assert not await screen.barriers()
         await screen.picture("messages")
+        await page.keyboard.press("Escape")
+        await screen.press(texts.SETTINGS)
+        await page.get_by_role("menuitem", name="Who did what").click()
+        trail = page.get_by_role("dialog", name="Who did what")
+        await trail.get_by_placeholder("User, request, item or address").fill("retryobject")
+        await trail.get_by_role("listitem").filter(has_text="done").first.wait_for()
+        await trail.get_by_placeholder("User, request, item or address").fill("")
+        await trail.get_by_text("What changed").first.click()
+        await trail.get_by_role("button", name="Check for edits").click()
+        await trail.get_by_role("status").filter(has_text="Nothing was edited or removed").wait_for()
+        assert not await screen.faults()
+        assert not await screen.barriers()
+        await screen.picture("audit trail")
+        await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
+        await screen.settle()
+        assert not await screen.faults_with(FONTS)
+        await screen.picture("audit trail phone")
 
 
 async def _tool(screen: Screen, name: str) -> None:

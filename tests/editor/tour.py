@@ -84,6 +84,11 @@ class Tour:
         await page.get_by_role("menuitem", name=words("Messages"), exact=True).click()
         async for shown in self._dialog("messages"):
             yield shown
+        await self._button(texts.SETTINGS).click()
+        await page.get_by_role("menuitem", name=words("Who did what"), exact=True).click()
+        await page.get_by_role("dialog").get_by_role("listitem").first.wait_for()
+        async for shown in self._dialog("audit trail"):
+            yield shown
         for key, name in (("?", "about"), ("/", "search")):
             await page.keyboard.press(key)
             async for shown in self._dialog(name):

@@ -1,12 +1,15 @@
-/** Dialogs that open over every screen: search ("/"), about and keys ("?"), messages. */
+/** Dialogs that open over every screen: search ("/"), about and keys ("?"), messages, audit trail. */
 
 import { Suspense, useEffect } from "react";
 import { lazyComponent } from "../kit/lazy";
 import { isTyping, type Overlay, openOverlay, useOverlay } from "./overlay";
 
-const Palette = lazyComponent(() => import("./Palette"));
-const About = lazyComponent(() => import("./About"));
-const Messages = lazyComponent(() => import("../notices/Messages"));
+const OVERLAYS = {
+  search: lazyComponent(() => import("./Palette")),
+  about: lazyComponent(() => import("./About")),
+  messages: lazyComponent(() => import("../notices/Messages")),
+  audit: lazyComponent(() => import("../audit/AuditTrail")),
+};
 
 export function Overlays() {
   const open = useOverlay();
@@ -29,16 +32,10 @@ export function Overlays() {
     return () => window.removeEventListener("keydown", key);
   }, []);
   if (!open) return null;
-  const close = () => openOverlay("");
+  const Opened = OVERLAYS[open];
   return (
     <Suspense fallback={null}>
-      {open === "search" ? (
-        <Palette onClose={close} />
-      ) : open === "about" ? (
-        <About onClose={close} />
-      ) : (
-        <Messages onClose={close} />
-      )}
+      <Opened onClose={() => openOverlay("")} />
     </Suspense>
   );
 }

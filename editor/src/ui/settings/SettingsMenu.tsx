@@ -6,6 +6,7 @@ import { chooseLanguage } from "../../commands/language";
 import { LANGUAGES, type Language, useLanguage } from "../../i18n/catalogue";
 import { remember } from "../../session/localStorage";
 import { theSession } from "../../session/session";
+import { whyUnavailable } from "../../store/permissions";
 import { setUi, useEditor } from "../../store/store";
 import type { Ui } from "../../store/ui";
 import MoreMenu from "../kit/menu";
@@ -22,6 +23,8 @@ export default function SettingsMenu({ defaultOpen }: { defaultOpen: boolean }) 
   const { theme, leftHanded } = useEditor((state) => state.ui);
   const user = useEditor((state) => state.connection.user);
   const language = useLanguage();
+  // It needs the role that edits scenes.
+  const noAudit = useEditor((state) => whyUnavailable(state, "SaveScene"));
   const choices: Choice[] = [
     { id: "find", label: t`Find a command or an object ( / )`, icon: "search", act: () => openOverlay("search") },
     ...(Object.keys(THEMES) as Ui["theme"][]).map((each) => ({
@@ -48,6 +51,7 @@ export default function SettingsMenu({ defaultOpen }: { defaultOpen: boolean }) 
       },
     },
     { id: "messages", label: t`Messages`, icon: "list", act: () => openOverlay("messages") },
+    { id: "audit", label: t`Who did what`, icon: "people", not: noAudit, act: () => openOverlay("audit") },
     { id: "about", label: t`Invite others, about, keys ( ? )`, icon: "info", act: () => openOverlay("about") },
     { id: "leave", label: t`Leave (you are ${user})`, icon: "close", act: () => theSession().leave() },
   ];
