@@ -39,7 +39,7 @@ test("a part that leaves a sensor of a running belt glides to the next one and s
   expect(drawn()).toEqual([]);
 });
 
-test("a part that does not arrive disappears after a while; with the belt stopped it stays away from the start", () => {
+test("a part that does not arrive disappears after a while, with the belt stopped after a shorter one", () => {
   const { parts, drawn } = belt();
   parts.show(sensors(true, false), 0.2);
   parts.show(sensors(false, false), 0.2);
@@ -49,6 +49,24 @@ test("a part that does not arrive disappears after a while; with the belt stoppe
   expect(parts.step(2)).toBe(false);
   expect(drawn()).toEqual([]);
   parts.show(sensors(true, false), 0);
+  expect(parts.show(sensors(false, false), 0)).toBe(true);
+  expect(drawn()).toEqual([0.06]);
+  expect(parts.step(0.7)).toBe(false);
+  expect(drawn()).toEqual([]);
+});
+
+test("a part waits at the sensor that it has left until the belt reports its speed", () => {
+  const { parts, drawn } = belt();
+  parts.show(sensors(true, false), 0);
+  parts.show(sensors(false, false), 0);
+  expect(parts.step(0.2)).toBe(true);
+  expect(drawn()).toEqual([0.06]);
+  expect(parts.show(sensors(false, false), 0.2)).toBe(true);
+  parts.step(0.5);
+  expect(drawn()).toEqual([0.16]);
+  // A part that is taken from the last sensor disappears at once.
+  parts.show(sensors(false, true), 0);
+  expect(drawn()).toEqual([0.26]);
   parts.show(sensors(false, false), 0);
   expect(drawn()).toEqual([]);
 });

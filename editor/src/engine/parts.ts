@@ -1,6 +1,9 @@
 /**
  * Parts on an object, drawn where sensors detect them. On a belt that runs, a part that leaves a sensor glides at the
  * reported speed until the next sensor detects it. A separate chunk.
+ *
+ * Sensors report faster than the belt reports its speed (every 0.25 s), so a part can leave a sensor of a belt that
+ * seems to stand still. It waits there until the speed arrives.
  */
 
 import { BoxGeometry, type Material, Mesh, type Object3D } from "three";
@@ -8,11 +11,15 @@ import type { DetectedPart } from "./items";
 
 /** Time that a part waits at a sensor which does not detect it, s; then somebody has taken it. */
 const LATE = 2;
+/** Time that a part which has left a sensor of a stopped belt waits for the speed, s; then somebody has taken it. */
+const STARTS_WITHIN = 0.6;
 
 interface Glider {
   mesh: Mesh;
   to: DetectedPart;
-  /** Time since it has arrived, s. */
+  /** Whether the object has moved since the part left its sensor. */
+  moved: boolean;
+  /** Time since it has arrived, or since it left the sensor of an object that has not moved yet, s. */
   waits: number;
 }
 
@@ -21,6 +28,8 @@ export class Parts {
   private readonly meshes = new Map<DetectedPart["sensor"], Mesh>();
   private gliders: Glider[] = [];
   private velocity = 0;
+  /** Sign of the last speed; along the x axis until the object moves. */
+  private direction = 1;
 
   constructor(
     private readonly root: Object3D,
@@ -32,6 +41,12 @@ export class Parts {
     const before = new Set(this.places.filter(({ seen }) => seen).map(({ sensor }) => sensor));
     this.places = places;
     this.velocity = velocity;
+    this.direction = Math.sign(velocity) || this.direction;
+    if (velocity !== 0)
+      for (const glider of this.gliders.filter(({ moved }) => !moved)) {
+        glider.moved = true;
+        glider.waits = 0;
+      }
     for (const place of places) {
       const { sensor, seen } = place;
       if (seen) this.detected(place);
@@ -52,8 +67,8 @@ export class Parts {
       const left = to.position.x - mesh.position.x;
       const way = Math.min(Math.abs(this.velocity) * seconds, Math.abs(left));
       if (way > 0) mesh.position.x += Math.sign(left) * way;
-      else if (this.velocity !== 0) glider.waits += seconds;
-      if (seconds < Infinity && glider.waits < LATE) continue;
+      else if (this.velocity !== 0 || !glider.moved) glider.waits += seconds;
+      if (seconds < Infinity && glider.waits < (glider.moved ? LATE : STARTS_WITHIN)) continue;
       this.gliders.splice(this.gliders.indexOf(glider), 1);
       this.drop(mesh);
     }
@@ -65,7 +80,7 @@ export class Parts {
   }
 
   private get glides(): boolean {
-    return this.gliders.length > 0 && this.velocity !== 0;
+    return this.gliders.some(({ moved }) => !moved || this.velocity !== 0);
   }
 
   private detected(place: DetectedPart): void {
@@ -74,11 +89,11 @@ export class Parts {
     if (!this.meshes.has(place.sensor)) this.meshes.set(place.sensor, this.mesh(place));
   }
 
-  /** A part has left a sensor: it is under way to the next one, if the object moves. */
+  /** A part has left a sensor: it is on its way to the next one, if there is one and no part is there. */
   private left(place: DetectedPart): void {
-    const ahead = ({ position }: DetectedPart) => (position.x - place.position.x) * Math.sign(this.velocity);
+    const ahead = ({ position }: DetectedPart) => (position.x - place.position.x) * this.direction;
     const next = this.places.filter((each) => ahead(each) > 0).sort((a, b) => ahead(a) - ahead(b))[0];
-    if (next && !next.seen) this.gliders.push({ mesh: this.mesh(place), to: next, waits: 0 });
+    if (next && !next.seen) this.gliders.push({ mesh: this.mesh(place), to: next, moved: this.velocity !== 0, waits: 0 });
   }
 
   private mesh({ position, size }: DetectedPart): Mesh {

@@ -7,6 +7,7 @@
 
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
+import { splitAddress } from "../../program/messages";
 import type { TaskStateData } from "../../protocol/types";
 import { without } from "../../store/records";
 import { isLive } from "../../store/selectors";
@@ -16,8 +17,6 @@ import { Button } from "../kit/kit";
 import { openOverlay } from "../search/overlay";
 import "./notices.css";
 
-/** The address of a device, which the server adds at the end of a message. */
-const ADDRESS = /(?<=\S) \[[^[\]]+\]$/;
 /** How long a message that is not an error stays, s. */
 const STAY = 6;
 
@@ -49,7 +48,7 @@ export function Notices({ docked = false }: { docked?: boolean }) {
             title={t`Show all messages`}
             onClick={() => openOverlay("messages")}
           >
-            <span>{newest.text.replace(ADDRESS, "")}</span>
+            <span>{splitAddress(newest.text).text}</span>
             {more > 0 && <span className="tag">+{more}</span>}
           </button>
           <Button look="plain" icon="close" aria-label={t`Dismiss`} onPress={() => dismiss(newest.id)} />
