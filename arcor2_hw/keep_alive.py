@@ -15,6 +15,7 @@ from typing import Any, Final, TypeVar
 from arcor2_hw.exceptions import DeviceTimeout
 from arcor2_hw.keep_alive_process import FROZEN_AFTER as FROZEN_AFTER
 from arcor2_hw.keep_alive_process import PULSE
+from arcor2_hw.messages import Message
 
 PULSE_PERIOD: Final = 0.05
 """Time between pulses for drivers without a cycle of their own, s."""
@@ -24,7 +25,7 @@ STARTS_WITHIN: Final = 5.0
 """Time limit of the start of the child process, s; it takes 0.03 s on an idle computer."""
 LONGEST_STEP: Final = 0.05
 """Maximum time that `RunningTime` counts between two readings, s."""
-TOO_SLOW: Final = "this computer was too slow for the {}'s watchdog"
+TOO_SLOW: Final = Message.of("this computer was too slow for the robot's watchdog")
 """Message for a watchdog that tripped because this computer was busy."""
 _SCRIPT: Final = Path(__file__).with_name("keep_alive_process.py")
 T = TypeVar("T")

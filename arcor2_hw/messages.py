@@ -88,6 +88,25 @@ class Message(Struct, frozen=True, omit_defaults=True):
         return {"key": self.key, "values": self.values} if self.values else {}
 
 
+class Phrase(str):
+    """A text that is translated as a part of messages that have it as a value, such as the owner of control.
+
+    Attributes:
+        message: The text with its key and values.
+    """
+
+    __slots__ = ("message",)
+    message: Message
+
+    @classmethod
+    def of(cls, template: str, /, **values: object) -> "Phrase":
+        """Return the phrase of a template. Arguments as of `Message.of`."""
+        message = Message.of(template, **values)
+        found = cls(message.text)
+        found.message = message
+        return found
+
+
 def device_at(device: str, address: "str | Message") -> Message:
     """Return the name of a device with its address, as a value of messages."""
     return Message.of("{device} at {address}", device=device, address=address)

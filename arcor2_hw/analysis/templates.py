@@ -1,6 +1,7 @@
 """Message templates in source files: the keys of translations."""
 
 import ast
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
@@ -18,8 +19,17 @@ _ROOT: Final = "Arcor2Error"
 _NOT_IMPLEMENTED: Final = "Arcor2NotImplemented"
 """Error whose message is the name of a method."""
 _ALARM: Final = ("text", "remedy", "severity", "health")
-_MARKED: Final = {"Message.of": ("template",), "translatable": ("texts",), "AlarmText": _ALARM, "Fault": _ALARM}
+_MARKED: Final = {
+    "Message.of": ("template",),
+    "Phrase.of": ("template",),
+    "translatable": ("texts",),
+    "AlarmText": _ALARM,
+    "Fault": _ALARM,
+}
 """Parameters of other calls that take texts for users. `Fault` is a tuple that a driver declares for its alarms."""
+_DATA: Final = frozenset({"NotificationData", "WebApiError"})
+"""Data that always contain a text for users."""
+_WORDS: Final = re.compile(r"[A-Za-z]+ [a-z]+")
 _TEXTS: Final = frozenset({"message", "template", "texts", "text", "remedy"})
 
 
@@ -71,6 +81,71 @@ def templates(files: Iterable[Path]) -> list[Template]:
     return [found for path, scan in scans.items() for found in _templates(scan, errors, str(path))]
 
 
+def hard_coded(files: Iterable[Path]) -> list[str]:
+    """Return the places where a text for users cannot be translated, with the call.
+
+    The message of an error is formatted before it becomes a template, a value of a template is an English phrase, or
+    an event or answer gets a text without its key.
+
+    Raises:
+        SyntaxError: A file is not valid Python.
+    """
+    scans = {path: _Scan.of(parse(path.read_bytes(), str(path))) for path in files}
+    errors = dict(_errors_of_library())
+    errors |= _errors((scan for path, scan in scans.items() if LIBRARY not in path.parents), errors)
+    return [
+        f"{path}:{call.lineno} {ast.unparse(call)[:120]}"
+        for path, scan in scans.items()
+        for call, function in scan.calls
+        if _is_hard_coded(scan, call, function, errors)
+    ]
+
+
+def _is_hard_coded(scan: "_Scan", call: ast.Call, function: ast.AST | None, errors: _Errors) -> bool:
+    called = ast.unparse(call.func)
+    short = called.rpartition(".")[2]
+    given = {keyword.arg: keyword.value for keyword in call.keywords}
+    if short in _DATA:
+        return None not in given and "key" not in given
+    parameters = _MARKED.get(called) or errors.get(short)
+    if not parameters or called == _NOT_IMPLEMENTED:
+        return False
+    texts = [call.args[place] for place, name in enumerate(parameters) if name in _TEXTS and place < len(call.args)]
+    texts += [value for name, value in given.items() if name in _TEXTS.intersection(parameters)]
+    values = [value for name, value in given.items() if name is not None and name not in parameters]
+    return any(
+        _is_formatted(each) and not list(scan.literals(each, function))
+        for text in texts
+        for each in scan.assigned_to(text, function)
+    ) or any(_is_phrase(each) for value in values for each in scan.assigned_to(value, function))
+
+
+def _is_formatted(node: ast.expr) -> bool:
+    """Whether an expression is a text that contains values."""
+    match node:
+        case ast.JoinedStr(values=parts):
+            return any(isinstance(part, ast.FormattedValue) for part in parts)
+        case ast.IfExp(body=body, orelse=orelse):
+            return _is_formatted(body) or _is_formatted(orelse)
+        case ast.Call(func=ast.Name(id="str")):
+            return True
+    return False
+
+
+def _is_phrase(node: ast.expr) -> bool:
+    """Whether an expression is or contains an English phrase: at least two words in a row, or `str(error)`."""
+    match node:
+        case ast.Constant(value=str(text)):
+            return _WORDS.search(text) is not None
+        case ast.JoinedStr(values=parts):
+            return any(_is_phrase(part) for part in parts if isinstance(part, ast.Constant))
+        case ast.IfExp(body=body, orelse=orelse):
+            return _is_phrase(body) or _is_phrase(orelse)
+        case ast.Call(func=ast.Name(id="str"), args=[ast.Name(id="error" | "e")]):
+            return True
+    return False
+
+
 class _Scan(NamedTuple):
     """What is needed of a syntax tree.
 
@@ -109,6 +184,10 @@ class _Scan(NamedTuple):
                         self.assigned[function, target.id].append(value)
         for child in ast.iter_child_nodes(node):
             self._visit(child, function)
+
+    def assigned_to(self, node: ast.expr, function: ast.AST | None) -> list[ast.expr]:
+        """Return the expressions that the function assigns to a variable; other expressions unchanged."""
+        return (self.assigned.get((function, node.id)) if isinstance(node, ast.Name) else None) or [node]
 
     def literals(
         self, node: ast.expr | None, function: ast.AST | None, passed: frozenset[str] = frozenset()

@@ -25,6 +25,7 @@ from arcor2_hw.data.camera import CameraParameters, MarkerCorners
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.messages import Message
 
 _FUNCTIONS = "arcor2_hw.compute.calibration_functions"
 
@@ -45,7 +46,7 @@ class FindCameraPose(_MarkerView[CameraPose], frozen=True):
 
     result_type: ClassVar = CameraPose
     function: ClassVar = f"{_FUNCTIONS}:camera_pose"
-    label: ClassVar = "the pose of a camera"
+    label: ClassVar = Message.of("the pose of a camera")
 
 
 class CheckLens(_MarkerView[LensCheck], frozen=True):
@@ -53,7 +54,7 @@ class CheckLens(_MarkerView[LensCheck], frozen=True):
 
     result_type: ClassVar = LensCheck
     function: ClassVar = f"{_FUNCTIONS}:lens_check"
-    label: ClassVar = "the check of a lens"
+    label: ClassVar = Message.of("the check of a lens")
 
 
 class DrawCameraPose(Task[bytes], frozen=True):
@@ -62,7 +63,7 @@ class DrawCameraPose(Task[bytes], frozen=True):
     result_type: ClassVar = bytes
     function: ClassVar = f"{_FUNCTIONS}:drawn_camera_pose"
     worker: ClassVar = WorkerKind.CALIBRATION
-    label: ClassVar = "the image of a camera's pose"
+    label: ClassVar = Message.of("the image of a camera's pose")
 
     picture: bytes
     parameters: CameraParameters
@@ -76,7 +77,7 @@ class FindMarkers(Task[list[MarkerCorners]], frozen=True):
     result_type: ClassVar = list[MarkerCorners]
     function: ClassVar = f"{_FUNCTIONS}:marker_corners"
     worker: ClassVar = WorkerKind.CALIBRATION
-    label: ClassVar = "the corners of markers"
+    label: ClassVar = Message.of("the corners of markers")
 
     picture: bytes
     parameters: CameraParameters
@@ -124,7 +125,7 @@ class FindRobotPose(Task[RobotPose], frozen=True):
     function: ClassVar = "arcor2_hw.compute.calibration_functions:robot_pose"
     worker: ClassVar = WorkerKind.CALIBRATION
     timeout: ClassVar = 180.0
-    label: ClassVar = "the pose of a robot"
+    label: ClassVar = Message.of("the pose of a robot")
 
     robot: RobotSource
     joints: list[Joint]
@@ -143,7 +144,7 @@ class FindHandEye(Task[HandEye], frozen=True):
     function: ClassVar = f"{_FUNCTIONS}:hand_eye"
     worker: ClassVar = WorkerKind.CALIBRATION
     timeout: ClassVar = 120.0
-    label: ClassVar = "a hand-eye calibration"
+    label: ClassVar = Message.of("a hand-eye calibration")
 
     samples: list[HandEyeSample]
     parameters: CameraParameters
@@ -159,7 +160,7 @@ class FindIntrinsics(Task[Intrinsics], frozen=True):
     function: ClassVar = f"{_FUNCTIONS}:intrinsics"
     worker: ClassVar = WorkerKind.CALIBRATION
     timeout: ClassVar = 120.0
-    label: ClassVar = "the intrinsics of a camera"
+    label: ClassVar = Message.of("the intrinsics of a camera")
 
     pictures: list[bytes]
     board: CharucoBoard
@@ -173,7 +174,7 @@ class FrameByAxes(Task[TouchedFrame], frozen=True):
     result_type: ClassVar = TouchedFrame
     function: ClassVar = f"{_FUNCTIONS}:frame_by_axes"
     worker: ClassVar = WorkerKind.CALIBRATION
-    label: ClassVar = "a frame by touch"
+    label: ClassVar = Message.of("a frame by touch")
 
     origin: Position
     on_x: Position
@@ -186,7 +187,7 @@ class FrameByPoints(Task[TouchedFrame], frozen=True):
     result_type: ClassVar = TouchedFrame
     function: ClassVar = f"{_FUNCTIONS}:frame_by_points"
     worker: ClassVar = WorkerKind.CALIBRATION
-    label: ClassVar = "a frame by touch"
+    label: ClassVar = Message.of("a frame by touch")
 
     known: list[Position]
     touched: list[Position]
@@ -198,7 +199,7 @@ class TipByTouches(Task[TouchedTip], frozen=True):
     result_type: ClassVar = TouchedTip
     function: ClassVar = f"{_FUNCTIONS}:tip_by_touches"
     worker: ClassVar = WorkerKind.CALIBRATION
-    label: ClassVar = "the tip of a tool"
+    label: ClassVar = Message.of("the tip of a tool")
 
     flange: list[Pose]
 
@@ -209,7 +210,7 @@ class OrientationByAlignment(Task[TouchedOrientation], frozen=True):
     result_type: ClassVar = TouchedOrientation
     function: ClassVar = f"{_FUNCTIONS}:orientation_by_alignment"
     worker: ClassVar = WorkerKind.CALIBRATION
-    label: ClassVar = "the orientation of a tool"
+    label: ClassVar = Message.of("the orientation of a tool")
 
     flange: list[Orientation]
     reference: Orientation = field(default_factory=Orientation)
@@ -221,7 +222,7 @@ class OrientationByPoints(Task[TouchedOrientation], frozen=True):
     result_type: ClassVar = TouchedOrientation
     function: ClassVar = f"{_FUNCTIONS}:orientation_by_points"
     worker: ClassVar = WorkerKind.CALIBRATION
-    label: ClassVar = "the orientation of a tool"
+    label: ClassVar = Message.of("the orientation of a tool")
 
     flange: Orientation
     tip: Position

@@ -10,6 +10,7 @@ from arcor2_hw.data.base import Data
 from arcor2_hw.data.dry_run import ActionDuration, Assumption, Prediction
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint, RobotMaxima
+from arcor2_hw.messages import Message
 
 
 class Move(Data, frozen=True):
@@ -89,7 +90,7 @@ class DryRunTask(Task[DryRunAnswer], frozen=True):
     function: ClassVar = "arcor2_hw.compute.dry_run_functions:dry_run"
     worker: ClassVar = WorkerKind.DRY_RUN
     timeout: ClassVar = 600.0
-    label: ClassVar = "the dry run"
+    label: ClassVar = Message.of("the dry run")
     cancellable: ClassVar = True
 
     graph: Graph

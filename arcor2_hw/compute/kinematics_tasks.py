@@ -54,7 +54,7 @@ class DescribeRobot(Task[ModelDescription], frozen=True):
     result_type: ClassVar = ModelDescription
     function: ClassVar = f"{_FUNCTIONS}:description"
     worker: ClassVar = WorkerKind.KINEMATICS
-    label: ClassVar = "the model of a robot"
+    label: ClassVar = Message.of("the model of a robot")
 
     model: RobotSource
 
@@ -65,7 +65,7 @@ class SolveForward(Task[Pose], frozen=True):
     result_type: ClassVar = Pose
     function: ClassVar = f"{_FUNCTIONS}:forward"
     worker: ClassVar = WorkerKind.KINEMATICS
-    label: ClassVar = "forward kinematics"
+    label: ClassVar = Message.of("forward kinematics")
 
     model: RobotSource
     end_effector: str
@@ -78,7 +78,7 @@ class SolveInverse(Task[list[Joint]], frozen=True):
     result_type: ClassVar = list[Joint]
     function: ClassVar = f"{_FUNCTIONS}:inverse"
     worker: ClassVar = WorkerKind.KINEMATICS
-    label: ClassVar = "inverse kinematics"
+    label: ClassVar = Message.of("inverse kinematics")
 
     robot: str
     end_effector: str
@@ -102,7 +102,7 @@ class JudgePoses(Task[list[Judged]], frozen=True):
     function: ClassVar = f"{_FUNCTIONS}:judge_poses"
     worker: ClassVar = WorkerKind.KINEMATICS
     timeout: ClassVar = 20.0
-    label: ClassVar = "reachability"
+    label: ClassVar = Message.of("reachability")
 
     robot: str
     end_effector: str
@@ -116,7 +116,7 @@ class JudgeJoints(Task[list[Judged]], frozen=True):
     function: ClassVar = f"{_FUNCTIONS}:judge_joints"
     worker: ClassVar = WorkerKind.KINEMATICS
     timeout: ClassVar = 20.0
-    label: ClassVar = "reachability of joints"
+    label: ClassVar = Message.of("reachability of joints")
 
     robot: str
     joints: list[list[Joint]]
@@ -149,7 +149,7 @@ class CheckLines(Task[list[LineHit | None]], frozen=True):
     result_type: ClassVar = list[LineHit | None]
     function: ClassVar = f"{_FUNCTIONS}:check_lines"
     worker: ClassVar = WorkerKind.KINEMATICS
-    label: ClassVar = "the safety of a line"
+    label: ClassVar = Message.of("the safety of a line")
 
     lines: list[Line]
     inflation: float = 0.0
@@ -162,7 +162,7 @@ class PlaceInLink(Task[Pose], frozen=True):
     result_type: ClassVar = Pose
     function: ClassVar = f"{_FUNCTIONS}:place_in_link"
     worker: ClassVar = WorkerKind.KINEMATICS
-    label: ClassVar = "the pose of a gripped part"
+    label: ClassVar = Message.of("the pose of a gripped part")
 
     model: RobotSource
     joints: list[Joint]
@@ -184,7 +184,7 @@ class ReadMesh(Task[MeshFacts], frozen=True):
     function: ClassVar = f"{_FUNCTIONS}:mesh_facts"
     worker: ClassVar = WorkerKind.KINEMATICS
     timeout: ClassVar = 30.0
-    label: ClassVar = "a mesh"
+    label: ClassVar = Message.of("a mesh")
 
     file: StoredFile
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)

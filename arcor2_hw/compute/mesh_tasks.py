@@ -7,6 +7,7 @@ from msgspec import field
 from arcor2_hw.collision.description import StoredFile
 from arcor2_hw.compute.task import Task, WorkerKind
 from arcor2_hw.data.base import Data
+from arcor2_hw.messages import Message
 
 CONVERSION: Final = 1
 """Version of the conversion; cached results of another version are converted again."""
@@ -35,7 +36,7 @@ class PrepareAsset(Task[PreparedAsset], frozen=True):
     function: ClassVar = "arcor2_hw.compute.mesh_functions:prepared"
     worker: ClassVar = WorkerKind.MESHES
     timeout: ClassVar = 120.0
-    label: ClassVar = "a mesh for the editor"
+    label: ClassVar = Message.of("a mesh for the editor")
 
     file: StoredFile
 

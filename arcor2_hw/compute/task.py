@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Final, Generic, TypeVar
 from msgspec import Struct
 
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.messages import Message
 
 R = TypeVar("R")
 
@@ -38,7 +39,7 @@ class Task(Struct, Generic[R], frozen=True, tag=True):
     function: ClassVar[str]
     worker: ClassVar[WorkerKind]
     timeout: ClassVar[float] = 10.0
-    label: ClassVar[str]
+    label: ClassVar[Message]
     cancellable: ClassVar[bool] = False
 
 

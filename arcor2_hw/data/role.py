@@ -1,6 +1,9 @@
 """Roles of users. Each role may do what the previous ones may."""
 
 import enum
+from typing import Final
+
+from arcor2_hw.messages import Message, translatable
 
 
 class Role(enum.IntEnum):
@@ -16,3 +19,19 @@ class Role(enum.IntEnum):
     """Sets up workplaces: objects, poses, calibration."""
     PROGRAMMER = 5
     """Adds object types."""
+
+    @property
+    def shown(self) -> Message:
+        """The name in messages."""
+        return Message.of(_NAMES[self])
+
+
+_NAMES: Final = translatable(
+    {
+        Role.OPERATOR: "operator",
+        Role.STANDARD_USER: "standard user",
+        Role.ADVANCED_USER: "advanced user",
+        Role.TECHNICIAN: "technician",
+        Role.PROGRAMMER: "programmer",
+    }
+)

@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Final, TypeAlias
 from arcor2_hw.data.device import Identity, Observation, Reading
 from arcor2_hw.data.modbus_point import Point, Table, Value
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused
+from arcor2_hw.messages import Phrase
 from arcor2_hw.objects.edges import Debounced
 from arcor2_hw.objects.modbus_device import ModbusDevice
 from arcor2_hw.objects.modbus_link import ModbusLink
@@ -136,7 +137,7 @@ class MappedDevice(ModbusDevice[dict[str, Any]]):
         except DeviceTimeout:
             self._write(point, [self._beats])
         except DeviceFault as error:
-            self.drop_control(str(error))
+            self.drop_control(Phrase.of("{reason}", reason=error))
 
     # -------------------------------------------------------------------------------- hooks of PolledControl
     def is_busy(self, state: dict[str, Any]) -> bool:

@@ -9,7 +9,7 @@ from typing import Final, Protocol, TypeVar
 
 from arcor2_hw.data.device import Health
 from arcor2_hw.exceptions import DeviceError, DeviceFault, NotInControl, Refused
-from arcor2_hw.messages import Message
+from arcor2_hw.messages import Message, Phrase
 from arcor2_hw.objects.connected import Connected
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.observing import GoOn
@@ -18,7 +18,7 @@ from arcor2_hw.objects.state_observer import Snapshot, StateObserver
 T = TypeVar("T")
 
 US: Final = "us"
-NOBODY: Final = "nobody has control"
+NOBODY: Final = Phrase.of("nobody has control")
 STANDS_WITHIN: Final = 1.0
 """Time limit from a stop to standstill, s."""
 
@@ -121,7 +121,7 @@ class PolledControl(Connected, typing.Generic[T]):
     def why_control_ended(self, state: T) -> str:
         """Return why our control has ended according to a state; empty if it has not."""
         owner = self.owner_of(state)
-        return "" if owner == US else f"{owner} has control" if owner else NOBODY
+        return "" if owner == US else Phrase.of("{owner} has control", owner=owner) if owner else NOBODY
 
     def fault_of(self, state: T) -> int:
         """Return the number of the fault in a state; 0 for none."""
@@ -153,7 +153,7 @@ class PolledControl(Connected, typing.Generic[T]):
         if not self.in_control:
             owner = self.control_owner()
             other = bool(owner) and self.why_not == NOBODY
-            why = Message.of("{owner} has control", owner=owner) if other else Message.of(self.why_not)
+            why = Phrase.of("{owner} has control", owner=owner) if other else self.why_not
             raise NotInControl("{device}: {what} is refused: {reason}", device=self.who, what=what, reason=why)
 
     def send(self, what: str, write: Callable[[], None], go_on: GoOn | None = None) -> None:
@@ -233,7 +233,7 @@ class PolledControl(Connected, typing.Generic[T]):
             try:
                 self.observing.check_unbroken(losses)
             except DeviceError:
-                self.drop_control("the connection was lost")
+                self.drop_control(Phrase.of("the connection was lost"))
                 raise
             self.observing.settled()
 
@@ -263,7 +263,7 @@ class PolledControl(Connected, typing.Generic[T]):
 
     def on_lost(self, error: DeviceError) -> None:
         """End control, because the connection is lost."""
-        self.drop_control("control ended when the connection was lost")
+        self.drop_control(Phrase.of("control ended when the connection was lost"))
 
     def check_control(self, snapshot: Snapshot[T]) -> None:
         """End control if a state requested after it was taken shows that the device no longer obeys us."""

@@ -89,7 +89,7 @@ class Watch:
         if moment - self._queried_at.get(device.id, -INQUIRY_PERIOD) >= INQUIRY_PERIOD:
             self._queried_at[device.id] = moment
             alarms = _value_or(instance.alarms, alarms)
-            owner = _value_or(instance.control_owner, owner)
+            owner = _plain(_value_or(instance.control_owner, owner))
         health = _value_or(lambda: instance.health, Health.FAILURE)
         self._compare(device, instance, (health, alarms, owner))
 
@@ -117,6 +117,10 @@ class Watch:
             self._post(found)
         if connection is not was and (connection is Connection.LOST or (connection is Connection.FAILED and device.up)):
             self._lost(device, why)
+
+
+def _plain(owner: str | None) -> str | None:
+    return None if owner is None else str(owner)  # it may be a Phrase, which cannot be encoded
 
 
 def _held_parts(instance: Generic) -> list[HeldPart]:

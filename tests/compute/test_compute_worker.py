@@ -22,6 +22,7 @@ from arcor2_hw.compute.worker import function_of
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
+from arcor2_hw.messages import Message
 from arcor2_server.compute import process
 from arcor2_server.compute import workers as compute_module
 from arcor2_server.compute.process import ComputeProcess, error_of
@@ -264,7 +265,7 @@ def test_every_task_has_a_worker_and_a_description() -> None:
     for kind in kinds:
         assert issubclass(kind, task_module.Task)
         assert callable(function_of(kind)), kind
-        assert isinstance(kind.label, str)
+        assert isinstance(kind.label, Message)
         assert kind.timeout > 0
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from arcor2_hw.analysis.extraction import texts, update
-from arcor2_hw.analysis.templates import LIBRARY, sources, templates
+from arcor2_hw.analysis.extraction import ENGLISH, texts, update
+from arcor2_hw.analysis.templates import LIBRARY, hard_coded, sources, templates
 from arcor2_hw.analysis.translations import FOLDER, faults, file_of, is_language, read
 from arcor2_hw.testing import declarations
 
@@ -56,6 +56,33 @@ def test_every_template_gets_the_values_of_its_fields() -> None:
     found = templates(files)
     assert len(found) > 1000
     assert [each for each in found if not each.fields <= each.values] == []
+
+
+def test_all_texts_for_users_are_templates() -> None:
+    files = [path for folder in OURS for path in sources(folder) if path.relative_to(folder).parts[0] not in ENGLISH]
+    assert hard_coded(files) == []
+
+
+@pytest.mark.parametrize(
+    ("call", "found"),
+    [
+        ('Refused(f"Remove the {x}.")', True),
+        ("Refused(str(error))", True),
+        ('text = f"Remove the {x}."; Refused(text)', True),
+        ('Refused("Remove the {x}.", x=x)', False),
+        ('Refused(f"Remove the {PART}.")', False),
+        ('Refused("{device}: {reason}", device=x, reason="the door is open" if x else x)', True),
+        ('Refused("{device}: {reason}", device=x, reason=f"the door {x} is open")', True),
+        ('Refused("{device}: {reason}", device=x, reason=str(error))', True),
+        ('Refused("{device}: {reason}", device=x, reason=Phrase.of("the door is open"))', False),
+        ('Refused("{device}: {reason}", f"detail of {x}", device=x, reason=error)', False),
+        ('NotificationData("Remove the part.", level)', True),
+        ("NotificationData(text.text, level, **text.translation())", False),
+    ],
+)
+def test_texts_that_cannot_be_translated_are_found(tmp_path: Path, call: str, found: bool) -> None:
+    (tmp_path / "driver.py").write_text(f'PART = "part"\ndef work(x):\n    {call}\n')
+    assert bool(hard_coded([tmp_path / "driver.py"])) is found
 
 
 @pytest.mark.parametrize(

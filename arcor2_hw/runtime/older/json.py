@@ -39,4 +39,4 @@ def dumps(value: Any) -> str:
     try:
         return encode(value)
     except InvalidData as error:
-        raise JsonException(str(error)) from error
+        raise JsonException(error.message, error.detail) from error

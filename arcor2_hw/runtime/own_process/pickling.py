@@ -114,8 +114,8 @@ class Codec:
             data = self.encode((_with_note, (error, note)))
             self.decode(data)
         except InvalidData:
-            text = f"{type(error).__name__}: {error}"
-            return self.encode((_with_note, (DeviceError(text, note), note)))
+            named = DeviceError("{type}: {reason}", note, type=type(error).__name__, reason=error)
+            return self.encode((_with_note, (named, note)))
         return data
 
     def decode_error(self, data: bytes) -> BaseException:

@@ -10,7 +10,7 @@ from typing import Final
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import ProgramState, Safety
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, NotInControl, Refused, SafetyStop
-from arcor2_hw.messages import Message
+from arcor2_hw.messages import Message, Phrase
 from arcor2_hw.objects.arm import StopCounter, label
 
 from .arms import Arms, other_arm
@@ -146,7 +146,7 @@ class Control:
             return "us"
         sample, panel = self._observer.sample(), self._observer.panel()
         if panel.operation_mode != AUTOMATIC:
-            return "pendant"
+            return Phrase.of("pendant")
         if panel.holder is not None and not self._mastership:
             return str(panel.holder)
         return panel.program_names if sample.running and not panel.ours else None

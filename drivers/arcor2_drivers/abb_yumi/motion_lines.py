@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from typing import Final, NamedTuple
 
 from arcor2_hw.exceptions import DeviceFault
-from arcor2_hw.keep_alive import TOO_SLOW
 from arcor2_hw.messages import translatable
 
 VERSION: Final = 1
@@ -73,7 +72,7 @@ class Status(enum.IntEnum):
 MEANING: Final = translatable(
     {
         Status.STOPPED: "stopped",
-        Status.WATCHDOG: f"stopped by its watchdog: {TOO_SLOW.format('robot')}",
+        Status.WATCHDOG: "stopped by its watchdog: this computer was too slow",
         Status.BAD_CHECK: "the checksum of the line was wrong",
         Status.BAD_CODE: "the RAPID modules do not know the code",
         Status.BAD_COUNT: "the number of arguments was wrong",

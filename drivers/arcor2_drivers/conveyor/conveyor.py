@@ -5,6 +5,7 @@ from typing import ClassVar, Final
 from arcor2_hw.actions import action
 from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction, Reading
 from arcor2_hw.exceptions import ConnectionLost, NotFound, NotInControl, OutOfRange, Refused
+from arcor2_hw.messages import Phrase
 from arcor2_hw.objects import Axis, Machine, MachineCommand, MachineState
 from arcor2_hw.objects.observing import GoOn
 from arcor2_hw.objects.polled_control import NOBODY, US, PolledControl
@@ -138,10 +139,11 @@ class Conveyor(PolledControl[State], Machine, Axis):
             return US
         master, limit = self._observer.consumer >> 16 & 0x7F, self._observer.consumer & 0xFFFF
         if limit and self._observer.received_heartbeat(master, limit / 1000.0):
-            return f"node {master}, whose heartbeat the drive monitors,"
+            return Phrase.of("node {node}, whose heartbeat the drive monitors,", node=master)
         if self._observer.received_heartbeat(self._units.master_id, LONGEST_HEARTBEAT / 1000.0):
-            return f"another host, which sends heartbeats as node {self._units.master_id} too,"
-        return "another client, which enabled the drive," if state.power is Power.ENABLED else None
+            return Phrase.of("another host, which sends heartbeats as node {node} too,", node=self._units.master_id)
+        other = Phrase.of("another client, which enabled the drive,")
+        return other if state.power is Power.ENABLED else None
 
     def drop_control(self, why: str = NOBODY) -> None:
         """End control. After a loss, also forget the zero: the drive may have been off."""
@@ -193,7 +195,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
     # -------------------------------------------------------------------------------- the base's methods
     def move_absolute(self, position: float, velocity: float) -> None:
         """Move to `position`, m, with `velocity`, m/s; return at the position. Refused before homing."""
-        what = f"move_to {position:g} m"
+        what = Phrase.of("move_to {position:g} m", position=position)
         self._check(position, velocity, what)
         now, go_on = self._begin(what)
         if not self._homed:
@@ -209,7 +211,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
 
     def move_relative(self, distance: float, velocity: float) -> None:
         """Move by `distance`, m, with `velocity`, m/s; return at the position."""
-        what = f"move_by {distance:g} m"
+        what = Phrase.of("move_by {distance:g} m", distance=distance)
         now, go_on = self._begin(what)
         end = self._units.metres(now.position) + distance
         self._check(end, velocity, what)
@@ -219,7 +221,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
 
     def move_velocity(self, velocity: float) -> None:
         """Run with `velocity`, m/s, until halted; return when it is reached."""
-        what = f"run with {velocity:g} m/s"
+        what = Phrase.of("run with {velocity:g} m/s", velocity=velocity)
         if not abs(velocity) <= self._units.max_speed:
             raise OutOfRange(
                 "{device}: {what}: velocity must be at most {max_speed:g} m/s",

@@ -6,6 +6,7 @@ from typing import Final
 
 from arcor2_hw.data.base import Timestamp, now
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault
+from arcor2_hw.messages import Phrase
 from arcor2_hw.objects.state_observer import Snapshot, StateObserver
 
 from . import cia402, pdo
@@ -95,7 +96,7 @@ class Observer(StateObserver[State]):
         before, self.nmt = self.nmt, state
         if self.guarded and before == OPERATIONAL[0] != state:
             # Another host commands the node; the drive has reacted as configured in 6007h.
-            self._drop_control("another host has changed the NMT state of the drive")
+            self._drop_control(Phrase.of("another host has changed the NMT state of the drive"))
             self.wake()
 
     # -------------------------------------------------------------------------------- on the observing thread
@@ -159,4 +160,4 @@ class Observer(StateObserver[State]):
 
     def on_lost(self, error: DeviceError) -> None:
         """End control: without our heartbeat the drive stops by itself."""
-        self._drop_control("control ended when the connection was lost")
+        self._drop_control(Phrase.of("control ended when the connection was lost"))

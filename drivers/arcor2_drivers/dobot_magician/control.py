@@ -6,6 +6,7 @@ import threading
 from typing import Final
 
 from arcor2_hw.exceptions import DeviceError, DeviceTimeout, NotInControl, OutOfRange, Refused
+from arcor2_hw.messages import Phrase
 from arcor2_hw.objects.arm import StopCounter
 
 from .frames import Command
@@ -91,7 +92,7 @@ class Control:
             return "us"
         newest = self._observer.newest()
         moving = newest is not None and self._observer.observing.online and newest.moving
-        return "another client" if moving else None
+        return Phrase.of("another client") if moving else None
 
     def require(self) -> None:
         """Raise NotInControl unless we have control, or why the arm is not observed."""

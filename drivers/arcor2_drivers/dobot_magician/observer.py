@@ -109,13 +109,13 @@ class Observer(StateObserver[Sample]):
         try:
             return struct.unpack("<" + layout, answer)
         except struct.error:
-            sizes = f"{len(answer)} bytes instead of {struct.calcsize('<' + layout)}"
             raise DeviceFault(
-                "{device} answered {name} with {sizes}.",
+                "{device} answered {name} with {size} bytes instead of {expected}.",
                 answer.hex(" "),
                 device=self.who,
                 name=command.name.lower(),
-                sizes=sizes,
+                size=len(answer),
+                expected=struct.calcsize("<" + layout),
             ) from None
 
     # -------------------------------------------------------------------------------- on the observing thread

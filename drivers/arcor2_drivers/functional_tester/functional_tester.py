@@ -8,7 +8,7 @@ from arcor2_hw.data.device import Alarm, Health, LossReaction, Observation, Qual
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models
 from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, DeviceTimeout, NotFound, Refused
-from arcor2_hw.messages import translatable
+from arcor2_hw.messages import Phrase, translatable
 from arcor2_hw.objects import CollisionObject, Machine, MachineCommand, MachineState, UnitMode
 
 from .registers import DOOR_CLOSE, DOOR_OPEN, FALLEN, PASSING, STATES, Holding, Inputs, fault_of, title
@@ -182,7 +182,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         """
         assert 1 <= program <= 9
 
-        what = f"test with program {program}"
+        what = Phrase.of("test with program {program}", program=program)
         go_on = self.begin(what)
         before = self.require_command("test")
         if before.state in PASSING:

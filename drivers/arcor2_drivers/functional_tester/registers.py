@@ -86,7 +86,7 @@ EMERGENCY_STOP: Final = 106
 
 def fault_of(code: int) -> Fault:
     """Return the meaning of a fault code; an unknown one counts as a failure."""
-    unknown = Fault(f"unknown fault {code}", "see the manual of the tester, then clear", health=Health.FAILURE)
+    unknown = Fault("unknown fault", "see the manual of the tester, then clear", health=Health.FAILURE)
     return FAULTS.get(code, unknown)
 
 

@@ -16,7 +16,7 @@ from arcor2_hw.exceptions import (
     SafetyStop,
     Stale,
 )
-from arcor2_hw.messages import Message
+from arcor2_hw.messages import Message, Phrase
 from arcor2_hw.objects import MachineCommand, MachineState, UnitMode
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.modbus_device import ModbusDevice
@@ -130,10 +130,11 @@ class Tester(ModbusDevice[Inputs]):
     def owner_of(self, state: Inputs) -> str | None:
         """Return who has control: us, the user of the key switch, or the client whose test runs."""
         if state.mode is not UnitMode.PRODUCE:
-            return f"the key switch at the station ({state.mode.name.lower()})"
+            return Phrase.of("the key switch at the station ({mode})", mode=state.mode.name.lower())
         if self.in_control:
             return US
-        return f"another client, which started a test (state {title(state.state)})," if state.state in RUNNING else None
+        other = Phrase.of("another client, which started a test (state {state}),", state=title(state.state))
+        return other if state.state in RUNNING else None
 
     def why_control_ended(self, state: Inputs) -> str:
         """Return an empty text: the key switch only interrupts our control."""
@@ -184,9 +185,11 @@ class Tester(ModbusDevice[Inputs]):
                 f"taking the command {name}",
             )
         if after.command_result != registers.ACCEPTED:
-            why = registers.REFUSALS.get(after.command_result, f"result {after.command_result}")
+            result = after.command_result
+            known = registers.REFUSALS.get(result)
+            why = Message.of("result {result}", result=result) if known is None else Message.of(known)
             if before.emergency_stop:
-                why = "the emergency stop is pressed"
+                why = Message.of("the emergency stop is pressed")
             raise Refused(
                 "{device}: {name} is refused in state {state}: {reason}",
                 device=self.who,

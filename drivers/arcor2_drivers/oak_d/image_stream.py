@@ -135,7 +135,11 @@ class ImageStream(Connected):
                 if (left := deadline - time.monotonic()) <= 0.0:
                     break
                 self._new_image.wait(left)
-        age = "never" if newest is None else f"{time.monotonic() - newest.monotonic:.2f} s ago"
+        age = (
+            Message.of("never")
+            if newest is None
+            else Message.of("{age:.2f} s ago", age=time.monotonic() - newest.monotonic)
+        )
         raise Stale(
             "{device} sent no new image within {timeout:g} s; the last was taken {age}",
             device=self.who,

@@ -239,7 +239,8 @@ class NetworkSource:
             except OSError as e:
                 raise ConnectionLost("{device}: the connection was lost", str(e), device=self.who) from e
             if received == 0:
-                why = f"the source refused: {self._refusal}" if self._refusal else "the source closed the connection"
+                refused = Message.of("the source refused: {reason}", reason=self._refusal)
+                why = refused if self._refusal else Message.of("the source closed the connection")
                 raise ConnectionLost("{device}: the connection was lost: {reason}", device=self.who, reason=why)
             count += received
 

@@ -191,10 +191,11 @@ class OakD(ImageStream, Camera):
         sample = color[::SAMPLE_STEP, ::SAMPLE_STEP]
         white = float((sample.min(axis=2) >= WHITE).mean())
         if white > self._config.white_limit:
-            exposed = "" if shot.exposure is None else f" with an exposure of {shot.exposure * 1e3:g} ms"
-            raise Overexposed(
-                "{device}: {white:.0%} of the image is white{exposed}", device=self.who, white=white, exposed=exposed
-            )
+            text = "{device}: {white:.0%} of the image is white"
+            if shot.exposure is None:
+                raise Overexposed(text, device=self.who, white=white)
+            text = "{device}: {white:.0%} of the image is white with an exposure of {exposure:g} ms"
+            raise Overexposed(text, device=self.who, white=white, exposure=shot.exposure * 1e3)
         if (mean := float(sample.mean())) < BLACK:
             raise DeviceFault(
                 "{device}: the image is black. Check that the lens is not covered and the light is on.",

@@ -206,8 +206,8 @@ class Link:
                 mode=ua.MessageSecurityMode.Sign if mode == "sign" else ua.MessageSecurityMode.SignAndEncrypt,
             )
         except (OSError, ValueError, TypeError, x509.ExtensionNotFound) as e:
-            what = "client_certificate, client_key or server_certificate cannot be used"
-            raise NotConnected("{device}: {what}", str(e), device=self.who, what=what) from e
+            text = "{device}: client_certificate, client_key or server_certificate cannot be used"
+            raise NotConnected(text, str(e), device=self.who) from e
 
     def close(self) -> None:
         """Close; calls that wait for an answer end with ConnectionLost. It does nothing when closed."""

@@ -17,6 +17,7 @@ from arcor2_hw.exceptions import (
     Refused,
     Stale,
 )
+from arcor2_hw.messages import Phrase
 from arcor2_hw.objects.edges import DigitalPoints
 from arcor2_hw.objects.observing import GoOn
 from arcor2_hw.objects.polled_control import US, PolledControl
@@ -113,8 +114,8 @@ class Plc(PolledControl[Handshake]):
         kind = type_of(value, data_type)
         digital = point.digital if point else name in ("request", "busy", "done", "error")
         if kind is None or not fits(kind, digital):
-            found = "of an unknown type" if kind is None else kind.name
-            wanted = "Boolean" if digital else "a number"
+            found = Phrase.of("of an unknown type") if kind is None else kind.name
+            wanted = "Boolean" if digital else Phrase.of("a number")
             raise DeviceFault(
                 "{device}: {node} is {found}, not {wanted}", device=self.who, node=node, found=found, wanted=wanted
             )
@@ -198,14 +199,14 @@ class Plc(PolledControl[Handshake]):
 
     def _named(self, owner: int) -> str:
         if owner == self._s.host_number:
-            return f"another program with our number {owner}, or one that has just ended,"
-        return f"host {owner}" if owner else "nobody"
+            return Phrase.of("another program with our number {number}, or one that has just ended,", number=owner)
+        return Phrase.of("host {number}", number=owner) if owner else Phrase.of("nobody")
 
     def why_control_ended(self, state: Handshake) -> str:
         """Return why the PLC does not obey us any more; empty while it does."""
         if self.program_stopped:
-            return "the program of the PLC was stopped"
-        return super().why_control_ended(state) if state.owner else "the PLC has taken control away"
+            return Phrase.of("the program of the PLC was stopped")
+        return super().why_control_ended(state) if state.owner else Phrase.of("the PLC has taken control away")
 
     def require_control(self, what: str) -> None:
         """Raise NotConnected, ConnectionLost, NotInControl or Stale with the reason, unless we may write."""
@@ -251,7 +252,7 @@ class Plc(PolledControl[Handshake]):
             ConnectionLost: The connection was lost.
             NotInControl: Control ended.
         """
-        what = f"job {number}"
+        what = Phrase.of("job {number}", number=number)
         self.require_handshake()
         self.require_control(what)
         low, high = INTEGERS.get(self.types["number"], (0, 0))
@@ -269,7 +270,9 @@ class Plc(PolledControl[Handshake]):
             start = {"number": self.variant("number", number)} | self._request(True)
             self.send(what, lambda: self.link.write(start), go_on)
             try:
-                self._await_job(lambda hand: not hand.idle, ANSWERS_WITHIN, f"the start of {what}", go_on)
+                self._await_job(
+                    lambda hand: not hand.idle, ANSWERS_WITHIN, Phrase.of("the start of {what}", what=what), go_on
+                )
                 end = self._await_job(lambda hand: not (hand.idle or hand.busy), timeout, what, go_on)
             finally:
                 self._end_request()

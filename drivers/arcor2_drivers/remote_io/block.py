@@ -9,7 +9,7 @@ from typing import ClassVar, Final
 
 from arcor2_hw.data.device import Alarm, LossReaction
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, Refused
-from arcor2_hw.messages import translatable
+from arcor2_hw.messages import Message, Phrase, translatable
 from arcor2_hw.objects.connected import AlarmText
 from arcor2_hw.objects.edges import DigitalPoints
 from arcor2_hw.objects.modbus_device import ModbusDevice
@@ -108,16 +108,27 @@ class Block(ModbusDevice[Image]):
         running, number = state.watchdog(self._s.watchdog)
         if running is not WatchdogState.RUNNING:
             return None
-        return US if number == self._number else f"another host (number {number} on watchdog {self._s.watchdog})"
+        return (
+            US
+            if number == self._number
+            else Phrase.of(
+                "another host (number {number} on watchdog {watchdog})", number=number, watchdog=self._s.watchdog
+            )
+        )
 
     def why_control_ended(self, state: Image) -> str:
         """Return why the watchdog does not run for us any more; empty while it does."""
         running, _ = state.watchdog(self._s.watchdog)
-        register = f"input register {registers.WATCHDOG_STATES + self._s.watchdog} is {running}"
+        number = self._s.watchdog
+        register = Message.of(
+            "input register {register} is {value}", register=registers.WATCHDOG_STATES + number, value=running
+        )
         if running is WatchdogState.EXPIRED:
-            return f"watchdog {self._s.watchdog} has expired ({register}); the outputs are safe until control is taken"
+            expired = "watchdog {number} has expired ({register}); the outputs are safe until control is taken"
+            return Phrase.of(expired, number=number, register=register)
         if running is WatchdogState.OFF:
-            return f"watchdog {self._s.watchdog} does not run ({register}): the block or another host switched it off"
+            off = "watchdog {number} does not run ({register}): the block or another host switched it off"
+            return Phrase.of(off, number=number, register=register)
         return super().why_control_ended(state)
 
     # -------------------------------------------------------------------------------- outputs

@@ -8,7 +8,7 @@ from arcor2_hw.data.base import Timestamp, now
 from arcor2_hw.data.device import Alarm, Health, LossReaction
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused
-from arcor2_hw.messages import Message
+from arcor2_hw.messages import Message, Phrase
 from arcor2_hw.objects import Gripper, GripResult, PartSize
 from arcor2_hw.objects.observing import GoOn
 from arcor2_hw.objects.polled_control import NOBODY, US, PolledControl
@@ -90,8 +90,9 @@ class Robotiq2F(PolledControl[Status], Gripper):
         if status.echo == commanded:
             self._echoed = True
         elif self._echoed:
-            self._other_client = f"another client of the gripper, which requested position {status.echo},"
-            self.drop_control(f"{self._other_client} has control")
+            other = "another client of the gripper, which requested position {position},"
+            self._other_client = Phrase.of(other, position=status.echo)
+            self.drop_control(Phrase.of("{owner} has control", owner=self._other_client))
 
     def condition(self) -> Health:
         """Return the condition that the gripper last reported."""
@@ -145,7 +146,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
         """Return the owner; another client is detected only while it moves the gripper."""
         if self.in_control:
             return US
-        return "another client, which moves the gripper," if state.moving else None
+        return Phrase.of("another client, which moves the gripper,") if state.moving else None
 
     def arm(self) -> None:
         """Take control without writing anything; the gripper is not activated."""

@@ -130,5 +130,5 @@ FAULTS: Final = {
 
 def fault_of(code: int) -> Fault:
     """Return text and remedy of a fault; an unknown code counts as a failure."""
-    unknown = Fault(f"fault {code}", "see the manual" + _REACTIVATE, Severity.ERROR, Health.FAILURE)
+    unknown = Fault("unknown fault", "see the manual" + _REACTIVATE, Severity.ERROR, Health.FAILURE)
     return FAULTS.get(code, unknown)

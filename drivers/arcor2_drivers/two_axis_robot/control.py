@@ -11,7 +11,7 @@ from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Alarm, Severity
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotInControl, Refused
 from arcor2_hw.keep_alive import TOO_SLOW, once_within
-from arcor2_hw.messages import Message, translatable
+from arcor2_hw.messages import Message, Phrase, translatable
 from arcor2_hw.objects.arm import StopCounter, check_confirmed
 
 from . import registers as reg
@@ -41,7 +41,7 @@ class Control:
         self.stops = StopCounter()
         self.ours = False
         self.teaching = False
-        self._why_not = "Take control first."
+        self._why_not: str = Phrase.of("Take control first.")
         self._since: dict[str, str] = {}
 
     # -------------------------------------------------------------------------------- taking and releasing
@@ -112,7 +112,7 @@ class Control:
                 self._observer.do(self.brake, urgent=True, timeout=timeout)
                 self.wait_rest(timeout)
             self._observer.do(self._disarm, timeout=timeout)
-        self.drop("it was released.")
+        self.drop(Phrase.of("it was released."))
 
     def _disarm(self, bus: Bus) -> None:
         for number in self._ids:
@@ -122,7 +122,7 @@ class Control:
         """Release control because we disconnect."""
         with contextlib.suppress(DeviceError):  # it cannot be reached: its watchdog stops it
             self.release(timeout=0.3)
-        self.drop("it was released.")
+        self.drop(Phrase.of("it was released."))
 
     def drop(self, why: str) -> None:
         """Note that control has ended."""
@@ -138,9 +138,11 @@ class Control:
         if self.ours:
             for number, servo in zip(self._ids, state.servos, strict=True):
                 if servo.watchdog == reg.TRIPPED:
-                    self.drop(f"the bus watchdog of servo {number} has tripped: {TOO_SLOW.format('robot')}")
+                    tripped = "the bus watchdog of servo {number} has tripped: {reason}"
+                    self.drop(Phrase.of(tripped, number=number, reason=TOO_SLOW))
                 elif servo.watchdog != self._watchdog() or servo.torque == self.teaching:
-                    self.drop(f"servo {number} was switched by another client, or lost its supply.")
+                    switched = "servo {number} was switched by another client, or lost its supply."
+                    self.drop(Phrase.of(switched, number=number))
         if not self.ours:
             raise NotInControl("Control of {name} is not taken: {why_not}", name=self.name, why_not=self._why_not)
 
@@ -215,7 +217,7 @@ class Control:
     def check_faults(self, state: State) -> None:
         """Raise DeviceFault if a servo has a hardware error."""
         if any(servo.hardware_error for servo in state.servos):
-            self.drop("a servo has a hardware error.")
+            self.drop(Phrase.of("a servo has a hardware error."))
             alarms = self.alarms()
             texts = "; ".join(f"{alarm.text} ({alarm.remedy})" for alarm in alarms)
             raise DeviceFault(
@@ -233,7 +235,7 @@ class Control:
         if not failed:
             raise Refused("{name} has no hardware error.", name=self.name)
         self.stops.request()
-        self.drop("a servo was rebooted.")
+        self.drop(Phrase.of("a servo was rebooted."))
 
         def reboot(bus: Bus) -> None:
             for number in failed:

@@ -10,6 +10,7 @@ from arcor2_hw.data.robot import Control as ControlMode
 from arcor2_hw.data.robot import ProgramState
 from arcor2_hw.exceptions import Cancelled, DeviceError, NotInControl, OutOfRange, Refused, SafetyStop
 from arcor2_hw.keep_alive import once_within
+from arcor2_hw.messages import Phrase
 from arcor2_hw.objects.arm import StopCounter, label
 
 from .arm import Arm
@@ -139,7 +140,7 @@ class Control:
             return "us"
         sample = self._observer.sample()
         if self._pendant.state()[0] is ControlMode.LOCAL:
-            return "pendant"
+            return Phrase.of("pendant")
         return self._pendant.program() if program_plays(sample.runtime) else None
 
     def current(self) -> ControlSession:

@@ -326,15 +326,17 @@ class ControlSession:
 
     # -------------------------------------------------------------------------------- from the control process
     def _on_exit(self, status: int) -> DeviceError:
-        detail = f"The control process of {self.who} ended with status {status}."
+        ended = ConnectionLost(
+            "The control process of {device} ended with status {status}.", device=self.who, status=status
+        )
         cause = _TOO_SLOW.get(status)
-        error = ConnectionLost(detail) if cause is None else self._too_slow(f"{cause}. {detail}")
+        error = ended if cause is None else self._too_slow(f"{cause}. {ended}")
         self.end(error)
         return self.ended or error
 
     def _too_slow(self, detail: str) -> ConnectionLost:
         self.too_slow = True
-        return ConnectionLost("{device}: {too_slow}", detail, device=self.who, too_slow=TOO_SLOW.format("robot"))
+        return ConnectionLost("{device}: {too_slow}", detail, device=self.who, too_slow=TOO_SLOW)
 
     def _on_output(self, line: bytes) -> None:
         text = line.decode("utf-8", "replace").strip()

@@ -14,6 +14,7 @@ from arcor2_hw.data.audit import AuditOutcome
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.messages import Message
 from arcor2_server.access.connection_limits import CONNECTION
 from arcor2_server.access.route_options import AS_ROLE, OPEN, PERSON, ROLE
 from arcor2_server.access.tokens import FILE, Token, TokenFile
@@ -119,12 +120,12 @@ class Access:
         return Admission(self._settings.default_role if self.open_to_all else None)
 
     @property
-    def damage(self) -> str:
+    def damage(self) -> Message | None:
         """The problem of the token file, empty if it is intact."""
         return self._tokens.damage
 
-    def repair(self) -> str:
-        """Repair the token file from its copy. Return its problem, empty if it was intact."""
+    def repair(self) -> Message | None:
+        """Repair the token file from its copy. Return its problem, None if it was intact."""
         return self._tokens.repair()
 
     def valid(self, token: Token) -> bool:
@@ -168,9 +169,11 @@ def role_needed(connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRou
     try:
         admission = access.admit(connection)
     except TooManyAttempts as error:
-        raise TooManyRequestsException(str(error)) from None
+        raise TooManyRequestsException(str(error), extra=error.message.translation()) from None
     except AccessRefused as error:
-        raise NotAuthorizedException(str(error), headers={"WWW-Authenticate": "Bearer"}) from None
+        raise NotAuthorizedException(
+            str(error), headers={"WWW-Authenticate": "Bearer"}, extra=error.message.translation()
+        ) from None
     role = admission.role
     extensions: dict[str, Any] = connection.scope.get("extensions") or {}
     if role is not None and CONNECTION in extensions:
@@ -191,4 +194,5 @@ def role_needed(connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRou
             role=role,
             address=address_of(connection),
         )
-        raise PermissionDeniedException(f"This needs the role {needed.name.lower()} or a higher one.")
+        message = Message.of("This needs the role {role} or a higher one.", role=needed.shown)
+        raise PermissionDeniedException(message.text, extra=message.translation())

@@ -15,6 +15,7 @@ import msgspec
 from arcor2_hw.data.base import Data, Timestamp, now
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Conflict, InvalidData, NotFound, StorageError
+from arcor2_hw.messages import Message
 from arcor2_server.files import aside, write_private
 
 FILE: Final = "tokens.json"
@@ -56,8 +57,8 @@ class TokenFile:
         self._copy = data_dir / COPY
         self._seen: tuple[int, int, int] | None = None
         self._tokens: list[Token] = []
-        self.damage = ""
-        """The problem of the file and its remedy, as sentences; empty if the file is intact."""
+        self.damage: Message | None = None
+        """The problem of the file and its remedy, as sentences; None if the file is intact."""
         self.unusable = False
         """Whether neither the file nor its copy can be read, so that no token is valid."""
 
@@ -69,7 +70,7 @@ class TokenFile:
             if stamp != self._seen:
                 self._tokens, self._seen = self._read(), stamp
         except FileNotFoundError:
-            self._tokens, self._seen, self.damage, self.unusable = [], None, "", False
+            self._tokens, self._seen, self.damage, self.unusable = [], None, None, False
         except OSError as error:
             raise StorageError(
                 "the token file {path} cannot be used: {reason}", path=self._path, reason=error
@@ -77,26 +78,29 @@ class TokenFile:
         return self._tokens
 
     def _read(self) -> list[Token]:
-        self.damage, self.unusable = "", False
+        self.damage, self.unusable = None, False
         try:
             return _decode(self._path.read_bytes())
         except msgspec.DecodeError as error:
-            self.damage = f"The token file {self._path} is damaged: {str(error).rstrip('.')}."
+            reason = str(error).rstrip(".")
+            damage = [Message.of("The token file {path} is damaged: {reason}.", path=self._path, reason=reason)]
         try:
             tokens = _decode(self._copy.read_bytes())
-            self.damage += f" Its copy {self._copy} is used instead."
+            damage.append(Message.of("Its copy {path} is used instead.", path=self._copy))
         except (OSError, msgspec.DecodeError):
             tokens, self.unusable = self._tokens, not self._tokens
-            self.damage += (
-                " Its copy cannot be used either, so no client can connect with a token."
+            admitted = (
+                "Its copy cannot be used either, so no client can connect with a token."
                 if self.unusable
-                else " The tokens that were read before stay valid until the server stops."
+                else "The tokens that were read before stay valid until the server stops."
             )
-            self.damage += " Create new tokens with `arcor2-hw token add`; this also renames the damaged file."
+            remedy = "Create new tokens with `arcor2-hw token add`; this also renames the damaged file."
+            damage += [Message.of(admitted), Message.of(remedy)]
+        self.damage = Message.joined(damage)
         return tokens
 
-    def repair(self) -> str:
-        """Replace a damaged file by its copy, or create a missing copy. Return the problem, empty if there is none."""
+    def repair(self) -> Message | None:
+        """Replace a damaged file by its copy, or create a missing copy. Return the problem, None if there is none."""
         tokens, damage = self.all(), self.damage
         if self.unusable or not (tokens or damage):
             return damage

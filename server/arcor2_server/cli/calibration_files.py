@@ -85,7 +85,7 @@ async def compute(task: Task[R]) -> R:
     server_logging.set_up("error")
     worker = Compute(idle=60.0)
     try:
-        with progress(task.label) as on_progress:
+        with progress(task.label.text) as on_progress:
             return await worker.run(task, on_progress=on_progress)
     finally:
         await worker.close()

@@ -66,7 +66,7 @@ def list_tokens(*, data_dir: DataDir = None) -> int:
     except Arcor2Error as error:
         return _failed(error)
     if file.damage:
-        fail("token", file.damage, ExitStatus.DATA_UNUSABLE)
+        fail("token", str(file.damage), ExitStatus.DATA_UNUSABLE)
         if file.unusable:
             return ExitStatus.DATA_UNUSABLE
     if not tokens:

@@ -7,6 +7,7 @@ import structlog
 from arcor2_hw.data.base import UNSET, Unset, now
 from arcor2_hw.data.events import Event, LockData
 from arcor2_hw.data.rpc import HeldLock, LockType
+from arcor2_hw.messages import Message
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.collaboration.users import Users
 from arcor2_server.events import make_event
@@ -40,6 +41,7 @@ class LockTakeover:
         """Release the locks of a user who left; return the events to send. A notice is sent when the user returns."""
         names = [lock.name or lock.object_id for lock in self.held(user)]
         time = now()[:16].replace("T", " ")
-        ids = self._users.release(user, f"{by} released your locks at {time} UTC: {', '.join(names)}.")
+        notice = "{by} released your locks at {time} UTC: {names}."
+        ids = self._users.release(user, Message.of(notice, by=by, time=time, names=", ".join(names)))
         log.info("locks taken over", user=user, by=by, ids=ids)
         return [make_event("ObjectsUnlocked", LockData(ids, user))] if ids else []

@@ -8,6 +8,7 @@ import structlog
 
 from arcor2_hw.data.base import now
 from arcor2_hw.data.events import Event, LockData, NotificationData, NotificationLevel
+from arcor2_hw.messages import Message
 from arcor2_server.collaboration.locks import Locks
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import Connection, EventHub, make_event
@@ -35,7 +36,7 @@ class Users:
         self._clients: dict[str, Connection] = {}
         self._releases: dict[str, asyncio.TimerHandle] = {}
         self._left: dict[str, str] = {}
-        self._notices: dict[str, list[str]] = {}
+        self._notices: dict[str, list[Message]] = {}
         self.on_enter: list[Callable[[str], None]] = []
         self.on_leave: list[Callable[[str], None]] = []
         """Called with the name of a user who registers or leaves."""
@@ -57,7 +58,7 @@ class Users:
         if user in self._clients:
             raise RequestRefused("{user} is connected. Ask {user} to unlock it.", user=user)
 
-    def release(self, user: str, notice: str) -> list[str]:
+    def release(self, user: str, notice: Message) -> list[str]:
         """Release all locks of a user who left and return their ids. The notice is sent when the user returns."""
         waiting = self._notices.pop(user, [])
         self._notices[user] = [*waiting, notice][-MAX_NOTICES:]
@@ -96,8 +97,9 @@ class Users:
         ]
         if own := self._locks.write_locked_by(name):
             events.append(make_event("ObjectsLocked", LockData(own, name)))
-        notices = [NotificationData(notice, NotificationLevel.WARN) for notice in self._notices.pop(name, [])]
-        events += [make_event("Notification", notice) for notice in notices]
+        for notice in self._notices.pop(name, []):
+            data = NotificationData(notice.text, NotificationLevel.WARN, **notice.translation())
+            events.append(make_event("Notification", data))
         return events
 
     def disconnected(self, client: Connection) -> None:

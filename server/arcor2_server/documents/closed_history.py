@@ -14,6 +14,7 @@ from msgspec.structs import replace
 from arcor2_hw.data.base import now
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
+from arcor2_hw.messages import Message
 from arcor2_server.documents.changes import (
     FILE_NAMES,
     OF_SCENE,
@@ -104,7 +105,7 @@ class ClosedHistories:
         except OSError as error:
             log.error("undo history cannot be read", file=str(path), reason=str(error))
         except (zlib.error, ValueError) as error:
-            what = f"Edits of {opened.name!r} from before it was opened cannot be undone."
+            what = Message.of("Edits of {name!r} from before it was opened cannot be undone.", name=opened.name)
             self._damage.set_aside(path, what, error)
         return None
 

@@ -18,6 +18,8 @@ import msgspec
 import structlog
 
 from arcor2_hw.data.base import now
+from arcor2_hw.exceptions import message_of
+from arcor2_hw.messages import Message
 from arcor2_server.documents.changes import Edit
 from arcor2_server.documents.journal_records import (
     EDIT_COLUMNS,
@@ -113,12 +115,17 @@ class JournalFile:
             fresh = self._write_new_file(content)
             stored = self._rename_damaged(copy) if exists and content.damage else None
             if content.damage:
-                log.error("journal damaged", reason=content.damage, lost=content.lost, stored_as=str(stored or ""))
+                log.error(
+                    "journal damaged",
+                    reason=str(content.damage),
+                    lost=str(content.lost or ""),
+                    stored_as=str(stored or ""),
+                )
             _with_ending(self._path, "-wal").unlink(missing_ok=True)
             fresh.replace(self._path)
             self._connection = _connect(self._path)
             _recover(self._connection)
-            if content.lost:
+            if content.damage and content.lost:
                 loss = Loss(content.damage, content.lost, "" if stored is None else str(stored), content.incomplete)
         _unlink(copy)
         recovered = content.recovered
@@ -184,8 +191,8 @@ class JournalFile:
             self.close()
             if not _is_damage(error, self._path):
                 raise
-            lost = "Unsaved changes of the scene or project that was open are lost."
-            return JournalContent(damage=str(error), lost=lost)
+            lost = Message.of("Unsaved changes of the scene or project that was open are lost.")
+            return JournalContent(damage=message_of(error), lost=lost)
 
     def _write_new_file(self, content: JournalContent) -> Path:
         """Write the intact content into a new file next to the damaged one."""
@@ -279,7 +286,7 @@ def _recover(connection: sqlite3.Connection) -> JournalContent:
         _migrate(connection, _BASE + _EDIT + _MIGRATE_FROM_2)
         return JournalContent()
     if version not in (1, 2, FORMAT):
-        raise JournalDamaged(f"its format is {version}, this version knows {FORMAT}")
+        raise JournalDamaged("its format is {format}, this version knows {known}", format=version, known=FORMAT)
     (check,) = connection.execute("pragma quick_check(1)").fetchone()
     if version != FORMAT:
         if check != "ok":
@@ -287,7 +294,7 @@ def _recover(connection: sqlite3.Connection) -> JournalContent:
         _migrate(connection, (_MIGRATE_FROM_1 if version == 1 else "") + _MIGRATE_FROM_2)
     content = read_content(connection)
     if check != "ok":
-        content.damage = content.damage or check
+        content.damage = content.damage or Message.of(check)
     return content
 
 

@@ -11,6 +11,8 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.project import BareProject
 from arcor2_hw.data.scene import BareScene
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.messages import Message
 from arcor2_server.documents.changes import (
     Edit,
     EditKind,
@@ -119,9 +121,11 @@ class Position(msgspec.Struct, frozen=True):
                 return Position(self.serial + 1)
 
     @property
-    def last_change(self) -> str:
-        """A clause with the author and time of the last change."""
-        return f", the last one by {self.user} at {self.time[:19].replace('T', ' ')} UTC" if self.time else ""
+    def last_change(self) -> list[Message]:
+        """A sentence with the author and time of the last change, if they are known."""
+        time = f"{self.time[:19].replace('T', ' ')} UTC"
+        last = Message.of("The last one was made by {user} at {time}.", user=self.user, time=time)
+        return [last] if self.time else []
 
 
 class Loss(msgspec.Struct, frozen=True):
@@ -134,18 +138,21 @@ class Loss(msgspec.Struct, frozen=True):
         incomplete: The reopened document differs from the last acknowledged state.
     """
 
-    reason: str
-    lost: str
+    reason: Message
+    lost: Message
     stored_as: str
     incomplete: bool
 
-    def __str__(self) -> str:
-        stored = f" The damaged file is stored as {self.stored_as}." if self.stored_as else ""
-        return f"The journal of unsaved changes is damaged: {self.reason}. {self.lost}{stored}"
+    @property
+    def message(self) -> Message:
+        """All of it, as sentences."""
+        damaged = Message.of("The journal of unsaved changes is damaged: {reason}.", reason=self.reason)
+        stored = [Message.of("The damaged file is stored as {path}.", path=self.stored_as)] if self.stored_as else []
+        return Message.joined([damaged, self.lost, *stored])
 
 
-class JournalDamaged(Exception):
-    """The document in the journal cannot be restored."""
+class JournalDamaged(Arcor2Error):
+    """The document in the journal cannot be restored. The message is a clause."""
 
 
 class JournalContent(msgspec.Struct):
@@ -154,15 +161,15 @@ class JournalContent(msgspec.Struct):
     Attributes:
         serial: See `Position`.
         recovered: What is intact.
-        damage: How the damage was detected, a clause.
+        damage: How the damage was detected, a clause; None if nothing is damaged.
         lost: What is lost, as sentences.
         incomplete: The intact part differs from the last acknowledged state.
     """
 
     serial: int = 0
     recovered: Recovered | None = None
-    damage: str = ""
-    lost: str = ""
+    damage: Message | None = None
+    lost: Message | None = None
     incomplete: bool = False
 
 
@@ -208,6 +215,12 @@ def document_of(items: list[Item]) -> str:
     return f"scene {names[Kind.SCENE][:LONGEST_NAME]!r}" if Kind.SCENE in names else ""
 
 
+def _shown(document: str) -> Message:
+    """Return the text of `document_of` as a message."""
+    kind, _, name = document.partition(" ")
+    return Message.of("project {name}" if kind == "project" else "scene {name}", name=name)
+
+
 def read_content(connection: sqlite3.Connection) -> JournalContent:
     """Read what is intact.
 
@@ -241,11 +254,15 @@ def read_content(connection: sqlite3.Connection) -> JournalContent:
     content.recovered = Recovered(decode_items(items), number, scene, project, edits)
     document = document_of(content.recovered.items)
     if beyond := [row[0] for row in rows if row[0] > last]:
-        content.damage = f"the checksum of change {last + 1} is wrong, or it is missing"
+        content.damage = _damaged_change(last + 1)
         content.lost, content.incomplete = _lost_changes(document, last, Position(0, beyond[-1])), True
     elif any(row[0] < first for row in rows):
-        content.damage = f"the checksum of change {first - 1} is wrong, or it is missing"
-        content.lost = f"All changes of {document} are present, but those before number {first} cannot be undone."
+        content.damage = _damaged_change(first - 1)
+        content.lost = Message.of(
+            "All changes of {document} are present, but those before number {first} cannot be undone.",
+            document=_shown(document),
+            first=first,
+        )
     return content
 
 
@@ -255,23 +272,34 @@ def note_missing(content: JournalContent, expected: Position) -> None:
     if not expected.document and content.serial <= expected.serial:
         # The document was closed, so the content of the file is saved or discarded.
         if found is not None:
-            content.damage = content.damage or "the newest changes are missing"
-        content.recovered, content.lost = None, ""
+            content.damage = content.damage or Message.of("the newest changes are missing")
+        content.recovered, content.lost = None, None
     elif (content.serial, -1 if found is None else found.last) < (expected.serial, expected.number):
-        content.damage = content.damage or "the newest changes are missing"
+        content.damage = content.damage or Message.of("the newest changes are missing")
         if found is not None and content.serial == expected.serial:
             content.lost, content.incomplete = _lost_changes(expected.document, found.last, expected), True
         else:
             # The content belongs to a document that was closed before.
             content.recovered = None
-            content.lost = (
-                f"Unsaved changes of {expected.document} are lost{expected.last_change}. "
-                "Open it again: it is as last saved."
+            content.lost = Message.joined(
+                [
+                    Message.of("Unsaved changes of {document} are lost.", document=_shown(expected.document)),
+                    *expected.last_change,
+                    Message.of("Open it again: it is as last saved."),
+                ]
             )
     content.serial = max(content.serial, expected.serial)
 
 
-def _lost_changes(document: str, last: int, expected: Position) -> str:
-    which = f"Change {expected.number}" if expected.number == last + 1 else f"Changes {last + 1} to {expected.number}"
-    are = "is" if expected.number == last + 1 else "are"
-    return f"{which} of {document} {are} lost{expected.last_change}. Check it before you save it."
+def _damaged_change(number: int) -> Message:
+    return Message.of("the checksum of change {number} is wrong, or it is missing", number=number)
+
+
+def _lost_changes(document: str, last: int, expected: Position) -> Message:
+    template = (
+        "Change {last} of {document} is lost."
+        if expected.number == last + 1
+        else "Changes {first} to {last} of {document} are lost."
+    )
+    lost = Message.of(template, document=_shown(document), first=last + 1, last=expected.number)
+    return Message.joined([lost, *expected.last_change, Message.of("Check it before you save it.")])

@@ -86,11 +86,12 @@ class Session(OpenDocument):
             self._restore(recovered)
             await self._find_unsaved()
         if (loss := self._journal.loss) is not None:
-            notice = str(loss)
+            notice = [loss.message]
             if loss.incomplete and await self._superseded():
                 await self.discard()
-                notice += " The saved version is newer than the rest of the journal: open it again."
-            self._damage.report(notice)
+                newer = "The saved version is newer than the rest of the journal: open it again."
+                notice.append(Message.of(newer))
+            self._damage.report(Message.joined(notice))
         if scene := self._name(Kind.SCENE):
             project = self._name(Kind.PROJECT)
             log.info("reopened", scene=scene, project=project, edits=len(self.history), unsaved=self.has_changes)

@@ -99,7 +99,7 @@ def prepare(action: Action, meta: ObjectAction, lookup: ProjectLookup, results: 
     try:
         object_id, method = action.parse_type()
     except ValueError as error:
-        raise InvalidData(str(error)) from error
+        raise InvalidData("{reason}", reason=error) from error
     arguments = {parameter.name: argument(parameter, lookup, results) for parameter in action.parameters}
     return PreparedAction(action.id, object_id, method, arguments, len(meta.returns))
 

@@ -60,7 +60,7 @@ async def find_perpendicular_pose(
     clock = asyncio.get_running_loop().time
     deadline = clock() + SEARCH_WITHIN
     best: tuple[float, Pose] | None = None
-    refusal = ""
+    refusal: CellError | str = ""
     for yaw in yaws(yaw_of(present.orientation)):
         pose = Pose(present.position, Orientation.from_rotation_vector(0, 0, yaw) * DOWN)
         request = InverseKinematicsArgs(
@@ -76,7 +76,7 @@ async def find_perpendicular_pose(
         except CellError as error:
             if error.code in _POSE_INDEPENDENT:
                 raise
-            refusal = str(error)
+            refusal = error
         else:
             change = joint_change(start_joints, joints)
             if best is None or change < best[0]:

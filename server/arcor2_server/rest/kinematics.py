@@ -2,8 +2,11 @@
 
 from dataclasses import dataclass
 
-from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
+from msgspec.structs import replace
+
+from arcor2_hw.data.base import UNSET, Timestamp, TranslatableData, Unset
 from arcor2_hw.data.role import Role
+from arcor2_hw.messages import Message
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.rest.general import SERVER
 from arcor2_server.rest.operations import operation
@@ -11,10 +14,11 @@ from arcor2_server.workspace.robot_calibrations import InForce, RobotCalibration
 from arcor2_server.workspace.robots import SceneRobots
 
 
-class RobotKinematics(Data, frozen=True):
+class RobotKinematics(TranslatableData, frozen=True):
     """Kinematic calibration with which the server computes the kinematics of a robot, also offline.
 
-    read, checksum: time and checksum of the calibration read from the controller. refused: why it is not used.
+    read, checksum: time and checksum of the calibration read from the controller. refused: why it is not used; its
+    translation is in `key` and `values`.
     """
 
     object_id: str
@@ -42,6 +46,8 @@ class KinematicsOperations:
         stored = self._robot_calibrations.stored(robot)
         if stored is None:
             return RobotKinematics(robot.id, robot.name, InForce.NOMINAL)
-        state = InForce.NOMINAL if stored.refused else InForce.MEASURED
-        checksum, refused = stored.calibration.checksum, stored.refused or UNSET
-        return RobotKinematics(robot.id, robot.name, state, stored.read, checksum, refused)
+        found = RobotKinematics(robot.id, robot.name, InForce.MEASURED, stored.read, stored.calibration.checksum)
+        if not stored.refused:
+            return found
+        why = stored.refused if isinstance(stored.refused, Message) else Message.of(stored.refused)
+        return replace(found, in_force=InForce.NOMINAL, refused=why.text, **why.translation())

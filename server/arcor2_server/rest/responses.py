@@ -86,7 +86,8 @@ def http_refusal(request: Request[Any, Any, Any], error: HTTPException) -> Respo
     if "route_handler" in request.scope:
         service = request.route_handler.opt.get(SERVICE, service)
     name = {404: "NotFound", 400: "Argument", 413: "Argument", 405: "Argument"}.get(error.status_code, "General")
-    refused = _json_response(WebApiError(service, error.detail, name, ""), error.status_code)
+    translation = error.extra if isinstance(error.extra, dict) else {}  # only our own errors have one
+    refused = _json_response(WebApiError(service, error.detail, name, "", **translation), error.status_code)
     for header, value in (error.headers or {}).items():
         refused.headers[header] = value
     return refused

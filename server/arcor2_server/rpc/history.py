@@ -113,7 +113,7 @@ class HistoryRequests:
     ) -> int:
         needed = role_for(changes)
         if context.client.role < needed:
-            raise RequestRefused("These changes need the role {name} or a higher one.", name=needed.name.lower())
+            raise RequestRefused("These changes need the role {name} or a higher one.", name=needed.shown)
         revision = await self._undo.apply(context.user, changes, after, request, kind, dry_run=context.dry_run)
         if not context.dry_run:
             emit_all(context, self._session, changes)

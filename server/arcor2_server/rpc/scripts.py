@@ -75,7 +75,7 @@ class ScriptRequests:
         changes = await self._scripts.changes(args.script, args.revision)
         needed = role_for(changes)
         if context.client.role < needed:
-            raise RequestRefused("These changes need the role {name} or a higher one.", name=needed.name.lower())
+            raise RequestRefused("These changes need the role {name} or a higher one.", name=needed.shown)
         return changes
 
     def _described(self, changes: Sequence[Change]) -> list[HistoryItem]:

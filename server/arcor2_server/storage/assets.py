@@ -11,7 +11,7 @@ import os
 import tempfile
 from collections.abc import AsyncIterable, AsyncIterator, Iterator
 from pathlib import Path
-from typing import Final, Self
+from typing import Final, Literal, Self
 
 import msgspec
 import structlog
@@ -19,6 +19,7 @@ from msgspec import UNSET
 
 from arcor2_hw.data.base import Data, Timestamp, Unset, new_id, now
 from arcor2_hw.exceptions import Conflict, InvalidData, NotFound, StorageError
+from arcor2_hw.messages import translatable
 from arcor2_server.files import replace_file, sync_directory
 
 log = structlog.get_logger(__name__)
@@ -29,6 +30,13 @@ MAX_ID: Final = 255
 """Maximum length of an id, characters."""
 CHUNK: Final = 256 * 1024
 """Size of a chunk that is read from a file, bytes."""
+_FAILED: Final = translatable(
+    {
+        "use": "The assets in {directory} cannot be used: {reason}",
+        "read": "The assets in {directory} cannot be read: {reason}",
+        "write": "The assets in {directory} cannot be written: {reason}",
+    }
+)
 
 
 class TooLarge(InvalidData):
@@ -249,12 +257,12 @@ class AssetStore:
         return self._records / f"{hashlib.sha256(key.encode()).hexdigest()}.json"
 
     @contextlib.contextmanager
-    def _storage_errors(self, what: str) -> Iterator[None]:
+    def _storage_errors(self, what: Literal["use", "read", "write"]) -> Iterator[None]:
         try:
             yield
         except OSError as error:
-            text = f"cannot {what} the assets in {self._directory}: {error.strerror}"
-            raise StorageError(text, detail=str(error)) from error
+            text = _FAILED[what]
+            raise StorageError(text, str(error), directory=self._directory, reason=error.strerror) from error
 
 
 def _checked(key: str) -> str:

@@ -9,6 +9,7 @@ import structlog
 from arcor2_hw.data.base import now
 from arcor2_hw.data.events import Event, NotificationData, NotificationLevel
 from arcor2_hw.exceptions import StorageError
+from arcor2_hw.messages import Message
 from arcor2_server.events import make_event
 from arcor2_server.files import aside, write_private
 
@@ -29,27 +30,28 @@ class DataDamage:
     def __init__(self, data_dir: Path, hub: "EventHub") -> None:
         self._path = data_dir / FILE
         self._hub = hub
-        self._notices: list[str] = []
+        self._notices: list[Message] = []
         self._waiting = False
 
     @property
-    def notices(self) -> list[str]:
+    def notices(self) -> list[Message]:
         """All notices, as sentences."""
         return list(self._notices)
 
     def load(self) -> None:
         """Read the notices that no client has received."""
         try:
-            self._notices = msgspec.json.decode(self._path.read_bytes(), type=list[str])
+            stored = msgspec.json.decode(self._path.read_bytes(), type=list[Message | str])  # older versions: texts
+            self._notices = [Message.of(each) if isinstance(each, str) else each for each in stored]
             self._waiting = True
         except FileNotFoundError:
             pass
         except (OSError, msgspec.DecodeError) as error:
             log.error("notices of damaged files cannot be read", file=str(self._path), reason=str(error))
 
-    def report(self, notice: str) -> None:
+    def report(self, notice: Message) -> None:
         """Notify all clients, now and when they connect."""
-        log.error("data damaged", notice=notice)
+        log.error("data damaged", notice=notice.text)
         self._notices.append(notice)
         self._hub.broadcast(_event(notice))
         self._waiting = True
@@ -58,7 +60,7 @@ class DataDamage:
         except OSError as error:
             log.error("notices of damaged files cannot be stored", file=str(self._path), reason=str(error))
 
-    def read_json(self, path: Path, kind: type[T], loss: str) -> T | None:
+    def read_json(self, path: Path, kind: type[T], loss: Message) -> T | None:
         """Read a JSON file; None if it is missing, or damaged, in which case it is renamed and reported.
 
         Args:
@@ -79,7 +81,7 @@ class DataDamage:
         except OSError as error:
             raise StorageError("The file {path} cannot be read: {reason}.", path=path, reason=error) from error
 
-    def set_aside(self, path: Path, loss: str, reason: object) -> Path | None:
+    def set_aside(self, path: Path, loss: Message, reason: object) -> Path | None:
         """Rename a damaged file and report it; return the new name, None if it cannot be renamed.
 
         Args:
@@ -92,8 +94,13 @@ class DataDamage:
             target = path.rename(aside(path, now()))
         except OSError as error:
             log.error("damaged file cannot be renamed", file=str(path), reason=str(error))
-        stored = f"The damaged file is stored as {target}." if target else "The damaged file was left in place."
-        self.report(f"The file {path} is damaged: {str(reason).rstrip('.')}. {loss} {stored}")
+        notice = (
+            Message.of("The damaged file was left in place.")
+            if target is None
+            else Message.of("The damaged file is stored as {path}.", path=target)
+        )
+        damage = Message.of("The file {path} is damaged: {reason}.", path=path, reason=str(reason).rstrip("."))
+        self.report(Message.joined([damage, loss, notice]))
         return target
 
     def greeting(self) -> list[Event]:
@@ -104,5 +111,6 @@ class DataDamage:
         return [_event(notice) for notice in self._notices]
 
 
-def _event(notice: str) -> Event:
-    return make_event("Notification", NotificationData(notice, NotificationLevel.ERROR))
+def _event(notice: Message) -> Event:
+    data = NotificationData(notice.text, NotificationLevel.ERROR, **notice.translation())
+    return make_event("Notification", data)

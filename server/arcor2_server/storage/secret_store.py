@@ -9,6 +9,7 @@ import msgspec
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.secret import new_reference
 from arcor2_hw.exceptions import StorageError
+from arcor2_hw.messages import Message
 from arcor2_server.files import write_private
 from arcor2_server.storage.damage_notices import DataDamage
 
@@ -48,7 +49,7 @@ class SecretStore:
 
     def load(self, damage: DataDamage) -> None:
         """Read the file; report a damaged one. Raise StorageError if it cannot be read."""
-        loss = "The passwords of devices are lost: enter them again."
+        loss = Message.of("The passwords of devices are lost: enter them again.")
         self._content = damage.read_json(self._path, _Content, loss) or _Content()
         self.values = frozenset(secret.value for secret in self._content.secrets.values())
 

@@ -39,7 +39,7 @@ def answer(request: Request, data: Any) -> bytes:
     return encode(Response(request.id, request.request, True, data=data))
 
 
-def refusal(request: "Request | Head", message: str | Message, code: str = "", data: Any = UNSET) -> bytes:
+def refusal(request: "Request | Head", message: Message, code: str = "", data: Any = UNSET) -> bytes:
     """Return the answer to a refused request.
 
     Args:
@@ -49,11 +49,10 @@ def refusal(request: "Request | Head", message: str | Message, code: str = "", d
         data: Results of a request that was done in part.
     """
     name = request.request if len(request.request) <= LONGEST_NAME else UNREADABLE
-    text = shortened(str(message))
+    text = shortened(message.text)
     response = Response(request.id, name, False, [text], data)
     if isinstance(request, Request) and request.codes:
-        translation = _translation(message) if isinstance(message, Message) else {}
-        response = replace(response, code=code or UNSET, **translation)
+        response = replace(response, code=code or UNSET, **_translation(message))
     try:
         return encode(response)
     except UnicodeEncodeError:

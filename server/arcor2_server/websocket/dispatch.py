@@ -29,11 +29,11 @@ from arcor2_server.websocket.routes import Route
 log = structlog.get_logger(__name__)
 
 
-def refuse(client: Client, request: "Request | Head", message: str | Message, code: str = "") -> None:
+def refuse(client: Client, request: "Request | Head", message: Message, code: str = "") -> None:
     """Send the answer to a refused request."""
     encoded = refusal(request, message, code)
     if log.is_enabled_for(logging.DEBUG):
-        log.debug("refused", client=client.number, request=request.request[:200], message=shortened(str(message)))
+        log.debug("refused", client=client.number, request=request.request[:200], message=shortened(message.text))
     client.put(encoded)
 
 
@@ -67,7 +67,7 @@ class Dispatcher:
         except Exception:
             reference = secrets.token_hex(4)
             log.exception("request failed", request=request.request, reference=reference, user=client.user)
-            message = f"An error inside the server: see its log, reference {reference}."
+            message = Message.of("An error inside the server: see its log, reference {reference}.", reference=reference)
             refuse(client, request, message, "internal")
             if commands.is_command(route.rpc):
                 self._audit.note(
@@ -82,7 +82,9 @@ class Dispatcher:
     async def _run(self, client: Client, request: Request, route: Route) -> None:
         rpc = route.rpc
         if client.role < rpc.role:
-            needed = f"{rpc.name} needs the role {Role(rpc.role).name.lower()} or a higher one."
+            needed = Message.of(
+                "{request} needs the role {role} or a higher one.", request=rpc.name, role=Role(rpc.role).shown
+            )
             refuse(client, request, needed, "forbidden")
             self._note(AuditOutcome.FORBIDDEN, client, rpc, UNSET)
             return
@@ -94,17 +96,22 @@ class Dispatcher:
                     if len(request.args) > SHORTEST:
                         check_texts(args)
                 except TextTooLong as error:
-                    refuse(client, request, f"The arguments of {rpc.name} are wrong: {error}", error.code)
+                    wrong = Message.of("The arguments of {request} are wrong: {reason}", request=rpc.name, reason=error)
+                    refuse(client, request, wrong, error.code)
                     return
                 except (msgspec.DecodeError, RecursionError) as error:
-                    wrong = f"The arguments of {rpc.name} are wrong: {error}."
+                    wrong = Message.of(
+                        "The arguments of {request} are wrong: {reason}.", request=rpc.name, reason=error
+                    )
                     refuse(client, request, wrong, "invalid_arguments")
                     return
             elif args is UNSET:
-                refuse(client, request, f"The arguments of {rpc.name} are missing.", "invalid_arguments")
+                missing = Message.of("The arguments of {request} are missing.", request=rpc.name)
+                refuse(client, request, missing, "invalid_arguments")
                 return
         if route.handler is None:
-            refuse(client, request, f"{rpc.name} is not available in this version.", "not_available")
+            missing = Message.of("{request} is not available in this version.", request=rpc.name)
+            refuse(client, request, missing, "not_available")
             return
         context = Context(client, request.dry_run and rpc.dry_run, rpc.name, request.codes, request.step)
         with collecting() as changes:

@@ -25,6 +25,7 @@ from arcor2_server.websocket.routes import AUTHENTICATE, Service
 
 log = structlog.get_logger(__name__)
 
+_TOKEN_NEEDED: Final = Message.of("A token is needed: send {request} first.", request=AUTHENTICATE)
 AUTHENTICATE_WITHIN: Final = 10.0
 """Time limit for a client to send its token, s."""
 LONGEST_AUTHENTICATION: Final = 4096
@@ -151,18 +152,19 @@ class Endpoint:
                 return
             text = message.get("text")
             if text is None:
-                refuse(client, Head(), "Send requests as text messages.")
+                refuse(client, Head(), Message.of("Send requests as text messages."))
                 continue
             if len(text) > served:
-                refuse(client, read_head(text), f"The message is longer than {served} bytes: it was not read.")
+                long = Message.of("The message is longer than {limit} bytes: it was not read.", limit=served)
+                refuse(client, read_head(text), long)
                 continue
             if not client.admitted and len(text) > LONGEST_AUTHENTICATION:
-                refuse(client, Head(), f"A token is needed: send {AUTHENTICATE} first.")
+                refuse(client, Head(), _TOKEN_NEEDED)
                 continue
             try:
                 request = _decode_request(text)
             except (msgspec.DecodeError, RecursionError) as error:
-                refuse(client, read_head(text), f"This is not a valid request: {error}.")
+                refuse(client, read_head(text), Message.of("This is not a valid request: {reason}.", reason=error))
                 continue
             route = self.service.routes.get(request.request)
             if route is None:
@@ -170,7 +172,7 @@ class Endpoint:
                 refuse(client, request, unknown, "unknown_request")
                 continue
             if not client.admitted and request.request != AUTHENTICATE:
-                refuse(client, request, f"A token is needed: send {AUTHENTICATE} first.", "token_needed")
+                refuse(client, request, _TOKEN_NEEDED, "token_needed")
                 continue
             if route.cached is not None and self._dispatcher.answer_from_cache(client, request, route):
                 continue

@@ -115,8 +115,8 @@ class DisplayModels:
         try:
             return await asyncio.to_thread(self._store, name_on_disk, made)
         except OSError as error:
-            text = f"converted models cannot be stored in {self._directory}: {error.strerror}"
-            raise StorageError(text, detail=str(error)) from error
+            text = "Converted models cannot be stored in {directory}: {reason}"
+            raise StorageError(text, str(error), directory=self._directory, reason=error.strerror) from error
 
     def _find(self, name_on_disk: str) -> DisplayModel | None:
         plain, packed = self._directory / f"{name_on_disk}.glb", self._directory / f"{name_on_disk}.glb.gz"

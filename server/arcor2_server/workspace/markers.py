@@ -8,6 +8,7 @@ import structlog
 
 from arcor2_hw.calibration.configuration import CalibrationConfiguration
 from arcor2_hw.exceptions import Conflict, StorageError
+from arcor2_hw.messages import Message
 from arcor2_server.files import write_private
 from arcor2_server.storage.damage_notices import DataDamage
 
@@ -30,7 +31,7 @@ class Markers:
 
     def load(self, damage: DataDamage) -> None:
         """Read the stored configuration; report a damaged file. Raise StorageError if it cannot be read."""
-        loss = "The positions of the markers are lost: set them again."
+        loss = Message.of("The positions of the markers are lost: set them again.")
         self._stored = damage.read_json(self._path, CalibrationConfiguration, loss) or CalibrationConfiguration()
 
     async def set(self, configuration: CalibrationConfiguration) -> None:

@@ -50,7 +50,7 @@ class RobotCalibration(Data, frozen=True):
         device: Identifies the device by the settings of the robot.
         read: When the calibration was read.
         calibration: The calibration.
-        refused: Why the calibration is not used, empty if it is used.
+        refused: Why the calibration is not used, empty if it is used. Older versions stored the English text.
     """
 
     object_id: str
@@ -58,7 +58,7 @@ class RobotCalibration(Data, frozen=True):
     device: str
     read: Timestamp
     calibration: KinematicCalibration
-    refused: str = ""
+    refused: Message | str = ""
 
 
 class InForce(enum.StrEnum):
@@ -100,7 +100,7 @@ class RobotCalibrations:
 
     def load(self) -> None:
         """Read the stored calibrations; report a damaged file. Raise StorageError if it cannot be read."""
-        loss = "Kinematics are nominal until each robot is connected again."
+        loss = Message.of("Kinematics are nominal until each robot is connected again.")
         stored = self._damage.read_json(self._settings.arm_calibrations_file, list[RobotCalibration], loss) or []
         self._stored = {each.object_id: each for each in stored}
 
@@ -174,9 +174,8 @@ class RobotCalibrations:
             return
         before = self.stored(robot)
         refusal = await self._refused(robot, calibration)
-        refused = "" if refusal is None else refusal.text
-        found = RobotCalibration(robot.id, robot.name, self._device(robot), now(), calibration, refused)
-        same = before is not None and (before.calibration, before.refused) == (calibration, refused)
+        found = RobotCalibration(robot.id, robot.name, self._device(robot), now(), calibration, refusal or "")
+        same = before is not None and (before.calibration, before.refused) == (calibration, found.refused)
         self._stored.pop(robot.id, None)
         self._stored[robot.id] = found
         while len(self._stored) > MAX_CALIBRATIONS:
@@ -185,7 +184,7 @@ class RobotCalibrations:
             "kinematic calibration read",
             robot=robot.name,
             checksum=calibration.checksum,
-            refused=refused,
+            refused=str(found.refused),
             same=same,
         )
         await self._save()

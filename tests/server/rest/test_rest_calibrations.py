@@ -249,12 +249,12 @@ async def test_damaged_marker_files_are_renamed(tmp_path: Path) -> None:
     assert stored.read_bytes() == b"{"
     assert not path.exists()
     (notice,) = notices.notices
-    assert str(path) in notice
-    assert str(stored) in notice
+    assert str(path) in notice.text
+    assert str(stored) in notice.text
     # A later run still shows the notice, until a client has received it.
     later = damage(tmp_path)
     later.load()
-    assert [event.data.message for event in later.greeting()] == [notice]
+    assert [event.data.as_message(event.data.message) for event in later.greeting()] == [notice]
     afterwards = damage(tmp_path)
     afterwards.load()
     assert afterwards.greeting() == []

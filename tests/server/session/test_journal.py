@@ -181,5 +181,5 @@ async def test_recovered_documents_are_converted_and_losses_reported(path: Path,
     found: Any = await journal.open()
     assert numbers(found) == [1]
     assert journal.loss is not None
-    assert journal.loss.lost.startswith("Change 3 of scene 'cell' is lost")
+    assert journal.loss.lost.text.startswith("Change 3 of scene 'cell' is lost")
     await journal.close()

@@ -83,8 +83,8 @@ def check(directory: Path, damage: str) -> Loss | None:
     whole = objects(found) == ALL_OBJECTS
     assert whole or loss is not None, damage
     if loss is not None:
-        assert "scene 'open'" in loss.lost, damage
-        assert whole or "lost" in loss.lost, damage
+        assert "scene 'open'" in loss.lost.text, damage
+        assert whole or "lost" in loss.lost.text, damage
         assert not loss.stored_as or Path(loss.stored_as).exists(), damage
         # The reopened document is never older than the reported loss.
         assert objects(found) == ALL_OBJECTS[: len(objects(found))], damage
@@ -124,7 +124,10 @@ def test_a_missing_log_is_noticed(killed: Path, tmp_path: Path) -> None:
     (tmp_path / "data" / "journal.sqlite-wal").unlink()
     loss = check(tmp_path / "data", "no log")
     assert loss is not None
-    assert f"to {EDITS} of scene 'open' are lost, the last one by alice at 2026-01-01 10:00:40 UTC" in loss.lost
+    assert (
+        f"to {EDITS} of scene 'open' are lost. The last one was made by alice at 2026-01-01 10:00:40 UTC."
+        in loss.lost.text
+    )
     assert Path(loss.stored_as).exists()
 
 
@@ -133,7 +136,7 @@ def test_a_missing_database_is_noticed(killed: Path, tmp_path: Path) -> None:
     shutil.copy(killed / "journal.position", tmp_path / "data")
     loss = check(tmp_path / "data", "no database")
     assert loss is not None
-    assert "scene 'open'" in str(loss)
+    assert "scene 'open'" in str(loss.message)
 
 
 def test_a_truncated_log_is_noticed(killed: Path, tmp_path: Path) -> None:
@@ -156,8 +159,8 @@ def test_damage_in_changes_that_only_undo_needs(killed: Path, tmp_path: Path) ->
     assert found is not None
     assert [each.number for each in found.edits] == list(range(8, EDITS + 1))
     assert loss is not None
-    assert loss.reason == "the checksum of change 7 is wrong, or it is missing"
-    assert "those before number 8 cannot be undone" in loss.lost
+    assert loss.reason.text == "the checksum of change 7 is wrong, or it is missing"
+    assert "those before number 8 cannot be undone" in loss.lost.text
     assert not loss.incomplete
 
 
@@ -174,7 +177,7 @@ def test_changes_after_a_missing_one_are_reported(killed: Path, tmp_path: Path, 
     found, loss = reopened(tmp_path / "data")
     assert objects(found) == ALL_OBJECTS[: number - 1]
     assert loss is not None
-    assert loss.lost.startswith(lost)
+    assert loss.lost.text.startswith(lost)
     assert loss.incomplete
 
 

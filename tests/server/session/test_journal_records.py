@@ -6,6 +6,7 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
+from arcor2_hw.messages import Message
 from arcor2_server.documents import journal_file
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.journal_records import (
@@ -46,8 +47,10 @@ def test_a_position_has_a_limited_size() -> None:
     assert len(position.user) == 60
     assert position.document == f"scene {'n' * 60!r}"
     assert len(msgspec.json.encode(position)) < journal_file.POSITION_SIZE
-    assert position.last_change == f", the last one by {'u' * 60} at 2026-01-01 10:00:01 UTC"
-    assert Position().last_change == ""
+    assert [str(each) for each in position.last_change] == [
+        f"The last one was made by {'u' * 60} at 2026-01-01 10:00:01 UTC."
+    ]
+    assert Position().last_change == []
 
 
 def test_opening_and_closing_a_document_are_counted() -> None:
@@ -76,12 +79,12 @@ def test_checksums_cover_every_column() -> None:
 
 
 def test_a_loss_is_a_text_for_users() -> None:
-    loss = Loss("reason", "Everything is lost.", "journal.damaged", incomplete=False)
-    assert str(loss) == (
+    loss = Loss(Message.of("reason"), Message.of("Everything is lost."), "journal.damaged", incomplete=False)
+    assert str(loss.message) == (
         "The journal of unsaved changes is damaged: reason. Everything is lost."
         " The damaged file is stored as journal.damaged."
     )
-    assert str(replace(loss, stored_as="")).endswith("Everything is lost.")
+    assert str(replace(loss, stored_as="").message).endswith("Everything is lost.")
 
 
 def test_closed_documents_stay_closed() -> None:
@@ -90,13 +93,13 @@ def test_closed_documents_stay_closed() -> None:
     note_missing(closed, Position(4))
     assert (closed.recovered, closed.lost, closed.damage, closed.serial) == (
         None,
-        "",
-        "the newest changes are missing",
+        None,
+        Message.of("the newest changes are missing"),
         4,
     )
-    empty = JournalContent(4, None, "check failed", "something")
+    empty = JournalContent(4, None, Message.of("check failed"), Message.of("something"))
     note_missing(empty, Position(4))
-    assert (empty.damage, empty.lost) == ("check failed", "")
+    assert (str(empty.damage), empty.lost) == ("check failed", None)
     newer = JournalContent(5, found)
     note_missing(newer, Position(4))
-    assert (newer.recovered, newer.serial, newer.damage) == (found, 5, "")
+    assert (newer.recovered, newer.serial, newer.damage) == (found, 5, None)

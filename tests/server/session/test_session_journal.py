@@ -208,9 +208,10 @@ async def test_a_damaged_journal_is_renamed_and_reported(tmp_path: Path, damage:
     left = ["one"] if damage == "gap" else []
     async with open_server(tmp_path) as server:
         (notice,) = server.services.damage.notices
-        assert "journal.damaged-" in notice
-        assert ("Changes 32 to 33" if damage == "gap" else "alice") in notice
-        assert notice == server.services.greeting()[-1].data.message
+        assert "journal.damaged-" in notice.text
+        assert ("Changes 32 to 33" if damage == "gap" else "alice") in notice.text
+        greeted = server.services.greeting()[-1].data
+        assert greeted.as_message(greeted.message) == notice
         alice = await server.person("alice")
         if not left:
             assert server.session.greeting(server.cell.state) == []

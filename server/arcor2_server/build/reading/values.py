@@ -12,7 +12,8 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction, ParameterMeta
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import ActionParameter, ActionParameterType
-from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.exceptions import InvalidData, message_of
+from arcor2_hw.messages import Message
 from arcor2_server.build.frame import REFERENCES, Frame, TypeFacts
 from arcor2_server.build.reading.errors import NotUnderstood, excerpt
 from arcor2_server.build.reading.module import Script
@@ -175,7 +176,7 @@ class Values:
         try:
             PARAMETER_TYPES[meta.type].check(parameter, meta)
         except (KeyError, InvalidData) as error:
-            raise NotUnderstood(node.lineno, str(error)) from error
+            raise NotUnderstood(node.lineno, "{reason}", reason=message_of(error)) from error
         return parameter
 
     def _project_parameter(self, node: ast.Name, meta: ParameterMeta) -> ActionParameter:
@@ -243,7 +244,7 @@ class Values:
         kind = facts.enumerations.get((method, meta.name))
         named = self._named_member(node)
         if kind is None or named is None or named[0] != kind.name:
-            wanted = "an enumeration" if kind is None else f"one of {kind.name}"
+            wanted = Message.of("an enumeration") if kind is None else Message.of("one of {name}", name=kind.name)
             raise NotUnderstood(
                 node.lineno, "{name} takes {wanted}, not {node}", name=meta.name, wanted=wanted, node=excerpt(node)
             )
