@@ -81,7 +81,7 @@ async def test_the_declared_role_is_required(tmp_path: Path) -> None:
                 assert await answer(operator, name) == "ok"
                 continue
             text = await refused(operator, name, **(ASKED[name] or {}))
-            assert ("needs the role standard_user" in text) is (role is Role.STANDARD_USER), f"{name}: {text}"
+            assert ("needs the role standard user" in text) is (role is Role.STANDARD_USER), f"{name}: {text}"
 
 
 def joints(person: Actor) -> list[dict[str, Any]]:
