@@ -101,8 +101,8 @@ class Server:
         secrets.store.load(damage)
         REDACTION.hide(lambda: secrets.store.values)
         audit = self.audit = closed(AuditTrail(settings.audit_file, REDACTION.in_text))
-        if problem := await audit.open():
-            damage.report(problem)
+        if edited := await audit.open():
+            damage.report(edited)
         packages = Packages(settings.packages_dir, secrets.hide_in_package)
         await migrate_secrets(storage, packages, secrets)
         shared = SharedData(storage)

@@ -1,8 +1,8 @@
 """The file of the audit trail: entries chained by digests, so that a removed or edited entry is noticed.
 
 The digest of an entry covers its content and the digest of the entry before it. A small second file, the head, states
-the number and digest of the newest entry, so that entries removed at the end are noticed too. Nothing here keeps somebody
-who may write both files from writing a new chain: compare with an exported digest to detect that.
+the number and digest of the newest entry, so that entries removed at the end are noticed too. Nothing here keeps
+somebody who may write both files from writing a new chain: compare with an exported digest to detect that.
 """
 
 import hashlib

@@ -15,6 +15,7 @@ from arcor2_hw.data.audit import AuditChange, AuditCheck, AuditEntry, AuditOutco
 from arcor2_hw.data.base import now
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import StorageError
+from arcor2_hw.messages import Message
 from arcor2_server.audit.chain import AuditFile, row_of
 from arcor2_server.audit.changes import Change
 from arcor2_server.files import aside
@@ -61,8 +62,8 @@ class AuditTrail:
         self._waiting: SimpleQueue[Noted | None] = SimpleQueue()
         self._writer: threading.Thread | None = None
 
-    async def open(self) -> str:
-        """Check the file and start to write. Return its problem, empty if it is intact.
+    async def open(self) -> Message | None:
+        """Check the file and start to write. Return its problem, None if it is intact.
 
         A file with a problem is renamed, and a new one is started. Its first entry states the problem.
 
@@ -73,21 +74,21 @@ class AuditTrail:
         self._writer = threading.Thread(target=self._write, name="audit trail", daemon=True)
         self._writer.start()
         if problem:
-            self.note(AuditOutcome.REFUSED, "CheckAuditTrail", reason=problem)
+            self.note(AuditOutcome.REFUSED, "CheckAuditTrail", reason=problem.text)
         return problem
 
-    def _open(self) -> str:
+    def _open(self) -> Message | None:
         path = self._file.path
         if not path.exists():
             self._file.open()
-            return ""
+            return None
         try:
             found = self._file.check()
             problem = found.problem
             if not problem:
                 self._file.open()
                 log.info("audit trail", last=found.last, digest=found.digest)
-                return ""
+                return None
         except StorageError as error:
             problem = str(error)
         self._file.close()
@@ -100,7 +101,11 @@ class AuditTrail:
             raise StorageError("The audit trail {path} cannot be used: {reason}.", path=path, reason=error) from error
         self._file = AuditFile(path)
         self._file.open()
-        return f"The audit trail was changed by somebody else: {problem}. It is stored as {stored.name}."
+        return Message.of(
+            "The audit trail was damaged or edited: {problem}. It is stored as {file}.",
+            problem=problem,
+            file=stored.name,
+        )
 
     def close(self) -> None:
         """Write the waiting entries and close the file."""

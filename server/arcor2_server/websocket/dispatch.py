@@ -76,7 +76,7 @@ class Dispatcher:
                     user=client.name,
                     role=client.role,
                     address=client.address,
-                    reason=message,
+                    reason=message.text,
                 )
 
     async def _run(self, client: Client, request: Request, route: Route) -> None:

@@ -117,10 +117,11 @@ async def test_a_file_with_a_problem_is_kept_and_a_new_one_started(path: Path, d
     problem = await audit.open()
     audit.close()
     (stored,) = path.parent.glob("audit.damaged-*.sqlite")
-    assert stored.name in problem
-    assert [(each.number, each.reason) for each in AuditFile(path).all()] == [(1, problem)]
+    assert problem is not None
+    assert stored.name in problem.text
+    assert [(each.number, each.reason) for each in AuditFile(path).all()] == [(1, problem.text)]
     again = reopened(path)
-    assert await again.open() == ""
+    assert await again.open() is None
     again.close()
 
 
