@@ -8,9 +8,11 @@ from arcor2_hw.data.object_type import ObjectAction, ParameterMeta
 from arcor2_hw.data.project import CALL, ActionParameter
 from arcor2_server.build.frame import Frame, TypeFacts
 from arcor2_server.build.functions import HINTS
+from arcor2_server.build.reading.calls import ScriptCalls
 from arcor2_server.build.reading.errors import NotUnderstood, excerpt
 from arcor2_server.build.reading.module import Script
-from arcor2_server.build.reading.paths import LoopReader, ScriptCalls, Use, _OpenPath
+from arcor2_server.build.reading.paths import LoopReader, _OpenPath
+from arcor2_server.build.reading.scope import Scope, Use
 from arcor2_server.build.reading.values import Values
 from arcor2_server.documents.checks.functions import PASSED
 
@@ -27,8 +29,6 @@ class FunctionReader(LoopReader):
         old: its parameters in the old project, by variable.
     """
 
-    stores = False
-
     def __init__(
         self,
         frame: Frame,
@@ -43,21 +43,18 @@ class FunctionReader(LoopReader):
         self.enumerations: dict[tuple[str, str], Enumeration] = {}
         self.returned: list[tuple[int, int]] | None = None
         """Number of the call and of its result for each result of the function; None if no line states it."""
-        self._variables: dict[str, ActionParameter] = {}
+        variables: dict[str, ActionParameter] = {}
         for each in node.args.args:
             if each.arg in script.lines and each.arg not in script.constants:
                 row = script.lines[each.arg]
                 raise NotUnderstood(each.lineno, "{name} is already defined in line {row}", name=each.arg, row=row)
-            self._variables[each.arg] = self._parameter(each, old.get(each.arg), values)
-        self.parameters = list(self._variables.values())
+            variables[each.arg] = self._parameter(each, old.get(each.arg), values)
+        self.parameters = list(variables.values())
         body = node.body
         match body:
             case [ast.Expr(ast.Constant(str())), *rest] if rest:
                 body = rest
-        super().__init__(frame, script, values, shared, body)
-
-    def _is_hidden(self, name: str) -> bool:
-        return name in self._variables
+        super().__init__(frame, Scope(script, values, variables), shared, body)
 
     def _parameter(self, given: ast.arg, old: ActionParameter | None, values: Values) -> ActionParameter:
         name = given.arg if old is None else old.name
@@ -81,7 +78,7 @@ class FunctionReader(LoopReader):
 
     def facts(self) -> TypeFacts:
         """Return the metadata of the calls of the function."""
-        returns = [self.calls[source].declared.returns[output] for source, output in self.returned or ()]
+        returns = [self.scope.calls[source].declared.returns[output] for source, output in self.returned or ()]
         parameters = [ParameterMeta(each.name, each.type) for each in self.parameters]
         meta = ObjectAction(CALL, parameters=parameters, returns=returns)
         return TypeFacts("", self.node.name, {CALL: meta}, self.enumerations)
@@ -106,14 +103,14 @@ class FunctionReader(LoopReader):
                 names = [value]
         returned: list[tuple[int, int]] = []
         for name in names:
-            if not isinstance(name, ast.Name) or name.id not in self._results:
+            if not isinstance(name, ast.Name) or name.id not in self.scope.results:
                 raise NotUnderstood(node.lineno, "{name} is not a result of an action above", name=excerpt(name))
-            source, output = self._results[name.id]
+            source, output = self.scope.results[name.id]
             returned.append((source, output))
             for path in open_paths:
                 after_error = bool(path.kinds)
                 if path.source >= 0:
-                    self.uses.append(Use(path.source, source, node.lineno, name.id, in_condition=not after_error))
+                    self.scope.uses.append(Use(path.source, source, node.lineno, name.id, in_condition=not after_error))
         if self.returned is not None and self.returned != returned:
             raise NotUnderstood(node.lineno, "every `return` of a function must return the same results")
         self.returned = returned
@@ -125,28 +122,3 @@ class FunctionReader(LoopReader):
         if open_paths:
             self.returned = []
         super()._end(open_paths, line)
-
-    # ------------------------------------------------------------------------------------------------ calls
-    def _claim(self, name: str, line: int) -> None:
-        if name in self._variables or name == "an":
-            raise NotUnderstood(line, "{name} is a parameter of the function", name=name)
-        super()._claim(name, line)
-
-    def _passed(self, arguments: dict[str, ast.expr], declared: ObjectAction) -> dict[str, str]:
-        passed: dict[str, str] = {}
-        for meta in declared.parameters:
-            node = arguments.get(meta.name)
-            if not isinstance(node, ast.Name) or node.id not in self._variables:
-                continue
-            parameter = self._variables[node.id]
-            if parameter.type != meta.type:
-                raise NotUnderstood(
-                    node.lineno,
-                    "{name} is {type}, but {id} is {other_type}",
-                    name=meta.name,
-                    type=meta.type,
-                    id=node.id,
-                    other_type=parameter.type,
-                )
-            passed[meta.name] = parameter.name
-        return passed

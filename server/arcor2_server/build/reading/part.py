@@ -23,7 +23,8 @@ from arcor2_hw.exceptions import InvalidProject
 from arcor2_server.build import layout
 from arcor2_server.build.error_exits import nodes_of
 from arcor2_server.build.reading.errors import NotUnderstood
-from arcor2_server.build.reading.paths import START_NODE, Call, LogicPath, LoopReader
+from arcor2_server.build.reading.paths import START_NODE, LogicPath, LoopReader
+from arcor2_server.build.reading.scope import Call
 from arcor2_server.build.reading.values import Values, json_of
 from arcor2_server.documents import logic_graph
 from arcor2_server.documents.comparisons import Comparisons, cases_of, condition_key, inverse
@@ -68,7 +69,7 @@ class Part:
         logic: list[LogicItem],
         variables: Variables,
     ) -> None:
-        self.calls = reader.calls
+        self.calls = reader.scope.calls
         self.before = {action.name: action for action in reversed(actions)}
         """The actions before by name."""
         self.ids = [self.before[call.name].id if call.name in self.before else new_id("act") for call in self.calls]
@@ -79,8 +80,8 @@ class Part:
         self._variables = variables
         self._paths = {number: _merged(found) for number, found in reader.paths.items()}
         self._exits = reader.exits
-        self._kinds = reader.kinds
-        self._stored = variables.stored if reader.stores else {}
+        self._kinds = reader.scope.kinds
+        self._stored = variables.stored if reader.scope.stores else {}
         self._number_of = {call.name: number for number, call in enumerate(self.calls)}
         self._reached = reached(logic)
         self._check_uses(reader)
@@ -91,7 +92,7 @@ class Part:
         edges = [tuple(Edge(path.target, None) for path in loop.paths[number]) for number in count]
         nodes = nodes_of(edges, [loop.exits.get(number, ()) for number in count])
         _, natural = layout.arrange(nodes.edges)
-        for use in loop.uses:
+        for use in loop.scope.uses:
             producer = self.calls[use.source].name
             node = (nodes.success if use.in_condition else nodes.call)[use.user]
             if use.of_error:

@@ -20,11 +20,13 @@ from arcor2_hw.exceptions import InvalidProject
 from arcor2_server.build.frame import Frame, TypeFacts
 from arcor2_server.build.functions import cycles_of
 from arcor2_server.build.reading import module
+from arcor2_server.build.reading.calls import ScriptCalls
 from arcor2_server.build.reading.errors import NotUnderstood
 from arcor2_server.build.reading.functions import FunctionReader
 from arcor2_server.build.reading.module import Script
 from arcor2_server.build.reading.part import Part, Variables, reached
-from arcor2_server.build.reading.paths import Call, LoopReader, ScriptCalls
+from arcor2_server.build.reading.paths import LoopReader
+from arcor2_server.build.reading.scope import Call, Scope
 from arcor2_server.build.reading.values import PLAIN, Values, json_as_before, json_of, of_type, plain
 
 
@@ -67,8 +69,8 @@ class _Reading:
         variables = _variables(frame, project)
         shared = ScriptCalls()
         self._functions = self._read_functions(frame, shared, variables)
-        loop = LoopReader(frame, self._script, self._values, shared, self._script.loop)
-        changed = {self._values.parameters[name][0] for name in loop.stored}
+        loop = LoopReader(frame, Scope(self._script, self._values), shared, self._script.loop)
+        changed = {self._values.parameters[name][0] for name in loop.scope.stored}
         self._parameters = [
             replace(one, variable=True) if one.id in changed and not one.variable else one for one in self._parameters
         ]
@@ -127,7 +129,9 @@ class _Reading:
             actions, logic = ([], []) if old is None else (old.actions, old.logic)
             part = Part(reader, self._values, actions, logic, variables)
             returns = [
-                FunctionReturns(reader.calls[source].declared.returns[output], f"{part.ids[source]}/default/{output}")
+                FunctionReturns(
+                    reader.scope.calls[source].declared.returns[output], f"{part.ids[source]}/default/{output}"
+                )
                 for source, output in reader.returned or ()
             ]
             name = old.name if old is not None and frame.functions[key] == node.name else node.name
