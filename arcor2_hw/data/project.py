@@ -290,7 +290,10 @@ class BareProject(Data, frozen=True):
 
 
 class Project(BareProject, frozen=True):
-    """A project with its content."""
+    """A project with its content.
+
+    `script` is the program in Python as a person has edited it. Build uses its comments and formatting.
+    """
 
     action_points: list[ActionPoint] = field(default_factory=list)
     parameters: list[ProjectParameter] = field(default_factory=list)
@@ -298,6 +301,7 @@ class Project(BareProject, frozen=True):
     logic: list[LogicItem] = field(default_factory=list)
     object_overrides: list[SceneObjectOverride] = field(default_factory=list)
     project_objects_ids: list[str] | Unset = UNSET
+    script: str | Unset = UNSET
 
     def all_actions(self) -> Iterator[Action]:
         """Return the actions on all action points, then those of all functions."""

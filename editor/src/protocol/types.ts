@@ -1547,7 +1547,11 @@ export interface ProgramPosition {
 /** Where a step ends: before the next action of the same function or a caller, of any function, or of a caller. */
 export type ProgramStep = "over" | "into" | "out";
 
-/** A project with its content. */
+/**
+ * A project with its content.
+ *
+ * `script` is the program in Python as a person has edited it. Build uses its comments and formatting.
+ */
 export interface Project {
   name: string;
   scene_id: string;
@@ -1563,6 +1567,7 @@ export interface Project {
   logic: LogicItem[];
   object_overrides: SceneObjectOverride[];
   project_objects_ids?: string[];
+  script?: string;
 }
 
 /** The shared breakpoints of a project: ids of its action points and actions, and who changed them last. */

@@ -32,6 +32,8 @@ REFERENCES: Final = frozenset({"pose", "position", "joints"})
 """Parameter types whose value is an id in the project."""
 _ANNOTATIONS: Final = {"boolean": "bool", "integer": "int", "double": "float", "string": "str"}
 """The types of variables in Python."""
+DOCSTRING: Final = "Main script of the project"
+"""Start of the docstring of a generated script."""
 _RESERVED: Final = ("ActionPoints", "Resources", "aps", ERROR, "main", "print_exception", "res", NEXT_ACTION)
 _FRAME: Final = """
 def main(res: Resources) -> None:
@@ -81,15 +83,33 @@ class ParameterUse(NamedTuple):
     meta: ParameterMeta
 
 
-class Frame:
-    """The names of one script, and all of its code except the loop."""
+class OwnNames(NamedTuple):
+    """The names that a person has chosen in a script: of objects by id, and of imports by module and name."""
 
-    def __init__(self, scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> None:
+    objects: Mapping[str, str]
+    imports: Mapping[tuple[str, str], str]
+
+
+class Frame:
+    """The names of one script, and all of its code except the loop.
+
+    Args:
+        scene: the scene of the project.
+        project: the project.
+        types: the object types of the scene.
+        own: names to use if they are free.
+    """
+
+    def __init__(
+        self, scene: Scene, project: Project, types: Mapping[str, TypeFacts], own: OwnNames | None = None
+    ) -> None:
         self.scene, self.project, self.types = scene, project, types
+        own = own or OwnNames({}, {})
+        self._own = own
         self.index = ProjectIndex(scene, project)
         self.points: PointNames = names_of(project)
         self.names = Names([*dir(builtins), *_RESERVED])
-        self.objects = {obj.id: self.names.claim(obj.name) for obj in scene.objects}
+        self.objects = {obj.id: self.names.claim(own.objects.get(obj.id, obj.name)) for obj in scene.objects}
         self.imports: dict[tuple[str, str], str] = {}
         self.classes = {obj.id: self.imported(self._facts(obj.type).module, obj.type) for obj in scene.objects}
         self.parameters = {parameter.id: self.names.claim(parameter.name) for parameter in project.parameters}
@@ -110,12 +130,16 @@ class Frame:
         """Import a class if it is not imported yet; return its name in the script."""
         key = (module, name)
         if key not in self.imports:
-            self.imports[key] = self.names.claim(name, f"{name}Type")
+            self.imports[key] = self.names.claim(self._own.imports.get(key, name), f"{name}Type")
         return self.imports[key]
 
     # ------------------------------------------------------------------------------------------------ module
     def module(self, loop: list[ast.stmt], functions: list[ast.stmt] | None = None) -> str:
         """Return the source code of the script, with functions and `loop` after the objects and project parameters."""
+        return Writer(self.comments).module(self.tree(loop, functions))
+
+    def tree(self, loop: list[ast.stmt], functions: list[ast.stmt] | None = None) -> ast.Module:
+        """Return the syntax tree of the script, whose comments are in `comments`."""
         main, entry = parse(_FRAME).body
         assert isinstance(main, ast.FunctionDef)
         objects = [
@@ -147,8 +171,8 @@ class Frame:
                 self.comments[part[0]] = title
                 main.body += part
         main.body += loop
-        heading = ast.Expr(ast.Constant(f"Main script of the project {self.project.name}."))
-        return Writer(self.comments).module(ast.Module([heading, *self._imports(), main, entry], []))
+        heading = ast.Expr(ast.Constant(f"{DOCSTRING} {self.project.name}."))
+        return ast.Module([heading, *self._imports(), main, entry], [])
 
     def _imports(self) -> list[ast.stmt]:
         imports: dict[str, list[ast.alias]] = {

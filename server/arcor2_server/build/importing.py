@@ -93,14 +93,12 @@ def _checked(package: Imported, known: Sequence[SourceFile], options: ImportOpti
 
 def _from_script(package: Imported, types: CombinedTypes) -> Project:
     """Return the project updated from the script, with default values added, as editors do."""
-    from arcor2_server.build.reading import completed_from_script  # not needed for the start of the server
-
     if package.needs_source:
         raise InvalidProject(
             "The project {name} has no logic, so its script cannot be converted to logic.", name=package.project.name
         )
     project = with_present_names(package.scene, package.project, types)
-    return completed_from_script(package.script, package.scene, project, types.facts(package.scene))
+    return script.read_with_text(package.script, package.scene, project, types.facts(package.scene))
 
 
 class _Saved(Data, frozen=True):

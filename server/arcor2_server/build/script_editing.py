@@ -100,12 +100,10 @@ def _changes(
     source: str, items: Sequence[Item], later: Sequence[Change], facts: Mapping[str, TypeFacts]
 ) -> list[Change]:
     """Return the changes that a script makes to these items without later changes."""
-    from arcor2_server.build.reading import completed_from_script  # not needed for the start of the server
-
     base = Document(items)
     base.apply(later)
     scene, project = base.scene, base.project
     assert scene is not None
     assert project is not None
-    wanted = Document().changes_to_fill(scene, completed_from_script(source, scene, project, facts))
+    wanted = Document().changes_to_fill(scene, script.read_with_text(source, scene, project, facts))
     return differences(base, [Item(each.kind, each.id, each.parent, each.rank, each.after) for each in wanted])

@@ -171,6 +171,9 @@ class Writer:
         comments: the comment above a statement.
     """
 
+    unit: str = _INDENT
+    """The indentation of a block."""
+
     def __init__(self, comments: Mapping[ast.stmt, str]) -> None:
         self._comments = comments
         self._lines: list[str] = []
@@ -180,16 +183,40 @@ class Writer:
         self._block(module.body, "")
         return "\n".join(self._lines) + "\n"
 
+    def statements(self, body: Sequence[ast.stmt], indent: str) -> list[str]:
+        """Return the lines of statements."""
+        self._lines = []
+        self._block(body, indent)
+        return self._lines
+
     def _block(self, body: Sequence[ast.stmt], indent: str) -> None:
         before: ast.stmt | None = None
         for node in body:
-            comment = self._comments.get(node)
-            if before is not None:
-                self._lines += [""] * self._distance(before, node, indent, commented=comment is not None)
-            if comment is not None:
-                self._lines.append(f"{indent}# {comment}")
+            self._above(before, node, indent)
             self._statement(node, indent)
             before = node
+
+    def _above(self, before: ast.stmt | None, node: ast.stmt, indent: str) -> None:
+        """Write the blank lines and the comment above a statement."""
+        comment = self._comments.get(node)
+        if before is not None:
+            self._lines += [""] * self._distance(before, node, indent, commented=comment is not None)
+        if comment is not None:
+            self._lines.append(f"{indent}# {comment}")
+
+    def _head(self, node: ast.stmt, lines: Sequence[str], indent: str) -> None:  # noqa: ARG002 - for derived classes
+        """Write a simple statement, or the head of a compound one."""
+        self._lines += lines
+
+    def _part(self, node: ast.stmt, key: object, body: Sequence[ast.stmt], indent: str, head: str = "") -> None:  # noqa: ARG002
+        """Write a block of a compound statement, and the line above it; `key` is "body", "else", or a number."""
+        if head:
+            self._lines.append(f"{indent}{head}")
+        self._block(body, indent + self.unit)
+
+    def _alternative(self, node: ast.If, branch: ast.If, indent: str) -> None:  # noqa: ARG002 - for derived classes
+        """Write the head of `branch`, which is an `elif` of `node`."""
+        self._head(branch, _condition("elif", branch.test, indent), indent)
 
     @staticmethod
     def _distance(before: ast.stmt, node: ast.stmt, indent: str, *, commented: bool) -> int:
@@ -203,42 +230,39 @@ class Writer:
         return int(commented or isinstance(before, _BLOCKS) or isinstance(node, _BLOCKS))
 
     def _statement(self, node: ast.stmt, indent: str) -> None:
-        deeper = indent + _INDENT
         match node:
             case ast.If():
-                word = "if"
+                self._head(node, _condition("if", node.test, indent), indent)
                 branch = node
                 while True:
-                    self._lines += _condition(word, branch.test, indent)
-                    self._block(branch.body, deeper)
+                    self._part(branch, "body", branch.body, indent)
                     match branch.orelse:
-                        case [ast.If() as branch]:
-                            word = "elif"
+                        case [ast.If() as following]:
+                            self._alternative(branch, following, indent)
+                            branch = following
                         case []:
                             return
                         case rest:
-                            self._lines.append(f"{indent}else:")
-                            self._block(rest, deeper)
+                            self._part(branch, "else", rest, indent, "else:")
                             return
             case ast.While():
-                self._lines.append(f"{indent}while {_unparse(node.test)}:")
-                self._block(node.body, deeper)
+                self._head(node, [f"{indent}while {_unparse(node.test)}:"], indent)
+                self._part(node, "body", node.body, indent)
             case ast.With():
-                self._lines.append(f"{indent}with {', '.join(map(_unparse, node.items))}:")
-                self._block(node.body, deeper)
+                self._head(node, [f"{indent}with {', '.join(map(_unparse, node.items))}:"], indent)
+                self._part(node, "body", node.body, indent)
             case ast.Try():
-                self._lines.append(f"{indent}try:")
-                self._block(node.body, deeper)
-                for handler in node.handlers:
+                self._head(node, [f"{indent}try:"], indent)
+                self._part(node, "body", node.body, indent)
+                for number, handler in enumerate(node.handlers):
                     kind = f" {_unparse(handler.type)}" if handler.type else ""
-                    self._lines.append(f"{indent}except{kind}{f' as {handler.name}' if handler.name else ''}:")
-                    self._block(handler.body, deeper)
+                    head = f"except{kind}{f' as {handler.name}' if handler.name else ''}:"
+                    self._part(node, number, handler.body, indent, head)
                 if node.orelse:
-                    self._lines.append(f"{indent}else:")
-                    self._block(node.orelse, deeper)
+                    self._part(node, "else", node.orelse, indent, "else:")
             case ast.FunctionDef():
-                self._lines += [f"{indent}@{_unparse(decorator)}" for decorator in node.decorator_list]
-                self._lines += _signature(node, indent)
-                self._block(node.body, deeper)
+                decorators = [f"{indent}@{_unparse(decorator)}" for decorator in node.decorator_list]
+                self._head(node, [*decorators, *_signature(node, indent)], indent)
+                self._part(node, "body", node.body, indent)
             case _:
-                self._lines += _simple(node, indent)
+                self._head(node, _simple(node, indent), indent)

@@ -9,8 +9,8 @@ from arcor2_hw.data.project import Action, LogicItem, Project
 def keep_extensions(sent: Project, stored: Project) -> Project:
     """Return a sent project with the functions and fields that it lacks, by the ids of its items.
 
-    These fields are the names of errors, retries, error exits, comparisons, and which parameters are variables. An
-    empty name or list removes them, and so does the count 0 of a retry. A condition replaces comparisons.
+    These fields are the names of errors, retries, error exits, comparisons, which parameters are variables, and the
+    script. An empty text or list removes them, and so does the count 0 of a retry. A condition replaces comparisons.
     """
     present = {function.id for function in sent.functions}
     functions = [*sent.functions, *(function for function in stored.functions if function.id not in present)]
@@ -49,4 +49,5 @@ def keep_extensions(sent: Project, stored: Project) -> Project:
     if steps:
         functions = [replace(one, logic=[item(each) for each in one.logic]) for one in functions]
         sent = replace(sent, logic=[item(one) for one in sent.logic])
-    return replace(sent, functions=functions)
+    script = stored.script if isinstance(sent.script, Unset) else sent.script or UNSET
+    return replace(sent, functions=functions, script=script)

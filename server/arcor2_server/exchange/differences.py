@@ -11,7 +11,7 @@ from msgspec import UNSET
 
 from arcor2_hw.data.base import Data, Unset
 from arcor2_hw.data.object_type import ObjectTypeSource
-from arcor2_hw.data.project import END, START
+from arcor2_hw.data.project import END, START, Project
 from arcor2_server.documents.comparisons import text_of
 from arcor2_server.exchange.archive import Archive
 
@@ -56,7 +56,7 @@ def names_of(*archives: Archive) -> dict[str, str]:
 def _tree(archive: Archive) -> dict[str, Any]:
     return {
         "scene": UNSET if archive.scene is None else msgspec.to_builtins(archive.scene),
-        "project": UNSET if archive.project is None else msgspec.to_builtins(archive.project),
+        "project": UNSET if archive.project is None else _project(archive.project),
         "script": UNSET if archive.script is None else _Text(archive.script),
         "object types": {name: _type(one) for name, one in archive.types.items()},
         "installed": dict.fromkeys(archive.installed, "needed"),
@@ -67,6 +67,11 @@ def _tree(archive: Archive) -> dict[str, Any]:
         "stored parameters": msgspec.to_builtins(archive.parameters),
         "stored overrides": msgspec.to_builtins(archive.overrides),
     }
+
+
+def _project(project: Project) -> dict[str, Any]:
+    found: dict[str, Any] = msgspec.to_builtins(project)
+    return found | {"script": _Text(project.script)} if project.script else found
 
 
 def _type(one: ObjectTypeSource) -> dict[str, Any]:

@@ -209,9 +209,10 @@ class ProjectRequests:
     async def _update_base(self, context: Context, project_id: str, **fields: str | bool) -> None:
         session, storage = self._session, self._storage
         without_logic = fields.get("has_logic") is False
+        text = {"script": UNSET} if without_logic else {}
         document = session.document
         if (item := document.find(Kind.PROJECT, project_id)) is not None:
-            changes = [document.update(Kind.PROJECT, project_id, replace(item.value, **fields))]
+            changes = [document.update(Kind.PROJECT, project_id, replace(item.value, **fields, **text))]
             if without_logic:
                 changes += [document.remove(Kind.LOGIC, step.id) for step in document.program_logic()]
             if await self._editing.commit(context, changes):
@@ -219,7 +220,7 @@ class ProjectRequests:
             return
         project = await storage.project(project_id)
         if not context.dry_run:
-            changed = replace(project, **fields, **({"logic": []} if without_logic else {}))
+            changed = replace(project, **fields, **text, **({"logic": []} if without_logic else {}))
             context.emit_first(
                 "ProjectChanged", reduce_to(BareProject, await storage.put_project(changed)), ChangeType.UPDATE_BASE
             )

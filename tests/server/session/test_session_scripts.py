@@ -99,6 +99,38 @@ async def test_problems_name_line_and_column(alice: Person, work: Work) -> None:
     assert "line" not in found["problems"][0]
 
 
+async def test_comments_of_a_script_survive_edits_on_a_tablet(
+    server: SessionServer, alice: Person, bob: Person, work: Work
+) -> None:
+    loaded = await alice.ask("ProjectScript")
+    commented = loaded["script"].replace(
+        '        time.sleep(0.5, an="pause")\n',
+        "        # Let the paint dry.\n        time.sleep(0.5, an='pause')  # seconds\n",
+    )
+    assert commented != loaded["script"]
+    checked = await alice.ask("CheckScript", script=commented, revision=loaded["revision"])
+    assert (checked["problems"], [each["kind"] for each in checked["changes"]]) == ([], ["project"])
+    alice.take()
+    await alice.ask("ImportScript", script=commented, revision=loaded["revision"])
+    events = alice.events()
+    assert not any("Let the paint dry" in str(event) for event in events), "clients of the original receive no text"
+    assert any(event["event"] == "ProjectChanged" for event in events)
+    imported = await alice.ask("ProjectScript")
+    assert imported["script"] == commented
+    again = await alice.ask("CheckScript", script=commented, revision=imported["revision"])
+    assert again["changes"] == []
+
+    await bob.lock(pause := work.action("pause").id)
+    seconds = {"name": "seconds", "type": "double", "value": "9.0"}
+    await bob.ask("UpdateAction", action_id=pause, parameters=[seconds])
+    await bob.ask("WriteUnlock", object_id=pause)
+    edited = (await alice.ask("ProjectScript"))["script"]
+    assert edited == commented.replace("time.sleep(0.5, an='pause')", 'time.sleep(9.0, an="pause")')
+    assert server.session.require_project().script == commented, "the stored text changes only by an import"
+    await alice.ask("Undo")
+    assert (await alice.ask("ProjectScript"))["script"] == loaded["script"].replace("sleep(0.5", "sleep(9.0", 1)
+
+
 async def test_edits_of_others_since_the_script_was_loaded_survive(alice: Person, bob: Person, work: Work) -> None:
     loaded = await alice.ask("ProjectScript")
     script, revision = loaded["script"], loaded["revision"]
@@ -132,7 +164,7 @@ async def test_edits_of_others_since_the_script_was_loaded_survive(alice: Person
 
 async def test_import_needs_the_role_of_the_changes(server: SessionServer, alice: Person, work: Work) -> None:
     loaded = await alice.ask("ProjectScript")
-    with_parameter = loaded["script"].replace("    while True:\n", "    speed = 3\n\n    while True:\n")
+    with_parameter = loaded["script"].replace("\n\n    while True:\n", "\n    speed = 3\n\n    while True:\n")
     checked = await alice.ask("CheckScript", script=with_parameter, revision=loaded["revision"])
     assert [(each["kind"], each["name"]) for each in checked["changes"]] == [("parameter", "speed")]
     [client] = [each for each in server.services.hub.clients if each.user == "alice"]

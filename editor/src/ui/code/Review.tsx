@@ -16,6 +16,7 @@ const KINDS: Record<string, MessageDescriptor> = {
   logic: msg`Step`,
   parameter: msg`Variable`,
   action_point: msg`Action point`,
+  project: msg`Comments and formatting`,
 };
 const CHANGES: Record<string, MessageDescriptor> = { add: msg`added`, update: msg`changed`, remove: msg`removed` };
 
@@ -60,13 +61,12 @@ export function Review({ draft, changes, onClose, onImport }: ReviewProps) {
     <div className="code-review">
       <div className="code-changes">
         <h2>{t`Changes in the project`}</h2>
-        {changes.length === 0 && (
-          <p className="quiet">{t`Only layout and comments differ, which the project does not store.`}</p>
-        )}
+        {changes.length === 0 && <p className="quiet">{t`Nothing to import.`}</p>}
         <ul>
           {changes.map(({ kind, id, name, change }) => (
             <li key={`${kind} ${id}`} data-change={change}>
-              <span className="quiet small">{KINDS[kind] ? i18n._(KINDS[kind]) : kind}</span> {name}{" "}
+              <span className="quiet small">{KINDS[kind] ? i18n._(KINDS[kind]) : kind}</span>{" "}
+              {kind !== "project" && name}{" "}
               <span className={`tag ${change === "remove" ? "bad" : change === "add" ? "good" : ""}`}>
                 {CHANGES[change] ? i18n._(CHANGES[change]) : change}
               </span>

@@ -13,18 +13,22 @@ from arcor2_server.documents.checks.actions import complete_parameters
 
 def completed_from_script(source: str, scene: Scene, project: Project, facts: Mapping[str, TypeFacts]) -> Project:
     """Return the project updated from its script (see `from_script`), with default values added, as editors do."""
-    project = from_script(source, scene, project, facts)
+    return completed(from_script(source, scene, project, facts), scene, facts)
+
+
+def completed(project: Project, scene: Scene, facts: Mapping[str, TypeFacts]) -> Project:
+    """Return the project with default values for missing parameters."""
     functions = {function.id for function in project.functions}
     type_of = {obj.id: obj.type for obj in scene.objects}
 
-    def completed(action: Action) -> Action:
+    def with_defaults(action: Action) -> Action:
         object_id, method = action.parse_type()
         if object_id in functions:
             return action  # a call states all parameters
         return complete_parameters(action, facts[type_of[object_id]].actions[method])
 
     points, changed = (
-        [replace(each, actions=[completed(action) for action in each.actions]) for each in lists]
+        [replace(each, actions=[with_defaults(action) for action in each.actions]) for each in lists]
         for lists in (project.action_points, project.functions)
     )
     return replace(project, action_points=points, functions=changed)
