@@ -86,6 +86,8 @@ def _text(node: ast.expr) -> Any:
     match node:
         case ast.Name(name):
             return name
+        case ast.Attribute(value, attribute):
+            return _text(value), attribute
         case ast.Constant(value):
             return _value(value)
         case ast.UnaryOp(ast.USub(), ast.Constant(int() | float() as value)):
@@ -131,13 +133,19 @@ def _parts(node: ast.stmt) -> tuple[ast.expr | None, ast.Call | None]:
 def _same_call(generated: ast.stmt, written: ast.stmt, declared: Sequence[Declared]) -> bool:
     """Return whether two calls have the same target, function and arguments, by position or by name."""
     (target, call), (other_target, other) = _parts(generated), _parts(written)
-    if call is None or other is None or _dump(target) != _dump(other_target) or _dump(call.func) != _dump(other.func):
+    if call is None or other is None or _text(call.func) != _text(other.func) or _names(target) != _names(other_target):
         return False
     given, found = _arguments(call, declared), _arguments(other, declared)
     defaults = {one.name: _argument(one.default, one.type) for one in declared if one.default is not None}
     if any(name not in defaults or given[name] != defaults[name] for name in given.keys() - found.keys()):
         return False
     return all(given.get(name) == value for name, value in found.items())
+
+
+def _names(target: ast.expr | None) -> Any:
+    if isinstance(target, ast.Tuple):
+        return [_text(each) for each in target.elts]
+    return None if target is None else _text(target)
 
 
 def _arguments(call: ast.Call, declared: Sequence[Declared]) -> dict[str, Any]:
