@@ -253,7 +253,7 @@ export const setRetry = (actionId: string, retry: Retry): Promise<string> =>
 export const renameAction = (action_id: string, new_name: string): Promise<string> =>
   refusal(() => held(action_id, () => call("RenameAction", { action_id, new_name })));
 
-/** Add a copy of an action at the same point, with its own results and without connections. */
+/** Add a copy of an action at the same point, with its retry, its own results, and without connections. */
 export async function duplicateAction(action: Action & { pointId: string }): Promise<void> {
   const { doc } = now();
   if (!doc) return;
@@ -269,6 +269,7 @@ export async function duplicateAction(action: Action & { pointId: string }): Pro
       type: action.type,
       parameters: action.parameters,
       flows,
+      retry: action.retry,
     }))
   )
     return;

@@ -88,17 +88,19 @@ class ParameterRequests:
             updated = replace(updated, value=args.value)
         check_project_parameter(updated)
         # The actions that store results in a variable name it.
-        renamed: list[Action] = []
-        if updated.name != parameter.name:
-            _require_no_result(document, updated)
-            renamed = [_with_output(one, parameter.name, updated.name) for one in document.storing(parameter)]
-        changes = [document.update(Kind.PARAMETER, args.id, updated)]
-        changes += [document.update(Kind.ACTION, action.id, action) for action in renamed]
-        if await self._editing.commit(context, changes):
-            context.emit("ProjectParameterChanged", updated, ChangeType.UPDATE)
-            for action in renamed:
-                context.emit("ActionChanged", action, ChangeType.UPDATE)
-            self._editing.unlock(context, args.id)
+        storing = document.storing(parameter) if updated.name != parameter.name else []
+        async with self._locks.auto_skip_held(context.user, *(action.id for action in storing)):
+            renamed: list[Action] = []
+            if updated.name != parameter.name:
+                _require_no_result(document, updated)
+                renamed = [_with_output(one, parameter.name, updated.name) for one in document.storing(parameter)]
+            changes = [document.update(Kind.PARAMETER, args.id, updated)]
+            changes += [document.update(Kind.ACTION, action.id, action) for action in renamed]
+            if await self._editing.commit(context, changes):
+                context.emit("ProjectParameterChanged", updated, ChangeType.UPDATE)
+                for action in renamed:
+                    context.emit("ActionChanged", action, ChangeType.UPDATE)
+                self._editing.unlock(context, args.id)
 
     @rpc("RemoveProjectParameter")
     async def remove_project_parameter(self, context: Context, args: RemoveProjectParameterArgs) -> None:

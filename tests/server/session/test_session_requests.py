@@ -96,7 +96,7 @@ async def test_comparisons_survive_a_client_that_does_not_know_them(work: Work, 
     await alice.ask("RemoveProjectParameter", id=limit.id)
 
 
-async def test_actions_store_results_in_a_variable(work: Work, alice: Person) -> None:
+async def test_actions_store_results_in_a_variable(work: Work, alice: Person, bob: Person) -> None:
     await work.project("p")
     await alice.ask("AddProjectParameter", name="last", type="double", value="0.0", variable=True)
     last = next(one for one in work.session.project.parameters if one.name == "last")
@@ -114,6 +114,11 @@ async def test_actions_store_results_in_a_variable(work: Work, alice: Person) ->
     with pytest.raises(Refused, match="The action one stores a result in the variable last"):
         await alice.ask("RemoveProjectParameter", id=last.id)
     await alice.lock(last.id)
+    await bob.lock(work.action("two").id)
+    with pytest.raises(Refused, match="bob"):
+        await alice.ask("UpdateProjectParameter", id=last.id, name="newest")
+    assert work.action("one").outputs() == ["last"]
+    await bob.ask("WriteUnlock", object_id=work.action("two").id)
     await alice.ask("UpdateProjectParameter", id=last.id, name="newest")
     assert [work.action(name).outputs() for name in ("one", "two")] == [["newest"], ["newest"]]
     await alice.ask("Undo")
