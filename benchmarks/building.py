@@ -1,12 +1,14 @@
 """Build time as a function of the number of actions: storage, code generation, files and rename."""
 
 import asyncio
+import re
 import tempfile
 import time
 from pathlib import Path
 from typing import Any, Final
 
 import msgspec
+from msgspec.structs import replace
 
 from arcor2_hw.data.geometry import Orientation, Position
 from arcor2_hw.data.object_type import ObjectTypeSource
@@ -133,6 +135,7 @@ async def build(report: Report) -> None:
                 await storage.put_project(project(size))
             await service.build(f"pro_{SIZES[0]}", "warm")
             reading = [_read_back(await service.collect("pro_1000"), types) for _ in range(ROUNDS)]
+            merging = [_merge(await service.collect("pro_1000"), types) for _ in range(ROUNDS)]
             for _ in range(ROUNDS):
                 for size in SIZES:
                     begin = time.perf_counter()
@@ -145,6 +148,7 @@ async def build(report: Report) -> None:
     report.add(Metric("build_1000_ms", medians[1000], ROUNDS, note))
     report.add(Metric("build_10000_ms", medians[10_000], ROUNDS))
     report.add(Metric("read_script_1000_ms", median(reading), ROUNDS))
+    report.add(Metric("merge_script_1000_ms", median(merging), ROUNDS))
 
 
 def _read_back(source_of: BuildInput, types: ObjectTypes) -> float:
@@ -156,6 +160,27 @@ def _read_back(source_of: BuildInput, types: ObjectTypes) -> float:
     elapsed = (time.perf_counter() - begin) * 1e3
     if back != source_of.project:
         raise RuntimeError("The script was not converted back to the same project.")
+    return elapsed
+
+
+def _merge(source_of: BuildInput, types: ObjectTypes) -> float:
+    """Return the time to generate a script with comments after a parameter was changed, ms."""
+    facts = CombinedTypes(types.files(), {}).facts(source_of.scene)
+    plain = from_logic(source_of.scene, source_of.project, facts)
+    source = re.sub(r"(?m)^( +)(bench\.)", r"\1# Comment\n\1\2", plain)
+    [point] = source_of.project.action_points
+    changed = next(one for one in point.actions if len(one.parameters) > 1)
+    pose, speed = changed.parameters
+    actions = [
+        replace(one, parameters=[pose, replace(speed, value="0.75")]) if one is changed else one
+        for one in point.actions
+    ]
+    project = replace(source_of.project, action_points=[replace(point, actions=actions)], script=source)
+    begin = time.perf_counter()
+    merged = from_logic(source_of.scene, project, facts)
+    elapsed = (time.perf_counter() - begin) * 1e3
+    if merged.count("# Comment") != source.count("# Comment") or "0.75" not in merged:
+        raise RuntimeError("The comments were not kept.")
     return elapsed
 
 

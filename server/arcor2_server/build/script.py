@@ -56,6 +56,7 @@ def read_with_text(source: str, scene: Scene, project: Project, types: Mapping[s
     """
     from arcor2_server.build.reading import completed_from_script  # not needed for the start of the server
 
+    source = source.replace("\r\n", "\n").replace("\r", "\n")
     found = completed_from_script(source, scene, project, types)
     for text in (UNSET, project.script):
         candidate = replace(found, script=text)

@@ -47,8 +47,9 @@ class _Parts:
             first = rest.pop(0)
             (self.imports if isinstance(first.node, ast.ImportFrom) else self.texts).append(first)
         match [one.node for one in rest]:
-            case [ast.FunctionDef(), ast.If()]:
-                self.main, self.entry = rest
+            case [ast.FunctionDef(), ast.If()] | [ast.FunctionDef()]:
+                self.main = rest[0]
+                self.entry = rest[1] if len(rest) > 1 else None
             case _:
                 raise _Unusual
 
@@ -194,7 +195,10 @@ def _outside(parts: _Parts, tree: ast.Module) -> list[Edit]:
         if found[3:].startswith(DOCSTRING) and ast.dump(heading) != ast.dump(statement.node):
             edits.append(Edit(statement.start, statement.end, _lines([heading])))
     edits += _imports(parts, [node for node in tree.body if isinstance(node, ast.ImportFrom)])
-    if ast.dump(entry) != ast.dump(parts.entry.node):
+    if parts.entry is None:
+        end = parts.main.end
+        edits.append(Edit(end, end, ["", "", *_lines([entry])]))
+    elif ast.dump(entry) != ast.dump(parts.entry.node):
         edits.append(Edit(parts.entry.start, parts.entry.end, _lines([entry])))
     return edits
 
