@@ -591,10 +591,13 @@ async def test_code_is_edited_and_imported(work: Work) -> None:
     await page.keyboard.type("0.5")
     await page.keyboard.press("Tab")
     await page.keyboard.type("rest")
+    await page.keyboard.press("End")
+    await page.keyboard.type("  # until the board is cold")
     await code.get_by_text(re.compile("changes to import")).wait_for()
     await code.get_by_role("button", name="Review and import").click()
     await code.get_by_role("heading", name="Changes in the project").wait_for()
     assert await code.locator("li", has_text="rest").count() >= 1
+    await code.locator("li", has_text="Comments and formatting").wait_for()
     for name in ("tablet", "phone"):
         await page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
         await screen.settle()
@@ -608,6 +611,11 @@ async def test_code_is_edited_and_imported(work: Work) -> None:
     added = await work.told("ActionChanged", lambda event: event.change_type is ChangeType.ADD)
     assert added.data.name == "rest"
     await screen.sees("Imported. Undo reverts it in one step.")
+    # The comment stays in the generated program.
+    comment = code.locator(".cm-line", has_text="# until the board is cold")
+    await expect(code.get_by_role("button", name="Review and import")).to_have_count(0)
+    await expect(comment).to_contain_text('an="rest"')
+    await screen.picture("program code with a comment")
     await page.get_by_role("button", name="Undo").first.click()
     await work.told("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
     await work.mode("3D")
