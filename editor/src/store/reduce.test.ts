@@ -143,6 +143,15 @@ describe("the open document", () => {
     expect(after(OPEN, closed, { event: "ShowMainScreen", data: { what: "ProjectsList" } }).doc).toBeNull();
   });
 
+  test("keeps the tool of the scene on which a project is created, and no other", () => {
+    const scene: ServerEvent = { event: "OpenScene", data: { scene: SCENE } };
+    const inTool = (state: State): State => ({ ...state, ui: { ...state.ui, tool: "things" } });
+    expect(reduce(inTool(after(scene)), OPEN, NOW).ui?.tool).toBe("things");
+    expect(reduce(inTool(after(OPEN)), scene, NOW).ui?.tool).toBe("");
+    const other: ServerEvent = { event: "OpenProject", data: { scene: { ...SCENE, id: "other" }, project: PROJECT } };
+    expect(reduce(inTool(after(scene)), other, NOW).ui?.tool).toBe("");
+  });
+
   test("keeps the selection after a reconnect if the item still exists", () => {
     const selected = (id: string): State => ({
       ...after(OPEN),

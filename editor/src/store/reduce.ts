@@ -148,9 +148,11 @@ function over(
 }
 
 function open(state: State, doc: NonNullable<State["doc"]>): Partial<State> {
-  const same = state.doc?.scene.id === doc.scene.id && state.doc.project?.id === doc.project?.id;
-  if (same) return { doc, ui: screenOf(state, doc) };
-  return { ...CLOSED, doc, ui: shut(state) };
+  const sameScene = state.doc?.scene.id === doc.scene.id;
+  if (sameScene && state.doc?.project?.id === doc.project?.id) return { doc, ui: screenOf(state, doc) };
+  // A project that is created on the open scene has the tools of the scene, too: the user may have just opened one.
+  const tool = sameScene && !state.doc?.project ? state.ui.tool : "";
+  return { ...CLOSED, doc, ui: { ...shut(state), tool } };
 }
 
 /** Return the screen state without what belonged to the open document. */
