@@ -32,7 +32,7 @@ class ZplPrinterBench(FakeBench):
 
     def reset(self) -> None:
         self.do("heal")
-        self.do("power_cycle")
+        self.do("renew")  # clears the list of received commands, too, which drops the oldest when it is long
 
     def build(self, address: str) -> ZplPrinter:
         return ZplPrinter("printer_id", "printer", settings=ZplPrinterSettings(address, answer_timeout=0.8))

@@ -22,6 +22,7 @@ class MtSicsScaleBench(FakeBench):
 
     def reset(self) -> None:
         self.do("heal")
+        self.do("renew")  # clears the list of received commands, too, which drops the oldest when it is long
         self.do("power_cycle")
         self.do("put", kg=0.5)
         self.fake.control.wait_until(lambda truth: truth["stable"])
