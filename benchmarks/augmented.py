@@ -40,7 +40,7 @@ async def augmented(report: Report, directory: Path, url: str) -> None:
     starts = []
     async with running_browser(*CAMERA, f"--use-file-for-fake-video-capture={video}") as browser:
         for number in range(STARTS):
-            async with screen_of(browser, url, "ipad") as screen:
+            async with screen_of(browser, url, "ipad", drawn=True) as screen:
                 await screen.page.route("**/api/calibration/markers", lambda route: route.fulfill(body=table))
                 await screen.join(f"AR {number}")
                 await screen.until("() => window.__engine?.ids().length > 0")

@@ -84,7 +84,7 @@ async def loading(report: Report, browser: Browser, cell: Cell) -> None:
     """Measure loading the page without a cache while a project is open: first paint, items, robot model."""
     paints, items, robots = [], [], []
     for number in range(LOADS):
-        async with screen_of(browser, cell.url) as screen:
+        async with screen_of(browser, cell.url, drawn=True) as screen:
             await screen.page.add_init_script(f"localStorage.setItem('arcor2-hw.name', 'bench {number}')")
             await screen.page.add_init_script(_PROBE)
             await screen.page.goto(f"{screen.url}/?q=low")
@@ -174,7 +174,7 @@ async def stopping(report: Report, screen: Screen, client: Client, cell: Cell, r
 async def editing(report: Report, browser: Browser, one: Screen, cell: Cell, project: Project) -> None:
     """Measure from a typed number to its event on another screen, and from a step to its preview there."""
     point = project.action_points[0]
-    async with screen_of(browser, cell.url, "small tablet") as two:
+    async with screen_of(browser, cell.url, "small tablet", drawn=True) as two:
         await two.page.add_init_script(_PROBE)
         await two.join("observer")
         await two.item(point.id)
@@ -248,7 +248,7 @@ async def large(report: Report, browser: Browser, cell: Cell, client: Client, pr
         if before != "START":
             await client.call("AddLogicItem", rpc.AddLogicItemArgs(before, added))
         before = added
-    async with screen_of(browser, cell.url) as screen:
+    async with screen_of(browser, cell.url, drawn=True) as screen:
         await screen.page.add_init_script("localStorage.setItem('arcor2-hw.name', 'large')")
         await screen.page.add_init_script(_PROBE)
         await screen.page.goto(f"{screen.url}/?q=low")
@@ -281,7 +281,7 @@ async def measure(report: Report, directory: Path) -> None:
         for number in range(POINTS - len(project.action_points)):
             place = Position(-0.4 + 0.08 * (number % 10), -0.4 + 0.08 * (number // 10), 0.05)
             await client.call("AddActionPoint", rpc.AddActionPointArgs(f"p{number}", place))
-        async with screen_of(browser, cell.url) as screen:
+        async with screen_of(browser, cell.url, drawn=True) as screen:
             await screen.join("Eva")
             await screen.item(robot)
             offline = await _idle(screen)
@@ -289,7 +289,7 @@ async def measure(report: Report, directory: Path) -> None:
         await scene_state(client, SceneStateEnum.STARTED, 30)
         await loading(report, browser, cell)
         await augmented.augmented(report, directory, cell.url)
-        async with screen_of(browser, cell.url) as screen:
+        async with screen_of(browser, cell.url, drawn=True) as screen:
             await screen.page.add_init_script(_PROBE)
             await screen.join("Eva")
             await screen.until("id => window.__engine?.item(id)?.endEffectors.length > 0", robot)

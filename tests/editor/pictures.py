@@ -46,7 +46,7 @@ async def _rest(screen: Screen) -> None:
 async def _tablet(browser: Browser, run: Run, to: Path) -> None:
     at = run.at()
     assert at is not None
-    async with screen_of(browser, at["url"]) as screen:
+    async with screen_of(browser, at["url"], drawn=True) as screen:
         page = screen.page
 
         async def take(name: str) -> None:
@@ -71,7 +71,7 @@ async def _tablet(browser: Browser, run: Run, to: Path) -> None:
 async def _lists(browser: Browser, run: Run, to: Path) -> None:
     at = run.at()
     assert at is not None
-    async with screen_of(browser, at["url"]) as screen:
+    async with screen_of(browser, at["url"], drawn=True) as screen:
         await _come_in(screen)
         await screen.page.get_by_role("button", name=texts.GO_OFFLINE).click()
         await screen.page.get_by_role("button", name=texts.GO_ONLINE).wait_for()
@@ -85,7 +85,7 @@ async def _lists(browser: Browser, run: Run, to: Path) -> None:
 async def _phone(browser: Browser, run: Run, to: Path) -> None:
     at = run.at()
     assert at is not None
-    async with screen_of(browser, at["url"], "phone", dark=True, touch=True) as screen:
+    async with screen_of(browser, at["url"], "phone", dark=True, touch=True, drawn=True) as screen:
         await screen.join("Ben")
         await screen.until("() => window.__engine?.ids().length > 20")
         tools = screen.page.get_by_role("navigation")

@@ -93,7 +93,7 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
     shots = write_video(tmp_path / "camera.mjpeg")
     async with (
         running_browser(*CAMERA, f"--use-file-for-fake-video-capture={tmp_path / 'camera.mjpeg'}") as browser,
-        screen_of(browser, server.url, "ipad", touch=True) as screen,
+        screen_of(browser, server.url, "ipad", touch=True, drawn=True) as screen,
     ):
         page = screen.page
         await page.add_init_script(RECORD_TRACKS)

@@ -211,7 +211,7 @@ async def _is(ask: Any, key: str, expected: Any) -> bool:
 
 async def test_selection_out_of_view_is_found_and_objects_are_faded(place: Place, browser: Browser) -> None:
     point, table = place.point("fixture"), place.object("table")
-    async with screen_of(browser, place.cell.url, touch=True) as screen:
+    async with screen_of(browser, place.cell.url, touch=True, drawn=True) as screen:
         page = screen.page
         await _came_in(screen, "Olga", place)
         # Points have the same size on the screen from any distance, scaled by the user.

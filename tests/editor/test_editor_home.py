@@ -131,7 +131,7 @@ async def test_projects_of_a_scene_pictures_and_templates(
     made: tuple[Client, Scene, Project], cell: Cell, browser: Browser
 ) -> None:
     client, scene, project = made
-    async with screen_of(browser, cell.url) as screen:
+    async with screen_of(browser, cell.url, drawn=True) as screen:
         await screen.join("Eva")
         await tab(screen, texts.SCENES)
         await screen.press(f"Projects on {scene.name}")

@@ -124,7 +124,7 @@ async def place(module_cell: Cell) -> AsyncIterator[Place]:
 
 
 async def test_uploaded_meshes_are_shown(browser: Browser, place: Place) -> None:
-    async with screen_of(browser, place.cell.url) as screen:
+    async with screen_of(browser, place.cell.url, drawn=True) as screen:
         # The browser's message for the two refused requests.
         screen.expected_errors = ("the server responded with a status of 400",)
         await screen.join("Eva")
@@ -145,7 +145,7 @@ async def test_uploaded_meshes_are_shown(browser: Browser, place: Place) -> None
 
 
 async def test_broken_meshes_are_replaced_with_the_reason(browser: Browser, place: Place) -> None:
-    async with screen_of(browser, place.cell.url) as screen:
+    async with screen_of(browser, place.cell.url, drawn=True) as screen:
         screen.expected_errors = ("the server responded with a status of 400",)
         await screen.join("Eva")
         for name, words, badge in (

@@ -80,7 +80,7 @@ async def opened_and_online(screen: Screen, place: Place) -> None:
 
 async def test_join_open_project_and_see_the_robot_move(place: Place, browser: Browser) -> None:
     client = place.client
-    async with screen_of(browser, place.cell.url) as screen:
+    async with screen_of(browser, place.cell.url, drawn=True) as screen:
         await screen.join("Eva")
         await screen.sees("on PCB testing")
         await screen.press(texts.open_document(place.project.name))
