@@ -1,13 +1,13 @@
 """Languages: chosen in the settings, stored with the user, switched without reload; all screens in all languages.
 
 Three pages visit every screen: in a pseudo-locale, whose texts come from the English ones, in Czech and in German. On
-each screen all texts are translated, none is cut off, all controls can be reached, on a tablet and on a phone, and axe
-finds no serious or critical violation. Czech is shown in dark colours, the others in light ones.
+each screen all texts are translated, none is cut off, and all controls can be reached, on a tablet and on a phone. Axe
+finds no serious or critical violation in Czech, which is shown in dark colours, and in German, shown in light ones.
 """
 
 import asyncio
 import re
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 
 import msgspec
@@ -122,7 +122,7 @@ class Visitor:
         self.names = names_in(*documents) | NAMES | PEOPLE | DEFINED_BY_DEVICES
         self._sizes = ["ipad", "phone"]
 
-    async def faults(self, screens: AsyncIterator[str]) -> list[str]:
+    async def faults(self, screens: AsyncIterator[str], *, axe: bool) -> list[str]:
         """Visit these screens, each in both sizes; the next one is opened in the size of the second."""
         found = []
         async for shown in screens:
@@ -134,7 +134,9 @@ class Visitor:
                 layout = [fault for fault in await self.screen.faults() if not fault.startswith("labels ")]
                 faults += [f"{size}: {fault}" for fault in [*await self.screen.clipped(), *layout]]
                 await self.screen.picture(f"{self.language} {shown} {size}")
-            faults += [each for each in await self.screen.barriers() if not (self.pseudo and each.startswith(LONGER))]
+            if axe:
+                barriers = await self.screen.barriers()
+                faults += [each for each in barriers if not (self.pseudo and each.startswith(LONGER))]
             self._sizes.reverse()
             found += [f"{self.language}, {shown}: {fault}" for fault in faults]
         return found
@@ -165,9 +167,11 @@ async def client(module_cell: Cell, visitors: list[Visitor]) -> Client:
     return await module_cell.client("helper")
 
 
-async def visit(visitors: Iterable[Visitor], screens: Callable[[Visitor], AsyncIterator[str]]) -> None:
-    """Visit these screens in all languages."""
-    found = await asyncio.gather(*(each.faults(screens(each)) for each in visitors))
+async def visit(visitors: Sequence[Visitor], screens: Callable[[Visitor], AsyncIterator[str]]) -> None:
+    """Visit these screens in all languages. The pseudo-locale has the colours of German, where axe checks them."""
+    found = await asyncio.gather(
+        *(each.faults(screens(each), axe=not each.pseudo or len(visitors) == 1) for each in visitors)
+    )
     faults = [fault for faults in found for fault in faults]
     assert not faults, "\n".join(faults)
 
