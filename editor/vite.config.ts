@@ -54,5 +54,11 @@ export default defineConfig({
       "/ws": { target: SERVER, ws: true },
     },
   },
-  test: { environment: "node", include: ["src/**/*.test.ts"], setupFiles: ["src/i18n/testing.ts"] },
+  test: {
+    environment: "node",
+    include: ["src/**/*.test.ts"],
+    setupFiles: ["src/i18n/testing.ts"],
+    // One process imports the sources once for all files, instead of each file again.
+    isolate: false,
+  },
 });
