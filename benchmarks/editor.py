@@ -117,7 +117,7 @@ async def _moving(client: Client, cell: Cell, robot: str, height: float) -> None
 
 
 async def _at_rest(cell: Cell) -> bool:
-    return not (await cell.tell("robot", "truth"))["moving"]
+    return not (await cell.command_fake("robot", "truth"))["moving"]
 
 
 async def drawing(report: Report, screen: Screen, client: Client, cell: Cell, robot: str) -> None:
@@ -164,7 +164,7 @@ async def stopping(report: Report, screen: Screen, client: Client, cell: Cell, r
         offset = time.time() - time.monotonic()
         await button.click()
         await until(lambda: _at_rest(cell), "the robot is at standstill")
-        truth = await cell.tell("robot", "truth")
+        truth = await cell.command_fake("robot", "truth")
         tapped = await screen.page.evaluate("() => window.__tap") / 1e3
         took.append((truth["last_stop"]["t"] + offset - tapped) * 1e3)
     note = f"median {median(took):.0f} ms; at the controller, through server and driver"

@@ -48,7 +48,7 @@ class ScriptedServer:
             answer["data"] = self.data[request["request"]]
         await socket.send(json.dumps(answer))
 
-    async def tell(self, **event: Any) -> None:
+    async def send_event(self, **event: Any) -> None:
         await self.sockets[-1].send(json.dumps(event))
 
     async def _serve(self, socket: ServerConnection) -> None:

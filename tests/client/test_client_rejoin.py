@@ -192,9 +192,9 @@ async def test_the_client_waits_for_a_server_that_starts_late() -> None:
 async def test_an_invalid_message_does_not_end_the_connection() -> None:
     async with scripted() as server, Client(server.url) as client:
         await client.next_event()
-        await server.tell(event="SceneState", data={"state": "upside down"})
+        await server.send_event(event="SceneState", data={"state": "upside down"})
         await server.sockets[-1].send("no JSON")
-        await server.tell(event="SomethingNew", data={"any": 1})
+        await server.send_event(event="SomethingNew", data={"any": 1})
         with pytest.raises(EventsMissed):
             await client.next_event()
         event = await client.next_event()
@@ -242,8 +242,8 @@ async def test_streams_can_be_opened_and_closed() -> None:
     async with scripted() as server, Client(server.url) as client:
         with client.follow("SceneSaved") as saved, client.follow("SceneSaved", limit=1) as narrow:
             for _ in range(2):
-                await server.tell(event="SceneSaved")
-            await server.tell(event="SceneClosed")
+                await server.send_event(event="SceneSaved")
+            await server.send_event(event="SceneClosed")
             await client.save_scene()
             assert [(await anext(saved)).event for _ in range(2)] == ["SceneSaved"] * 2
             with pytest.raises(EventsMissed) as missed:

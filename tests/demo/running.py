@@ -30,7 +30,7 @@ class Run:
         file = self.data_dir / "demo.json"
         return msgspec.json.decode(file.read_bytes()) if file.exists() else None
 
-    async def tell(self, name: str, do: str, /, **arguments: Any) -> Any:
+    async def command_fake(self, name: str, do: str, /, **arguments: Any) -> Any:
         at = self.at()
         assert at is not None
         return await ask(at[name]["control"], do, **arguments)

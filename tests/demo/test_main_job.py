@@ -44,7 +44,7 @@ class Cell:
 
     async def renew(self, boards: int = 1) -> None:
         """Prepare a new start like an operator: remove everything and insert new boards."""
-        await self.run.tell("world", "renew", boards=boards, seed=GOOD)
+        await self.run.command_fake("world", "renew", boards=boards, seed=GOOD)
 
     async def program(
         self, client: Client, at: dict[str, Callable[[], Awaitable[Any]]] | None = None, package_id: str = ""
@@ -115,7 +115,7 @@ async def test_four_readings_agree(cell: Cell) -> None:
     await tester.connect()
     counters = (await tester.read_input_registers(12, count=3, device_id=1)).registers
     tester.close()
-    world, erp = await run.tell("world", "truth"), await run.tell("erp", "truth")
+    world, erp = await run.command_fake("world", "truth"), await run.command_fake("erp", "truth")
 
     assert boards == BOARDS
     assert passed > 0 < failed
@@ -129,7 +129,7 @@ async def test_four_readings_agree(cell: Cell) -> None:
 
 
 async def test_good_boards_carry_their_own_label(cell: Cell) -> None:
-    world, printer = await cell.run.tell("world", "truth"), await cell.run.tell("printer", "truth")
+    world, printer = await cell.run.command_fake("world", "truth"), await cell.run.command_fake("printer", "truth")
     good = [board["code"] for board in world["boards"] if board["good"]]
     labels = {board["code"]: board["label"] for board in world["boards"] if board["label"] is not None}
     assert labels == {code: {"code": code, "pressed": True} for code in good}
@@ -137,7 +137,7 @@ async def test_good_boards_carry_their_own_label(cell: Cell) -> None:
 
 
 async def test_the_tower_was_green_while_the_program_ran_and_is_red_after_it(cell: Cell) -> None:
-    io, world = await cell.run.tell("io", "truth"), await cell.run.tell("world", "truth")
+    io, world = await cell.run.command_fake("io", "truth"), await cell.run.command_fake("world", "truth")
     green = [event["on"] for event in io["history"] if event["output"] == 2]
     assert green
     assert (green[0], green[-1]) == (True, False)
@@ -146,25 +146,27 @@ async def test_the_tower_was_green_while_the_program_ran_and_is_red_after_it(cel
 
 # ---------------------------------------------------------------------------------------------------- sabotage
 async def test_each_fault_is_reported_and_the_cell_restarts(cell: Cell) -> None:
-    tell, run = cell.run.tell, cell.run
+    command_fake, run = cell.run.command_fake, cell.run
     async with Client(cell.url, "tests") as client:
         # The label of the board cannot be read: the board is rejected and reported, and the program goes on.
         await cell.renew()
-        await tell("erp", "add_order", order="UNREAD", product="Controller board", quantity=1)
-        assert await cell.program(client, {"picture": lambda: tell("reader", "health", value="FAIL")}) == ""
-        await tell("reader", "health", value="OK")
-        assert (await tell("world", "truth"))["counts"]["bad"] == 1
-        (unread,) = [result for result in (await tell("erp", "truth"))["results"] if result["order"] == "UNREAD"]
+        await command_fake("erp", "add_order", order="UNREAD", product="Controller board", quantity=1)
+        assert await cell.program(client, {"picture": lambda: command_fake("reader", "health", value="FAIL")}) == ""
+        await command_fake("reader", "health", value="OK")
+        assert (await command_fake("world", "truth"))["counts"]["bad"] == 1
+        (unread,) = [
+            result for result in (await command_fake("erp", "truth"))["results"] if result["order"] == "UNREAD"
+        ]
         assert (unread["serial"], unread["passed"]) == ("unread", False)
         assert "no code was read" in unread["note"]
-        await tell("erp", "add_order", order="AGAIN", product="Controller board", quantity=1)
+        await command_fake("erp", "add_order", order="AGAIN", product="Controller board", quantity=1)
 
         # The barcode reader does not answer.
         await cell.renew()
-        await tell("reader", "silence")
+        await command_fake("reader", "silence")
         problem = await cell.program(client)
         assert "reader" in problem
-        await tell("reader", "heal")
+        await command_fake("reader", "heal")
 
         # The belt has a following error, which the command line injects and clears.
         await cell.renew()
@@ -178,52 +180,54 @@ async def test_each_fault_is_reported_and_the_cell_restarts(cell: Cell) -> None:
 
         # The light barrier detects nothing.
         await cell.renew()
-        await tell("world", "barrier", number=0, stuck=False)
+        await command_fake("world", "barrier", number=0, stuck=False)
         problem = await cell.program(client)
         assert "io" in problem
         assert "board_at_stop" in problem
 
         # The gripper has no air; the light barrier is repaired.
         await cell.renew()
-        await tell("world", "gripper", works=False)
+        await command_fake("world", "gripper", works=False)
         problem = await cell.program(client)
         assert "robot picked nothing" in problem
 
         # The tester has no contact.
         await cell.renew()
-        problem = await cell.program(client, {"test": lambda: tell("tester", "fault", code=103, armed=True)})
+        problem = await cell.program(client, {"test": lambda: command_fake("tester", "fault", code=103, armed=True)})
         assert "tester" in problem
         assert "no contact" in problem.lower()
-        await tell("tester", "command", name="clear")
+        await command_fake("tester", "command", name="clear")
         await until(lambda: _state(run, "Stopped"), "the tester to be cleared")
-        await tell("tester", "push_door", opening=True)
+        await command_fake("tester", "push_door", opening=True)
 
         # The printer is out of labels.
         await cell.renew()
-        problem = await cell.program(client, {"label": lambda: tell("printer", "media", labels=0)})
+        problem = await cell.program(client, {"label": lambda: command_fake("printer", "media", labels=0)})
         assert "printer" in problem
         assert "out of labels" in problem
-        await tell("printer", "media", labels=100)
-        (board,) = (await tell("world", "truth"))["boards"]
+        await command_fake("printer", "media", labels=100)
+        (board,) = (await command_fake("world", "truth"))["boards"]
         assert (board["place"], board["label"]) == ("label", None)
-        assert [result for result in (await tell("erp", "truth"))["results"] if result["order"] == "AGAIN"] == []
+        assert [
+            result for result in (await command_fake("erp", "truth"))["results"] if result["order"] == "AGAIN"
+        ] == []
 
         # After all that the cell starts again. The planning service stops meanwhile: production continues.
         await cell.renew()
         missing: list[int] = []
 
         async def down() -> None:
-            await tell("erp", "refuse")
-            await tell("erp", "reset")
+            await command_fake("erp", "refuse")
+            await command_fake("erp", "reset")
 
         async def up() -> None:
-            erp = await tell("erp", "truth")
+            erp = await command_fake("erp", "truth")
             missing.append(sum(result["order"] == "AGAIN" for result in erp["results"]))
-            await tell("erp", "heal")
+            await command_fake("erp", "heal")
 
         assert await cell.program(client, {"bring": down, "all_sent": up}) == ""
     assert missing == [0]
-    world, erp = await tell("world", "truth"), await tell("erp", "truth")
+    world, erp = await command_fake("world", "truth"), await command_fake("erp", "truth")
     assert world["counts"]["good"] == 1
     (board,) = world["boards"]
     repeated = [(result["serial"], result["passed"]) for result in erp["results"] if result["order"] == "AGAIN"]
@@ -236,10 +240,10 @@ async def test_a_package_of_the_first_version_runs_with_its_own_drivers(cell: Ce
         await client.rest.download_package((await client.call("ListPackages"))[-1].id, newest)
         await client.rest.upload_package("first-version", with_the_settings_of(FIRST_VERSION, newest))
         await cell.renew()
-        await cell.run.tell("erp", "add_order", order="FIRST", product="Controller board", quantity=1)
+        await cell.run.command_fake("erp", "add_order", order="FIRST", product="Controller board", quantity=1)
         assert await cell.program(client, package_id="first-version") == ""
         await client.call("DeletePackage", rpc.IdArgs("first-version"))
-    world, erp = await cell.run.tell("world", "truth"), await cell.run.tell("erp", "truth")
+    world, erp = await cell.run.command_fake("world", "truth"), await cell.run.command_fake("erp", "truth")
     (board,) = world["boards"]
     assert (board["place"], board["label"]) == ("good", {"code": board["code"], "pressed": True})
     reported = [(result["serial"], result["passed"]) for result in erp["results"] if result["order"] == "FIRST"]
@@ -265,7 +269,7 @@ def with_the_settings_of(package: Path, other: Path) -> bytes:
 
 
 async def _state(run: Run, wanted: str) -> bool:
-    state: str = (await run.tell("tester", "truth"))["state"]
+    state: str = (await run.command_fake("tester", "truth"))["state"]
     return state == wanted
 
 
@@ -274,7 +278,7 @@ async def test_once_prints_one_line_when_a_fault_ends_the_program(tmp_path: Path
         await until(run.at, "the demo prints its addresses", 40)
         # No call of the belt is running: the message must name it nevertheless.
         await until(lambda: "  board_there" in run.output, "the board to be waited for", 60)
-        await run.tell("belt", "emergency", code=0x2310)
+        await run.command_fake("belt", "emergency", code=0x2310)
         assert await asyncio.wait_for(run.process.wait(), 60) == 8, run.output
     last = run.output.strip().splitlines()[-1]
     assert last.startswith("arcor2-hw demo: ")

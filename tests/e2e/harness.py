@@ -42,7 +42,7 @@ async def until(ask: Callable[[], Any], what: str, timeout: float = 30.0) -> Any
 
 
 class Cell:
-    """All processes. `tell` sends commands to a fake, `client` connects to the server."""
+    """All processes. `command_fake` sends commands to a fake, `client` connects to the server."""
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
@@ -141,7 +141,7 @@ class Cell:
         """Return a connected, registered client, which is closed with the cell or by `close_clients`."""
         return await self._exit.enter_async_context(Client(self.url, name, reconnect=False))
 
-    async def tell(self, name: str, do: str, **arguments: Any) -> Any:
+    async def command_fake(self, name: str, do: str, **arguments: Any) -> Any:
         """Send a command to a fake over its control channel."""
         host, _, port = self.at[name]["control"].rpartition(":")
         reader, writer = await asyncio.open_connection(host, int(port), limit=1 << 22)

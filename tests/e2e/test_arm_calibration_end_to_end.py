@@ -89,7 +89,7 @@ async def place(tmp_path: Path) -> AsyncIterator[Place]:
     cell = Cell(tmp_path)
     try:
         await cell.start_robot()
-        await cell.tell("robot", "calibration", deltas=DELTAS.tolist())
+        await cell.command_fake("robot", "calibration", deltas=DELTAS.tolist())
         await cell.start_server()
         client = await cell.client("alice")
         await client.call("NewScene", rpc.NewSceneArgs("arm"))
@@ -135,7 +135,7 @@ async def test_calibration_from_the_controller_is_used_offline_and_after_a_resta
 async def test_safe_moves_avoid_bodies_added_by_rest_and_the_gripped_part(place: Place) -> None:
     client, robot = place.client, place.robot
     await place.set_host(place.cell.robot_host, Parameter("payload_mass", "double", "0.0"))
-    await place.cell.tell("robot", "place", q=[0.4, -1.3, 1.5, -1.77, -1.57, 0.3])
+    await place.cell.command_fake("robot", "place", q=[0.4, -1.3, 1.5, -1.77, -1.57, 0.3])
     await client.call("StartScene")
     await scene_state(client, SceneStateEnum.STARTED)
     tip = await client.get_end_effector_pose(robot_id=robot, end_effector_id="tcp")
@@ -185,7 +185,7 @@ async def test_safe_moves_avoid_bodies_added_by_rest_and_the_gripped_part(place:
 async def test_calibration_of_another_arm_is_not_used(place: Place) -> None:
     await place.go_online()
     assert (await place.robot_kinematics())["in_force"] == "measured"
-    await place.cell.tell("robot", "calibration", deltas=DELTAS.tolist(), reported=False)
+    await place.cell.command_fake("robot", "calibration", deltas=DELTAS.tolist(), reported=False)
     message = await place.go_online()
     assert "The calibration cannot be read from the controller. The stored one is used." in message
     assert place.cell.robot_host in message
@@ -193,7 +193,7 @@ async def test_calibration_of_another_arm_is_not_used(place: Place) -> None:
 
     strange = DELTAS.copy()
     strange[2, 0] += 0.2
-    await place.cell.tell("robot", "calibration", deltas=strange.tolist())
+    await place.cell.command_fake("robot", "calibration", deltas=strange.tolist())
     message = await place.go_online()
     assert "arm: The calibration in the controller cannot be used. Kinematics are nominal." in message
     kinematics = await place.robot_kinematics()
@@ -201,6 +201,6 @@ async def test_calibration_of_another_arm_is_not_used(place: Place) -> None:
     assert "50 mm" in kinematics["refused"]
     assert (await place.forward()).distance_to(tip()) < 1e-6
 
-    await place.cell.tell("robot", "calibration", deltas=DELTAS.tolist())
+    await place.cell.command_fake("robot", "calibration", deltas=DELTAS.tolist())
     await place.go_online()
     assert (await place.forward()).distance_to(tip(DELTAS)) < 1e-6

@@ -38,7 +38,7 @@ async def running(tmp_path: Path) -> AsyncIterator[Cell]:
 
 
 async def arm(cell: Cell) -> dict[str, Any]:
-    truth: dict[str, Any] = await cell.tell("robot", "truth")
+    truth: dict[str, Any] = await cell.command_fake("robot", "truth")
     return truth
 
 
@@ -112,7 +112,7 @@ async def test_robot_off_at_start_is_named_and_a_later_start_works(cell: Cell) -
 
 
 async def test_joints_are_shown_and_control_is_refused_while_another_program_runs(cell: Cell) -> None:
-    await cell.tell("robot", "foreign_program", on=True)
+    await cell.command_fake("robot", "foreign_program", on=True)
     playing = (await arm(cell))["program"]
     assert playing is not None
     client = await cell.client("operator")
@@ -136,11 +136,11 @@ async def test_joints_are_shown_and_control_is_refused_while_another_program_run
 async def test_a_cable_cut_during_a_move_fails_the_action_and_nothing_moves_again(running: Cell, fault: str) -> None:
     client = await running.client("operator")
     await program_in_mid_move(running, client)
-    await running.tell("robot", fault)
+    await running.command_fake("robot", fault)
     text = await program_ends_with(client)
     assert "robot" in text, text
     await until(lambda: is_stopped(running), "standstill")
-    await running.tell("robot", "heal")
+    await running.command_fake("robot", "heal")
     await assert_stays(running, 2.0)
     await client.call("SystemInfo")
 
@@ -148,7 +148,7 @@ async def test_a_cable_cut_during_a_move_fails_the_action_and_nothing_moves_agai
 async def test_a_protective_stop_is_named_and_stays_until_unlocked(running: Cell) -> None:
     client = await running.client("operator")
     await program_in_mid_move(running, client)
-    await running.tell("robot", "protective_stop")
+    await running.command_fake("robot", "protective_stop")
     text = await program_ends_with(client)
     assert "protective stop" in text.lower(), text
     await assert_stays(running, 6.0)  # the controller refuses to unlock for 5 s: no attempt may follow
@@ -159,11 +159,11 @@ async def test_nothing_moves_after_a_safeguard_stop_until_a_new_command(cell: Ce
     client = await cell.client("operator")
     project = await online(cell, client)
     await start_moving(cell, client, project)
-    await cell.tell("robot", "safeguard_stop", on=True)
+    await cell.command_fake("robot", "safeguard_stop", on=True)
     result = (await client.next_event("ActionResult", timeout=30)).data
     assert not isinstance(result.error, Unset)
     assert "safeguard" in result.error.lower()
-    await cell.tell("robot", "safeguard_stop", on=False)
+    await cell.command_fake("robot", "safeguard_stop", on=False)
     await until(lambda: is_stopped(cell), "standstill")
     await assert_stays(cell, 2.0)
     await start_moving(cell, client, project)

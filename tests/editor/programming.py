@@ -69,7 +69,7 @@ class Work:
 
         await until(opened, f"{name} is open", 30)
         # Events of earlier tests are dropped with this.
-        await self.told("OpenProject", lambda event: event.data.project.id == copy.id)
+        await self.next_event("OpenProject", lambda event: event.data.project.id == copy.id)
         self.project = await self.client.get_project(copy.id)
         await self.screen.page.get_by_role("heading", name=name, exact=True).wait_for()
         await self.screen.item(self.project.action_points[0].id)
@@ -104,7 +104,7 @@ class Work:
         await self.panel.locator(".step-name").get_by_text(name, exact=True).click()
         await self.panel.get_by_role("heading", name=name, exact=True).wait_for()
 
-    async def told(self, name: str, wanted: Any = lambda event: True) -> Event:
+    async def next_event(self, name: str, wanted: Any = lambda event: True) -> Event:
         """Return the next event of that name that is wanted, as the second client receives it."""
         while True:
             event = await self.client.next_event(name)
@@ -117,7 +117,7 @@ class Work:
         flows, parameters = [Flow(FlowTypes.DEFAULT, list(results))], list(values.values())
         args = rpc.AddActionArgs(self.point(point), name, f"{self.object(owner)}/{method}", parameters, flows)
         await self.client.call("AddAction", args)
-        added = await self.told("ActionChanged", lambda event: event.data.name == name)
+        added = await self.next_event("ActionChanged", lambda event: event.data.name == name)
         added_id: str = added.data.id
         return added_id
 

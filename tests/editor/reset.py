@@ -31,18 +31,18 @@ async def reset(cell: Cell, browser: Browser) -> None:
     else:
         await _empty(cell)
     USERS.clear()
-    await cell.tell("tester", "renew")
-    await cell.tell("reader", "heal")
-    await cell.tell("robot", "heal")
-    if (await cell.tell("robot", "truth"))["safety"] != "NORMAL":
+    await cell.command_fake("tester", "renew")
+    await cell.command_fake("reader", "heal")
+    await cell.command_fake("robot", "heal")
+    if (await cell.command_fake("robot", "truth"))["safety"] != "NORMAL":
         await cell.renew_robot()
-    await cell.tell("robot", "place", q=START)
+    await cell.command_fake("robot", "place", q=START)
 
 
 async def place_robot(cell: Cell, screen: Screen, robot: str) -> None:
     """Put the simulated robot at its start position, and wait until the screen shows it there."""
-    await cell.tell("robot", "place", q=START)
-    joints = (await cell.tell("robot", "truth"))["q"]
+    await cell.command_fake("robot", "place", q=START)
+    joints = (await cell.command_fake("robot", "truth"))["q"]
     shown = """([robot, wanted]) => Object.values(window.__engine?.item(robot)?.joints ?? {})
         .filter((value, index) => Math.abs(value - wanted[index]) < 1e-3).length === wanted.length"""
     await screen.until(shown, [robot, joints])

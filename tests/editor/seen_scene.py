@@ -28,9 +28,9 @@ async def camera_of(cell: Cell, *, width: int = 1280, height: int = 720) -> Asyn
 
 async def new_scene(cell: Cell, client: Client) -> dict[str, str]:
     """Open a new scene whose poses of camera and robot are wrong; return the ids of `scene`, `eye` and `arm`."""
-    await cell.tell("camera", "scene", things=in_view())
-    await cell.tell("camera", "camera", pose=pose(CAMERA))
-    await cell.tell("robot", "place", q=Q)
+    await cell.command_fake("camera", "scene", things=in_view())
+    await cell.command_fake("camera", "camera", pose=pose(CAMERA))
+    await cell.command_fake("robot", "place", q=Q)
     await client.new_scene(SCENE)
     near = Pose(CAMERA.position + Position(0.1, -0.05, 0.08), CAMERA.orientation)
     wrong = Pose(ROBOT.position + Position(0.02, -0.015, 0.01), ROBOT.orientation * tilted(0.03))

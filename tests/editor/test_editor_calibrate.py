@@ -294,7 +294,7 @@ async def test_aiming_wizard_shows_how_well_the_points_fit(
 
         await screen.press("Start")
         for number, (q, at) in enumerate(zip(TOUCHES, touched, strict=True), 1):
-            await cell.tell("robot", "place", q=q)
+            await cell.command_fake("robot", "place", q=q)
             await until(functools.partial(_tool_at, screen, ids["arm"], at), "the tool is seen there", 15)
             await screen.press(f"Record point {number}")
             await panel.get_by_role("button", name=f"Record point {number} again").wait_for()
@@ -315,7 +315,7 @@ async def test_aiming_wizard_shows_how_well_the_points_fit(
 
 async def _touch(cell: Cell, client: Client, arm: str, q: tuple[float, ...]) -> Position:
     """Put the simulated robot at these joints and return the position of its tool."""
-    await cell.tell("robot", "place", q=q)
+    await cell.command_fake("robot", "place", q=q)
 
     async def there() -> bool:
         joints = await client.get_robot_joints(arm)

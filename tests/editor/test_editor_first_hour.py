@@ -81,7 +81,7 @@ class Counting:
 
 async def test_from_an_empty_server_to_a_stepped_program(cell: Cell, browser: Browser) -> None:
     await cell.renew_robot()  # the height that it reports includes the tool that an earlier test has set
-    await cell.tell("robot", "place", q=START)
+    await cell.command_fake("robot", "place", q=START)
     addresses = cell.addresses()
     async with screen_of(browser, cell.url, "ipad", touch=True) as screen:
         user, page = Counting(screen), screen.page
@@ -223,12 +223,12 @@ async def test_a_missing_payload_is_named_and_set(cell: Cell, browser: Browser) 
 
 
 async def tool_height(cell: Cell) -> float:
-    height: float = (await cell.tell("robot", "truth"))["tcp_pose"][2]
+    height: float = (await cell.command_fake("robot", "truth"))["tcp_pose"][2]
     return height
 
 
 async def is_at(cell: Cell, height: float) -> bool:
-    return abs(await tool_height(cell) - height) < 1e-4 and not (await cell.tell("robot", "truth"))["moving"]
+    return abs(await tool_height(cell) - height) < 1e-4 and not (await cell.command_fake("robot", "truth"))["moving"]
 
 
 async def is_saved(client: Client) -> bool:

@@ -64,7 +64,7 @@ async def panel_away(screen: Screen) -> None:
 
 
 async def moving(cell: Cell) -> bool:
-    speeds: list[float] = (await cell.tell("robot", "truth"))["qd"]
+    speeds: list[float] = (await cell.command_fake("robot", "truth"))["qd"]
     return max(map(abs, speeds)) > 1e-3
 
 

@@ -233,11 +233,11 @@ async def test_running_program(visitors: list[Visitor], client: Client, module_c
     while (await client.next_event("PackageState")).data.state is not PackageStateEnum.PAUSED:
         pass
     await visit(visitors, lambda each: each.tour.running())
-    await module_cell.tell("reader", "present", code="PCB-1")
-    await module_cell.tell("reader", "late", seconds=60)
+    await module_cell.command_fake("reader", "present", code="PCB-1")
+    await module_cell.command_fake("reader", "late", seconds=60)
     await client.call("ResumePackage")
     await visit(visitors, lambda each: each.tour.executing())
-    await module_cell.tell("reader", "power_cycle")
+    await module_cell.command_fake("reader", "power_cycle")
     await visit(visitors, lambda each: each.tour.failed())
 
 

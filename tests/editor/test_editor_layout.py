@@ -67,7 +67,7 @@ class Looks:
         await self.screen.picture(f"{what} large text")
         await page.evaluate("() => { document.documentElement.style.fontSize = ''; }")
 
-    def told(self) -> str:
+    def report(self) -> str:
         return "\n".join(f"{where}: {fault}" for where, faults in self.found.items() for fault in faults)
 
     async def _note(self, where: str, faults: list[str]) -> None:
@@ -111,7 +111,7 @@ async def test_join_and_home(cell: Cell, project: Project, browser: Browser) -> 
         await page.keyboard.press("Escape")
         await page.get_by_role("radio", name=texts.PACKAGES).click()
         await looks.at("empty list", FEW)
-        assert not looks.found, looks.told()
+        assert not looks.found, looks.report()
 
 
 @asynccontextmanager
@@ -121,7 +121,7 @@ async def at_work(cell: Cell, project: Project, browser: Browser, *, dark: bool)
         await at_the_project(screen, "Adam", project)
         looks = Looks(screen, dark=dark)
         yield screen, looks
-        assert not looks.found, looks.told()
+        assert not looks.found, looks.report()
 
 
 async def test_the_workplace(cell: Cell, project: Project, browser: Browser) -> None:
@@ -218,4 +218,4 @@ async def test_lost_server(cell: Cell, project: Project, browser: Browser) -> No
         await screen.sees(texts.NO_CONNECTION)
         looks = Looks(screen)
         await looks.at("lost server")
-        assert not looks.found, looks.told()
+        assert not looks.found, looks.report()

@@ -256,7 +256,7 @@ async def test_point_is_moved_to_the_robot_by_a_tap_and_by_hand_guiding(place: P
     button = page.get_by_role("button", name=re.compile("^Hold to teach"))
 
     async def free() -> bool:
-        return bool((await place.cell.tell("robot", "truth"))["freedrive"])
+        return bool((await place.cell.command_fake("robot", "truth"))["freedrive"])
 
     async def guided() -> bool:
         """Guide the robot; press again if the hold has ended, as it may on a busy machine."""
@@ -264,14 +264,14 @@ async def test_point_is_moved_to_the_robot_by_a_tap_and_by_hand_guiding(place: P
             await page.mouse.up()
             await button.hover()
             await page.mouse.down()
-        truth = await place.cell.tell("robot", "truth")
+        truth = await place.cell.command_fake("robot", "truth")
         if not truth["freedrive"]:
             return False
         if max(abs(a - b) for a, b in zip(truth["q"], goal, strict=True)) < 1e-3:
             return await button.get_attribute("data-held") == "true"
         if not any(truth["qd"]):
             with contextlib.suppress(AssertionError):  # hand guiding has ended meanwhile
-                await place.cell.tell("robot", "guide", q=goal, speed=0.5)
+                await place.cell.command_fake("robot", "guide", q=goal, speed=0.5)
         return False
 
     await until(guided, "the arm was moved by hand", 20)
@@ -333,7 +333,7 @@ async def test_robot_is_previewed_and_moved_to_a_taught_orientation(place: Place
     await until(reached, "the tool is as it is taught", 20)
 
     async def rests() -> bool:
-        return not any((await place.cell.tell("robot", "truth"))["qd"])
+        return not any((await place.cell.command_fake("robot", "truth"))["qd"])
 
     await until(rests, "the arm rests")
     # The tool is rotated to another orientation at the same position.

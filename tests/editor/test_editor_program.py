@@ -62,9 +62,9 @@ async def test_action_at_the_crosshair_takes_two_taps(work: Work) -> None:
     assert aimed, "the view shows the table in its middle"
     await work.tap_button("move Move the TCP to a pose.")
     assert work.taps <= 3
-    point = (await work.told("ActionPointChanged")).data
-    orientation = (await work.told("OrientationChanged")).data
-    action = (await work.told("ActionChanged")).data
+    point = (await work.next_event("ActionPointChanged")).data
+    orientation = (await work.next_event("OrientationChanged")).data
+    action = (await work.next_event("ActionChanged")).data
     assert math.dist(tuple(point.position), aimed) < 1e-6
     # The tool points down on the table: its z axis is opposite to the surface normal.
     assert abs(orientation.orientation.x) == pytest.approx(1, abs=1e-3)
@@ -89,7 +89,7 @@ async def test_values_are_validated_by_field_and_server(work: Work) -> None:
     await expect(work.panel.get_by_role("alert")).to_have_text("Enter a whole number.")
     await field.fill("3")
     await field.press("Enter")
-    await work.told("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
+    await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
     assert (await work.parameters(action))["number"] == number(3)
     # Locked by another user: refused at the field, and the typed text stays.
     await work.client.call("WriteLock", rpc.WriteLockArgs(action))
@@ -103,9 +103,9 @@ async def test_values_are_validated_by_field_and_server(work: Work) -> None:
     # It becomes a new project parameter.
     await work.panel.get_by_role("radiogroup", name="Source of number").get_by_text("Project").click()
     await field.select_option(label="New variable…")
-    made = (await work.told("ProjectParameterChanged")).data
+    made = (await work.next_event("ProjectParameterChanged")).data
     assert (made.name, made.type, made.value) == ("number", "integer", "3")
-    await work.told("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
+    await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
     linked = (await work.parameters(action))["number"]
     assert (linked.type, reference(linked)) == ("project_parameter", made.id)
     await work.tool(texts.PROGRAM)
@@ -121,14 +121,14 @@ async def test_only_results_of_earlier_actions_can_be_used(work: Work) -> None:
     first = await work.add("count_up", "counter/increment", "feeder", "so_many")
     second = await work.add("take_off", "counter/decrement", "feeder", "left_over")
     await work.client.call("AddLogicItem", rpc.AddLogicItemArgs(first, second))
-    await work.told("LogicItemChanged")
+    await work.next_event("LogicItemChanged")
     await work.select("count_up")
     await work.panel.get_by_role("radiogroup", name="Source of by").get_by_text("Project").wait_for()
     assert await work.panel.get_by_text("Result", exact=True).count() == 0
     await work.select("take_off")
     await work.panel.get_by_role("radiogroup", name="Source of by").get_by_text("Result").click()
     await work.panel.get_by_label("by", exact=True).select_option(label="so_many of count_up")
-    await work.told("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
+    await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
     linked = (await work.parameters(second))["by"]
     assert (linked.type, reference(linked)) == ("link", f"{first}/default/0")
 
@@ -152,10 +152,10 @@ async def test_branch_takes_four_taps_and_step_two(work: Work) -> None:
     await work.tap_button("check_input: yes", graph)
     await page.get_by_role("status").filter(has_text="Tap the step that follows check_input").wait_for()
     await node("on_yes")
-    step = (await work.told("LogicItemChanged")).data
+    step = (await work.next_event("LogicItemChanged")).data
     await work.tap_button("check_input: no", graph)
     await node("on_no")
-    other = (await work.told("LogicItemChanged")).data
+    other = (await work.next_event("LogicItemChanged")).data
     assert work.taps <= 5
     assert [(each.start, each.end, each.condition.what, each.condition.value) for each in (step, other)] == [
         (check, yes, f"{check}/default/0", "true"),
@@ -164,7 +164,7 @@ async def test_branch_takes_four_taps_and_step_two(work: Work) -> None:
     work.taps = 0
     await work.tap_button("on_yes: next", graph)
     await node("on_no")
-    joined = (await work.told("LogicItemChanged")).data
+    joined = (await work.next_event("LogicItemChanged")).data
     assert work.taps == 2
     assert (joined.start, joined.end, joined.condition) == (yes, no, UNSET)
     # A loop is refused without a request.
@@ -185,7 +185,7 @@ async def test_branch_takes_four_taps_and_step_two(work: Work) -> None:
     await work.tap_button("Change target", work.panel)
     await page.get_by_role("status").filter(has_text="Tap the step that follows on_yes").wait_for()
     await graph.locator('.react-flow__node[data-id="END"] .flow-name').click()
-    moved = await work.told("LogicItemChanged")
+    moved = await work.next_event("LogicItemChanged")
     assert (moved.change_type, moved.data.id, moved.data.end) == (ChangeType.UPDATE, joined.id, "END")
     await screen.picture("program graph")
     await work.mode("3D")
@@ -205,15 +205,15 @@ async def test_error_exit_is_added_in_the_graph_and_its_error_used(work: Work) -
     await work.tap_button("grab: On error", graph)
     await page.get_by_role("status").filter(has_text="Tap the step that follows if grab fails").wait_for()
     await graph.locator('.react-flow__node[aria-label^="tell,"] .flow-name').click()
-    exit_ = (await work.told("LogicItemChanged")).data
+    exit_ = (await work.next_event("LogicItemChanged")).data
     assert (exit_.start, exit_.end, exit_.error_kinds) == (grab, tell, ["error"])
-    await work.told("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
+    await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
     await work.panel.get_by_label("Name of the error").wait_for()
     await page.get_by_role("button", name=re.compile("^Undo")).click()
-    gone = await work.told("LogicItemChanged")
+    gone = await work.next_event("LogicItemChanged")
     assert (gone.change_type, gone.data.id) == (ChangeType.REMOVE, exit_.id)
     await page.get_by_role("button", name=re.compile("^Redo")).click()
-    await work.told("LogicItemChanged")
+    await work.next_event("LogicItemChanged")
     named = next(each for point in (await work.saved()).action_points for each in point.actions if each.id == grab)
     assert named.error_output == "get_digital_input_error"
     await graph.locator('.react-flow__node[aria-label^="grab,"] .flow-name').click()
@@ -221,7 +221,7 @@ async def test_error_exit_is_added_in_the_graph_and_its_error_used(work: Work) -
     # Its kinds are chosen in plain words, and the edge names them.
     for kind in ("Refused", "Not done in time"):
         await work.panel.locator(".kinds .chip", has_text=kind).click()
-        changed = (await work.told("LogicItemChanged")).data
+        changed = (await work.next_event("LogicItemChanged")).data
     assert changed.error_kinds == ["refused", "device_timeout"]
     await graph.get_by_text("on error: 2 kinds").wait_for()
     await screen.picture("program error exit")
@@ -229,7 +229,7 @@ async def test_error_exit_is_added_in_the_graph_and_its_error_used(work: Work) -
     await graph.locator('.react-flow__node[aria-label^="tell,"] .flow-name').click()
     await work.panel.get_by_role("radiogroup", name="Source of text").get_by_text("Result").click()
     await work.panel.get_by_label("text", exact=True).select_option(label="text of the error of grab")
-    await work.told("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
+    await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.UPDATE)
     assert reference((await work.parameters(tell))["text"]) == f"{grab}/error/2"
     assert await screen.faults() == []
     await work.mode("3D")
@@ -317,7 +317,7 @@ async def test_straight_sequences_are_folded_except_around_the_selection(work: W
     # A step to the folded sequence leads to its first action.
     await work.tap_button("lead: next", graph)
     await one.locator(".flow-name").click()
-    step = await work.told("LogicItemChanged", lambda event: event.data.start == lead)
+    step = await work.next_event("LogicItemChanged", lambda event: event.data.start == lead)
     assert step.data.end == head
     # A fault is unfolded as well: here a removed step.
     out = next(each for each in (await work.saved()).logic if each.start == third)
@@ -346,17 +346,17 @@ async def test_action_is_renamed_and_duplicated(work: Work) -> None:
     await expect(work.panel.get_by_role("alert")).to_contain_text("scan already")
     await name.fill("look_here")
     await name.press("Enter")
-    renamed = await work.told("ActionChanged", lambda event: event.data.name == "look_here")
+    renamed = await work.next_event("ActionChanged", lambda event: event.data.name == "look_here")
     assert renamed.change_type is ChangeType.UPDATE_BASE
     await work.panel.get_by_role("heading", name="look_here", exact=True).wait_for()
     await work.tap_button(texts.DUPLICATE, work.panel)
-    copy = (await work.told("ActionChanged", lambda event: event.change_type is ChangeType.ADD)).data
+    copy = (await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.ADD)).data
     saved = {each.id: each for point in (await work.saved()).action_points for each in point.actions}
     assert (saved[copy.id].type, saved[copy.id].parameters) == (saved[look].type, [number(3)])
     assert saved[copy.id].flows[0].outputs not in ([], ["seen"]), "each result has a name of its own"
     await work.panel.get_by_role("heading", name=copy.name, exact=True).wait_for()
     await work.tap_button(texts.REMOVE, work.panel)
-    await work.told("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
+    await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
     await expect(page.get_by_role("option", name=f"{copy.name} Action")).to_have_count(0)
 
 
@@ -373,12 +373,12 @@ async def test_removed_action_is_bridged_and_restored_by_one_undo(work: Work) ->
     await work.select("close")
     work.taps = 0
     await work.tap_button(texts.REMOVE, work.panel)
-    await work.told("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
+    await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
     now = await work.saved()
     assert {(each.start, each.end) for each in now.logic if each.end == test} == {(work.action("insert").id, test)}
     assert not [each for each in now.logic if close in (each.start, each.end)]
     await page.get_by_role("button", name="Undo removing the action close").click()
-    await work.told("ActionChanged", lambda event: event.change_type is ChangeType.ADD)
+    await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.ADD)
 
     async def back() -> bool:
         return bool((await work.saved()).logic == before.logic)
@@ -414,18 +414,18 @@ async def test_step_in_the_view_and_integer_condition_with_else(work: Work) -> N
     await work.tap_button("Connect", work.panel)
     await page.evaluate("id => __engine.focus(id)", rest)
     await screen.tap(rest)
-    plain = (await work.told("LogicItemChanged")).data
+    plain = (await work.next_event("LogicItemChanged")).data
     assert (plain.start, plain.end, plain.condition) == (count, rest, UNSET)
     # Next to it a step with a condition: the first one becomes the else branch.
     await work.select("how_many")
     await work.tap_button("Connect", work.panel)
     await work.tap_button("at_three", work.panel)
-    asked = (await work.told("LogicItemChanged")).data
+    asked = (await work.next_event("LogicItemChanged")).data
     assert (asked.end, asked.condition.value) == (three, "0")
     value = work.panel.get_by_label("Value of many")
     await value.fill("3")
     await value.press("Enter")
-    changed = await work.told("LogicItemChanged")
+    changed = await work.next_event("LogicItemChanged")
     assert (changed.change_type, changed.data.id) == (ChangeType.UPDATE, asked.id)
     assert (changed.data.condition.what, changed.data.condition.value) == (f"{count}/default/0", "3")
     await work.select("how_many")
@@ -443,12 +443,14 @@ async def test_a_condition_of_several_comparisons(work: Work) -> None:
     for start, end in ((check, count), (count, rest), (count, few)):
         condition = rpc.ProjectLogicIf(f"{count}/default/0", "0") if end == few else UNSET
         await work.client.call("AddLogicItem", rpc.AddLogicItemArgs(start, end, condition))
-    step = (await work.told("LogicItemChanged", lambda event: event.data.end == few)).data
+    step = (await work.next_event("LogicItemChanged", lambda event: event.data.end == few)).data
     await work.select("how_many_parts")
     await work.panel.get_by_role("button", name="few").first.click()
 
     async def changed(holds: Callable[[Any], bool]) -> Any:
-        event = await work.told("LogicItemChanged", lambda event: event.data.id == step.id and holds(event.data.when))
+        event = await work.next_event(
+            "LogicItemChanged", lambda event: event.data.id == step.id and holds(event.data.when)
+        )
         return event.data.when
 
     await work.panel.get_by_label("Comparison", exact=True).select_option(label="from … to below …")
@@ -494,7 +496,7 @@ async def test_program_fault_is_listed_and_leads_to_its_action(work: Work) -> No
     await work.panel.get_by_role("heading", name="lonely", exact=True).wait_for()
     assert (await work.screen.page.evaluate("id => __engine.item(id).visible", lonely)) is True
     await work.tap_button(texts.REMOVE, work.panel)
-    gone = await work.told("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
+    gone = await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
     assert gone.data.id == lonely
     await work.tool(texts.PROGRAM)
     await expect(fault).to_have_count(0)
@@ -509,12 +511,12 @@ async def test_device_setting_is_overridden_in_one_project(work: Work) -> None:
     scenes = await field.input_value()
     await field.fill("1502")
     await field.press("Enter")
-    replaced = await work.told("OverrideUpdated")
+    replaced = await work.next_event("OverrideUpdated")
     assert (replaced.change_type, replaced.parent_id) == (ChangeType.ADD, work.object("tester"))
     assert (replaced.data.name, replaced.data.value) == ("port", "1502")
     await settings.get_by_text(f"In the scene: {scenes}").wait_for()
     await settings.get_by_role("button", name="Reset port to the scene").click()
-    assert (await work.told("OverrideUpdated")).change_type is ChangeType.REMOVE
+    assert (await work.next_event("OverrideUpdated")).change_type is ChangeType.REMOVE
     await expect(field).to_have_value(scenes)
 
 
@@ -608,7 +610,7 @@ async def test_code_is_edited_and_imported(work: Work) -> None:
     await page.emulate_media(color_scheme="light")
     await page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
     await code.get_by_role("button", name="Import", exact=True).click()
-    added = await work.told("ActionChanged", lambda event: event.change_type is ChangeType.ADD)
+    added = await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.ADD)
     assert added.data.name == "rest"
     await screen.sees("Imported. Undo reverts it in one step.")
     # The comment stays in the generated program.
@@ -617,7 +619,7 @@ async def test_code_is_edited_and_imported(work: Work) -> None:
     await expect(comment).to_contain_text('an="rest"')
     await screen.picture("program code with a comment")
     await page.get_by_role("button", name="Undo").first.click()
-    await work.told("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
+    await work.next_event("ActionChanged", lambda event: event.change_type is ChangeType.REMOVE)
     await work.mode("3D")
 
 
@@ -677,11 +679,11 @@ async def test_project_without_logic_has_no_program(work: Work) -> None:
     await work.client.call("NewProject", rpc.NewProjectArgs(work.scene.id, "Loose actions", has_logic=False))
     await page.get_by_role("heading", name="Loose actions").wait_for()
     await work.client.call("AddActionPoint", rpc.AddActionPointArgs("here", Position(0.4, 0.0, 0.2)))
-    point = (await work.told("ActionPointChanged")).data.id
+    point = (await work.next_event("ActionPointChanged")).data.id
     flows = [Flow(FlowTypes.DEFAULT, [])]
     args = rpc.AddActionArgs(point, "alone", f"{work.object('flow')}/wait", [], flows)
     await work.client.call("AddAction", args)
-    alone = (await work.told("ActionChanged")).data.id
+    alone = (await work.next_event("ActionChanged")).data.id
     await work.screen.item(alone)
     assert await page.evaluate("['START', 'END'].map((id) => __engine.item(id) ?? null)") == [None, None]
     modes = page.get_by_role("radiogroup", name="View mode").get_by_role("radio")

@@ -73,7 +73,7 @@ async def go_offline(work: Work) -> None:
 
 
 async def state(work: Work, wanted: PackageStateEnum) -> None:
-    await work.told("PackageState", lambda event: event.data.state is wanted)
+    await work.next_event("PackageState", lambda event: event.data.state is wanted)
 
 
 async def is_broken_at(work: Work, *ids: str) -> bool:
@@ -169,7 +169,7 @@ async def test_single_action_is_executed_and_another_cancelled(work: Work) -> No
     present = await work.add("look_for_board", "tester/board_present", "fixture", "is_there")
     await work.select("look_for_board")
     await work.tap_button("Try", work.panel)
-    result: Any = (await work.told("ActionResult")).data
+    result: Any = (await work.next_event("ActionResult")).data
     assert (result.action_id, result.results) == (present, ["false"])
     outcome = work.panel.get_by_role("status").filter(has_text="Done")
     await expect(outcome).to_contain_text("is_there")
@@ -178,7 +178,7 @@ async def test_single_action_is_executed_and_another_cancelled(work: Work) -> No
     await work.select("wait_long")
     await work.tap_button("Try", work.panel)
     await work.tap_button(texts.CANCEL, work.panel)
-    await work.told("ActionCancelled")
+    await work.next_event("ActionCancelled")
     await work.panel.get_by_role("button", name="Try").wait_for()
     await go_offline(work)
 
@@ -197,9 +197,9 @@ async def test_choices_come_from_the_device_and_stay_when_it_is_offline(work: Wo
     shelf = work.panel.get_by_label("shelf", exact=True)
     board = work.panel.get_by_role("combobox", name="board", exact=True)  # a text field until the choices arrive
     await shelf.get_by_text("lower").click()
-    await work.told("ActionChanged", lambda event: event.data.name == "fetch_one")
+    await work.next_event("ActionChanged", lambda event: event.data.name == "fetch_one")
     await board.select_option(label="lower board 2")
-    await work.told("ActionChanged", lambda event: event.data.name == "fetch_one")
+    await work.next_event("ActionChanged", lambda event: event.data.name == "fetch_one")
     stored = await work.parameters(fetch)
     assert (stored["shelf"].value, stored["board"].value) == ('"lower"', '"lower board 2"')
     await go_offline(work)

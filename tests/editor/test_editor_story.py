@@ -52,7 +52,7 @@ class User:
         return await self.panel.get_by_role("heading", level=2).inner_text()
 
     async def robot(self) -> dict[str, Any]:
-        truth: dict[str, Any] = await self.workplace.tell("robot", "truth")
+        truth: dict[str, Any] = await self.workplace.command_fake("robot", "truth")
         return truth
 
     async def moving(self) -> bool:
@@ -172,11 +172,11 @@ async def test_the_first_day(workplace: Run, browser: Browser) -> None:
         await user.tool(texts.DEVICES)
         row = user.panel.get_by_role("listitem").filter(has_text="robot").filter(has_text="online")
         await row.wait_for()
-        await workplace.tell("robot", "silence")
+        await workplace.command_fake("robot", "silence")
         lost = user.panel.get_by_role("listitem").filter(has_text="connection lost")
         await expect(lost).to_contain_text("robot")
         await screen.picture("story cable")
-        await workplace.tell("robot", "heal")
+        await workplace.command_fake("robot", "heal")
         await user.panel.get_by_role("listitem").filter(has_text="robot").filter(has_text="online").wait_for()
         await asyncio.sleep(0.3)
         assert (await user.robot())["q"] == pytest.approx(still, abs=1e-3), "it moved by itself"

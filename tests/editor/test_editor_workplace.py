@@ -238,7 +238,7 @@ async def test_online_without_a_device_and_retry(place: Place, browser: Browser)
         await screen.item(place.robot)
         await _tool(screen, texts.DEVICES)
         await screen.sees("The workplace is offline.")
-        await place.cell.tell("tester", "refuse")
+        await place.cell.command_fake("tester", "refuse")
         try:
             await screen.press(texts.GO_ONLINE)
             tester = page.get_by_role("listitem").filter(has=page.get_by_text("tester", exact=True))
@@ -257,7 +257,7 @@ async def test_online_without_a_device_and_retry(place: Place, browser: Browser)
             await screen.picture("device fault phone")
             await page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
         finally:
-            await place.cell.tell("tester", "heal")
+            await place.cell.command_fake("tester", "heal")
         await screen.press("Retry tester")
         await expect(tester).not_to_contain_text("not reachable", timeout=40_000)
         await page.get_by_role("button", name=texts.GO_OFFLINE).wait_for()
