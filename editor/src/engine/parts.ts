@@ -93,7 +93,8 @@ export class Parts {
   private left(place: DetectedPart): void {
     const ahead = ({ position }: DetectedPart) => (position.x - place.position.x) * this.direction;
     const next = this.places.filter((each) => ahead(each) > 0).sort((a, b) => ahead(a) - ahead(b))[0];
-    if (next && !next.seen) this.gliders.push({ mesh: this.mesh(place), to: next, moved: this.velocity !== 0, waits: 0 });
+    if (next && !next.seen)
+      this.gliders.push({ mesh: this.mesh(place), to: next, moved: this.velocity !== 0, waits: 0 });
   }
 
   private mesh({ position, size }: DetectedPart): Mesh {
