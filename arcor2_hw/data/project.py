@@ -22,6 +22,13 @@ ERROR_PARTS: Final = ("device", "kind", "text")
 CALL: Final = "call"
 """The action of a function in the type of an action that calls it: `<function id>/call`."""
 
+PARALLEL: Final = "functions/parallel"
+"""The type of an action that runs several calls at once, and ends when all of them have ended."""
+MIN_BRANCHES: Final = 2
+"""Minimum number of calls that an action runs at once."""
+MAX_BRANCHES: Final = 4
+"""Maximum number of calls that an action runs at once."""
+
 
 MAX_RETRIES: Final = 100
 """Maximum number of repetitions of an action."""
@@ -81,13 +88,15 @@ class Action(BareAction, frozen=True):
     """An action on an action point, or of a function.
 
     `error_output` names the error for the actions after an error exit; without it, the error is not stored. `retry`
-    repeats an action that is safe to repeat.
+    repeats an action that is safe to repeat. `branches` are the ids of the calls that an action of type
+    `functions/parallel` runs at once; no connection leads to or from them.
     """
 
     parameters: list[ActionParameter] = field(default_factory=list)
     flows: list[Flow] = field(default_factory=list)
     error_output: str | Unset = UNSET
     retry: Retry | Unset = UNSET
+    branches: list[str] | Unset = UNSET
 
     def parse_type(self) -> tuple[str, str]:
         """Return the object id and the name of the method. Raises ValueError when `type` is not of that form."""
@@ -95,6 +104,11 @@ class Action(BareAction, frozen=True):
         if not slash or not object_id or not method or "/" in method:
             raise ValueError(f"action {self.name}: type {self.type!r} is not <object id>/<action>")
         return object_id, method
+
+    @property
+    def is_parallel(self) -> bool:
+        """Whether the action runs several calls at once."""
+        return self.type == PARALLEL
 
     def outputs(self) -> list[str]:
         """Return the names of the results in the default flow, empty when they are not stored."""

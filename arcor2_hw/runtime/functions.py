@@ -2,14 +2,15 @@
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar, cast
 
 from arcor2_hw.exceptions import InvalidData, ProgramFinished
 from arcor2_hw.runtime.lane import on_any_lane
-from arcor2_hw.runtime.program import Program
+from arcor2_hw.runtime.program import Action, Program
 
 F = TypeVar("F", bound=Callable[..., Any])
+T = TypeVar("T")
 
 
 def function_of(program: Program, body: F) -> F:
@@ -25,32 +26,48 @@ def function_of(program: Program, body: F) -> F:
 
     @functools.wraps(body)
     def call(*arguments: Any, an: str | None = None, **keywords: Any) -> Any:
-        if on_any_lane():
-            raise InvalidData("the function {what} cannot be called inside an action", what=what)
         shown = [*arguments, *keywords.values()]
         if named:
             keywords["an"] = an
-        main = program.in_main_thread
-        program.inside = program.inside or main
-        try:
-            entered = program.function_begins(what, an, shown)
-            try:
-                if main:
-                    program.inside = False
-                value = body(*arguments, **keywords)
-            except ProgramFinished:
-                program.inside = program.inside or main
-                program.function_ended(entered, None)
-                raise
-            except BaseException as error:
-                program.inside = program.inside or main
-                program.function_failed(entered, error)
-                raise
-            program.inside = program.inside or main
-            program.function_ended(entered, value)
-            return value
-        finally:
-            if main:
-                program.inside = False
+        return announced(program, what, an, shown, lambda _: body(*arguments, **keywords))
 
     return cast("F", call)
+
+
+def announced(
+    program: Program, what: str, an: str | None, shown: Sequence[Any], body: Callable[[Action], T], *, own: bool = False
+) -> T:
+    """Run a call of a function, or parallel work, as an action that contains other actions.
+
+    Args:
+        program: the program.
+        what: what is called, for messages.
+        an: name of the action.
+        shown: values of the parameters.
+        body: receives the announced action and returns the result.
+        own: whether `body` is code of this library, which is not interrupted, and whose result is not reported.
+    """
+    if on_any_lane():
+        raise InvalidData("the function {what} cannot be called inside an action", what=what)
+    main = program.in_main_thread
+    program.inside = program.inside or main
+    try:
+        entered = program.function_begins(what, an, shown)
+        try:
+            if main:
+                program.inside = own
+            value = body(entered)
+        except ProgramFinished:
+            program.inside = program.inside or main
+            program.function_ended(entered, None)
+            raise
+        except BaseException as error:
+            program.inside = program.inside or main
+            program.function_failed(entered, error)
+            raise
+        program.inside = program.inside or main
+        program.function_ended(entered, None if own else value)
+        return value
+    finally:
+        if main:
+            program.inside = False

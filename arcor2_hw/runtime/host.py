@@ -357,7 +357,7 @@ class Host:
                 gate = self.program.gate
                 {m.Pause: gate.pause, m.Resume: gate.resume}[type(message)]()
             case m.Step() if self.program is not None:
-                self.program.gate.step(message.mode)
+                self.program.gate.step(message.mode, message.branch)
             case m.SetBreakpoints() if self.program is not None:
                 self.program.set_shared_breakpoints(frozenset(message.shared_breakpoints))
 

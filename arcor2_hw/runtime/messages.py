@@ -210,9 +210,13 @@ class Resume(ToHost, frozen=True):
 
 
 class Step(ToHost, frozen=True):
-    """Continue the program for one action, over or into functions, or until the present function is left."""
+    """Continue the program for one action, over or into functions, or until the present function is left.
+
+    branch: id of the branch; empty for the one that waits longest.
+    """
 
     mode: ProgramStep = ProgramStep.OVER
+    branch: str = ""
 
 
 class SetBreakpoints(ToHost, frozen=True):

@@ -3,16 +3,21 @@
 import enum
 import sys
 import threading
-from collections.abc import Callable, Set
+from collections.abc import Callable, Iterable, Set
 
 from arcor2_hw.data.position import ProgramStep
 from arcor2_hw.exceptions import ProgramStopped
+from arcor2_hw.runtime.branches import Branch
 
 
 class _Mode(enum.Enum):
     RUN = enum.auto()
     STEP = enum.auto()
     PAUSE = enum.auto()
+
+
+class BranchHeld(ProgramStopped):
+    """The branch was ended at its next action, because another branch of the same parallel work has failed."""
 
 
 class Gate:
@@ -39,6 +44,10 @@ class Gate:
         self._mode = _Mode.RUN
         self._steps = 0
         self._step = ProgramStep.OVER
+        self._stepping: Branch | None = None
+        """The branch that makes the step; None for the first one that arrives."""
+        self._waiting: dict[Branch, None] = {}
+        """The branches that wait because of a pause, the one that waits longest first."""
         self._deepest = sys.maxsize
         """After a step: the largest number of calls around an action before which the program pauses."""
         if start_paused:  # the same state as after a single step
@@ -59,10 +68,17 @@ class Gate:
         """Continue the program."""
         self._continue(_Mode.RUN)
 
-    def step(self, mode: ProgramStep = ProgramStep.OVER) -> None:
-        """Continue for one action. `mode`: whether the actions inside a function that it calls count."""
+    def step(self, mode: ProgramStep = ProgramStep.OVER, branch: str = "") -> None:
+        """Continue one branch for one action. The other branches of the same parallel work remain paused.
+
+        Args:
+            mode: whether the actions inside a function that it calls count.
+            branch: id of the branch; empty or unknown for the one that waits longest.
+        """
         with self._changed:
             self._step = mode
+            longest = next(iter(self._waiting), None)
+            self._stepping = next((one for one in self._waiting if one.id == branch), longest)
             self._continue(_Mode.STEP)
 
     def stop(self) -> None:
@@ -85,48 +101,93 @@ class Gate:
         with self._changed:
             self._breakpoints = breakpoints
 
-    def before(self, ids: Set[str] = frozenset(), depth: int = 0, *, is_call: bool = False) -> None:
+    def before(self, branch: Branch, ids: Set[str] = frozenset(), depth: int = 0, *, is_call: bool = False) -> None:
         """Wait until an action may start. Raises ProgramStopped.
 
         Args:
+            branch: the branch of the action.
             ids: of the action and its action points, compared with the breakpoints.
             depth: number of calls of functions around the action.
             is_call: whether it calls a function, so that other actions pass the gate before it ends.
         """
         with self._changed:
             stepped = self._mode is _Mode.STEP and not self._steps and depth <= self._deepest
-            if stepped or not self._breakpoints.isdisjoint(ids):
+            if (stepped and not self._is_blocked(branch)) or not self._breakpoints.isdisjoint(ids):
                 self._mode = _Mode.PAUSE
-            self._wait()
+            self._wait(branch)
             if self._mode is _Mode.STEP and self._steps:
                 self._steps = 0
+                self._stepping = branch
                 limits = {ProgramStep.OVER: depth, ProgramStep.INTO: sys.maxsize, ProgramStep.OUT: depth - 1}
                 self._deepest = limits[self._step]
             if not is_call:
                 self._running += 1
 
-    def after(self) -> None:
+    def after(self, branch: Branch) -> None:
         """Record the end of an action, then wait while the program is paused. Raises ProgramStopped."""
         if self._mode is _Mode.PAUSE:
             self._settle()
         with self._changed:
             self._running -= 1
-            self._wait()
+            self._wait(branch)
 
-    def sleep(self, seconds: float) -> None:
+    def sleep(self, branch: Branch, seconds: float) -> None:
         """Wait for a time between two actions. Raises ProgramStopped as soon as the program is stopped."""
         with self._changed:
-            if self._changed.wait_for(lambda: self._stopped, seconds):
-                raise ProgramStopped
+            self._changed.wait_for(lambda: self._stopped or branch.held, seconds)
+            self._check(branch)
 
-    def _wait(self) -> None:
-        while self._mode is _Mode.PAUSE and not self._stopped:
+    def _is_blocked(self, branch: Branch) -> bool:
+        """Return whether a branch has to wait. A step of one branch leaves the others of its parallel work paused."""
+        if self._mode is _Mode.STEP:
+            return branch.parent is not None and self._stepping not in (None, branch, branch.parent)
+        return self._mode is _Mode.PAUSE
+
+    def _wait(self, branch: Branch) -> None:
+        while self._is_blocked(branch) and not self._stopped and not branch.held:
+            self._waiting.setdefault(branch)
             self._report_paused()
             self._changed.wait()
+        self._waiting.pop(branch, None)
+        self._check(branch)
+
+    def _check(self, branch: Branch) -> None:
         if self._stopped:
             raise ProgramStopped
+        if branch.held:
+            raise BranchHeld("It was stopped, because another branch has failed.")
+
+    # -------------------------------------------------------------------------------- parallel work
+    def hold(self, branches: Iterable[Branch]) -> None:
+        """Raise BranchHeld in branches that wait at the gate or arrive later."""
+        with self._changed:
+            for branch in branches:
+                branch.held = True
+            self._changed.notify_all()
+
+    def ended(self, branch: Branch) -> None:
+        """Record the end of a branch of parallel work. Its step ends there, unless all branches have ended."""
+        with self._changed:
+            if self._mode is _Mode.STEP and self._stepping is branch:
+                if self._waiting:
+                    self._mode = _Mode.PAUSE
+                    self._report_paused()
+                else:
+                    self._stepping = branch.parent
+            self._changed.notify_all()
+
+    def wait_for(self, condition: Callable[[], bool], timeout: float | None = None, *, stop: bool = True) -> None:
+        """Wait until a condition holds, which `hold` and `ended` let check again.
+
+        Args:
+            condition: the condition.
+            timeout: longest time, s.
+            stop: whether the wait ends when the program is stopped.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: condition() or (stop and self._stopped), timeout)
 
     def _report_paused(self) -> None:
-        if not self._running and not self._reported:
+        if self._mode is _Mode.PAUSE and not self._running and not self._reported:
             self._reported = True
             self._notify("paused")

@@ -33,6 +33,7 @@ from arcor2_hw.exceptions import (
     message_of,
 )
 from arcor2_hw.messages import Message
+from arcor2_hw.runtime.branches import Branches
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
 from arcor2_hw.runtime.pacing import Gate
@@ -82,12 +83,13 @@ class Channel(Protocol):
 class Action:
     """One call of an action. `id` is None in a project that declares no actions.
 
-    number: Counts the calls of a run from 1. call: The number of the call of the function around it, 0 for none.
+    number: Counts the calls of a run from 1. call: The number of the call around it, 0 for none. frame: Its place in
+    the position of the program; None for parallel work, which is not part of the stacks of its branches.
     """
 
     __slots__ = ("began", "call", "frame", "id", "number", "waited")
 
-    def __init__(self, number: int, action_id: str | None, call: int, frame: Frame) -> None:
+    def __init__(self, number: int, action_id: str | None, call: int, frame: Frame | None) -> None:
         self.number = number
         self.id = action_id
         self.call = call
@@ -141,9 +143,7 @@ class Program:
         self.inside = False
         """Whether the main thread runs our code, which an asynchronous exception would leave in an undefined state."""
         self.error: BaseException | None = None
-        self._error_source: tuple[BaseException, Device] | None = None
-        self._failed: tuple[BaseException, Action] | None = None
-        self._main = threading.main_thread()
+        self.branches = Branches()
         self._reporting = threading.Lock()
         self._device_lost = False
         self._stops: list[SentStop] = []
@@ -152,8 +152,6 @@ class Program:
         self._functions: dict[str, str] = {}
         """The called functions by the ids of the actions that call them."""
         self._joints_points: dict[str, str] = {}
-        self._calls: dict[int, list[Action]] = {}
-        """The calls of functions around the present action of each thread, outermost first."""
         self._numbers = itertools.count(1)
 
     # -------------------------------------------------------------------------------- the project
@@ -182,7 +180,7 @@ class Program:
     @property
     def in_main_thread(self) -> bool:
         """Return whether the current thread is the main thread of the script."""
-        return threading.current_thread() is self._main
+        return self.branches.in_main_thread
 
     def check(self) -> None:
         """Raise ProgramStopped if the program was stopped."""
@@ -233,12 +231,17 @@ class Program:
             if action_id is None:
                 raise InvalidData("{what}: the project has no action named {name!r}", what=what, name=name)
         points = self.points_of(arguments)
-        thread = None if self.in_main_thread else threading.get_ident()
-        calls = self._calls.setdefault(threading.get_ident(), [])
+        branch = self.branches.current
+        thread = None if branch is self.branches.main else threading.get_ident()
+        calls = branch.calls
+        frames = [call.frame for call in calls if call.frame is not None]
         frame = Frame(action_id or "")
-        if calls:
-            caller = calls[-1].id or ""
+        if frames:
+            caller = frames[-1].action_id
             frame = Frame(frame.action_id, self._functions.get(caller, ""), caller)
+        if branch.parent is not None and not frames and action_id is not None:
+            branch.id = action_id
+        branch.device = device  # before the gate, so that a stop of the branch finds it
         data = ActionStateBeforeData(
             msgspec.UNSET if action_id is None else action_id,
             [encode_shown(argument) for argument in arguments] if arguments else msgspec.UNSET,
@@ -255,14 +258,14 @@ class Program:
             time.time(),
             device,
             call=action.call,
-            frames=[*(call.frame for call in calls), frame],
-            branch=MAIN_BRANCH if thread is None else f"thread {thread}",
+            frames=[*frames, frame],
+            branch=branch.id,
             attempt=ATTEMPT.get(),
         )
         announced = time.monotonic()
         # The action that uses a pose pauses at its action point, not the call that passes it on.
         ids = set() if is_call else points
-        self.gate.before(ids if action_id is None else ids | {action_id}, len(calls), is_call=is_call)
+        self.gate.before(branch, ids if action_id is None else ids | {action_id}, len(calls), is_call=is_call)
         action.began = time.monotonic()
         action.waited = action.began - announced
         if is_call:
@@ -272,18 +275,24 @@ class Program:
     def action_ended(self, action: Action, value: Any) -> None:
         """Report the result of an action, then wait while the program is paused. Raises ProgramStopped."""
         self._report_end(action, value)
-        self.gate.after()
+        self._leave()
+
+    def _leave(self) -> None:
+        branch = self.branches.current
+        branch.device = ""
+        self.gate.after(branch)
 
     def function_ended(self, call: Action, value: Any) -> None:
         """Report the result of a function."""
-        self._calls[threading.get_ident()].pop()
+        self.branches.current.calls.pop()
         self._report_end(call, value)
 
     def function_failed(self, call: Action, error: BaseException) -> None:
         """Report that a function has failed. The failed action inside remains the cause of the error."""
-        self._calls[threading.get_ident()].pop()
-        if self._failed is None or self._failed[0] is not error:
-            self._failed = error, call
+        branch = self.branches.current
+        branch.calls.pop()
+        if branch.failure.action is None or branch.failure.action[0] is not error:
+            branch.failure.action = error, call
         self.channel.action_over(call.number, time.monotonic() - call.began, message_of(error), call.waited)
 
     def _report_end(self, action: Action, value: Any) -> None:
@@ -299,10 +308,10 @@ class Program:
 
     def action_failed(self, action: Action, error: BaseException) -> None:
         """Report that an action has failed, then wait while the program is paused. Raises ProgramStopped."""
-        self._failed = error, action
+        self.branches.current.failure.action = error, action
         duration = time.monotonic() - action.began
         self.channel.action_over(action.number, duration, message_of(error), action.waited)
-        self.gate.after()
+        self._leave()
 
     def pause_before_retry(self, seconds: float) -> None:
         """Wait before an action is repeated. Raises ProgramStopped if the program is stopped."""
@@ -310,14 +319,14 @@ class Program:
         if main:
             self.inside = True
         try:
-            self.gate.sleep(seconds)
+            self.gate.sleep(self.branches.current, seconds)
         finally:
             if main:
                 self.inside = False
 
     def record_error_source(self, device: Device, error: BaseException) -> None:
         """Record the device that raised an error, so that the report of the error names it."""
-        self._error_source = error, device
+        self.branches.current.failure.device = error, device
 
     def caught(self, error: Arcor2Error) -> ActionError:
         """Return what happened, for the error exit of an action.
@@ -328,7 +337,7 @@ class Program:
         """
         if isinstance(error, ENDS_PROGRAM):
             raise error
-        source = self._error_source
+        source = self.branches.current.failure.device
         device = source[1].name if source is not None and source[0] is error else ""
         return ActionError(device, error.code, str(error))
 
@@ -381,11 +390,12 @@ class Program:
     def _report_exception(self, error: BaseException) -> None:
         self.error = error
         message = message_of(error)
-        if self._error_source is not None and self._error_source[0] is error:
-            message = describe(self._error_source[1], error).message
+        failure = self.branches.main.failure
+        if failure.device is not None and failure.device[0] is error:
+            message = describe(failure.device[1], error).message
         action_id: str | msgspec.UnsetType = msgspec.UNSET
-        if self._failed is not None and self._failed[0] is error and self._failed[1].id is not None:
-            action_id = self._failed[1].id
+        if failure.action is not None and failure.action[0] is error and failure.action[1].id is not None:
+            action_id = failure.action[1].id
         data = ProjectExceptionData(
             message.text, type(error).__name__, isinstance(error, Arcor2Error), action_id, **message.translation()
         )

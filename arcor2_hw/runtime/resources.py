@@ -1,8 +1,9 @@
 """Resources: the objects and action points that the script of a package uses."""
 
 import types
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar, cast, overload
 
 from arcor2_hw.data.cell import overlay
 from arcor2_hw.data.events import PackageInfoData
@@ -15,12 +16,17 @@ from arcor2_hw.runtime.cell import SceneFault, recipes
 from arcor2_hw.runtime.creation import find_type, prepare_for_sources
 from arcor2_hw.runtime.functions import F, function_of
 from arcor2_hw.runtime.package import PackageData, WorldPoints, package_name, put_on_path
+from arcor2_hw.runtime.parallel import run_parallel
 from arcor2_hw.runtime.program import ActionError, Program, current
 from arcor2_hw.runtime.proxy import proxy
 from arcor2_hw.runtime.retrying import Retrying
 from arcor2_hw.runtime.standalone import Standalone
 
 T = TypeVar("T", bound=Generic)
+A = TypeVar("A")
+B = TypeVar("B")
+C = TypeVar("C")
+D = TypeVar("D")
 
 # A script that is run by hand imports this module first, then its object types, and only then calls something here.
 prepare_for_sources()
@@ -106,6 +112,38 @@ class Resources:
     def function(self, body: F) -> F:
         """Let calls of a function of the script be announced, stepped into and traced: the decorator of functions."""
         return function_of(self._program, body)
+
+    @overload
+    def parallel(self, a: Callable[[], A], b: Callable[[], B], /, *, an: str | None = None) -> tuple[A, B]: ...
+    @overload
+    def parallel(
+        self, a: Callable[[], A], b: Callable[[], B], c: Callable[[], C], /, *, an: str | None = None
+    ) -> tuple[A, B, C]: ...
+    @overload
+    def parallel(
+        self,
+        a: Callable[[], A],
+        b: Callable[[], B],
+        c: Callable[[], C],
+        d: Callable[[], D],
+        /,
+        *,
+        an: str | None = None,
+    ) -> tuple[A, B, C, D]: ...
+    def parallel(self, *calls: Callable[[], Any], an: str | None = None) -> tuple[Any, ...]:
+        """Run two to four calls of functions at once, wait until all have ended, and return their results.
+
+        If one fails, the devices of the others are stopped, and the others end at their next action. Then the error
+        that came first is raised.
+
+        Args:
+            calls: the calls, such as `lambda: fetch(3, an="fetch")`.
+            an: name of the action.
+
+        Raises:
+            InvalidData: the number of calls is wrong, or this is one of calls that run at once.
+        """
+        return run_parallel(self._program, calls, an)
 
     # -------------------------------------------------------------------------------- life
     def __enter__(self) -> "Resources":
