@@ -48,6 +48,8 @@ class Gate:
         """The branch that makes the step; None for the first one that arrives."""
         self._waiting: dict[Branch, None] = {}
         """The branches that wait because of a pause, the one that waits longest first."""
+        self._parallel: set[Branch] = set()
+        """The branches of the present parallel work."""
         self._deepest = sys.maxsize
         """After a step: the largest number of calls around an action before which the program pauses."""
         if start_paused:  # the same state as after a single step
@@ -78,7 +80,8 @@ class Gate:
         with self._changed:
             self._step = mode
             longest = next(iter(self._waiting), None)
-            self._stepping = next((one for one in self._waiting if one.id == branch), longest)
+            # The branch may be on its way to the gate.
+            self._stepping = next((one for one in self._parallel if one.id == branch), longest)
             self._continue(_Mode.STEP)
 
     def stop(self) -> None:
@@ -158,6 +161,11 @@ class Gate:
             raise BranchHeld("It was stopped, because another branch has failed.")
 
     # -------------------------------------------------------------------------------- parallel work
+    def started(self, branches: Iterable[Branch]) -> None:
+        """Record the start of branches of parallel work."""
+        with self._changed:
+            self._parallel.update(branches)
+
     def hold(self, branches: Iterable[Branch]) -> None:
         """Raise BranchHeld in branches that wait at the gate or arrive later."""
         with self._changed:
@@ -168,8 +176,9 @@ class Gate:
     def ended(self, branch: Branch) -> None:
         """Record the end of a branch of parallel work. Its step ends there, unless all branches have ended."""
         with self._changed:
+            self._parallel.discard(branch)
             if self._mode is _Mode.STEP and self._stepping is branch:
-                if self._waiting:
+                if self._parallel:
                     self._mode = _Mode.PAUSE
                     self._report_paused()
                 else:

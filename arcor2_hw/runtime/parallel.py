@@ -55,6 +55,7 @@ class _Group:
 
     def run(self) -> tuple[Any, ...]:
         """Run the calls and wait for them."""
+        self._program.gate.started(self._branches)
         for number, branch in enumerate(self._branches):
             name = f"branch {number + 1}"
             threading.Thread(target=self._run_branch, args=(number, branch), name=name, daemon=True).start()
