@@ -83,6 +83,7 @@ from arcor2_hw.data.rpc.functions import (
     FunctionExport,
     ImportFunctionData,
     MakeFunctionData,
+    MakeParallelData,
 )
 from arcor2_hw.data.rpc.general import AuthenticateData, SystemInfoData
 from arcor2_hw.data.rpc.history import HistoryData, RestoreRevisionData, UndoData
@@ -377,6 +378,12 @@ class Requests(ABC):
         Needs the role standard user.
         """
 
+    async def dissolve_parallel(self, action_id: str, *, dry_run: bool = False, timeout: float | None = None) -> None:
+        """DissolveParallel: a parallel action, whose calls then run one after the other.
+
+        Needs the role standard user.
+        """
+
     async def execute_action(self, action_id: str, *, dry_run: bool = False, timeout: float | None = None) -> None:
         """ExecuteAction. Needs the role standard user."""
 
@@ -602,6 +609,14 @@ class Requests(ABC):
         timeout: float | None = None,
     ) -> MakeFunctionData:
         """MakeFunction: the name of the function, its actions, and the name of the action that calls it.
+
+        Needs the role standard user.
+        """
+
+    async def make_parallel(
+        self, *, name: str, action_ids: list[str], dry_run: bool = False, timeout: float | None = None
+    ) -> MakeParallelData:
+        """MakeParallel: the name of the parallel action, and the calls that it runs at once.
 
         Needs the role standard user.
         """
@@ -938,7 +953,9 @@ class Requests(ABC):
     async def start_scene_keep_going(self, *, dry_run: bool = False, timeout: float | None = None) -> None:
         """StartSceneKeepGoing. Needs the role standard user."""
 
-    async def step_action(self, *, mode: ProgramStep = ProgramStep.OVER, timeout: float | None = None) -> None:
+    async def step_action(
+        self, *, mode: ProgramStep = ProgramStep.OVER, branch: str | Unset = UNSET, timeout: float | None = None
+    ) -> None:
         """StepAction. Needs the role operator."""
 
     async def step_robot_eef(
@@ -1132,6 +1149,14 @@ class Requests(ABC):
         self, *, id: str, override: Parameter, dry_run: bool = False, timeout: float | None = None
     ) -> None:
         """UpdateOverride. Needs the role advanced user."""
+
+    async def update_parallel(
+        self, *, action_id: str, branches: list[str], dry_run: bool = False, timeout: float | None = None
+    ) -> None:
+        """UpdateParallel: the calls that a parallel action runs at once, in their order.
+
+        Needs the role standard user.
+        """
 
     async def update_presence(
         self,

@@ -15,7 +15,8 @@ class Span(Data, frozen=True):
     the first action of the run, s. duration: s. branch: value of the condition after which the action followed the one
     before it, as JSON; omitted without a condition. error: why the action failed. thread_id: omitted in the main thread
     of the script. call: number of the call of the function that contains the action; omitted in the program itself. The
-    span of a call has no device. attempt: number of the attempt of a retried action; omitted for the first one.
+    span of a call has no device. attempt: number of the attempt of a retried action; omitted for the first one. lane:
+    id of the branch that executed the action at the same time as others; omitted in the program itself.
     """
 
     number: int
@@ -29,6 +30,7 @@ class Span(Data, frozen=True):
     thread_id: int | Unset = UNSET
     call: int | Unset = UNSET
     attempt: int | Unset = UNSET
+    lane: str | Unset = UNSET
 
 
 class TracedDevice(Data, frozen=True):

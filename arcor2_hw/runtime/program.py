@@ -239,7 +239,7 @@ class Program:
         if frames:
             caller = frames[-1].action_id
             frame = Frame(frame.action_id, self._functions.get(caller, ""), caller)
-        if branch.parent is not None and not frames and action_id is not None:
+        if calls and calls[-1].frame is None and action_id is not None:  # the call that the branch runs
             branch.id = action_id
         branch.device = device  # before the gate, so that a stop of the branch finds it
         data = ActionStateBeforeData(

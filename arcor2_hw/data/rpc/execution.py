@@ -59,9 +59,10 @@ class TemporaryPackageArgs(Data, frozen=True):
 
 
 class StepActionArgs(Data, frozen=True):
-    """Arguments of StepAction."""
+    """Arguments of StepAction; `branch` is the id of a branch of the program, by default the one that waits longest."""
 
     mode: ProgramStep = ProgramStep.OVER
+    branch: str | Unset = UNSET
 
 
 class UploadPackageArgs(Data, frozen=True):

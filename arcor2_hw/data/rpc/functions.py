@@ -6,7 +6,7 @@ from msgspec import Meta, field
 
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.parameter import Parameter
-from arcor2_hw.data.project import ProjectFunction
+from arcor2_hw.data.project import MAX_BRANCHES, MIN_BRANCHES, ProjectFunction
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc.envelope import Rpc
 from arcor2_hw.data.rpc.general import IdArgs
@@ -19,17 +19,21 @@ __all__ = [
     "AddFunctionResultArgs",
     "DissolveCallArgs",
     "DissolveCallData",
+    "DissolveParallelArgs",
     "FunctionExport",
     "ImportFunctionArgs",
     "ImportFunctionData",
     "MakeFunctionArgs",
     "MakeFunctionData",
+    "MakeParallelArgs",
+    "MakeParallelData",
     "NamedReference",
     "RemoveFunctionParameterArgs",
     "RemoveFunctionResultArgs",
     "RenameFunctionArgs",
     "UpdateFunctionParameterArgs",
     "UpdateFunctionResultArgs",
+    "UpdateParallelArgs",
 ]
 
 
@@ -48,6 +52,32 @@ class MakeFunctionData(Data, frozen=True):
     """Answer to MakeFunction: the function, and the action that calls it."""
 
     function_id: str
+    action_id: str
+
+
+class MakeParallelArgs(Data, frozen=True):
+    """Arguments of MakeParallel: the name of the parallel action, and the calls that it runs at once."""
+
+    name: str
+    action_ids: Annotated[list[str], Meta(min_length=MIN_BRANCHES, max_length=MAX_BRANCHES)]
+
+
+class MakeParallelData(Data, frozen=True):
+    """Answer to MakeParallel: the parallel action."""
+
+    action_id: str
+
+
+class UpdateParallelArgs(Data, frozen=True):
+    """Arguments of UpdateParallel: the calls that a parallel action runs at once, in their order."""
+
+    action_id: str
+    branches: Annotated[list[str], Meta(min_length=MIN_BRANCHES, max_length=MAX_BRANCHES)]
+
+
+class DissolveParallelArgs(Data, frozen=True):
+    """Arguments of DissolveParallel: a parallel action, whose calls then run one after the other."""
+
     action_id: str
 
 
@@ -182,6 +212,9 @@ FUNCTION_RPCS: Final = (
     Rpc("DissolveCall", DissolveCallArgs, DissolveCallData, Role.STANDARD_USER, dry_run=True, additional=True),
     Rpc("ExportFunction", IdArgs, FunctionExport, Role.OPERATOR, additional=True),
     Rpc("ImportFunction", ImportFunctionArgs, ImportFunctionData, Role.STANDARD_USER, dry_run=True, additional=True),
+    Rpc("MakeParallel", MakeParallelArgs, MakeParallelData, Role.STANDARD_USER, dry_run=True, additional=True),
+    Rpc("UpdateParallel", UpdateParallelArgs, None, Role.STANDARD_USER, dry_run=True, additional=True),
+    Rpc("DissolveParallel", DissolveParallelArgs, None, Role.STANDARD_USER, dry_run=True, additional=True),
     Rpc("MakeFunction", MakeFunctionArgs, MakeFunctionData, Role.STANDARD_USER, dry_run=True, additional=True),
     Rpc("RemoveFunction", IdArgs, None, Role.STANDARD_USER, dry_run=True, additional=True),
     Rpc(

@@ -14,7 +14,8 @@ export interface AcknowledgeStopArgs {
  * An action on an action point, or of a function.
  *
  * `error_output` names the error for the actions after an error exit; without it, the error is not stored. `retry`
- * repeats an action that is safe to repeat.
+ * repeats an action that is safe to repeat. `branches` are the ids of the calls that an action of type
+ * `functions/parallel` runs at once; no connection leads to or from them.
  */
 export interface Action {
   name: string;
@@ -24,6 +25,7 @@ export interface Action {
   flows: Flow[];
   error_output?: string;
   retry?: Retry;
+  branches?: string[];
 }
 
 /** The source of the duration of an action. count: number of executions of which it is the median. */
@@ -581,6 +583,11 @@ export interface DissolveCallData {
   action_ids: string[];
 }
 
+/** Arguments of DissolveParallel: a parallel action, whose calls then run one after the other. */
+export interface DissolveParallelArgs {
+  action_id: string;
+}
+
 /**
  * A dry run without its result, and data of the event DryRunChanged.
  *
@@ -1099,6 +1106,17 @@ export interface MakeFunctionArgs {
 /** Answer to MakeFunction: the function, and the action that calls it. */
 export interface MakeFunctionData {
   function_id: string;
+  action_id: string;
+}
+
+/** Arguments of MakeParallel: the name of the parallel action, and the calls that it runs at once. */
+export interface MakeParallelArgs {
+  name: string;
+  action_ids: string[];
+}
+
+/** Answer to MakeParallel: the parallel action. */
+export interface MakeParallelData {
   action_id: string;
 }
 
@@ -2148,7 +2166,8 @@ export interface ShowMainScreenData {
  * the first action of the run, s. duration: s. branch: value of the condition after which the action followed the one
  * before it, as JSON; omitted without a condition. error: why the action failed. thread_id: omitted in the main thread
  * of the script. call: number of the call of the function that contains the action; omitted in the program itself. The
- * span of a call has no device. attempt: number of the attempt of a retried action; omitted for the first one.
+ * span of a call has no device. attempt: number of the attempt of a retried action; omitted for the first one. lane:
+ * id of the branch that executed the action at the same time as others; omitted in the program itself.
  */
 export interface Span {
   number: number;
@@ -2162,6 +2181,7 @@ export interface Span {
   thread_id?: number;
   call?: number;
   attempt?: number;
+  lane?: string;
 }
 
 /** A sphere around its origin, m. */
@@ -2181,9 +2201,10 @@ export interface StartDryRunArgs {
   branches?: Record<string, string>;
 }
 
-/** Arguments of StepAction. */
+/** Arguments of StepAction; `branch` is the id of a branch of the program, by default the one that waits longest. */
 export interface StepActionArgs {
   mode?: ProgramStep;
+  branch?: string;
 }
 
 /** Values of Axis in StepRobotEef. */
@@ -2505,6 +2526,12 @@ export interface UpdateOverrideArgs {
   override: Parameter;
 }
 
+/** Arguments of UpdateParallel: the calls that a parallel action runs at once, in their order. */
+export interface UpdateParallelArgs {
+  action_id: string;
+  branches: string[];
+}
+
 /** Arguments of UpdateProjectDescription. */
 export interface UpdateProjectDescriptionArgs {
   project_id: string;
@@ -2628,6 +2655,7 @@ export interface Requests {
   DeleteProject: { args: IdArgs; data: undefined };
   DeleteScene: { args: IdArgs; data: string[] };
   DissolveCall: { args: DissolveCallArgs; data: DissolveCallData };
+  DissolveParallel: { args: DissolveParallelArgs; data: undefined };
   ExecuteAction: { args: ExecuteActionArgs; data: undefined };
   ExportFunction: { args: IdArgs; data: FunctionExport };
   FindDevices: { args: FindDevicesArgs; data: FoundDevice[] };
@@ -2663,6 +2691,7 @@ export interface Requests {
   ListRuns: { args: ListRunsArgs | undefined; data: ListRunsData };
   ListScenes: { args: undefined; data: ListScenesData[] };
   MakeFunction: { args: MakeFunctionArgs; data: MakeFunctionData };
+  MakeParallel: { args: MakeParallelArgs; data: MakeParallelData };
   MarkersCorners: { args: MarkersCornersArgs; data: MarkerCorners[] };
   MoveToActionPoint: { args: MoveToActionPointArgs; data: undefined };
   MoveToJoints: { args: MoveToJointsArgs; data: undefined };
@@ -2749,6 +2778,7 @@ export interface Requests {
   UpdateObjectPose: { args: UpdateObjectPoseArgs; data: undefined };
   UpdateObjectPoseUsingRobot: { args: UpdateObjectPoseUsingRobotArgs; data: undefined };
   UpdateOverride: { args: UpdateOverrideArgs; data: undefined };
+  UpdateParallel: { args: UpdateParallelArgs; data: undefined };
   UpdatePresence: { args: Presence; data: undefined };
   UpdateProjectDescription: { args: UpdateProjectDescriptionArgs; data: undefined };
   UpdateProjectHasLogic: { args: UpdateProjectHasLogicArgs; data: undefined };
@@ -2884,6 +2914,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   DeleteProject: 2,
   DeleteScene: 4,
   DissolveCall: 2,
+  DissolveParallel: 2,
   ExecuteAction: 2,
   ExportFunction: 1,
   FindDevices: 4,
@@ -2919,6 +2950,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   ListRuns: 1,
   ListScenes: 1,
   MakeFunction: 2,
+  MakeParallel: 2,
   MarkersCorners: 4,
   MoveToActionPoint: 2,
   MoveToJoints: 2,
@@ -3005,6 +3037,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   UpdateObjectPose: 4,
   UpdateObjectPoseUsingRobot: 4,
   UpdateOverride: 3,
+  UpdateParallel: 2,
   UpdatePresence: 1,
   UpdateProjectDescription: 2,
   UpdateProjectHasLogic: 3,

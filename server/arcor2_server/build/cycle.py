@@ -45,6 +45,11 @@ CAUGHT: Final = expressions.dotted("res", ("caught",))
 RETRY: Final = expressions.dotted("res", ("retry",))
 """The method that returns a device whose actions are repeated after they have failed."""
 
+PARALLEL: Final = expressions.dotted("res", ("parallel",))
+"""The method that runs several calls at once."""
+NO_RESULT: Final = "_"
+"""The variable for the result of a branch that is not stored."""
+
 Block = list[ast.stmt]
 Stack = list[tuple[int, Block]]
 
@@ -66,6 +71,8 @@ class Cycle:
         self.nodes = nodes_of(flow.edges, flow.exits)
         self.layout, self.natural = arrange(self.nodes.edges)
         self.numbers = {action.id: number for number, action in enumerate(flow.actions)}
+        self._branches = {branch: one for one, branches in flow.parallel.items() for branch in branches}
+        """The parallel action of each of its branches."""
         self.calls = [frame.resolve(action) for action in flow.actions]
         self.results = [self._name_results(number) for number in range(len(flow.actions))]
         """The variables for the results of each action."""
@@ -125,8 +132,8 @@ class Cycle:
                 block = guard.body
             action = nodes.actions[node]
             attempt: ast.Try | None = None
-            if node == nodes.call[action]:
-                call = self._call(action)
+            if node == nodes.call[action] and action not in self._branches:
+                call = self._parallel(action) if action in self.flow.parallel else self._call(action)
                 if nodes.exits[action]:
                     attempt = ast.Try([call], [], [], [])
                 block.append(attempt or call)
@@ -351,6 +358,12 @@ class Cycle:
         node = self.nodes.call[user]
         if flow == ERROR_FLOW:
             return self._part_of_error(user, source, output, meta)
+        if source in self._branches and self._branches[source] == self._branches.get(user):
+            raise InvalidProject(
+                "action {name!r} uses a result of {producer_name!r}, which runs at the same time",
+                name=self.flow.actions[user].name,
+                producer_name=self.flow.actions[source].name,
+            )
         if source == user or not self.nodes.has_results(self.natural, source, node):
             raise self._too_early(user, source)
         return expressions.name(self._result(user, source, output, meta.type))
@@ -454,6 +467,35 @@ class Cycle:
 
     def _call(self, number: int) -> ast.stmt:
         """Return the statement that runs an action and stores its results."""
+        call = self._expression(number)
+        match self.results[number]:
+            case []:
+                return ast.Expr(call)
+            case [name]:
+                return expressions.assign(name, call)
+            case names:
+                return ast.Assign([_targets(names)], call, lineno=0)
+
+    def _parallel(self, number: int) -> ast.stmt:
+        """Return the statement that runs calls at once, `found, _ = res.parallel(lambda: find(an="find"), ...)`."""
+        branches = self.flow.parallel[number]
+        action = self.flow.actions[number]
+        if action.parameters:
+            raise InvalidProject("action {name!r}: parallel work has no parameters", name=action.name)
+        none = ast.arguments([], [], None, [], [], None, [])
+        calls: list[ast.expr] = [ast.Lambda(none, self._expression(one)) for one in branches]
+        call = ast.Call(PARALLEL, calls, [ast.keyword("an", ast.Constant(action.name))])
+        results = [self.results[one] for one in branches]
+        if not any(results):
+            return ast.Expr(call)
+        parts = [
+            expressions.target(names[0] if names else NO_RESULT) if len(names) < 2 else _targets(names)
+            for names in results
+        ]
+        return ast.Assign([ast.Tuple(parts, ast.Store())], call, lineno=0)
+
+    def _expression(self, number: int) -> ast.expr:
+        """Return the call of an action."""
         action = self.flow.actions[number]
         object_id, _, method, _ = self.calls[number]
         try:
@@ -469,12 +511,9 @@ class Cycle:
             called = expressions.dotted(self.frame.objects[object_id], (method,))
         if not isinstance(action.retry, Unset):
             called = self._retried(action, action.retry, self.calls[number])
-        call = ast.Call(called, positional, keywords)
-        match self.results[number]:
-            case []:
-                return ast.Expr(call)
-            case [name]:
-                return expressions.assign(name, call)
-            case names:
-                target = ast.Tuple([expressions.target(name) for name in names], ast.Store())
-                return ast.Assign([target], call, lineno=0)
+        return ast.Call(called, positional, keywords)
+
+
+def _targets(names: Sequence[str]) -> ast.expr:
+    """Return several names to which results are assigned."""
+    return ast.Tuple([expressions.target(name) for name in names], ast.Store())

@@ -34,7 +34,7 @@ _ANNOTATIONS: Final = {"boolean": "bool", "integer": "int", "double": "float", "
 """The types of variables in Python."""
 DOCSTRING: Final = "Main script of the project"
 """Start of the docstring of a generated script."""
-_RESERVED: Final = ("ActionPoints", "Resources", "aps", ERROR, "main", "print_exception", "res", NEXT_ACTION)
+_RESERVED: Final = ("_", "ActionPoints", "Resources", "aps", ERROR, "main", "print_exception", "res", NEXT_ACTION)
 _FRAME: Final = """
 def main(res: Resources) -> None:
     aps = ActionPoints(res)
@@ -74,6 +74,10 @@ class ActionCall(NamedTuple):
     type_name: str
     method: str
     meta: ObjectAction
+
+
+PARALLEL_CALL: Final = ActionCall("functions", "functions", "parallel", ObjectAction("parallel"))
+"""What an action calls that runs several calls at once."""
 
 
 class ParameterUse(NamedTuple):
@@ -206,6 +210,8 @@ class Frame:
             InvalidProject: the action cannot be called.
             NotFound: the object type is unknown.
         """
+        if action.is_parallel:
+            return PARALLEL_CALL
         try:
             object_id, method = action.parse_type()
             if method == CALL and (function := self.index.find_function(object_id)) is not None:

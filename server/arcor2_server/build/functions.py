@@ -10,6 +10,7 @@ from arcor2_hw.exceptions import InvalidData, InvalidProject
 from arcor2_server.build import expressions
 from arcor2_server.build.cycle import Block, Cycle
 from arcor2_server.build.frame import Frame
+from arcor2_server.build.parallel_work import check_parallel_work
 from arcor2_server.documents import logic_graph
 from arcor2_server.documents.checks.actions import text_of
 from arcor2_server.documents.item_indexes import reference
@@ -217,4 +218,5 @@ def cycles_of(frame: Frame, project: Project) -> tuple[Cycle, list[FunctionCycle
     """
     program = logic_graph.read(project, frame.parameters)
     functions = called_functions(project, program)
+    check_parallel_work(program, functions, frame.index)
     return Cycle(frame, program), [FunctionCycle(frame, flow, function) for function, flow in functions]

@@ -32,6 +32,11 @@ def _keyword(node: ast.keyword) -> str:
     return f"{node.arg}={_unparse(node.value)}"
 
 
+def _lambda(node: ast.Lambda) -> str:
+    """Return a function without parameters."""
+    return f"lambda: {_unparse(node.body)}"
+
+
 def _name(node: ast.Name) -> str:
     return node.id
 
@@ -87,6 +92,7 @@ _FREQUENT: Final[dict[type[ast.AST], Callable[[Any], str]]] = {
     ast.Compare: _compare,
     ast.Constant: _constant,
     ast.Expr: _expression,
+    ast.Lambda: _lambda,
     ast.Name: _name,
     ast.UnaryOp: _unary,
     ast.keyword: _keyword,

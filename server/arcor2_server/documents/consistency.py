@@ -121,7 +121,24 @@ def _owned(document: Document, change: Change, types: Types) -> None:  # noqa: A
 def _action(document: Document, change: Change, types: Types) -> None:
     _owned(document, change, types)
     _check_action(document, change.after, types)
+    _check_branches(document, change.after)
     _check_users(document, change.id, types)
+
+
+def _check_branches(document: Document, action: Action) -> None:
+    for key in action.branches or ():
+        items = [item.id for item in (*document.outgoing(key), *document.incoming(key))]
+        others = [
+            user.id
+            for user in document.users_of(key)
+            if isinstance(user, Action) and user.id != action.id and key in (user.branches or ())
+        ]
+        if items or others:
+            raise Inconsistent(
+                "{call} is connected, or part of other parallel work.",
+                [*items, *others],
+                call=document.action(key).name,
+            )
 
 
 def _check_users(document: Document, key: str, types: Types) -> None:

@@ -374,7 +374,8 @@ class Document:
     def users_of(self, target_id: str) -> list[Action | LogicItem | ProjectFunction]:
         """Return the actions with a parameter that refers to this id, and the logic items with a condition on it.
 
-        The users of an action are also the function that returns a result of it; those of a function are its calls.
+        The users of an action are also the function that returns a result of it, and the parallel action of which it is
+        a branch; those of a function are its calls.
         """
         actions, logic, functions = (self._items[kind] for kind in (Kind.ACTION, Kind.LOGIC, Kind.FUNCTION))
         return [(actions.get(i) or logic.get(i) or functions[i]).value for i in self._indexes.users.get(target_id, ())]
@@ -382,6 +383,11 @@ class Document:
     def calls_of(self, function_id: str) -> list[Action]:
         """Return the actions that call a function."""
         return [user for user in self.users_of(function_id) if isinstance(user, Action)]
+
+    def parallel_of(self, action_id: str) -> Action | None:
+        """Return the parallel action of which an action is a branch, None if it is none."""
+        users = (user for user in self.users_of(action_id) if isinstance(user, Action))
+        return next((user for user in users if action_id in (user.branches or ())), None)
 
     def root_of(self, item: str) -> str:
         """Return the root of the lock tree that an id belongs to (protocol, section 6). Raise NotFound if unknown."""

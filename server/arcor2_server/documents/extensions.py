@@ -9,13 +9,15 @@ from arcor2_hw.data.project import Action, LogicItem, Project
 def keep_extensions(sent: Project, stored: Project) -> Project:
     """Return a sent project with the functions and fields that it lacks, by the ids of its items.
 
-    These fields are the names of errors, retries, error exits, comparisons, which parameters are variables, and the
-    script. An empty text or list removes them, and so does the count 0 of a retry. A condition replaces comparisons.
+    These fields are the names of errors, retries, branches, error exits, comparisons, which parameters are variables,
+    and the script. An empty text or list removes them, and so does the count 0 of a retry. A condition replaces
+    comparisons.
     """
     present = {function.id for function in sent.functions}
     functions = [*sent.functions, *(function for function in stored.functions if function.id not in present)]
     logic = [*stored.logic, *(item for function in stored.functions for item in function.logic)]
     errors = {action.id: action.error_output for action in stored.all_actions() if action.error_output}
+    branches = {action.id: action.branches for action in stored.all_actions() if action.branches}
     retries = {action.id: action.retry for action in stored.all_actions() if action.retry}
     variables = {parameter.id for parameter in stored.parameters if parameter.variable}
     steps = {item.id: item for item in logic if item.is_error_exit or item.has_comparisons}
@@ -27,6 +29,8 @@ def keep_extensions(sent: Project, stored: Project) -> Project:
             one = replace(one, retry=retries[one.id])
         elif one.retry and one.retry.count == 0:
             one = replace(one, retry=UNSET)
+        if isinstance(one.branches, Unset) and one.id in branches:
+            one = replace(one, branches=branches[one.id])
         return one
 
     def item(one: LogicItem) -> LogicItem:
@@ -42,7 +46,7 @@ def keep_extensions(sent: Project, stored: Project) -> Project:
             for one in sent.parameters
         ]
         sent = replace(sent, parameters=parameters)
-    if errors or retries:
+    if errors or retries or branches:
         points = [replace(point, actions=[action(one) for one in point.actions]) for point in sent.action_points]
         functions = [replace(one, actions=[action(each) for each in one.actions]) for one in functions]
         sent = replace(sent, action_points=points)

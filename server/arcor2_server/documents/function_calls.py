@@ -23,6 +23,7 @@ from arcor2_server.documents.checks.actions import text_of
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.function_links import Names, changes_of_users, with_condition, with_links
 from arcor2_server.documents.item_indexes import action_of, reference
+from arcor2_server.documents.parallel_work import mapped_branches
 from arcor2_server.errors import RequestRefused
 
 
@@ -42,6 +43,10 @@ def dissolve_call(document: Document, call_id: str, *, remove_function: bool = F
     item = document.find(Kind.ACTION, call_id)
     assert item is not None
     function = document.find_function(call.type.partition("/")[0])
+    if (owner := document.parallel_of(call_id)) is not None:
+        raise RequestRefused(
+            "{owner} runs {name} in parallel. Dissolve {owner} first.", name=call.name, owner=owner.name
+        )
     if function is None:
         raise RequestRefused("{name} does not call a function.", name=call.name)
     if remove_function and len(document.calls_of(function.id)) > 1:
@@ -123,6 +128,7 @@ class _Copies:
             parameters=[self._parameter(one) for one in with_links(action, self._mapped).parameters],
             flows=flows,
             error_output=error,
+            branches=mapped_branches(action, self._ids),
         )
 
     def _mapped(self, link: tuple[str, str, int]) -> str | None:

@@ -25,6 +25,7 @@ from arcor2_server.documents.checks.actions import text_of
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.function_links import Names, encoded, with_condition, with_links
 from arcor2_server.documents.item_indexes import action_of
+from arcor2_server.documents.parallel_work import mapped_branches
 from arcor2_server.errors import RequestRefused
 
 OBJECT: Final = "object"
@@ -222,7 +223,7 @@ class _Importing:
 
     def _action(self, action: Action) -> Action:
         key, method = action.parse_type()
-        target = self._functions.get(key) if method == CALL else None
+        target = self._functions.get(key) if method == CALL else key if action.is_parallel else None
         return replace(
             with_links(action, self._mapped),
             id=self._actions[action.id],
@@ -230,6 +231,7 @@ class _Importing:
             type=f"{target or self._ids[OBJECT, key]}/{method}",
             parameters=[self._parameter(one) for one in with_links(action, self._mapped).parameters],
             error_output=action.error_output or UNSET,
+            branches=mapped_branches(action, self._actions),
         )
 
     def _parameter(self, one: ActionParameter) -> ActionParameter:

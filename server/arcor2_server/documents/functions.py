@@ -34,6 +34,7 @@ from arcor2_server.documents.function_links import (
     with_condition,
 )
 from arcor2_server.documents.item_indexes import action_of
+from arcor2_server.documents.parallel_work import mapped_branches, with_branches
 from arcor2_server.errors import RequestRefused
 
 FROM_OUTSIDE = frozenset({ActionParameterType.PROJECT_PARAMETER, ActionParameterType.FUNCTION_PARAMETER})
@@ -69,7 +70,7 @@ class _Selection:
 
     def __init__(self, document: Document, action_ids: Sequence[str]) -> None:
         self.document = document
-        self.ids = list(dict.fromkeys(action_ids))
+        self.ids = with_branches(document, action_ids)
         self.actions = {key: document.action(key) for key in self.ids}
         self.scope = document.function_of(self.ids[0])
         if any(document.function_of(key) != self.scope for key in self.ids):
@@ -101,6 +102,7 @@ class _Selection:
         entries = list(dict.fromkeys(action_of(item.end) for item in self.arriving))
         if not entries:
             followed = {action_of(item.end) for item in self.inside}
+            followed.update(key for action in self.actions.values() for key in action.branches or ())
             entries = [key for key in self.ids if key not in followed]
         if len(entries) > 1:
             names = self._named(entries)
@@ -113,6 +115,8 @@ class _Selection:
         following: dict[str, list[str]] = {}
         for item in self.inside:
             following.setdefault(action_of(item.start), []).append(action_of(item.end))
+        for key, action in self.actions.items():
+            following.setdefault(key, []).extend(action.branches or ())
         while waiting:
             for key in following.get(waiting.pop(), ()):
                 if key not in reached:
@@ -172,7 +176,12 @@ class _Parameters:
             name = self._name(one, kinds[meta.present_name(one.name)])
             return replace(one, type=ActionParameterType.FUNCTION_PARAMETER, value=encoded(name))
 
-        return replace(action, id=ids[action.id], parameters=[parameter(one) for one in action.parameters])
+        return replace(
+            action,
+            id=ids[action.id],
+            parameters=[parameter(one) for one in action.parameters],
+            branches=mapped_branches(action, ids),
+        )
 
     def _name(self, given: ActionParameter, kind: str) -> str:
         """Return the name of the parameter that passes on `given`."""

@@ -62,7 +62,8 @@ class ItemIndexes:
         owned: Orientations, joints, actions and logic items, by action point or function, and kind.
         points: Action points by parent.
         names: Items by scope and name; the scope is a kind, for orientations and joints with their action point.
-        users: Actions, logic items and functions by the item that they refer to; calls also by their function.
+        users: Actions, logic items and functions by the item that they refer to; calls also by their function, and
+            parallel actions by their branches.
         leaving: Logic items by their start (`place_of`).
         arriving: Logic items by their end.
     """
@@ -119,6 +120,7 @@ class ItemIndexes:
                 called, _, method = value.type.partition("/")
                 if method == CALL:
                     targets.add(called)
+                targets.update(value.branches or ())
                 for target in targets - {None}:
                     yield self.users, target
             case Kind.FUNCTION:

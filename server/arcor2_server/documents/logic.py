@@ -37,6 +37,12 @@ def check_logic_item(
         raise InvalidData("{name} cannot lead to itself.", name=_name(document, start))
     for place in {start, end} - {START, END}:
         document.action(place)
+        if (parallel := document.parallel_of(place)) is not None:
+            raise InvalidData(
+                "{parallel} runs {name} in parallel: connect {parallel}.",
+                name=_name(document, place),
+                parallel=parallel.name,
+            )
     if item.has_comparisons and not isinstance(item.condition, Unset):
         raise InvalidData("A step has either a condition or comparisons, not both.")
     function = scope_of(document, item)

@@ -1,13 +1,17 @@
 """The logic of a project as a graph: the successors of each action and their conditions."""
 
+import itertools
 import json
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, NamedTuple, TypeGuard
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.project import (
+    CALL,
     END,
+    MAX_BRANCHES,
+    MIN_BRANCHES,
     START,
     Action,
     LogicItem,
@@ -69,12 +73,15 @@ class Flow:
 
     `edges[n]` is one unconditional edge, or several that are tested in order. The last one applies if no other does.
     Whether edges with comparisons are complete is not checked, because this depends on the types of the values.
-    `exits[n]` are the error exits in the order in which they apply.
+    `exits[n]` are the error exits in the order in which they apply. `parallel[n]` are the calls that action `n` runs at
+    once. An edge leads from the action to the first of them, from each to the next one, and from the last one to what
+    follows the action: so their results are set where the action has succeeded.
     """
 
     actions: list[Action]
     edges: list[tuple[Edge, ...]]
     exits: list[tuple[ErrorExit, ...]]
+    parallel: dict[int, tuple[int, ...]] = field(default_factory=dict)
 
 
 def _node(reference: str, item: LogicItem, known: dict[str, int]) -> int:
@@ -282,6 +289,47 @@ def _number(first: int, edges: list[list[int]], actions: Sequence[Action]) -> li
     return done
 
 
+def _chains(actions: Sequence[Action], known: Mapping[str, int], logic: Iterable[LogicItem]) -> dict[int, list[int]]:
+    """Return the calls that each parallel action runs at once. Raise InvalidProject if they are invalid."""
+    found: dict[int, list[int]] = {}
+    owners: dict[str, str] = {}
+    for number, action in enumerate(actions):
+        if not action.is_parallel:
+            continue
+        branches = action.branches or []
+        if (problem := branches_problem(branches)) is not None:
+            raise InvalidProject("action {name!r}: {reason}", name=action.name, reason=problem)
+        for key in branches:
+            call = actions[known[key]] if key in known else None
+            if call is None or call.type.partition("/")[2] != CALL:
+                raise InvalidProject(
+                    "action {name!r}: its branch {id} is not a call of a function", name=action.name, id=key
+                )
+            if (other := owners.setdefault(key, action.name)) != action.name:
+                raise InvalidProject(
+                    "{call!r} is a branch of {name!r} and of {other!r}", call=call.name, name=other, other=action.name
+                )
+        found[number] = [known[key] for key in branches]
+    for item in logic if owners else ():
+        for key in (item.start.partition("/")[0], item.end.partition("/")[0]):
+            if key in owners:
+                raise InvalidProject(
+                    "{call!r} is a branch of {name!r}, so no connection leads to or from it",
+                    call=actions[known[key]].name,
+                    name=owners[key],
+                )
+    return found
+
+
+def branches_problem(branches: Sequence[str]) -> Message | None:
+    """Return the problem of the number of branches of a parallel action, None if there is none."""
+    if not MIN_BRANCHES <= len(branches) <= MAX_BRANCHES or len(set(branches)) != len(branches):
+        return Message.of(
+            "parallel work runs {least} to {most} different calls of functions", least=MIN_BRANCHES, most=MAX_BRANCHES
+        )
+    return None
+
+
 def read(logic_of: Project | ProjectFunction, parameters: Collection[str] = ()) -> Flow:
     """Return the graph of the logic of a project or function.
 
@@ -311,6 +359,13 @@ def read(logic_of: Project | ProjectFunction, parameters: Collection[str] = ()) 
         names = ", ".join(repr(actions[start].name) for start in starts)
         raise InvalidProject("the logic has more than one first action: {names}", names=names)
 
+    chains = _chains(actions, known, logic_of.logic)
+    owners = {branches[-1]: number for number, branches in chains.items()}
+    for number, branches in chains.items():
+        items[branches[-1]] = [one for one in items[number] if not one[1].is_error_exit]
+        items[number] = [one for one in items[number] if one[1].is_error_exit]
+        for start, end in itertools.pairwise((number, *branches)):
+            items[start].append((end, LogicItem(actions[start].id, actions[end].id)))
     order = _number(starts[0], [[target for target, _ in targets] for targets in items], actions)
     new_numbers = {old: number for number, old in enumerate(order)}
     reached = [actions[number] for number in order]
@@ -318,7 +373,8 @@ def read(logic_of: Project | ProjectFunction, parameters: Collection[str] = ()) 
     new_numbers[END_NODE] = END_NODE
     edges: list[tuple[Edge, ...]] = []
     exits: list[tuple[ErrorExit, ...]] = []
-    for old, source in zip(order, reached, strict=True):
+    for old in order:
+        source = actions[owners.get(old, old)]
         outgoing = [
             Edge(new_numbers[target], test_of(item, source.name, reached_ids, parameters))
             for target, item in items[old]
@@ -329,4 +385,9 @@ def read(logic_of: Project | ProjectFunction, parameters: Collection[str] = ()) 
         edges.append(_ordered(outgoing, source, reached))
         failing = [(new_numbers[target], item) for target, item in items[old] if item.is_error_exit]
         exits.append(_exits(failing, source) if failing else ())
-    return Flow(reached, edges, exits)
+    parallel = {
+        new_numbers[number]: tuple(new_numbers[branch] for branch in branches)
+        for number, branches in chains.items()
+        if number in new_numbers
+    }
+    return Flow(reached, edges, exits, parallel)

@@ -42,6 +42,12 @@ def require_point_unused(document: Document, point: BareActionPoint) -> None:
         for user in document.users_of(needed):
             if isinstance(user, LogicItem):
                 raise RequestRefused("A condition of the logic uses a result of an action on {name}.", name=point.name)
+            if user.id not in own and isinstance(user, Action) and needed in (user.branches or ()):
+                raise RequestRefused(
+                    "{user} runs {name} in parallel. Remove {user} first.",
+                    user=user.name,
+                    name=document.action(needed).name,
+                )
             if user.id not in own:
                 raise RequestRefused(
                     "The action {name} uses {point_name}, or one of its orientations, joints or actions.",

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import RunEnd
 from arcor2_hw.data.events import PackageInfoData, ProjectExceptionData
-from arcor2_hw.data.position import Branch, Frame, ProgramPosition
+from arcor2_hw.data.position import MAIN_BRANCH, Branch, Frame, ProgramPosition
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
@@ -52,6 +52,8 @@ class ProgramRun:
         self._statistics: RunStatisticsCollector | None = None
         self._exception: ProjectExceptionData | None = None
         self._frames: dict[str, list[Frame]] = {}
+        self._branches: dict[int, str] = {}
+        """The branches by the number of the call that each of them runs."""
         self._number = 0
 
     def begin(self, how: How, *, temporary: bool) -> None:
@@ -97,6 +99,8 @@ class ProgramRun:
         if message.number:
             self._runs.announced(message)
         if message.frames:
+            if message.call and message.branch != MAIN_BRANCH and message.branch not in self._frames:
+                self._branches[message.number] = message.branch
             self._frames[message.branch] = message.frames
         statistics, changed = self._statistics, False
         match message.event:
@@ -105,6 +109,7 @@ class ProgramRun:
                     self.action = message.encoded
                 changed = statistics is not None and statistics.handle_start(message.encoded, message.attempt)
             case "ActionStateAfter":
+                self.action_over(message.number)
                 if not message.call:
                     self.action = None
                 changed = statistics is not None and statistics.handle_result(message.encoded)
@@ -112,6 +117,10 @@ class ProgramRun:
                 self._exception = msgspec.json.decode(message.encoded, type=_ExceptionEvent).data
         if statistics is not None and changed:
             self._runs.set_statistics(self._number, statistics.statistics())
+
+    def action_over(self, number: int) -> bool:
+        """Handle the end of an action. Return whether a branch has ended with it."""
+        return self._frames.pop(self._branches.pop(number, ""), None) is not None
 
     def handle_end(self, error: m.ErrorData | None) -> None:
         """Store the error with which the program ended, None if it finished."""

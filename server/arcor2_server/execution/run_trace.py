@@ -9,6 +9,7 @@ from msgspec import UNSET, Struct
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.events import PackageInfoData
+from arcor2_hw.data.position import MAIN_BRANCH
 from arcor2_hw.data.run_trace import RunTrace, Span, traced_devices
 from arcor2_hw.runtime import messages as m
 
@@ -86,6 +87,7 @@ class RunTraceCollector:
                 data.thread_id,
                 before.call or UNSET,
                 before.attempt if before.attempt > 1 else UNSET,
+                UNSET if before.branch == MAIN_BRANCH else before.branch,
             )
         )
 

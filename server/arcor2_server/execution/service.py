@@ -270,11 +270,21 @@ class Execution(PackageLibrary):
         self._enter(S.RESUMING)
         host.send(m.Resume())
 
-    def step(self, mode: ProgramStep = ProgramStep.OVER) -> None:
-        """Let a paused program execute one action. `mode`: whether actions inside of functions count."""
+    def step(self, mode: ProgramStep = ProgramStep.OVER, branch: str = "") -> None:
+        """Let a paused program execute one action.
+
+        Args:
+            mode: whether actions inside of functions count.
+            branch: id of the branch; empty for the one that waits longest.
+
+        Raises:
+            RequestRefused: the program is not paused, or has no such branch.
+        """
         host = self._require({S.PAUSED}, "stepped")
+        if branch and branch not in (one.id for one in self.program.position.branches):
+            raise RequestRefused("The program has no branch {branch}.", branch=branch)
         self._enter(S.RESUMING)
-        host.send(m.Step(mode))
+        host.send(m.Step(mode, branch))
 
     def _breakpoints_changed(self, project_id: str, ids: set[str]) -> None:
         if self.program.shared_of == project_id and self.state not in _IDLE:
@@ -310,7 +320,7 @@ class Execution(PackageLibrary):
                 self.program.handle_event(message)
                 if message.event == "PackageInfo":
                     self._show_devices(message.encoded)
-                if message.frames:
+                if message.frames or message.event == "ActionStateAfter":
                     self._publish_position()
                 if message.call:  # other clients do not know the actions of functions
                     for client in self._hub.subscribers(POSITION):
@@ -319,6 +329,8 @@ class Execution(PackageLibrary):
                     self._hub.broadcast_encoded(message.event, message.encoded)
             case m.ActionFailed():
                 self._runs.ended(message)
+                if self.program.action_over(message.number):
+                    self._publish_position()
             case m.ProgramChanged():
                 self._program_changed(host, message)
             case _:

@@ -22,6 +22,7 @@ from arcor2_server.documents.checks.actions import (
     check_stored,
     complete_parameters,
 )
+from arcor2_server.documents.checks.branches import check_branches
 from arcor2_server.documents.removal import bypass, neighbours, require_results_unused, title_of
 from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.registry import ObjectTypes
@@ -60,6 +61,7 @@ class ActionRequests:
             action = Action(args.name, args.type, new_id("act"), list(args.parameters), list(args.flows))
             action = replace(action, error_output=args.error_output or UNSET, retry=_given(args.retry))
             meta = action_meta(action, document, self._types)
+            check_branches(action, document)
             check_flows(action, meta)
             check_retry(action, meta)
             check_outputs_unique(document, action, "" if function is None else function.id)
@@ -125,6 +127,10 @@ class ActionRequests:
             for user in document.users_of(action.id):
                 if isinstance(user, LogicItem) and user.id in removed:
                     continue
+                if isinstance(user, Action) and action.id in (user.branches or ()):
+                    raise RequestRefused(
+                        "{user} runs {name} in parallel. Remove {user} first.", user=user.name, name=action.name
+                    )
                 using = title_of(user)
                 raise RequestRefused(
                     "A result of {name} is used by {user}. Change that first.",

@@ -17,6 +17,7 @@ from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.document import OUTPUT, Document
 from arcor2_server.documents.item_indexes import OWNED, reference
+from arcor2_server.documents.parallel_work import mapped_branches
 from arcor2_server.rpc.change_events import EVENTS
 from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.registry import Context, rpc
@@ -69,7 +70,9 @@ def _copied_action(
     flows = [replace(flow, outputs=[free_output(output) for output in flow.outputs]) for flow in action.flows]
     parameters = [_redirected(parameter, new_ids) for parameter in action.parameters]
     error = free_output(action.error_output) if action.error_output else action.error_output
-    return replace(action, name=free_name(action.name), flows=flows, parameters=parameters, error_output=error)
+    branches = mapped_branches(action, new_ids)
+    name = free_name(action.name)
+    return replace(action, name=name, flows=flows, parameters=parameters, error_output=error, branches=branches)
 
 
 def _redirected(parameter: ActionParameter, new_ids: dict[str, str]) -> ActionParameter:

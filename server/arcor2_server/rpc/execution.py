@@ -6,7 +6,7 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.events import ActionExecutionData, ChangeType
 from arcor2_hw.data.package import PackageSummary
-from arcor2_hw.data.position import ProgramPosition, ProgramStep
+from arcor2_hw.data.position import ProgramPosition
 from arcor2_hw.data.rpc import (
     ExecuteActionArgs,
     IdArgs,
@@ -166,7 +166,10 @@ class ExecutionRequests:
     @rpc("StepAction")
     async def step_action(self, context: Context, args: StepActionArgs | None) -> None:
         """Resume the paused program for one action, over or into functions, or until the present function is left."""
-        self._execution.step(ProgramStep.OVER if args is None else args.mode)
+        if args is None:
+            self._execution.step()
+        else:
+            self._execution.step(args.mode, args.branch or "")
 
     @rpc("GetProgramPosition")
     async def get_program_position(self, context: Context, args: None) -> ProgramPosition:

@@ -14,17 +14,21 @@ from arcor2_hw.data.rpc import (
     AddFunctionResultArgs,
     DissolveCallArgs,
     DissolveCallData,
+    DissolveParallelArgs,
     FunctionExport,
     IdArgs,
     ImportFunctionArgs,
     ImportFunctionData,
     MakeFunctionArgs,
     MakeFunctionData,
+    MakeParallelArgs,
+    MakeParallelData,
     RemoveFunctionParameterArgs,
     RemoveFunctionResultArgs,
     RenameFunctionArgs,
     UpdateFunctionParameterArgs,
     UpdateFunctionResultArgs,
+    UpdateParallelArgs,
 )
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Change, EditKind, Kind
@@ -39,6 +43,7 @@ from arcor2_server.documents.function_signature import (
     update_result,
 )
 from arcor2_server.documents.functions import make_function
+from arcor2_server.documents.parallel_work import dissolve_parallel, make_parallel
 from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.undo import Undo
@@ -99,6 +104,31 @@ class FunctionRequests:
         await self._edit(context, changes)
         return DissolveCallData(ids)
 
+    # ---------------------------------------------------------------------------------------------- parallel work
+    @rpc("MakeParallel")
+    async def make_parallel(self, context: Context, args: MakeParallelArgs) -> MakeParallelData:
+        """Let calls that follow each other, or are not connected, run at once."""
+        document = self._session.require_project_open()
+        changes, action_id = make_parallel(document, args.name, args.action_ids)
+        await self._edit(context, changes)
+        return MakeParallelData(action_id)
+
+    @rpc("UpdateParallel")
+    async def update_parallel(self, context: Context, args: UpdateParallelArgs) -> None:
+        """Change the calls that a parallel action runs at once."""
+        document = self._session.require_project_open()
+        action = document.action(args.action_id)
+        await self._edit(
+            context, [document.update(Kind.ACTION, action.id, replace(action, branches=list(args.branches)))]
+        )
+
+    @rpc("DissolveParallel")
+    async def dissolve_parallel(self, context: Context, args: DissolveParallelArgs) -> None:
+        """Let the calls of a parallel action run one after the other in its place."""
+        document = self._session.require_project_open()
+        await self._edit(context, dissolve_parallel(document, args.action_id))
+
+    # ---------------------------------------------------------------------------------------------- functions
     @rpc("AddFunction")
     async def add_function(self, context: Context, args: AddFunctionArgs) -> AddFunctionData:
         """Add a function without actions."""

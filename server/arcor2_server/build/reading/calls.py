@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.object_type import Again, ObjectAction, ParameterMeta, find_action
 from arcor2_hw.data.project import CALL, ERROR_FLOW, ERROR_PARTS, MAX_RETRIES, MAX_RETRY_PAUSE, FlowTypes, Retry
-from arcor2_server.build.frame import Frame
+from arcor2_server.build.frame import ActionCall, Frame
 from arcor2_server.build.reading.errors import NotUnderstood, excerpt
 from arcor2_server.build.reading.scope import Call, Scope, Use
 
@@ -45,12 +45,20 @@ class CallReader:
         """Read a statement that calls an action. Return the number of the call."""
         match node:
             case ast.Expr(ast.Call() as call):
-                return self._call(node, call, [])
+                return self.read_call(node, call, [])
             case ast.Assign([target], ast.Call() as call) | ast.AnnAssign(target, _, ast.Call() as call):
-                return self._call(node, call, self._targets(target))
+                return self.read_call(node, call, self._targets(target))
         raise NotUnderstood(node.lineno, "{node} is not a call of an action", node=excerpt(node))
 
-    def _call(self, node: ast.stmt, call: ast.Call, outputs: list[str]) -> int:
+    def add_parallel(self, call: ast.Call, what: ActionCall) -> int:
+        """Add an action that runs calls at once. Return its number."""
+        number = len(self._scope.calls)
+        name = self._name(call)
+        self._scope.calls.append(Call(call.lineno, name, what.object_id, what.type_name, what.meta, {}, []))
+        return number
+
+    def read_call(self, node: ast.stmt, call: ast.Call, outputs: list[str]) -> int:
+        """Read the call of an action or function in a statement. Return its number."""
         retry: Retry | Unset = UNSET
         match call.func:
             case ast.Attribute(ast.Name(variable), method) if variable in self._scope.script.objects:

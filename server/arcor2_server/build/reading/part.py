@@ -80,10 +80,11 @@ class Part:
         self._variables = variables
         self._paths = {number: _merged(found) for number, found in reader.paths.items()}
         self._exits = reader.exits
+        self._parallel = reader.parallel
         self._kinds = reader.scope.kinds
         self._stored = variables.stored if reader.scope.stores else {}
         self._number_of = {call.name: number for number, call in enumerate(self.calls)}
-        self._reached = reached(logic)
+        self._reached = reached(logic, actions)
         self._check_uses(reader)
 
     def _check_uses(self, loop: LoopReader) -> None:
@@ -168,6 +169,7 @@ class Part:
             self._flows(call, old),
             self._error_output(call, old),
             call.retry,
+            [self.ids[branch] for branch in self._parallel[number]] if number in self._parallel else UNSET,
         )
 
     def _error_output(self, call: Call, old: Action | None) -> str | Unset:
@@ -204,7 +206,12 @@ class Part:
             old_items.setdefault(item.start.partition("/")[0], []).append(item)
         unchanged: dict[int, LogicItem] = {}
         changed: list[LogicItem] = []
-        for number, paths in self._paths.items():
+        inner = {one for number, branches in self._parallel.items() for one in (number, *branches[:-1])}
+        last = {branches[-1]: number for number, branches in self._parallel.items()}
+        for after, paths in self._paths.items():
+            if after in inner:
+                continue  # the chain of an action and the calls that it runs at once
+            number = last.get(after, after)
             start = START if number == START_NODE else self.ids[number]
             old = old_items.get(start, [])
             wanted = self._steps(paths, old)
@@ -330,9 +337,9 @@ def _key(item: LogicItem) -> tuple[str, object, frozenset[str]]:
     return item.end.partition("/")[0], condition_key(item), frozenset(item.error_kinds or ())
 
 
-def reached(logic: Iterable[LogicItem]) -> set[str]:
+def reached(logic: Iterable[LogicItem], actions: Iterable[Action]) -> set[str]:
     """Return the ids of the actions reachable from START, which are those in the script of the project."""
-    following: dict[str, list[str]] = {}
+    following: dict[str, list[str]] = {action.id: list(action.branches) for action in actions if action.branches}
     for item in logic:
         following.setdefault(item.start.partition("/")[0], []).append(item.end.partition("/")[0])
     seen: set[str] = set()

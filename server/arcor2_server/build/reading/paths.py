@@ -14,6 +14,7 @@ from arcor2_server.build.frame import NEXT_ACTION, Frame
 from arcor2_server.build.reading.calls import CallReader, ScriptCalls
 from arcor2_server.build.reading.conditions import ConditionReader
 from arcor2_server.build.reading.errors import NotUnderstood, excerpt
+from arcor2_server.build.reading.parallel import parallel_call, read_parallel
 from arcor2_server.build.reading.scope import Scope, Use
 from arcor2_server.documents.logic_graph import (
     END_NODE,
@@ -56,6 +57,8 @@ class LoopReader:
         self.paths: dict[int, list[LogicPath]] = {START_NODE: []}
         self.exits: dict[int, list[ErrorExit]] = {}
         """The error exits by the number of the call."""
+        self.parallel: dict[int, list[int]] = {}
+        """The branches of each call of parallel work. They are a chain of paths after it."""
         self._calls = CallReader(frame, scope, shared)
         self._conditions = ConditionReader(scope)
         open_paths = self._block(body, [_OpenPath(START_NODE)])
@@ -118,8 +121,17 @@ class LoopReader:
         exits.append(ErrorExit(target, path.kinds))
 
     def _step(self, node: ast.stmt, open_paths: list[_OpenPath]) -> list[_OpenPath]:
-        """Read a statement that calls an action, which ends all open paths and starts one."""
-        number = self._calls.read(node)
+        """Read a statement that calls an action, or several at once."""
+        if (call := parallel_call(node, self.scope.script.resources)) is None:
+            return self._reach(self._calls.read(node), open_paths)
+        number, *branches = read_parallel(self._calls, self.scope, node, call)
+        self.parallel[number] = branches
+        for each in (number, *branches):
+            open_paths = self._reach(each, open_paths)
+        return open_paths
+
+    def _reach(self, number: int, open_paths: list[_OpenPath]) -> list[_OpenPath]:
+        """End all open paths at a call, and start one there."""
         self.paths[number] = []
         for path in open_paths:
             self._arrive(path, number)
@@ -127,12 +139,12 @@ class LoopReader:
 
     # ------------------------------------------------------------------------------------------------ error exits
     def _try(self, node: ast.Try, open_paths: list[_OpenPath]) -> list[_OpenPath]:
+        number = len(self.scope.calls)
         match node.body:
             case [ast.Expr() | ast.Assign() | ast.AnnAssign() as step] if not node.finalbody and node.handlers:
                 after = self._step(step, open_paths)
             case _:
                 raise NotUnderstood(node.lineno, "a `try` block contains one call of an action, and has no `finally`")
-        number = len(self.scope.calls) - 1
         if node.orelse:
             after = self._block(node.orelse, after)
         seen: set[str] = set()

@@ -247,7 +247,8 @@ def _called(project: Project) -> set[str]:
     ]
     while waiting:
         actions, logic = waiting.pop()
-        own = reached(logic)
+        actions = list(actions)
+        own = reached(logic, actions)
         for action in actions:
             key = action.type.partition("/")[0]
             if action.id in own and key in functions and key not in found:

@@ -1,6 +1,7 @@
 """Checks of actions, their parameters, flows and results."""
 
 from collections.abc import Iterator, Set
+from typing import Final
 
 import msgspec
 from msgspec import UNSET
@@ -29,10 +30,14 @@ from arcor2_hw.data.project import (
 )
 from arcor2_hw.data.project_index import ProjectLookup
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
+from arcor2_server.documents.checks.branches import check_branches
 from arcor2_server.documents.checks.names import check_name
 from arcor2_server.documents.checks.object_types import Types
 from arcor2_server.documents.document import OUTPUT, Document
 from arcor2_server.documents.renamed_actions import with_present_name
+
+_PARALLEL: Final = ObjectAction("parallel")
+"""The metadata of an action that runs several calls at once."""
 
 
 def check_action(action: Action, lookup: ProjectLookup, types: Types, function: ProjectFunction | None = None) -> None:
@@ -43,6 +48,7 @@ def check_action(action: Action, lookup: ProjectLookup, types: Types, function: 
     meta = action_meta(action, lookup, types)
     check_flows(action, meta)
     check_retry(action, meta)
+    check_branches(action, lookup)
     complete = complete_parameters(action, meta)
     check_parameters(complete, meta, lookup, types, function)
     if function is not None:
@@ -83,6 +89,8 @@ def action_meta(action: Action, lookup: ProjectLookup, types: Types) -> ObjectAc
 
 
 def _action_meta(action: Action, lookup: ProjectLookup, types: Types, callers: Set[str]) -> ObjectAction:
+    if action.is_parallel:
+        return _PARALLEL
     try:
         object_id, method = action.parse_type()
     except ValueError as error:
