@@ -79,8 +79,12 @@ class _Selection:
         self.inside: list[LogicItem] = []
         self.arriving: list[LogicItem] = []
         self.leaving: list[LogicItem] = []
+        self.own: list[LogicItem] = []
+        """The logic items that start at the selected actions, in the order in which their conditions are tested."""
         for item in (each.value for each in logic):
             starts, ends = action_of(item.start) in self.actions, action_of(item.end) in self.actions
+            if starts:
+                self.own.append(item)
             if starts or ends:
                 (self.inside if starts and ends else self.leaving if starts else self.arriving).append(item)
         for action in self.actions.values():
@@ -139,7 +143,7 @@ class _Selection:
         return exits[0] if exits else None
 
     def _check_conditions(self) -> None:
-        for item in (*self.inside, *self.leaving):
+        for item in self.own:
             outside = [tested for tested in tested_by(item) if tested[0] not in self.actions]
             for tested in outside[:1]:
                 raise NoFunction(
@@ -209,7 +213,7 @@ class _Parameters:
 def _results_used_outside(document: Document, selection: _Selection) -> list[tuple[str, int]]:
     """Return the results of the selected actions that links, conditions or a function outside of them use."""
     found: dict[tuple[str, int], None] = {}
-    own = {*selection.ids, *(item.id for item in (*selection.inside, *selection.leaving))}
+    own = {*selection.ids, *(item.id for item in selection.own)}
 
     def note(link: tuple[str, str, int]) -> None:
         if link[1] == ERROR_FLOW:
@@ -279,7 +283,7 @@ def make_function(
         return f"{call_id}/default/{used.index((link[0], link[2]))}" if link[0] in ids else None
 
     logic = [LogicItem(START, ids[selection.entry], id=new_id("lit"))]
-    own = (*selection.inside, *selection.leaving)
+    own = selection.own
     for item in own:
         start, end = ids[action_of(item.start)], ids.get(action_of(item.end), END)
         logic.append(replace(with_condition(item, inner), start=start, end=end, id=new_id("lit")))

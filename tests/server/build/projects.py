@@ -1,13 +1,14 @@
 """Projects made for the tests of Build, and a direct walk through a project's logic to compare programs with."""
 
 import builtins
+import collections
 import contextlib
 import copy
 import itertools
 import json
 import random
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from operator import eq, ge, gt, le, lt, ne
 from typing import Any
@@ -18,6 +19,7 @@ from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.object_type import ActionMetadata, Again, ObjectAction, ObjectTypeMeta, ParameterMeta
 from arcor2_hw.data.project import (
+    CALL,
     END,
     START,
     Action,
@@ -51,9 +53,11 @@ from arcor2_server.documents.comparisons import (
     cases_of,
     decoded,
 )
-from arcor2_server.documents.consistency import check_consistent
+from arcor2_server.documents.consistency import Inconsistent, check_consistent
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.functions import NoFunction, make_function
+from arcor2_server.documents.parallel_work import make_parallel
+from arcor2_server.errors import RequestRefused
 
 OBJECT = "obj_1"
 PARAMETERS = [
@@ -349,7 +353,13 @@ def run(source: str, oracle: Oracle, count: int, exits: Exits | None = None) -> 
     try:
         caught = lambda error: ActionError("thing", error.code, str(error))  # noqa: E731
         names["main"](
-            types.SimpleNamespace(objects={OBJECT: thing}, caught=caught, retry=_Retrying, function=lambda body: body)
+            types.SimpleNamespace(
+                objects=collections.defaultdict(lambda: thing),
+                caught=caught,
+                retry=_Retrying,
+                function=lambda body: body,
+                parallel=lambda *calls, an: tuple(call() for call in calls),
+            )
         )
     except Enough:
         return thing.done
@@ -626,6 +636,8 @@ def with_functions(project: Project, rng: random.Random, count: int) -> Project:
         for item in items:
             following.setdefault(item.value.start, []).append(item.value.end)
         places = [place for place in following if place != START]
+        if not places:
+            continue
         selected = [rng.choice(places)]
         for _ in range(rng.randrange(8)):
             near = [end for place in selected for end in following.get(place, ()) if end not in (END, *selected)]
@@ -641,3 +653,60 @@ def with_functions(project: Project, rng: random.Random, count: int) -> Project:
     changed = document.project
     assert changed is not None
     return changed
+
+
+def with_parallel_work(project: Project, rng: random.Random) -> tuple[Scene, Project]:
+    """Let pairs of actions that follow each other run at once, as calls of functions with a device of their own.
+
+    Return the project, and its scene with these devices.
+    """
+    document = Document.of(SCENE, project)
+    devices: list[SceneObject] = []
+    separate: set[str] = set()
+    """The functions that run in parallel or contain parallel work, also through calls."""
+    scopes = ["", *(item.id for item in document.of_kind(Kind.FUNCTION))]
+    for number in range(8):
+        scope = rng.choice(scopes)
+        steps = [item.value for item in (document.owned(scope, Kind.LOGIC) if scope else document.program_logic())]
+        steps = [one for one in steps if one.start != START and one.end != END]
+        if scope in separate or not steps:
+            continue
+        step = rng.choice(steps)
+        trial = Document.of(SCENE, document.project)
+        calls = []
+        try:
+            for place, key in enumerate((step.start, step.end)):
+                changes, _, call = make_function(trial, TypesOfTests(), f"b{number}{place}", [key])
+                trial.apply(changes)
+                calls.append(call)
+            changes, _ = make_parallel(trial, f"both {number}", calls)
+            check_consistent(trial, changes, TypesOfTests())
+        except (RequestRefused, Inconsistent):
+            continue
+        trial.apply(changes)
+        inside = [list(_inner(trial, trial.action(key).type.partition("/")[0])) for key in calls]
+        if any(function in separate for functions in inside for function in functions):
+            continue
+        document = trial
+        for place, functions in enumerate(inside):
+            device = f"thing_{number}_{place}"
+            devices.append(SceneObject(device, "Thing", id=device))
+            for action in [item.value for one in functions for item in document.owned(one, Kind.ACTION)]:
+                key, _, method = action.type.partition("/")
+                if key == OBJECT:
+                    moved = replace(action, type=f"{device}/{method}")
+                    document.apply([document.update(Kind.ACTION, action.id, moved)])
+            separate.update(functions)
+        separate.update({scope} - {""})
+    changed = document.project
+    assert changed is not None
+    return replace(SCENE, objects=[*SCENE.objects, *devices]), changed
+
+
+def _inner(document: Document, function_id: str) -> Iterator[str]:
+    """Return a function and the functions that it calls."""
+    yield function_id
+    for item in document.owned(function_id, Kind.ACTION):
+        key, _, method = item.value.type.partition("/")
+        if method == CALL:
+            yield from _inner(document, key)

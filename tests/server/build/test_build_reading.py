@@ -22,6 +22,7 @@ from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.consistency import check_consistent
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.function_calls import dissolve_call
+from arcor2_server.documents.parallel_work import dissolve_parallel
 from arcor2_server.errors import RequestRefused
 from tests.server.build import workplace
 from tests.server.build.projects import (
@@ -36,6 +37,7 @@ from tests.server.build.projects import (
     with_comparisons,
     with_exits,
     with_functions,
+    with_parallel_work,
     with_retries,
     with_variables,
     without_doubles,
@@ -137,6 +139,51 @@ def test_functions_round_trip_and_do_what_their_actions_did(
     dissolved = document.project
     assert dissolved is not None
     assert run(from_logic(SCENE, dissolved, TYPES), oracle, 3 * size, exits_of(dissolved)) == ran, source
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
+@given(
+    st.integers(0, 2**32),
+    st.integers(6, 30),
+    st.sampled_from([0.0, 0.2, 0.5]),
+    st.booleans(),
+    st.booleans(),
+    st.booleans(),
+)
+def test_parallel_work_round_trips_and_does_what_its_calls_did(
+    seed: int, size: int, joining: float, comparisons: bool, variables: bool, exits: bool
+) -> None:
+    rng = random.Random(seed)
+    draft = without_doubles(random_draft(rng, size, joining, 0.05, 3))
+    if comparisons:
+        draft = with_comparisons(draft, rng)
+    if variables:
+        draft = with_retries(with_variables(draft, rng), rng)
+    flat = (with_exits(draft, rng) if exits else draft).project()
+    steps = [(item.start, item.end, item.is_error_exit) for item in flat.logic]
+    assume(len(steps) == len(set(steps)))
+    scene, project = with_parallel_work(with_functions(flat, rng, 3), rng)
+    parallel = [action.id for action in project.all_actions() if action.is_parallel]
+    assume(parallel)
+    source = from_logic(scene, project, TYPES)
+    assert from_script(source, scene, project, TYPES) == project, source
+    oracle = _oracle(seed)
+    ran = run(source, oracle, 3 * size, exits_of(project))
+    assert ran == walk(flat, oracle, 3 * size), source
+
+    [point] = project.action_points
+    bare = replace(project, action_points=[replace(point, actions=[])], logic=[], functions=[])
+    fresh = from_script(source, scene, bare, TYPES)
+    assert run(from_logic(scene, fresh, TYPES), oracle, 3 * size, exits_of(fresh)) == ran, source
+
+    document = Document.of(scene, project)
+    for action_id in parallel:
+        changes = dissolve_parallel(document, action_id)
+        check_consistent(document, changes, TypesOfTests())
+        document.apply(changes)
+    dissolved = document.project
+    assert dissolved is not None
+    assert run(from_logic(scene, dissolved, TYPES), oracle, 3 * size, exits_of(dissolved)) == ran, source
 
 
 # ------------------------------------------------------------------------------------------------ edits by hand
