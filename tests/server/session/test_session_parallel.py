@@ -1,0 +1,111 @@
+"""Parallel work of the open project: made from calls, changed, dissolved, undone, and kept for older clients."""
+
+from typing import Any
+
+import pytest
+from msgspec import UNSET
+from msgspec.structs import replace
+
+from arcor2_hw.data.project import PARALLEL, Action, Project
+from arcor2_server.documents.document import UNTIMED
+from arcor2_server.documents.extensions import keep_extensions
+from tests.server.session.session_server import Person, Refused
+from tests.server.session.test_session_scripts import STORED, connect
+from tests.server.session.work import Work
+
+
+@pytest.fixture
+async def work(alice: Person) -> Work:
+    """A program: draw, then sleep, then draw again. Draw and sleep are calls of functions."""
+    work = Work(alice)
+    await work.project("here")
+    here = work.point("here")
+    probability = {"name": "probability", "type": "double", "value": "0.5"}
+    await work.add_action(here, "draw", "rnd/random_bool", probability, **STORED)
+    await work.add_action(here, "pause", "time/sleep", {"name": "seconds", "type": "double", "value": "0.1"})
+    await work.add_action(here, "again", "rnd/random_bool", probability)
+    for start, end in (("START", "draw"), ("draw", "pause"), ("pause", "again"), ("again", "END")):
+        await connect(work, start, end)
+    for name in ("draw", "pause"):
+        await alice.ask("MakeFunction", name=f"do_{name}", action_ids=[work.action(name).id])
+    alice.take()
+    return work
+
+
+def project_of(work: Work) -> Project:
+    return replace(work.session.require_project(), **UNTIMED)
+
+
+def steps_of(work: Work) -> set[tuple[str, str]]:
+    names = {action.id: action.name for action in project_of(work).all_actions()}
+    return {(names.get(item.start, item.start), names.get(item.end, item.end)) for item in project_of(work).logic}
+
+
+async def made(work: Work, *names: str) -> Any:
+    ids = [work.action(name).id for name in names or ("do_draw", "do_pause")]
+    return await work.person.ask("MakeParallel", name="both", action_ids=ids)
+
+
+async def test_calls_run_in_parallel_and_return(alice: Person, work: Work) -> None:
+    before = project_of(work)
+    with pytest.raises(Refused, match="again does not call a function"):
+        await made(work, "do_pause", "again")
+    answer = await made(work, "do_pause", "do_draw")
+    parallel = work.action("both")
+    assert (parallel.id, parallel.type) == (answer["action_id"], PARALLEL)
+    assert parallel.branches == [work.action("do_draw").id, work.action("do_pause").id], "in the order of the program"
+    assert steps_of(work) == {("START", "both"), ("both", "again"), ("again", "END")}
+    script = await alice.ask("ProjectScript")
+    assert 'res.parallel(lambda: do_draw(an="do_draw"), lambda: do_pause(an="do_pause"), an="both")' in script["script"]
+
+    with pytest.raises(Refused, match="both runs do_draw in parallel: connect both"):
+        await alice.ask("AddLogicItem", start=work.action("again").id, end=work.action("do_draw").id)
+    with pytest.raises(Refused, match="both runs do_draw in parallel"):
+        await alice.ask("RemoveAction", id=work.action("do_draw").id)
+    with pytest.raises(Refused, match="both runs do_draw in parallel"):
+        await alice.ask("DissolveCall", action_id=work.action("do_draw").id)
+    with pytest.raises(Refused, match="again is not a call of a function"):
+        await alice.ask(
+            "UpdateParallel", action_id=parallel.id, branches=[work.action(name).id for name in ("again", "do_draw")]
+        )
+    swapped = [work.action(name).id for name in ("do_pause", "do_draw")]
+    await alice.ask("UpdateParallel", action_id=parallel.id, branches=swapped)
+    assert work.action("both").branches == swapped
+    await alice.ask("Undo")
+    await alice.ask("DissolveParallel", action_id=parallel.id)
+    assert steps_of(work) == {
+        ("START", "do_draw"),
+        ("do_draw", "do_pause"),
+        ("do_pause", "again"),
+        ("again", "END"),
+    }
+    for _ in range(2):
+        await alice.ask("Undo")
+    assert project_of(work) == before
+
+
+async def test_a_function_contains_parallel_work(alice: Person, work: Work) -> None:
+    await made(work)
+    with pytest.raises(Refused, match="both runs do_draw in parallel. Select both"):
+        await alice.ask("MakeFunction", name="everything", action_ids=[work.action("do_draw").id])
+    ids = [work.action(name).id for name in ("both", "again")]
+    await alice.ask("MakeFunction", name="everything", action_ids=ids)
+    [function] = [each for each in project_of(work).functions if each.name == "everything"]
+    names = {action.id: action.name for action in function.actions}
+    [parallel] = [action for action in function.actions if action.is_parallel]
+    assert [names[key] for key in parallel.branches or ()] == ["do_draw", "do_pause"]
+    await alice.ask("DissolveCall", action_id=work.action("everything").id, remove_function=True)
+    assert steps_of(work) == {("START", "both"), ("both", "again"), ("again", "END")}
+    assert work.action("both").branches == [work.action("do_draw").id, work.action("do_pause").id]
+
+
+async def test_parallel_work_survives_a_client_that_does_not_know_it(work: Work) -> None:
+    await made(work)
+    stored = project_of(work)
+
+    def without(action: Action) -> Action:
+        return replace(action, branches=UNSET)
+
+    points = [replace(one, actions=list(map(without, one.actions))) for one in stored.action_points]
+    sent = replace(stored, action_points=points, functions=[])
+    assert keep_extensions(sent, stored) == stored
