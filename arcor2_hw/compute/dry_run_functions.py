@@ -10,7 +10,7 @@ from msgspec import UNSET
 
 from arcor2_hw.collision.sweep import Sweep
 from arcor2_hw.compute.dry_run_tasks import ActionMoves, DryRunAnswer, DryRunTask, Move, MovingRobot
-from arcor2_hw.compute.program_walk import Step, Visit, walk
+from arcor2_hw.compute.program_walk import OUTSIDE, Step, Visit, walk
 from arcor2_hw.compute.worker_state import WorkerState
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.dry_run import ActionDuration, Assumption, DryRunProblem, DurationSource, Prediction
@@ -182,21 +182,58 @@ class _Cycle:
         """
         additions = self._measured_additions()
         known = self._task.additions | additions
-        spans: list[Span] = []
         durations: list[ActionDuration] = []
-        clock = 0.0
-        for number, (visit, planned, reason) in enumerate(self._records, 1):
-            step = self._task.graph.steps[visit.step]
-            seconds, source = self._duration(step, planned, known)
-            error = UNSET if reason is None else reason.text
-            start, clock = round(clock, 6), clock + seconds
-            spans.append(
-                Span(number, step.action_id, step.name, step.device, start, round(seconds, 6), visit.branch, error)
-            )
-            durations.append(source)
+        calls = {visit.call for visit in self._visits}
+        seconds = [0.0] * len(self._records)
+        for number, (visit, planned, _) in enumerate(self._records):
+            if number not in calls:  # a call takes as long as what it executes
+                step = self._task.graph.steps[visit.step]
+                seconds[number], source = self._duration(step, planned, known)
+                durations.append(source)
+        spans = self._spans(seconds)
         trace = RunTrace(0, devices=traced_devices(spans, self._task.names), spans=spans)
         every = [*assumptions, *self._assumptions(known), *self._task.assumptions]
         return DryRunAnswer(Prediction(trace, summarize(trace), durations, every, self._problem), additions)
+
+    def _spans(self, seconds: list[float]) -> list[Span]:
+        """Return the spans in the order of their start. `seconds`: the durations of the visits, 0 of calls."""
+        steps, visits = self._task.graph.steps, self._visits
+        starts, ends = [0.0] * len(visits), [0.0] * len(visits)
+        whole = 0.0
+        for number, visit in enumerate(visits):
+            if visit.call == OUTSIDE:
+                starts[number] = whole
+            else:
+                # Branches start together, other steps after the one before them.
+                parallel = bool(steps[visits[visit.call].step].branches)
+                starts[number] = (starts if parallel else ends)[visit.call]
+            ends[number] = starts[number] + seconds[number]
+            around = visit.call
+            while around != OUTSIDE:
+                ends[around] = max(ends[around], ends[number])
+                around = visits[around].call
+            whole = max(whole, ends[number])
+        order = sorted(range(len(visits)), key=lambda number: starts[number])
+        numbers = {visit: number for number, visit in enumerate(order, 1)}
+        spans: list[Span] = []
+        for number in order:
+            visit, _, reason = self._records[number]
+            step = steps[visit.step]
+            spans.append(
+                Span(
+                    numbers[number],
+                    step.action_id,
+                    step.name,
+                    step.device,
+                    round(starts[number], 6),
+                    round(ends[number] - starts[number], 6),
+                    visit.branch,
+                    UNSET if reason is None else reason.text,
+                    call=UNSET if visit.call == OUTSIDE else numbers[visit.call],
+                    lane=visit.lane or UNSET,
+                )
+            )
+        return spans
 
     def _duration(self, step: Step, planned: float | None, additions: dict[str, float]) -> tuple[float, ActionDuration]:
         if planned is not None:

@@ -16,6 +16,8 @@ from arcor2_hw.messages import Message
 
 END_STEP: Final = -1
 """The target of an edge that leads to END."""
+OUTSIDE: Final = -1
+"""What stands for the call around a step of the program."""
 
 
 class Edge(Data, frozen=True):
@@ -31,9 +33,11 @@ class Step(Data, frozen=True):
     Attributes:
         action_id: Id of the action.
         name: Name of the action.
-        device: Id of its object.
+        device: Id of its object; empty for a call of a function and for parallel work.
         edges: Connections to the next steps, in the order in which their conditions are tested.
         exits: Whether it has error exits.
+        function: Id of the function that it calls.
+        branches: Numbers of the steps that it executes at once.
     """
 
     action_id: str
@@ -41,6 +45,8 @@ class Step(Data, frozen=True):
     device: str
     edges: list[Edge]
     exits: bool = False
+    function: str = ""
+    branches: list[int] = field(default_factory=list)
 
 
 class UsualBranch(Data, frozen=True):
@@ -54,21 +60,29 @@ class Graph(Data, frozen=True):
     """The logic of a project.
 
     Attributes:
-        steps: The actions, the first one first.
+        steps: The actions, the first one of the program first; then those of functions.
         wanted: The branches requested by the client: id of the action to the id of the next one, or END.
         usual: The branches of the newest run, by id of the action.
+        functions: Numbers of the first steps of functions, by id.
     """
 
     steps: list[Step]
     wanted: dict[str, str] = field(default_factory=dict)
     usual: dict[str, UsualBranch] = field(default_factory=dict)
+    functions: dict[str, int] = field(default_factory=dict)
 
 
 class Visit(Data, frozen=True):
-    """An executed step. branch: the value of the condition after which it followed the step before it, as JSON."""
+    """An executed step. branch: the value of the condition after which it followed the step before it, as JSON.
+
+    call: number of the visit of the call or of the parallel work around it; OUTSIDE for a step of the program. lane: id
+    of the branch of parallel work; empty in the program itself.
+    """
 
     step: int
     branch: str | Unset = UNSET
+    call: int = OUTSIDE
+    lane: str = ""
 
 
 class Walk(Data, frozen=True):
@@ -81,7 +95,8 @@ class Walk(Data, frozen=True):
 def walk(graph: Graph, first: int = 0) -> Walk:
     """Walk from a step to END, or to a step that was executed before: every loop ends after one cycle.
 
-    A branch is that requested by the client, otherwise that of the newest run, otherwise the first one.
+    The steps of a function, and those of the branches of parallel work, follow their call. A branch is that requested by
+    the client, otherwise that of the newest run, otherwise the first one.
 
     Args:
         graph: The logic.
@@ -89,20 +104,48 @@ def walk(graph: Graph, first: int = 0) -> Walk:
     """
     visits: list[Visit] = []
     assumptions: list[Assumption] = []
+    _walk(graph, first, OUTSIDE, "", frozenset(), visits, assumptions)
+    if any(graph.steps[visit.step].exits for visit in visits):
+        assumptions.append(Assumption(Message.of("No action fails, so no error exit is taken.").text))
+    return Walk(visits, assumptions)
+
+
+def _walk(
+    graph: Graph,
+    first: int,
+    call: int,
+    lane: str,
+    callers: frozenset[str],
+    visits: list[Visit],
+    assumptions: list[Assumption],
+) -> None:
+    """Append the visits from a step to the end of the program or of a function. `callers`: the functions around it."""
     seen: set[int] = set()
     number, branch = first, UNSET
     while number != END_STEP and number not in seen:
         seen.add(number)
-        visits.append(Visit(number, branch))
+        _visit(graph, Visit(number, branch, call, lane), callers, visits, assumptions)
         edge = _next(graph, number, assumptions)
         number, branch = edge.target, edge.value  # type: ignore[assignment]
     if number in seen:
         step = graph.steps[number]
         message = Message.of("The loop back to {name} ends after one cycle.", name=step.name)
         assumptions.append(_assumption(message, step))
-    if any(graph.steps[visit.step].exits for visit in visits):
-        assumptions.append(Assumption(Message.of("No action fails, so no error exit is taken.").text))
-    return Walk(visits, assumptions)
+
+
+def _visit(
+    graph: Graph, visit: Visit, callers: frozenset[str], visits: list[Visit], assumptions: list[Assumption]
+) -> None:
+    """Append the visit of a step, and those inside it."""
+    step = graph.steps[visit.step]
+    own = len(visits)
+    visits.append(visit)
+    for branch in step.branches:
+        lane = graph.steps[branch].action_id
+        _visit(graph, Visit(branch, call=own, lane=lane), callers, visits, assumptions)
+    first = graph.functions.get(step.function)
+    if first is not None and step.function not in callers:
+        _walk(graph, first, own, visit.lane, callers | {step.function}, visits, assumptions)
 
 
 def _next(graph: Graph, number: int, assumptions: list[Assumption]) -> Edge:

@@ -139,3 +139,42 @@ def test_a_safe_motion_goes_around_an_obstacle() -> None:
     assert "post" in problem_of(predict(program(direct), post)).reason
     safe = {key: ActionMoves([replace(one.moves[0], safe=True)], JOINTS) for key, one in direct.items()}
     assert predict(program(safe), post).problem is UNSET
+
+
+def test_branches_of_parallel_work_start_together_and_the_longest_counts() -> None:
+    end = [Edge(END_STEP)]
+    steps = [
+        Step("bring", "Bring", "belt", [Edge(1)]),
+        Step("both", "Both", "", [Edge(6)], branches=[2, 3]),
+        Step("call test", "Call test", "", end, function="test"),
+        Step("call fetch", "Call fetch", "", end, function="fetch"),
+        Step("close", "Close", "tester", [Edge(5)]),
+        Step("measure", "Measure", "tester", end),
+        Step("report", "Report", "erp", end),
+        Step("run", "Run", "belt", end),
+    ]
+    seconds = {"bring": 1.0, "close": 0.5, "measure": 2.0, "run": 1.5, "report": 0.25}
+    known = {key: KnownDuration(value, ActionDuration(key, DurationSource.ACTION, 1)) for key, value in seconds.items()}
+    graph = Graph(steps, functions={"test": 4, "fetch": 7})
+    found = predict(DryRunTask(graph, {"belt": "Belt"}, durations=known))
+    spans = {span.action_id: (span.start, span.duration) for span in found.trace.spans}
+    assert spans == {
+        "bring": (0.0, 1.0),
+        "both": (1.0, 2.5),
+        "call test": (1.0, 2.5),
+        "close": (1.0, 0.5),
+        "measure": (1.5, 2.0),
+        "call fetch": (1.0, 1.5),
+        "run": (1.0, 1.5),
+        "report": (3.5, 0.25),
+    }
+    assert found.summary.cycle == pytest.approx(3.75)
+    by_number = {span.number: span for span in found.trace.spans}
+    outer = {
+        span.action_id: "" if isinstance(span.call, Unset) else by_number[span.call].action_id
+        for span in found.trace.spans
+    }
+    assert [outer[key] for key in ("both", "call fetch", "measure", "run")] == ["", "both", "call test", "call fetch"]
+    lanes = {span.action_id: span.lane for span in found.trace.spans}
+    assert [lanes[key] for key in ("report", "close", "run")] == [UNSET, "call test", "call fetch"]
+    assert {each.action_id for each in found.durations} == set(seconds), "calls have no duration of their own"

@@ -1,6 +1,6 @@
 """The walk through the logic of a program: branches, loops, and the branches that a run took."""
 
-from arcor2_hw.compute.program_walk import END_STEP, Edge, Graph, Step, UsualBranch, usual_branches, walk
+from arcor2_hw.compute.program_walk import END_STEP, OUTSIDE, Edge, Graph, Step, UsualBranch, usual_branches, walk
 
 
 def graph(edges: dict[str, list[str]], **more: object) -> Graph:
@@ -55,3 +55,22 @@ def test_the_usual_branch_is_the_most_frequent_one() -> None:
     # Four cycles; the third one ended after a, and the next started with a again.
     found = usual_branches(3, [*"ab", "c", *"ab", "c", "a", *"ab"], edges)
     assert found == {"a": UsualBranch(3, "b"), "b": UsualBranch(3, "c"), "c": UsualBranch(3, "END")}
+
+
+def test_branches_of_parallel_work_and_functions_are_walked() -> None:
+    end = [Edge(END_STEP)]
+    made = Graph(
+        [
+            Step("both", "Both", "", end, branches=[1, 2]),
+            Step("call a", "Call a", "", end, function="a"),
+            Step("call b", "Call b", "", end, function="b"),
+            Step("a1", "A1", "arm", [Edge(4)]),
+            Step("a2", "A2", "arm", end),
+            Step("b1", "B1", "press", end, function="b"),  # damaged data: it calls itself
+        ],
+        functions={"a": 3, "b": 5},
+    )
+    visits = walk(made).visits
+    assert [made.steps[visit.step].action_id for visit in visits] == ["both", "call a", "a1", "a2", "call b", "b1"]
+    assert [visit.call for visit in visits] == [OUTSIDE, 0, 1, 1, 0, 4]
+    assert [visit.lane for visit in visits] == ["", "call a", "call a", "call a", "call b", "call b"]

@@ -26,7 +26,7 @@ LINES: Final = ("linear", "line")
 
 
 class UnknownTarget(Exception):
-    """The target of a motion is the result of another action."""
+    """The target of a motion is known only in a run."""
 
 
 def maxima_of(settings: Mapping[str, Any]) -> RobotMaxima:
@@ -53,7 +53,7 @@ def moves_of(
         settings: the settings of the robot, with defaults.
 
     Raises:
-        UnknownTarget: the target is the result of another action.
+        UnknownTarget: the target is the result of another action, or a parameter of a function.
         Arcor2Error: a parameter refers to something that does not exist.
     """
     values = _values(action, declared, index)
@@ -110,7 +110,7 @@ def _number(values: Mapping[str, Any], name: str, default: float) -> float:
 
 
 def _values(action: Action, declared: ObjectAction, index: ProjectIndex) -> dict[str, Any]:
-    """Return the values of parameters by name; None for the result of another action."""
+    """Return the values of parameters by name; None for those that are known only in a run."""
     found: dict[str, Any] = {
         each.name: msgspec.json.decode(each.default_value)
         for each in declared.parameters
@@ -118,7 +118,7 @@ def _values(action: Action, declared: ObjectAction, index: ProjectIndex) -> dict
     }
     for parameter in action.parameters:
         name, value = declared.present_name(parameter.name), msgspec.json.decode(parameter.value)
-        if parameter.type == ActionParameterType.LINK:
+        if parameter.type in (ActionParameterType.LINK, ActionParameterType.FUNCTION_PARAMETER):
             value = None
         elif parameter.type == ActionParameterType.PROJECT_PARAMETER:
             value = msgspec.json.decode(index.parameter(value).value)

@@ -1,6 +1,6 @@
 """Prepares the task of a dry run from a project: the graph, the motions, and data of earlier runs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import msgspec
@@ -11,7 +11,7 @@ from arcor2_hw.compute.program_walk import END_STEP, Edge, Graph, Step, action_o
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.dry_run import Assumption, DurationSource
 from arcor2_hw.data.object_type import ObjectAction
-from arcor2_hw.data.project import Action, Project
+from arcor2_hw.data.project import CALL, Action, Project, ProjectFunction
 from arcor2_hw.data.project_index import ProjectIndex
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.rpc import StartDryRunArgs
@@ -20,6 +20,7 @@ from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
 from arcor2_hw.messages import Message
 from arcor2_server.documents import logic_graph
+from arcor2_server.documents.logic_graph import Flow
 from arcor2_server.dry_run import experience
 from arcor2_server.dry_run.motions import UnknownTarget, maxima_of, moves_of
 
@@ -77,13 +78,17 @@ def prepare(
         NotFound: the requested action is not part of the program.
         InvalidData: a requested branch does not exist.
     """
-    flow = logic_graph.read(project, {parameter.id for parameter in project.parameters})
+    parameters = {parameter.id for parameter in project.parameters}
+    flow = logic_graph.read(project, parameters)
+    flows = _called(flow, {function.id: function for function in project.functions}, parameters)
     index = ProjectIndex(scene, project)
-    calls = {function.id for function in project.functions}
-    steps = [
-        _step(action, edges, bool(exits), calls)
-        for action, edges, exits in zip(flow.actions, flow.edges, flow.exits, strict=True)
-    ]
+    steps = _steps(flow, 0, flows)
+    program = len(steps)
+    firsts: dict[str, int] = {}
+    for key, called in flows.items():
+        firsts[key] = len(steps)
+        steps += _steps(called, len(steps), flows)
+    actions = [action for one in (flow, *flows.values()) for action in one.actions]
     graph = Graph(steps)
     following = {step.action_id: [action_of(graph, edge) for edge in step.edges] for step in steps}
     branches = {} if isinstance(args.branches, Unset) else args.branches
@@ -92,13 +97,13 @@ def prepare(
             raise InvalidData("The program has no branch from {action} to {next}.", action=action_id, next=wanted)
     traces = earlier.traces
     usual = experience.branches(traces[0], following) if traces else {}
-    moves, assumptions = _moves(flow.actions, index, devices)
-    methods = {action.id: _method(action, devices) for action in flow.actions}
+    moves, assumptions = _moves(actions, index, devices)
+    methods = {action.id: _method(action, devices) for action in actions}
     measured = experience.durations(earlier.unchanged, {key: one.method for key, one in moves.items()})
     return DryRunTask(
-        Graph(steps, branches, usual),
+        Graph(steps, branches, usual, firsts),
         {key: device.name for key, device in devices.items()},
-        _first(steps, args.from_action),
+        _first(steps[:program], args.from_action),
         {step.device: _moving(devices[step.device], project, step.device) for step in steps if step.action_id in moves},
         moves,
         experience.durations(traces, methods),
@@ -108,14 +113,45 @@ def prepare(
     )
 
 
-def _step(action: Action, edges: Sequence[logic_graph.Edge], exits: bool, functions: set[str]) -> Step:
-    object_id, _ = action.parse_type()
-    device = "" if object_id in functions else object_id
-    return Step(action.id, action.name, device, [_edge(edge) for edge in edges], exits)
+def _called(program: Flow, functions: Mapping[str, ProjectFunction], parameters: Collection[str]) -> dict[str, Flow]:
+    """Return the logic of the functions that a program calls, also through functions."""
+    found: dict[str, Flow] = {}
+    waiting = [program]
+    while waiting:
+        for action in waiting.pop().actions:
+            key, _, method = action.type.partition("/")
+            if method == CALL and key in functions and key not in found:
+                found[key] = logic_graph.read(functions[key], parameters)
+                waiting.append(found[key])
+    return found
 
 
-def _edge(edge: logic_graph.Edge) -> Edge:
-    target = END_STEP if edge.target == logic_graph.END_NODE else edge.target
+def _steps(flow: Flow, first: int, functions: Collection[str]) -> list[Step]:
+    """Return the steps of the program or of a function. `first`: number of its first step in the graph."""
+    steps = []
+    for number, action in enumerate(flow.actions):
+        object_id, _, _ = action.type.partition("/")
+        branches = flow.parallel.get(number, ())
+        # What follows parallel work, which the graph of the logic has after the last branch.
+        edges = flow.edges[branches[-1] if branches else number]
+        function = object_id if object_id in functions else ""
+        device = "" if function or branches else object_id
+        steps.append(
+            Step(
+                action.id,
+                action.name,
+                device,
+                [_edge(edge, first) for edge in edges],
+                bool(flow.exits[number]),
+                function,
+                [first + branch for branch in branches],
+            )
+        )
+    return steps
+
+
+def _edge(edge: logic_graph.Edge, first: int) -> Edge:
+    target = END_STEP if edge.target == logic_graph.END_NODE else first + edge.target
     tested = edge.condition
     value = msgspec.json.encode(tested.value).decode() if isinstance(tested, logic_graph.Condition) else UNSET
     return Edge(target, value)
@@ -153,10 +189,6 @@ def _moves(
     without_model: dict[str, None] = {}
     for action in actions:
         object_id, method = action.parse_type()
-        if index.find_function(object_id) is not None:
-            text = "{name} calls a function: it takes as long as in earlier runs, and its motions are not planned."
-            assumptions.append(_assumption(Message.of(text, name=action.name), action.id))
-            continue
         device = devices.get(object_id)
         declared = None if device is None else device.actions.get(method)
         if device is None or declared is None or not device.robot:
@@ -164,7 +196,7 @@ def _moves(
         try:
             moves = moves_of(action, declared, _method(action, devices), index, device.settings)
         except UnknownTarget:
-            text = "The target of {name} is the result of another action, so its motion is not planned."
+            text = "The target of {name} is known only in a run, so its motion is not planned."
             assumptions.append(_assumption(Message.of(text, name=action.name), action.id))
             continue
         except (Arcor2Error, msgspec.DecodeError) as error:
