@@ -95,8 +95,8 @@ class Walk(Data, frozen=True):
 def walk(graph: Graph, first: int = 0) -> Walk:
     """Walk from a step to END, or to a step that was executed before: every loop ends after one cycle.
 
-    The steps of a function, and those of the branches of parallel work, follow their call. A branch is that requested by
-    the client, otherwise that of the newest run, otherwise the first one.
+    The steps of a function, and those of the branches of parallel work, follow their call. A branch is that requested
+    by the client, otherwise that of the newest run, otherwise the first one.
 
     Args:
         graph: The logic.

@@ -1,7 +1,7 @@
 """The trace of a run: when each device executed which action, also as a Chrome trace."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
 
 from msgspec import UNSET, field
 
@@ -66,7 +66,8 @@ def chrome_trace(name: str, devices: Sequence[TracedDevice], spans: Sequence[Spa
     """Return spans in the Trace Event Format, which chrome://tracing and Perfetto open. Each device is a thread.
 
     Spans of a device that overlap, because a script uses several threads, are shown in further rows of the device.
-    Calls of functions have rows of their own.
+    Calls of functions have rows of their own. If branches ran at the same time, a second process shows all spans again,
+    with a lane for the program and for each branch.
 
     Args:
         name: Name of the process in the viewer.
@@ -90,20 +91,48 @@ def chrome_trace(name: str, devices: Sequence[TracedDevice], spans: Sequence[Spa
         of_device[row] = (thread, end)
         details = {"number": span.number, "action_id": span.action_id, "branch": span.branch, "error": span.error}
         details["call"] = span.call
-        events.append(
-            {
-                "ph": "X",
-                "cat": "action",
-                "name": span.name,
-                "pid": 1,
-                "tid": thread,
-                "ts": round(span.start * 1e6),
-                "dur": round(span.duration * 1e6),
-                "args": {key: value for key, value in details.items() if not isinstance(value, Unset)},
-            }
-        )
-    process = {"ph": "M", "name": "process_name", "pid": 1, "tid": 0, "args": {"name": name}}
-    threads = [
-        {"ph": "M", "name": "thread_name", "pid": 1, "tid": thread, "args": {"name": title}} for thread, title in titles
-    ]
-    return {"traceEvents": [process, *threads, *events], "displayTimeUnit": "ms"}
+        event = {
+            "ph": "X",
+            "cat": "action",
+            "name": span.name,
+            "pid": _DEVICES,
+            "tid": thread,
+            "ts": round(span.start * 1e6),
+            "dur": round(span.duration * 1e6),
+            "args": {key: value for key, value in details.items() if not isinstance(value, Unset)},
+        }
+        events.append(event)
+    heads = _named(_DEVICES, name, titles)
+    lanes = lanes_of(spans)
+    if lanes:
+        numbers = {lane: number for number, lane in enumerate(["", *lanes], 1)}
+        heads += _named(_BRANCHES, "branches", enumerate(["program", *lanes.values()], 1))
+        events += [
+            event | {"pid": _BRANCHES, "tid": numbers[span.lane or ""]}
+            for event, span in zip(list(events), spans, strict=True)
+        ]
+    return {"traceEvents": [*heads, *events], "displayTimeUnit": "ms"}
+
+
+_DEVICES: Final = 1
+"""Number of the process of the devices in a Chrome trace."""
+_BRANCHES: Final = 2
+"""Number of the process of the branches in a Chrome trace."""
+
+
+def _named(process: int, name: str, threads: Iterable[tuple[int, str]]) -> list[dict[str, Any]]:
+    """Return the events that name a process and its threads."""
+    found = [{"ph": "M", "name": "process_name", "pid": process, "tid": 0, "args": {"name": name}}]
+    for thread, title in threads:
+        found.append({"ph": "M", "name": "thread_name", "pid": process, "tid": thread, "args": {"name": title}})
+    return found
+
+
+def lanes_of(spans: Iterable[Span]) -> dict[str, str]:
+    """Return the branches of spans that ran at the same time: their ids, and the names of the calls that they ran."""
+    found: dict[str, str] = {}
+    for span in spans:
+        if not isinstance(span.lane, Unset):
+            name = span.name if span.action_id == span.lane else found.get(span.lane, span.lane)
+            found[span.lane] = name
+    return found

@@ -6,7 +6,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.run_trace import RunTrace
+from arcor2_hw.data.run_trace import RunTrace, lanes_of
 from arcor2_hw.data.trace_comparison import compare, summarize
 from arcor2_server.cli.server_connection import printable
 from arcor2_server.cli.tables import console
@@ -27,9 +27,13 @@ def show_trace(trace: RunTrace) -> None:
     times = summarize(trace)
     names = {device.id: device.name for device in trace.devices}
     out = console()
-    table = Table("start", "duration", "device", "action", "branch", "error", box=None, pad_edge=False)
+    lanes = lanes_of(trace.spans)
+    lane = ["lane"] if lanes else []
+    table = Table("start", "duration", *lane, "device", "action", "branch", "error", box=None, pad_edge=False)
     for span in trace.spans:
-        texts = (names.get(span.device, ""), span.name, span.branch or "", span.error or "")
+        texts = [names.get(span.device, ""), span.name, span.branch or "", span.error or ""]
+        if lanes:
+            texts.insert(0, lanes.get(span.lane or "", ""))
         table.add_row(f"{span.start:.3f} s", f"{span.duration:.3f} s", *map(_safe, texts))
     out.print(table if trace.spans else "The run has executed no actions.")
     counts = f", {times.cycles} complete; all: {times.whole:.3f} s" if trace.run else ""

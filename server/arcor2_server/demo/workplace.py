@@ -1,6 +1,8 @@
 """The demo cell: its description in workplace.toml, and its creation through the protocol as a client."""
 
 import contextlib
+import dataclasses
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
@@ -18,7 +20,6 @@ from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import (
     ERROR_FLOW,
     ERROR_PARTS,
-    Action,
     ActionParameter,
     Flow,
     Project,
@@ -79,8 +80,9 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True):
 class Step(Struct, frozen=True, forbid_unknown_fields=True):
     """An action.
 
-    A parameter "@point" is the pose of an action point, "$name" a project parameter, "#result" the result of an
-    earlier step, "#error.text" a part of the error named `error`.
+    An object that is the name of a function stands for a call of it. A parameter "@point" is the pose of an action
+    point, "$name" a project parameter, "#result" the result of an earlier step, "#error.text" a part of the error named
+    `error`.
     """
 
     name: str
@@ -105,6 +107,21 @@ class Link(Struct, frozen=True, forbid_unknown_fields=True):
     errors: list[str] = field(default_factory=list)
 
 
+class Function(Struct, frozen=True, forbid_unknown_fields=True):
+    """A function of connected steps. call: name of the action that calls it in their place."""
+
+    name: str
+    steps: list[str]
+    call: str
+
+
+class Parallel(Struct, frozen=True, forbid_unknown_fields=True):
+    """An action that runs calls of functions at once."""
+
+    name: str
+    calls: list[str]
+
+
 class Workplace(Struct, frozen=True, forbid_unknown_fields=True):
     """Scene and project of the demo."""
 
@@ -119,6 +136,8 @@ class Workplace(Struct, frozen=True, forbid_unknown_fields=True):
     constants: dict[str, Scalar]
     places: list[Place] = field(default_factory=list)
     part_sensors: list[PartSensor] = field(default_factory=list)
+    functions: list[Function] = field(default_factory=list)
+    parallel: list[Parallel] = field(default_factory=list)
 
 
 def load(file: Path | None = None) -> Workplace:
@@ -289,42 +308,55 @@ class Creation:
             )
             orientations[point.name] = (await self._client.next_event("OrientationChanged")).data.id
             await self._client.write_unlock(points[point.name])
-        actions: dict[str, Action] = {}
-        results: dict[str, str] = {}
-        declared = {
-            obj.type: {action.name: action for action in await self._client.get_actions(obj.type)}
-            for obj in self._workplace.objects
-        }
+        places = _Places(points, orientations, parameters)
         for step in self._workplace.steps:
-            obj = objects[step.object]
-            given = [
-                self._parameter(step, name, value, declared[obj.type][step.action], orientations, parameters, results)
-                for name, value in step.parameters.items()
-            ]
-            await self._client.call(
-                "AddAction",
-                rpc.AddActionArgs(
-                    points[step.point],
-                    step.name,
-                    f"{obj.id}/{step.action}",
-                    given,
-                    [Flow(outputs=step.results)],
-                    step.error or UNSET,
-                ),
-            )
-            added: Action = (await self._client.next_event("ActionChanged")).data
-            actions[step.name] = added
-            results |= {result: f"{added.id}/default/{number}" for number, result in enumerate(step.results)}
-            if step.error:
-                parts = enumerate(ERROR_PARTS)
-                results |= {f"{step.error}.{part}": f"{added.id}/{ERROR_FLOW}/{number}" for number, part in parts}
-        for link in self._workplace.logic:
+            if step.object in objects:
+                await self._add_step(step, objects[step.object].id, places)
+        waiting = await self._connect(self._workplace.logic, places)
+        for function in self._workplace.functions:
+            ids = [places.actions[name] for name in function.steps]
+            args = rpc.MakeFunctionArgs(function.name, ids, function.call)
+            made: rpc.MakeFunctionData = await self._client.call("MakeFunction", args)
+            places.actions[function.call] = made.action_id
+            for step in self._workplace.steps:
+                if step.object == function.name:
+                    await self._add_step(step, made.function_id, places)
+            waiting = await self._connect(waiting, places)
+        for parallel in self._workplace.parallel:
+            calls = [places.actions[name] for name in parallel.calls]
+            await self._client.call("MakeParallel", rpc.MakeParallelArgs(parallel.name, calls))
+
+    async def _add_step(self, step: Step, object_id: str, places: "_Places") -> None:
+        kind = next((obj.type for obj in self._workplace.objects if obj.name == step.object), "")
+        declared = {action.name: action for action in await self._client.get_actions(kind)} if kind else {}
+        given = [
+            self._parameter(step, name, value, declared[step.action], places) for name, value in step.parameters.items()
+        ]
+        flows = [Flow(outputs=step.results)]
+        args = rpc.AddActionArgs(
+            places.points[step.point], step.name, f"{object_id}/{step.action}", given, flows, step.error or UNSET
+        )
+        await self._client.call("AddAction", args)
+        while (added := (await self._client.next_event("ActionChanged")).data).name != step.name:
+            pass  # the actions of a function that was made before
+        places.actions[step.name] = added.id
+        places.results |= {result: f"{added.id}/default/{number}" for number, result in enumerate(step.results)}
+        if step.error:
+            parts = enumerate(ERROR_PARTS)
+            places.results |= {f"{step.error}.{part}": f"{added.id}/{ERROR_FLOW}/{number}" for number, part in parts}
+
+    async def _connect(self, links: list[Link], places: "_Places") -> list[Link]:
+        """Add connections. Return those to or from calls that do not exist yet."""
+        ids = {"START": "START", "END": "END"} | places.actions
+        for link in links:
+            if link.start not in ids or link.end not in ids:
+                continue
             condition: ProjectLogicIf | Unset = UNSET
             if link.result:
-                condition = ProjectLogicIf(results[link.result], _json(link.value))
-            start = link.start if link.start == "START" else actions[link.start].id
-            end = link.end if link.end == "END" else actions[link.end].id
-            await self._client.call("AddLogicItem", rpc.AddLogicItemArgs(start, end, condition, link.errors or UNSET))
+                condition = ProjectLogicIf(places.results[link.result], _json(link.value))
+            args = rpc.AddLogicItemArgs(ids[link.start], ids[link.end], condition, link.errors or UNSET)
+            await self._client.call("AddLogicItem", args)
+        return [link for link in links if link.start not in ids or link.end not in ids]
 
     @staticmethod
     def _parameter(
@@ -332,9 +364,7 @@ class Creation:
         name: str,
         value: Scalar,
         action: ObjectAction,
-        orientations: dict[str, str],
-        parameters: dict[str, str],
-        results: dict[str, str],
+        places: "_Places",
     ) -> ActionParameter:
         meta = next((meta for meta in action.parameters if meta.name == name), None)
         if meta is None:
@@ -344,8 +374,24 @@ class Creation:
                 action=step.action,
                 other_name=name,
             )
-        references = {"@": (meta.type, orientations), "$": ("project_parameter", parameters), "#": ("link", results)}
+        references = {
+            "@": (meta.type, places.orientations),
+            "$": ("project_parameter", places.parameters),
+            "#": ("link", places.results),
+        }
         if isinstance(value, str) and value[:1] in references:
             kind, ids = references[value[0]]
             return ActionParameter(name, kind, _json(ids[value[1:]]))
         return ActionParameter(name, meta.type, _json(value))
+
+
+@dataclass(slots=True)
+class _Places:
+    """The ids of what was created, by name."""
+
+    points: dict[str, str]
+    orientations: dict[str, str]
+    parameters: dict[str, str]
+    actions: dict[str, str] = dataclasses.field(default_factory=dict)
+    results: dict[str, str] = dataclasses.field(default_factory=dict)
+    """Links to results and parts of errors."""

@@ -49,9 +49,20 @@ def durations(traces: Sequence[RunTrace], methods: Mapping[str, Method]) -> dict
 def branches(trace: RunTrace, edges: Mapping[str, list[str]]) -> dict[str, UsualBranch]:
     """Return the branches that a run took most often, by id of the action. Repetitions after an error do not count.
 
+    The branches of a function are those of all its executions by the same call.
+
     Args:
         trace: the trace of the run.
         edges: ids of the actions that may follow each action, or END.
     """
-    executed = [span.action_id for span in trace.spans if span.thread_id is span.call is span.attempt is UNSET]
-    return usual_branches(trace.run, executed, edges)
+    actions = {span.number: span.action_id for span in trace.spans}
+    executed: dict[str, list[str]] = {"": []}
+    for span in trace.spans:
+        if span.attempt is UNSET and (span.thread_id is UNSET or span.lane is not UNSET):
+            call = "" if isinstance(span.call, Unset) else actions.get(span.call, "?")
+            executed.setdefault(call, []).append(span.action_id)
+    found: dict[str, UsualBranch] = {}
+    for call, of_call in executed.items():
+        # After the end of a function, its next execution starts.
+        found |= usual_branches(trace.run, of_call + of_call[:1] if call else of_call, edges)
+    return found
