@@ -33,8 +33,8 @@ FIRST_VERSION = Path(__file__).parents[1] / "compatibility" / "recorded" / "demo
 class Cell:
     """A demo that has completed its order and keeps running, and an observer's record of that run."""
 
-    def __init__(self, run: Run, script: list[bool]) -> None:
-        self.run, self.script = run, script
+    def __init__(self, run: Run, script: list[bool], order: list[str]) -> None:
+        self.run, self.script, self.order = run, script, order
 
     @property
     def url(self) -> str:
@@ -55,6 +55,7 @@ class Cell:
         """
         if not package_id:
             package_id = (await client.call("ListPackages"))[-1].id
+        await client.subscribe_events({"ProgramPosition"})  # with it, actions of functions are announced
         await client.call("RunPackage", rpc.RunPackageArgs(package_id))
         names: dict[str, str] = {}
         problem = ""
@@ -62,8 +63,7 @@ class Cell:
             event = await client.next_event(timeout=40)
             match event.event:
                 case "PackageInfo":
-                    points = event.data.project.action_points
-                    names = {action.id: action.name for point in points for action in point.actions}
+                    names = {action.id: action.name for action in event.data.project.all_actions()}
                 case "ActionStateBefore" if at and (act := at.get(names.get(event.data.action_id, ""))):
                     await act()
                 case "ProjectException":
@@ -72,17 +72,25 @@ class Cell:
                     return problem
 
 
-async def watch(url: str, results: list[bool]) -> None:
-    """Observe the server without registering a user; collect the events of the script."""
+async def watch(url: str, results: list[bool], order: list[str]) -> None:
+    """Observe the server without registering a user; collect the events of the script.
+
+    order: starts and ends of actions, as `+name` and `-name`.
+    """
     async with Client(url, reconnect=False) as client:
-        tests: set[str] = set()
+        names: dict[str, str] = {}
+        await client.subscribe_events({"ProgramPosition"})
         async for event in client.events():
-            if event.event == "PackageInfo":
-                points = event.data.project.action_points
-                tests = {a.id for point in points for a in point.actions if a.outputs() == ["passed"]}
-            elif event.event == "ActionStateAfter" and event.data.action_id in tests:
-                assert not isinstance(event.data.results, Unset)
-                results.append(event.data.results == ["true"])
+            match event.event:
+                case "PackageInfo":
+                    names = {action.id: action.name for action in event.data.project.all_actions()}
+                case "ActionStateBefore":
+                    order.append(f"+{names[event.data.action_id]}")
+                case "ActionStateAfter":
+                    order.append(f"-{names[event.data.action_id]}")
+                    if names[event.data.action_id] == "test":
+                        assert not isinstance(event.data.results, Unset)
+                        results.append(event.data.results == ["true"])
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
@@ -91,11 +99,12 @@ async def cell(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Cell]:
     async with demo(tmp_path_factory.mktemp("demo"), "--boards", str(BOARDS), "--seed", str(SEED)) as run:
         at = await until(run.at, "the demo prints its addresses", 40)
         script: list[bool] = []
-        observer = asyncio.create_task(watch(at["url"], script))
+        order: list[str] = []
+        observer = asyncio.create_task(watch(at["url"], script, order))
         await until(
             lambda: "The server runs at" in run.output or run.process.returncode is not None, "the cycle to end", 200
         )
-        yield Cell(run, script)
+        yield Cell(run, script, order)
         run.process.send_signal(signal.SIGINT)
         assert await asyncio.wait_for(run.process.wait(), 15) == 0, run.output
         await asyncio.wait_for(observer, 5)  # its events end with the server
@@ -126,6 +135,16 @@ async def test_four_readings_agree(cell: Cell) -> None:
     reported = {(result["serial"], result["passed"]) for result in erp["results"]}
     assert reported == {(board["code"], board["good"]) for board in world["boards"]}
     assert len(erp["results"]) == boards
+
+
+async def test_the_belt_brings_the_next_board_while_the_tester_works(cell: Cell) -> None:
+    order = cell.order
+    work = order[order.index("+test_and_fetch") : order.index("-test_and_fetch")]
+    assert work.index("+close") < work.index("-halt"), "the tester starts before the belt has ended"
+    assert work.index("+bring") < work.index("-open_again"), "the belt starts before the tester has ended"
+    second = order[order.index("-test_and_fetch") :]
+    assert "+picture" in second
+    assert "+bring" not in second, "the second board is at the stop already"
 
 
 async def test_good_boards_carry_their_own_label(cell: Cell) -> None:

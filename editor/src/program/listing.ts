@@ -2,6 +2,7 @@
 
 import type { LogicItem } from "../protocol/types";
 import type { OpenDocument } from "../store/state";
+import { parallelOf } from "./parallel";
 import { END, incoming, isConditional, isErrorExit, nextSteps, outgoing, placeOf, START } from "./steps";
 
 /**
@@ -86,7 +87,7 @@ export function listingOf(doc: OpenDocument): Row[] {
     expand(one.id, one.depth, one.next);
     while (later.length > 0) waiting.push(later.pop() as (typeof later)[number]);
   }
-  const known = new Set(order);
+  const known = new Set([...order, ...parallelOf(doc).keys()]);
   const rest = Object.keys(doc.actions).filter((id) => !known.has(id));
   if (rest.length > 0) {
     if (rows.length > 0) rows.push({ kind: "unreached", depth: 0 });

@@ -25,6 +25,7 @@ import {
   variableNamed,
   whenOf,
 } from "./logic";
+import { parallelOf, runsFunctions } from "./parallel";
 import { reachOfAction } from "./reach";
 
 export interface Problem {
@@ -64,10 +65,12 @@ type Tell = (id: string, text: string) => void;
 
 function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Tell): void {
   const used = after(doc, START);
+  const branches = parallelOf(doc);
   if (outgoing(doc, START).length === 0) error(START, t`Start has no next step. Connect it to the first action.`);
   for (const action of Object.values(doc.actions)) {
     const steps = nextSteps(doc, action.id);
     const { name } = action;
+    if (branches.has(action.id)) continue;
     if (!used.has(action.id)) {
       const loose = incoming(doc, action.id).length === 0;
       warn(
@@ -107,7 +110,9 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
     }
   }
   for (const item of Object.values(doc.logic)) {
-    const missing = whenOf(item).comparisons.some(({ what }) => !operandAt(doc, types, what));
+    const missing = whenOf(item).comparisons.some(
+      ({ what }) => !operandAt(doc, types, what) && !isResultOfFunction(doc, what),
+    );
     if (missing && typesKnown(doc, types)) {
       error(
         item.id,
@@ -124,6 +129,12 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
   }
 }
 
+/** Return whether a link leads to a result of a call of a function, whose results are not known here. */
+function isResultOfFunction(doc: OpenDocument, link: string): boolean {
+  const source = doc.actions[placeOf(link)];
+  return source !== undefined && runsFunctions(source);
+}
+
 function typesKnown(doc: OpenDocument, types: State["types"]): boolean {
   return Object.values(doc.objects).every((object) => object.type in types.actions);
 }
@@ -137,6 +148,7 @@ function ofAction(
 ): void {
   const [objectId = ""] = action.type.split("/");
   const object = doc.objects[objectId];
+  if (runsFunctions(action)) return;
   if (!object) return error(action.id, t`${action.name}: its device is no longer in the scene.`);
   if (!(object.type in types.actions)) return;
   const meta = metaOf(types, doc, action);
@@ -160,7 +172,7 @@ function ofAction(
         ? errorProblem(doc, action, wanted.name, link)
         : failedProblem(doc, action, wanted.name, link);
       if (problem) error(action.id, problem);
-      if (problem !== undefined) continue;
+      if (problem !== undefined || isResultOfFunction(doc, link)) continue;
       const result = resultAt(doc, types, link);
       if (!result) error(action.id, t`${action.name}: the result used for ${wanted.name} no longer exists.`);
       else if (doc.project?.has_logic && !after(doc, result.action.id).has(action.id)) {

@@ -14,6 +14,7 @@ import {
   resultsOf,
   START,
 } from "../../program/logic";
+import { branchNames, isParallel, parallelOf, runsFunctions } from "../../program/parallel";
 import { valuesOf } from "../../program/step";
 import type { OpenDocument, State } from "../../store/state";
 
@@ -67,6 +68,7 @@ export function graphOf(
   types: State["types"],
   folded: readonly string[][] = [],
 ): { boxes: Box[]; lines: Line[] } {
+  const branches = parallelOf(doc);
   const into = new Map(folded.flatMap((run) => run.map((id) => [id, foldOf(run)] as const)));
   const shown = (id: string) => into.get(id) ?? id;
   const lines = Object.values(doc.logic)
@@ -92,14 +94,14 @@ export function graphOf(
       ...BORDER,
     },
     ...Object.values(doc.actions)
-      .filter((action) => !into.has(action.id))
+      .filter((action) => !into.has(action.id) && !branches.has(action.id))
       .map((action) => {
         const values = valuesOf(doc, types, action);
         return {
           id: action.id,
           kind: "action" as const,
           name: action.name,
-          detail: detailOf(doc, action.type, action.pointId),
+          detail: detailOf(doc, action),
           values,
           icon: types.byName[doc.objects[action.type.split("/")[0] ?? ""]?.type ?? ""]?.icon,
           run: [],
@@ -121,10 +123,12 @@ export function graphOf(
   return { boxes: bare.map((box) => ({ ...box, ...(places.get(box.id) ?? { x: 0, y: 0 }) })), lines };
 }
 
-/** Return the device and the point of an action as text. */
-function detailOf(doc: OpenDocument, type: string, pointId: string): string {
-  const object = doc.objects[type.split("/")[0] ?? ""]?.name ?? "?";
-  const point = doc.points[pointId]?.name ?? "?";
+/** Return the device and the point of an action as text; the calls of parallel work. */
+function detailOf(doc: OpenDocument, action: OpenDocument["actions"][string]): string {
+  const point = doc.points[action.pointId]?.name ?? "?";
+  if (isParallel(action)) return branchNames(doc, action);
+  if (runsFunctions(action)) return point;
+  const object = doc.objects[action.type.split("/")[0] ?? ""]?.name ?? "?";
   return t`${object} at ${point}`;
 }
 
