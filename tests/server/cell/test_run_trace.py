@@ -106,3 +106,27 @@ def test_a_chrome_trace_has_a_row_for_each_device_and_overlap() -> None:
         ("d", 1, second, 250_000),
     ]
     assert made["traceEvents"][5]["args"] == {"number": 2, "action_id": "act_b", "branch": "true"}
+
+
+def test_a_chrome_trace_has_a_lane_for_each_branch() -> None:
+    spans = [
+        Span(1, "act_both", "both", "", 0.0, 2.0),
+        Span(2, "act_a", "call a", "", 0.0, 2.0, call=1, lane="act_a"),
+        Span(3, "act_b", "call b", "", 0.0, 1.0, call=1, lane="act_b"),
+        Span(4, "act_a1", "a1", "arm", 0.0, 2.0, call=2, lane="act_a"),
+        Span(5, "act_b1", "b1", "press", 0.0, 1.0, call=3, lane="act_b"),
+    ]
+    made = chrome_trace("run 1", [TracedDevice("arm", "arm", 2.0), TracedDevice("press", "press", 1.0)], spans)
+    events = made["traceEvents"]
+    titles = {(e["pid"], e["tid"]): e["args"]["name"] for e in events if e["name"] == "thread_name"}
+    lanes = {title: tid for (pid, tid), title in titles.items() if pid == 2}
+    assert list(lanes) == ["program", "call a", "call b"]
+    shown = {(e["tid"], e["name"]) for e in events if e["ph"] == "X" and e["pid"] == 2}
+    assert shown == {
+        (lanes["program"], "both"),
+        (lanes["call a"], "call a"),
+        (lanes["call a"], "a1"),
+        (lanes["call b"], "call b"),
+        (lanes["call b"], "b1"),
+    }
+    assert {e["name"] for e in events if e["ph"] == "X" and e["pid"] == 1} == {span.name for span in spans}
