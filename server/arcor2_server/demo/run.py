@@ -190,7 +190,7 @@ class Demo:
         built = await client.call("BuildProject", rpc.BuildProjectArgs(project.id, project.name))
         await client.close_project()
         started = time.monotonic()
-        await client.subscribe_events(["ProgramPosition"])  # also actions of functions are announced then
+        await client.subscribe_events({"ProgramPosition"})  # also actions of functions are announced then
         await client.run_package(built.package_id)
         await self._follow(client, project, outcome)
         outcome.seconds = time.monotonic() - started
