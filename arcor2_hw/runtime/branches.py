@@ -3,11 +3,28 @@
 import threading
 from typing import TYPE_CHECKING
 
-from arcor2_hw.data.position import MAIN_BRANCH
+from arcor2_hw.data.position import MAIN_BRANCH, Frame
 
 if TYPE_CHECKING:
     from arcor2_hw.runtime.device import Device
-    from arcor2_hw.runtime.program import Action
+
+
+class Action:
+    """One call of an action. `id` is None in a project that declares no actions.
+
+    number: Counts the calls of a run from 1. call: The number of the call around it, 0 for none. frame: Its place in
+    the position of the program; None for parallel work, which is not part of the stacks of its branches.
+    """
+
+    __slots__ = ("began", "call", "frame", "id", "number", "waited")
+
+    def __init__(self, number: int, action_id: str | None, call: int, frame: Frame | None) -> None:
+        self.number = number
+        self.id = action_id
+        self.call = call
+        self.frame = frame
+        self.began = 0.0
+        self.waited = 0.0
 
 
 class Failure:

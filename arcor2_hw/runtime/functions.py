@@ -6,8 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeVar, cast
 
 from arcor2_hw.exceptions import InvalidData, ProgramFinished
+from arcor2_hw.runtime.branches import Action
 from arcor2_hw.runtime.lane import on_any_lane
-from arcor2_hw.runtime.program import Action, Program
+from arcor2_hw.runtime.program import Program
 
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")

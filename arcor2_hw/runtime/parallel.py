@@ -7,10 +7,10 @@ from typing import Any, Final
 
 from arcor2_hw.data.project import MAX_BRANCHES, MIN_BRANCHES
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, ProgramStopped
-from arcor2_hw.runtime.branches import Branch
+from arcor2_hw.runtime.branches import Action, Branch
 from arcor2_hw.runtime.functions import announced
 from arcor2_hw.runtime.lane import Job
-from arcor2_hw.runtime.program import Action, Program
+from arcor2_hw.runtime.program import Program
 from arcor2_hw.runtime.stopping import send_stop, wait_stopped
 
 STOP_PERIOD: Final = 0.05

@@ -33,7 +33,7 @@ from arcor2_hw.exceptions import (
     message_of,
 )
 from arcor2_hw.messages import Message
-from arcor2_hw.runtime.branches import Branches
+from arcor2_hw.runtime.branches import Action, Branches
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
 from arcor2_hw.runtime.pacing import Gate
@@ -78,24 +78,6 @@ class Channel(Protocol):
 
         See ActionFailed.
         """
-
-
-class Action:
-    """One call of an action. `id` is None in a project that declares no actions.
-
-    number: Counts the calls of a run from 1. call: The number of the call around it, 0 for none. frame: Its place in
-    the position of the program; None for parallel work, which is not part of the stacks of its branches.
-    """
-
-    __slots__ = ("began", "call", "frame", "id", "number", "waited")
-
-    def __init__(self, number: int, action_id: str | None, call: int, frame: Frame | None) -> None:
-        self.number = number
-        self.id = action_id
-        self.call = call
-        self.frame = frame
-        self.began = 0.0
-        self.waited = 0.0
 
 
 class ActionError(NamedTuple):

@@ -13,7 +13,7 @@ from tests.protocol import PROTOCOL
 
 TRANSLATION = {"key", "values"}
 ADDED = {
-    "Action": {"error_output", "retry"},
+    "Action": {"branches", "error_output", "retry"},
     "ActionMetadata": {"again", "verdict"},
     "AddAction.Request.Args": {"error_output", "retry"},
     "AddLogicItem.Request.Args": {"error_kinds", "when"},
