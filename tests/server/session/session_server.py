@@ -31,6 +31,7 @@ from arcor2_server.access.admission import Access
 from arcor2_server.app import Server
 from arcor2_server.app.application import endpoints
 from arcor2_server.app.parts import connect_edits, is_stored
+from arcor2_server.audit.trail import AuditTrail
 from arcor2_server.build.script_editing import ScriptEditing
 from arcor2_server.collaboration.lock_takeover import LockTakeover
 from arcor2_server.collaboration.locks import Locks
@@ -336,6 +337,7 @@ async def open_server(directory: Path, **settings: Any) -> AsyncIterator[Session
             parts: Any = Parts(
                 settings=chosen,
                 access=Access(chosen),
+                audit=AuditTrail(chosen.audit_file, str),  # not opened: it only collects entries
                 hub=hub,
                 users=users,
                 locks=locks,
