@@ -81,6 +81,12 @@ class NotInControl(Refused):
     code = "not_in_control"
 
 
+class WatchdogTripped(ConnectionLost, NotInControl):
+    """This computer was too slow for the watchdog of the device, which has stopped."""
+
+    code = "watchdog_tripped"
+
+
 class OutOfRange(DeviceError):
     """A value is outside of the range that the device allows. Nothing was sent."""
 

@@ -13,6 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
+from arcor2_hw.analysis import alarms
 from arcor2_hw.analysis.installed import installed_types
 from arcor2_hw.analysis.library import BUILT_IN, Library
 from arcor2_hw.analysis.source import SourceFile
@@ -45,6 +46,7 @@ def _texts_of_library() -> frozenset[str]:
 def _found(folder: Path, types: Iterable[SourceFile] = ()) -> frozenset[str]:
     files = [path for path in sources(folder) if path.relative_to(folder).parts[0] not in ENGLISH]
     found = {each.key for each in templates(files)}.union(_texts_of_types(folder, types))
+    found |= set(alarms.texts_of(alarms.read(folder)))
     return frozenset(text for text in found if any(map(str.isalpha, _FIELD.sub("", text))))
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence, Set
 from typing import Any, Literal, overload
 
 from arcor2_hw.client.stream import LIMIT, EventStream, TypedEvent
+from arcor2_hw.data.alarms import AlarmFilter, AlarmRecord
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.calibration import CalibrationCheck, CalibrationKind
 from arcor2_hw.data.camera import CameraParameters, EstimatedPose, MarkerCorners
@@ -73,6 +74,7 @@ from arcor2_hw.data.project import (
     Retry,
 )
 from arcor2_hw.data.robot import Joint, RobotArg, RobotMeta
+from arcor2_hw.data.rpc.alarms import AlarmStatisticsData, ListAlarmsData
 from arcor2_hw.data.rpc.calibrations import ListCalibrationsData
 from arcor2_hw.data.rpc.dry_runs import GetDryRunData
 from arcor2_hw.data.rpc.editor import GetExecutionTraceData, ListRunsData, SetViewStateData
@@ -104,6 +106,9 @@ class Requests(ABC):
     ) -> Any: ...
     @abstractmethod
     def _follow(self, names: frozenset[str], limit: int) -> EventStream[Any]: ...
+    async def acknowledge_alarm(self, number: int, *, note: str = "", timeout: float | None = None) -> None:
+        """AcknowledgeAlarm: number of the record, and a note. Needs the role operator."""
+
     async def acknowledge_stop(
         self, object_id: str, *, code: str | Unset = UNSET, timeout: float | None = None
     ) -> None:
@@ -273,6 +278,11 @@ class Requests(ABC):
         self, *, name: str, pose: Pose, model: ObjectModel, dry_run: bool = False, timeout: float | None = None
     ) -> None:
         """AddVirtualCollisionObjectToScene. Needs the role technician."""
+
+    async def alarm_statistics(
+        self, *, days: float = 7.0, limit: int = 10, timeout: float | None = None
+    ) -> AlarmStatisticsData:
+        """AlarmStatistics: number of past days, and maximum number of alarms in each list. Needs the role operator."""
 
     async def authenticate(self, token: str, *, timeout: float | None = None) -> AuthenticateData:
         """Authenticate. Needs the role operator."""
@@ -560,6 +570,21 @@ class Requests(ABC):
         """JogRobot: a velocity of the end effector (`linear` m/s, `angular` rad/s), or of joints (rad/s, m/s).
 
         Needs the role standard user.
+        """
+
+    async def list_alarms(
+        self,
+        *,
+        show: AlarmFilter = AlarmFilter.RETAINED,
+        limit: int = 100,
+        before: int | Unset = UNSET,
+        object_id: str | Unset = UNSET,
+        run: int | Unset = UNSET,
+        timeout: float | None = None,
+    ) -> ListAlarmsData:
+        """ListAlarms: which records, maximum number, number before which they are listed, object, run.
+
+        Needs the role operator.
         """
 
     async def list_calibrations(
@@ -938,6 +963,9 @@ class Requests(ABC):
     ) -> SetViewStateData:
         """SetViewState: values by key; null removes a value, other keys are unchanged. Needs the role operator."""
 
+    async def shelve_alarm(self, *, number: int, seconds: float, note: str = "", timeout: float | None = None) -> None:
+        """ShelveAlarm: number of the record, time in s (0 ends the shelving), and a note. Needs the role technician."""
+
     async def start_dry_run(
         self,
         *,
@@ -1247,6 +1275,10 @@ class Requests(ABC):
     def follow(
         self, name: Literal["ActionStateBefore"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[ActionStateBeforeData]]: ...
+    @overload
+    def follow(
+        self, name: Literal["AlarmChanged"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[AlarmRecord]]: ...
     @overload
     def follow(
         self, name: Literal["BreakpointsChanged"], /, *, limit: int = LIMIT

@@ -5,6 +5,7 @@ from typing import Any, Final
 
 from msgspec import Struct, field
 
+from arcor2_hw.data.alarms import AlarmRecord
 from arcor2_hw.data.base import UNSET, Data, TranslatableData, Unset
 from arcor2_hw.data.device import Connection, Observation
 from arcor2_hw.data.dry_run import DryRunHead
@@ -363,6 +364,7 @@ EVENTS: Final = {
         EventType("ObjectObservations", ObjectObservationsData, Role.OPERATOR, additional=True),
         EventType("ObjectValues", ObjectValuesData, Role.OPERATOR, additional=True),
         EventType("RobotHold", RobotHoldData, Role.OPERATOR, additional=True),
+        EventType("AlarmChanged", AlarmRecord, Role.OPERATOR, additional=True),
         EventType("BreakpointsChanged", ProjectBreakpoints, Role.OPERATOR, additional=True),
         EventType("DryRunChanged", DryRunHead, Role.OPERATOR, additional=True),
         EventType("ExecutionTrace", TraceEntry, Role.OPERATOR, additional=True),

@@ -4,10 +4,10 @@ import threading
 from collections.abc import Mapping
 from typing import ClassVar, Final, NamedTuple
 
-from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Alarm, Connection, Health, Severity
 from arcor2_hw.exceptions import DeviceError
 from arcor2_hw.messages import Message
+from arcor2_hw.objects.conditions import conditions_of
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.observing import GoOn, Observing
 
@@ -35,13 +35,11 @@ class Connected:
     who: str | Message
     """Name and address, for errors."""
     observing: Observing
-    _active_alarms: dict[str, Alarm]
 
     def keep_connection(self, who: str | Message, observing: Observing | None = None) -> None:
         """Create the connection without opening it."""
         self.who = who
         self.observing = observing or Observing(who, self.open_link, self.watch, self.close_link, self.on_lost)
-        self._active_alarms = {}
 
     # -------------------------------------------------------------------------------- hooks
     def open_link(self, timeout: float) -> object:
@@ -59,8 +57,9 @@ class Connected:
 
     def condition(self) -> Health:
         """Return the health of an observed device. By default it depends on the active alarms."""
-        worst = any(alarm.severity is not Severity.WARNING for alarm in self._active_alarms.values())
-        return Health.FAILURE if worst else Health.CHECK_FUNCTION if self._active_alarms else Health.NORMAL
+        active = conditions_of(self).alarms()
+        worst = any(alarm.severity is not Severity.WARNING for alarm in active)
+        return Health.FAILURE if worst else Health.CHECK_FUNCTION if active else Health.NORMAL
 
     # -------------------------------------------------------------------------------- connection
     def connect(self, timeout: float = DEFAULT_CONNECT_TIMEOUT) -> None:
@@ -83,15 +82,12 @@ class Connected:
 
     def alarms(self) -> list[Alarm]:
         """Return the active alarms."""
-        return list(self._active_alarms.values())
+        return conditions_of(self).alarms()
 
     def set_alarm(self, code: str, active: bool) -> None:
         """Raise an alarm of ALARMS, or end it."""
-        if not active:
-            self._active_alarms.pop(code, None)
-        elif code not in self._active_alarms:
-            text, remedy, severity = self.ALARMS[code]
-            self._active_alarms[code] = Alarm(code, severity, text, remedy, now())
+        text, remedy, severity = self.ALARMS[code]
+        conditions_of(self).set(code, active, text, remedy, severity)
 
     # -------------------------------------------------------------------------------- stopping
     def begin(self, what: str) -> GoOn:

@@ -5,12 +5,13 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from arcor2_hw.actions import action
-from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction, Observation
+from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction, Observation, Severity
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2NotImplemented, NotFound
 from arcor2_hw.messages import Message
+from arcor2_hw.objects.conditions import Conditions, conditions_of
 from arcor2_hw.objects.settings import Settings
 
 DEFAULT_CONNECT_TIMEOUT = 5.0
@@ -137,8 +138,35 @@ class Generic(abc.ABC):
         raise Arcor2NotImplemented("identify")
 
     def alarms(self) -> list[Alarm]:
-        """Return the active alarms."""
-        return []
+        """Return the active alarms. By default they are the conditions reported by `set_condition`."""
+        return self.conditions.alarms()
+
+    @property
+    def conditions(self) -> Conditions:
+        """Return the conditions that this object has reported."""
+        return conditions_of(self)
+
+    def set_condition(
+        self,
+        code: str,
+        active: bool,
+        text: str | Message = "",
+        remedy: str | Message = "",
+        severity: Severity = Severity.ERROR,
+    ) -> None:
+        """Report at once that a condition became active or has ended, from any thread.
+
+        `alarms.toml` next to the driver declares priority, cause and remedy of the code. Text and remedy may be empty
+        then.
+
+        Args:
+            code: Code of the alarm.
+            active: Whether the condition exists.
+            text: What happened; a message if it has values.
+            remedy: What to do.
+            severity: Severity for clients that do not know the declaration.
+        """
+        self.conditions.set(code, active, text, remedy, severity)
 
     def observations(self) -> list[Observation]:
         """Return the present values of the device, for display and trends.

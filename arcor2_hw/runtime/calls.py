@@ -1,6 +1,7 @@
 """Calls and stops of devices for the server. Each is answered exactly once; stops run concurrently with calls."""
 
 import threading
+import time
 from collections.abc import Callable
 
 import msgspec
@@ -22,7 +23,8 @@ Post = Callable[[m.ToServer], None]
 def error_data(error: BaseException, object_id: str = "") -> m.ErrorData:
     """Convert an error to the form that is sent to the server."""
     code, detail = (error.code, error.detail) if isinstance(error, Arcor2Error) else ("error", "")
-    return m.ErrorData(code, type(error).__name__, message_of(error), detail, object_id)
+    fault = str(getattr(error, "fault_code", "") or getattr(error, "kind", ""))
+    return m.ErrorData(code, type(error).__name__, message_of(error), detail, object_id, fault, time.monotonic())
 
 
 class Calls:

@@ -142,6 +142,8 @@ class Cell:
         """Added bodies and calibrations from the server."""
         self.changed: Callable[[Device], None] = lambda _: None
         """Called when the connection of a device changes, on the thread that observes it."""
+        self.conditions_changed: Callable[[Device], None] = lambda _: None
+        """Called when a device has reported a condition, on any thread."""
 
     def __iter__(self) -> Iterator[Device]:
         return iter(list(self._devices.values()))
@@ -224,6 +226,7 @@ class Cell:
     def _make(self, how: Recipe) -> Device:
         surroundings = SceneSurroundings(how.scene_object.id, self, self.assets, self.updates)
         device = Device(how, lambda device: self.changed(device), self.find, surroundings, self.find_robot)
+        device.conditions_changed = lambda: self.conditions_changed(device)
         self._devices[device.id] = device
         return device
 

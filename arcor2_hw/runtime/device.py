@@ -18,6 +18,7 @@ from arcor2_hw.exceptions import (
 )
 from arcor2_hw.messages import Message
 from arcor2_hw.objects import CollisionObject, Generic, HoldsParts, Robot
+from arcor2_hw.objects.conditions import conditions_of
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.observing import Observing, listening
 from arcor2_hw.objects.surroundings import Surroundings
@@ -71,6 +72,8 @@ class Device:
         self._connections: list[Observing] = []
         self.id = recipe.scene_object.id
         self.name = recipe.scene_object.name
+        self.conditions_changed: Callable[[], None] = lambda: None
+        """Called when the instance has reported a condition, on any thread."""
         self.instance: Generic | None = None
         self.lane = Lane(self.name)
         self.stop_lane = Lane(self.name, "stop")
@@ -103,6 +106,7 @@ class Device:
     def _open(self) -> None:
         with listening(self._connection_changed):
             self.instance = instance = self._make()
+            conditions_of(instance).listener = lambda: self.conditions_changed()
             if isinstance(instance, CollisionObject):
                 instance.on_enabled_changed(lambda: self._changed(self))
             if self._find is not None:

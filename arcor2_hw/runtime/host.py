@@ -276,7 +276,9 @@ class Host:
         problem = program.cell.close() or problem
         why = program.error or problem
         self.link.post(
-            m.ProgramChanged("stopped", not failed and problem is None, None if why is None else error_data(why))
+            m.ProgramChanged(
+                "stopped", not failed and problem is None, None if why is None else _described(program, why)
+            )
         )
 
     # -------------------------------------------------------------------------------- channel of the program
@@ -412,6 +414,14 @@ class Host:
         program = self.program
         if program is not None and program.stop_requested and not program.inside and not program.ended:
             raise ProgramStopped
+
+
+def _described(program: Program, error: BaseException) -> m.ErrorData:
+    """Return the error that ended a program, with its device."""
+    data, device = error_data(error), program.source_of(error)
+    if device is None:
+        return data
+    return replace(data, object_id=device.id, object_name=device.name, object_type=device.recipe.cls.__name__)
 
 
 _MAIN: Final = threading.main_thread().ident or 0

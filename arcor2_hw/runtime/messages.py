@@ -33,13 +33,21 @@ SILENCE_LIMIT: Final = 1.0
 
 
 class ErrorData(Struct, frozen=True):
-    """An error on its way between processes: code and name of its class, texts, and the device that raised it."""
+    """An error on its way between processes: code and name of its class, texts, and the device that raised it.
+
+    fault: code of the device's fault, or kind of the safety stop. stamp: when it was raised, on the monotonic clock, s.
+    object_name, object_type: of the device, in the error that ended a program.
+    """
 
     code: str
     type: str
     message: Message
     detail: str = ""
     object_id: str = ""
+    fault: str = ""
+    stamp: float = 0.0
+    object_name: str = ""
+    object_type: str = ""
 
 
 class TypeCode(Struct, frozen=True):
@@ -359,7 +367,8 @@ class DeviceChanged(ToServer, frozen=True):
     """The connection, health, alarms, control owner or shown values of a device have changed.
 
     reason: of a lost connection. in_the_way: false for a disabled collision object. held: the parts that a robot holds.
-    values: what the device reports of what one can see (`Generic.shown_values`).
+    values: what the device reports of what one can see (`Generic.shown_values`). stamp: when the connection changed, on
+    the monotonic clock, s. raised: when each alarm became active, by code, on the same clock.
     """
 
     object_id: str
@@ -371,6 +380,8 @@ class DeviceChanged(ToServer, frozen=True):
     in_the_way: bool = True
     held: list[HeldPart] = field(default_factory=list)
     values: dict[str, float] = field(default_factory=dict)
+    stamp: float = 0.0
+    raised: dict[str, float] = field(default_factory=dict)
 
 
 class LogLine(ToServer, frozen=True):

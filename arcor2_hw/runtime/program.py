@@ -319,9 +319,13 @@ class Program:
         """
         if isinstance(error, ENDS_PROGRAM):
             raise error
+        source = self.source_of(error)
+        return ActionError("" if source is None else source.name, error.code, str(error))
+
+    def source_of(self, error: BaseException) -> Device | None:
+        """Return the device that raised an error, None if no device did."""
         source = self.branches.current.failure.device
-        device = source[1].name if source is not None and source[0] is error else ""
-        return ActionError(device, error.code, str(error))
+        return source[1] if source is not None and source[0] is error else None
 
     # -------------------------------------------------------------------------------- stop and end
     def stop(self) -> None:
@@ -343,7 +347,9 @@ class Program:
             if self.ended or self.stop_requested or self.error is not None:
                 return False
             self._device_lost = True
-            self._report_exception(describe(device, error))
+            described = describe(device, error)
+            self.record_error_source(device, described)
+            self._report_exception(described)
         self.stop()
         return True
 

@@ -1,5 +1,6 @@
 """Resources: the objects and action points that the script of a package uses."""
 
+import contextlib
 import types
 from collections.abc import Callable
 from pathlib import Path
@@ -172,6 +173,8 @@ class Resources:
             program.check()
             program.cell.take_control()
         except SceneFault as fault:
+            with contextlib.suppress(Arcor2Error):  # an object without an instance is no device
+                program.record_error_source(program.cell[fault.object_id], fault.error)
             raise fault.error from fault
         for device in program.cell:
             self.objects[device.id] = proxy(device, program)

@@ -5,10 +5,13 @@ import time
 from collections.abc import Callable
 from typing import Any, Final
 
+from msgspec.structs import replace
+
 from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.messages import Message
 from arcor2_hw.objects import CollisionObject, Generic, Robot
+from arcor2_hw.objects.conditions import conditions_of
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.lane import Job
@@ -46,6 +49,7 @@ class Watch:
         self._lost = lost
         self._lock = threading.Lock()
         cell.changed = self.check_connection
+        cell.conditions_changed = self.check_conditions
         self._pending: dict[str, Job] = {}
         self._reported: dict[str, DeviceChanged] = {}
         self._queried_at: dict[str, float] = {}
@@ -53,18 +57,18 @@ class Watch:
     def check_all(self) -> None:
         """Start the check of every device whose state can change."""
         for device in self._cell:
-            cls = device.recipe.cls
-            if device.instance is None or device.closing:
-                continue
-            static = not any(overrides(cls, name) for name in _CHANGING)
-            if static and device.id in self._reported:
-                continue
-            before = self._pending.get(device.id)
-            if before is not None and not before.ended:
-                continue
-            job = Job("watch", self._observe, (device, device.instance))
-            self._pending[device.id] = job
-            device.watch_lane.submit_or_fail(job)
+            static = not any(overrides(device.recipe.cls, name) for name in _CHANGING)
+            if not static or device.id not in self._reported or device.id not in self._queried_at:
+                self._start(device)
+
+    def _start(self, device: Device) -> None:
+        """Start the check of a device, unless one is in progress."""
+        before = self._pending.get(device.id)
+        if device.instance is None or device.closing or (before is not None and not before.ended):
+            return
+        job = Job("watch", self._observe, (device, device.instance))
+        self._pending[device.id] = job
+        device.watch_lane.submit_or_fail(job)
 
     def check_connection(self, device: Device) -> None:
         """Check only the connection, without I/O. Runs on the thread that observes the connection."""
@@ -72,12 +76,18 @@ class Watch:
         if instance is not None and not device.closing:
             self._compare(device, instance, None)
 
+    def check_conditions(self, device: Device) -> None:
+        """Query the alarms of a device soon, because it has reported a condition. It neither waits nor does I/O."""
+        self._queried_at.pop(device.id, None)
+        self._start(device)
+
     def report(self, object_id: str, connection: Connection, reason: Message | None = None) -> None:
         """Report the connection of an object that has no instance."""
         health = Health.FAILURE if connection is Connection.FAILED else Health.NORMAL
         with self._lock:
-            found = DeviceChanged(object_id, connection, health, [], None, reason)
-            if found != self._reported.get(object_id):
+            before = self._reported.get(object_id)
+            found = DeviceChanged(object_id, connection, health, [], None, reason, stamp=time.monotonic())
+            if before is None or found != replace(before, stamp=found.stamp):
                 self._reported[object_id] = found
                 self._post(found)
 
@@ -88,7 +98,7 @@ class Watch:
         moment = time.monotonic()
         if moment - self._queried_at.get(device.id, -INQUIRY_PERIOD) >= INQUIRY_PERIOD:
             self._queried_at[device.id] = moment
-            alarms = _value_or(instance.alarms, alarms)
+            alarms = _with_first_times(_value_or(instance.alarms, alarms), alarms)
             owner = _plain(_value_or(instance.control_owner, owner))
         health = _value_or(lambda: instance.health, Health.FAILURE)
         self._compare(device, instance, (health, alarms, owner))
@@ -110,7 +120,9 @@ class Watch:
             in_the_way = _value_or(lambda: not isinstance(instance, CollisionObject) or instance.enabled, True)
             held = _value_or(lambda: _held_parts(instance), [])
             values = _value_or(lambda: dict(instance.shown_values), {}) if connection in _OBSERVED else {}
-            found = DeviceChanged(device.id, connection, *queried, why, in_the_way, held, values)
+            stamp = time.monotonic() if before is None or connection is not was else before.stamp
+            raised = _raised(instance, queried[1], {} if before is None else before.raised)
+            found = DeviceChanged(device.id, connection, *queried, why, in_the_way, held, values, stamp, raised)
             if found == before:
                 return
             self._reported[device.id] = found
@@ -121,6 +133,20 @@ class Watch:
 
 def _plain(owner: str | None) -> str | None:
     return None if owner is None else str(owner)  # it may be a Phrase, which cannot be encoded
+
+
+def _with_first_times(alarms: list[Alarm], before: list[Alarm]) -> list[Alarm]:
+    """Return alarms with the times of the last report, for drivers that state the present time at every reading."""
+    since = {alarm.code: alarm.since for alarm in before}
+    return [replace(alarm, since=since.get(alarm.code, alarm.since)) for alarm in alarms]
+
+
+def _raised(instance: Generic, alarms: list[Alarm], before: dict[str, float]) -> dict[str, float]:
+    """Return when each alarm became active: as the driver reported it, else when it was first seen."""
+    found = {}
+    for code in (alarm.code for alarm in alarms):
+        found[code] = conditions_of(instance).raised(code) or before.get(code) or time.monotonic()
+    return found
 
 
 def _held_parts(instance: Generic) -> list[HeldPart]:

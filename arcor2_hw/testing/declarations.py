@@ -10,6 +10,7 @@ from arcor2_hw.analysis import (
     Library,
     SourceFile,
     TypeAnalysis,
+    alarms,
     extraction,
     installed_types,
     templates,
@@ -18,7 +19,7 @@ from arcor2_hw.analysis import (
 from arcor2_hw.analysis.library import NO_DESCRIPTION
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction
-from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_hw.parsing import parse
 from arcor2_hw.testing import quality
 
@@ -69,6 +70,31 @@ def translation_faults(file: SourceFile) -> list[str]:
     if not (folder / translations.FOLDER).is_dir():
         return []
     return translations.faults(folder, extraction.texts(folder, [file]) | extraction.texts(templates.LIBRARY))
+
+
+def alarm_faults(file: SourceFile) -> list[str]:
+    """Return a sentence for each fault of the alarms that a driver declares."""
+    folder = Path(file.path).parent
+    try:
+        declared = alarms.read(folder)
+    except InvalidData as error:
+        return [str(error)]
+    wrong = [
+        f"{alarms.FILE}: alarm {kind.number} ({kind.code}) has no {name}"
+        for kind in declared
+        for name in ("cause", "remedy")
+        if not getattr(kind, name)
+    ]
+    shared = extraction.texts(templates.LIBRARY)
+    for language in alarms.LANGUAGES if declared and (folder / translations.FOLDER).is_dir() else ():
+        path = translations.file_of(folder, language)
+        known = translations.read(path) if path.exists() else {}
+        wrong += [
+            f"{path.name}: the text {text!r} of {alarms.FILE} is not translated"
+            for text in sorted(set(alarms.texts_of(declared)) - set(shared))
+            if not known.get(text)
+        ]
+    return wrong
 
 
 def own_actions(found: TypeAnalysis) -> list[ObjectAction]:

@@ -20,6 +20,11 @@ class WrittenCases:
         wrong = declarations.translation_faults(declarations.source_of(arcor2_bench.object_type))
         assert not wrong, "; ".join(wrong)
 
+    def test_alarms_declared(self, arcor2_bench: Bench) -> None:
+        """alarms.toml has no unknown keys or duplicates, and every alarm has a cause, a remedy and its translations."""
+        wrong = declarations.alarm_faults(declarations.source_of(arcor2_bench.object_type))
+        assert not wrong, "; ".join(wrong)
+
     def test_types_complete(self, arcor2_bench: Bench) -> None:
         """Every public method has a type hint for each parameter and for the result."""
         lacking = capabilities.unhinted(arcor2_bench.object_type)

@@ -3,6 +3,7 @@
 from typing import Final
 
 from arcor2_hw.data.rpc.action_points import *
+from arcor2_hw.data.rpc.alarms import *
 from arcor2_hw.data.rpc.calibrations import *
 from arcor2_hw.data.rpc.dry_runs import *
 from arcor2_hw.data.rpc.editor import *
@@ -21,6 +22,7 @@ from arcor2_hw.data.rpc.scripts import *
 
 _ALL: Final = (
     *ACTION_POINT_RPCS,
+    *ALARM_RPCS,
     *CALIBRATION_RPCS,
     *DRY_RUN_RPCS,
     *EDITOR_RPCS,

@@ -4,11 +4,20 @@ import logging
 import threading
 from typing import ClassVar
 
-from arcor2_hw.actions import action
+from arcor2_hw.actions import StrEnum, action
+from arcor2_hw.data.device import Severity
 from arcor2_hw.exceptions import Cancelled, ProgramFinished
 from arcor2_hw.objects import Generic, Settings
 
 log = logging.getLogger(__name__)
+
+
+class AlarmLevel(StrEnum):
+    """How urgent an alarm of a program is."""
+
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
 
 
 class FlowActions(Generic):
@@ -53,6 +62,20 @@ class FlowActions(Generic):
         :param text: message, such as "Refill the labels"
         """
         log.info("%s: message: %s", self.name, text)
+
+    @action(quick=True)
+    def raise_alarm(self, text: str, level: AlarmLevel = AlarmLevel.WARNING, *, an: str | None = None) -> None:
+        """Raise an alarm for the operator and continue. It stays until the program clears it or ends.
+
+        :param text: what the operator needs to know or do, such as "Empty the box for bad parts"
+        :param level: how urgent it is
+        """
+        self.set_condition(f"raised_{level.value}:{text[:40]}", True, text, severity=Severity(level.value))
+
+    @action(quick=True)
+    def clear_alarms(self, *, an: str | None = None) -> None:
+        """Clear the alarms that this object has raised."""
+        self.conditions.clear()
 
     @action
     def repeat(self, times: int = 2, *, an: str | None = None) -> bool:

@@ -21,6 +21,7 @@ from arcor2_hw.exceptions import (
     OutOfRange,
     Refused,
     SafetyStop,
+    WatchdogTripped,
 )
 from arcor2_hw.keep_alive import once_within
 from arcor2_hw.objects.arm import StopGuard, exclusive_motion
@@ -300,7 +301,7 @@ class Motion:
             return Cancelled("The move of {name} was stopped.", name=self._arms.name)
         if isinstance(error, CommandRefused):
             if error.status is Status.WATCHDOG:
-                return ConnectionLost(error.message, error.detail)
+                return WatchdogTripped(error.message, error.detail)
             if error.status is Status.STOPPED:
                 return Cancelled(error.message, error.detail)
             return error

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, ClassVar, Final
 from arcor2_hw.data.device import Health, Severity
 from arcor2_hw.exceptions import DeviceError, DeviceTimeout, NotConnected, Refused, Stale
 from arcor2_hw.messages import Message, device_at
+from arcor2_hw.objects.conditions import conditions_of
 from arcor2_hw.objects.connected import AlarmText, Connected
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 
@@ -71,14 +72,14 @@ class ImageStream(Connected):
         super().disconnect()
         self._newest = None
         self._exposure = None
-        self._active_alarms.clear()
+        conditions_of(self).clear()
         self._wake()
 
     def condition(self) -> Health:
         """Return failure when the camera repeats an old image, off_spec when it is too hot."""
-        if "frozen" in self._active_alarms:
+        if "frozen" in conditions_of(self):
             return Health.FAILURE
-        return Health.OFF_SPEC if self._active_alarms else Health.NORMAL
+        return Health.OFF_SPEC if conditions_of(self) else Health.NORMAL
 
     def stop_waiting(self) -> None:
         """End the calls that wait for an image, with Cancelled."""

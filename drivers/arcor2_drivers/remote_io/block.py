@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import ClassVar, Final
 
-from arcor2_hw.data.device import Alarm, LossReaction
+from arcor2_hw.data.device import Alarm, LossReaction, Severity
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, Refused
 from arcor2_hw.messages import Message, Phrase, translatable
 from arcor2_hw.objects.connected import AlarmText
@@ -23,6 +23,8 @@ from .points import Point
 from .registers import Image, WatchdogState
 from .settings import LONGEST_WATCHDOG, BlockSettings
 
+WATCHDOG: Final = "watchdog"
+"""Code of the fault of an expired watchdog."""
 REFUSALS: Final = translatable({4: "an expired watchdog holds the output"})
 """Meaning of Modbus exceptions at this block, where it differs from the usual."""
 
@@ -34,6 +36,11 @@ class Block(ModbusDevice[Image]):
     ALARMS: ClassVar[Mapping[str, AlarmText]] = {
         "supply_missing": AlarmText("the supply of the outputs is missing", "check fuse and cable of the outputs"),
         "overload": AlarmText("an output is overloaded", "check the loads at the outputs for a short circuit"),
+        WATCHDOG: AlarmText(
+            "this computer was too slow for its watchdog; the outputs are in their safe state",
+            "take control again",
+            Severity.WARNING,
+        ),
     }
     period = busy_period = 0.02
 
@@ -92,12 +99,13 @@ class Block(ModbusDevice[Image]):
         armed = registers.arming(self.block_points.values(), self._s.watchdog_ms, self._number)
         self.link.write_registers(self._watchdog + registers.COMMAND, registers.ACKNOWLEDGE)
         self.link.write_verified(self._watchdog, *armed)
+        self.set_alarm(WATCHDOG, False)
         self._triggered = time.monotonic()
         if problem := self.why_control_ended(self.snapshot().value):
             with contextlib.suppress(DeviceError):
                 self.disarm()
             self.drop_control(problem)
-            raise DeviceFault("{device}: control is refused: {reason}", "", "watchdog", device=self.who, reason=problem)
+            raise DeviceFault("{device}: control is refused: {reason}", "", WATCHDOG, device=self.who, reason=problem)
 
     def disarm(self) -> None:
         """Switch our outputs to their safe state and the watchdog off."""
@@ -124,6 +132,7 @@ class Block(ModbusDevice[Image]):
             "input register {register} is {value}", register=registers.WATCHDOG_STATES + number, value=running
         )
         if running is WatchdogState.EXPIRED:
+            self.set_alarm(WATCHDOG, True)
             expired = "watchdog {number} has expired ({register}); the outputs are safe until control is taken"
             return Phrase.of(expired, number=number, register=register)
         if running is WatchdogState.OFF:

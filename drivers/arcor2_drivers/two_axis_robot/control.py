@@ -9,7 +9,7 @@ from typing import Final
 
 from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Alarm, Severity
-from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotInControl, Refused
+from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotInControl, Refused, WatchdogTripped
 from arcor2_hw.keep_alive import TOO_SLOW, once_within
 from arcor2_hw.messages import Message, Phrase, translatable
 from arcor2_hw.objects.arm import StopCounter, check_confirmed
@@ -42,6 +42,7 @@ class Control:
         self.ours = False
         self.teaching = False
         self._why_not: str = Phrase.of("Take control first.")
+        self._tripped = False
         self._since: dict[str, str] = {}
 
     # -------------------------------------------------------------------------------- taking and releasing
@@ -127,7 +128,7 @@ class Control:
     def drop(self, why: str) -> None:
         """Note that control has ended."""
         if self.ours:
-            self._why_not = why
+            self._why_not, self._tripped = why, False
         self.ours = self.teaching = False
         self._observer.end_keep_alive()
 
@@ -140,11 +141,13 @@ class Control:
                 if servo.watchdog == reg.TRIPPED:
                     tripped = "the bus watchdog of servo {number} has tripped: {reason}"
                     self.drop(Phrase.of(tripped, number=number, reason=TOO_SLOW))
+                    self._tripped = True
                 elif servo.watchdog != self._watchdog() or servo.torque == self.teaching:
                     switched = "servo {number} was switched by another client, or lost its supply."
                     self.drop(Phrase.of(switched, number=number))
         if not self.ours:
-            raise NotInControl("Control of {name} is not taken: {why_not}", name=self.name, why_not=self._why_not)
+            error = NotInControl("Control of {name} is not taken: {why_not}", name=self.name, why_not=self._why_not)
+            raise WatchdogTripped(error.message) if self._tripped else error
 
     def require_motion(self) -> None:
         """Raise what prevents motions: no control, or hand teaching."""

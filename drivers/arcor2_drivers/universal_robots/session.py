@@ -21,6 +21,7 @@ from arcor2_hw.exceptions import (
     DeviceTimeout,
     NotInControl,
     SafetyStop,
+    WatchdogTripped,
 )
 from arcor2_hw.keep_alive import FROZEN_AFTER, PULSE_PERIOD, TOO_SLOW, once_within, pulse, result_within
 from arcor2_hw.objects.arm import label
@@ -336,7 +337,7 @@ class ControlSession:
 
     def _too_slow(self, detail: str) -> ConnectionLost:
         self.too_slow = True
-        return ConnectionLost("{device}: {too_slow}", detail, device=self.who, too_slow=TOO_SLOW)
+        return WatchdogTripped("{device}: {too_slow}", detail, device=self.who, too_slow=TOO_SLOW)
 
     def _on_output(self, line: bytes) -> None:
         text = line.decode("utf-8", "replace").strip()

@@ -110,7 +110,7 @@ class SuctionGripper(Connected, Suction):
 
     @property
     def _part_lost(self) -> bool:
-        return PART_LOST in self._active_alarms
+        return PART_LOST in self.conditions
 
     def _carrying_robot(self) -> Robot | None:
         """Return the robot that the settings name, else the carrier if it is a robot, else the only robot."""

@@ -1,6 +1,7 @@
 """Builds the handlers of websocket requests and REST operations from the parts of the server."""
 
 from arcor2_server.app.parts import Server
+from arcor2_server.rest.alarms import AlarmOperations
 from arcor2_server.rest.api_page import ApiPageOperations
 from arcor2_server.rest.assets import AssetOperations
 from arcor2_server.rest.audit_trail import AuditOperations
@@ -24,6 +25,7 @@ from arcor2_server.rest.scene_service import SceneServiceOperations
 from arcor2_server.rest.scenes import SceneOperations
 from arcor2_server.rpc.action_points import ActionPointRequests
 from arcor2_server.rpc.actions import ActionRequests
+from arcor2_server.rpc.alarms import AlarmRequests
 from arcor2_server.rpc.answer_cache import AnswerCache
 from arcor2_server.rpc.build import BuildRequests
 from arcor2_server.rpc.calibration import CalibrationRequests
@@ -68,6 +70,7 @@ def request_handlers(s: Server) -> Handlers:
     return Handlers(
         ActionPointRequests(s.locks, s.session, s.online, editing),
         ActionRequests(s.locks, s.types, s.session, editing),
+        AlarmRequests(s.alarms),
         BuildRequests(s.locks, s.execution, s.build, s.tasks),
         CalibrationRequests(s.session, s.online, s.calibration, s.scene_calibration),
         CalibrationRecordRequests(s.session, s.calibration_records),
@@ -119,6 +122,7 @@ def rest_groups(s: Server) -> list[object]:
     diagnosis = Diagnosis(s.settings, s.hub, s.types, s.session, s.online, s.execution, s.runs)
     return [
         ApiPageOperations(),
+        AlarmOperations(s.alarms),
         AssetOperations(s.assets, s.type_notifications),
         AuditOperations(s.audit),
         BuildOperations(s.storage, s.build, s.package_import),

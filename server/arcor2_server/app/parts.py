@@ -6,6 +6,9 @@ from typing import Protocol, TypeVar
 
 from arcor2_hw.data.events import Event
 from arcor2_server.access.admission import Access
+from arcor2_server.alarms.kinds import AlarmKinds
+from arcor2_server.alarms.service import Alarms
+from arcor2_server.alarms.system import SystemAlarms
 from arcor2_server.audit.trail import AuditTrail
 from arcor2_server.build.importing import PackageImport
 from arcor2_server.build.script_editing import ScriptEditing
@@ -47,6 +50,7 @@ from arcor2_server.online.scene_opening import SceneOpening
 from arcor2_server.online.undo import Undo
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage
+from arcor2_server.storage.alarms import AlarmStore
 from arcor2_server.storage.calibrations import Calibrations
 from arcor2_server.storage.damage_notices import DataDamage
 from arcor2_server.storage.packages import Packages
@@ -181,6 +185,25 @@ class Server:
         execution = self.execution = closed(
             Execution(packages, program_host, online, settings, hub, types, runs, breakpoints, secrets, messages)
         )
+        alarms = self.alarms = Alarms(
+            hub,
+            AlarmStore(storage),
+            AlarmKinds(types.installed_folder),
+            lambda: execution.program.number if execution.active else 0,
+        )
+        await alarms.open()
+        closed(alarms)
+        connect_alarms(alarms, scene_host, program_host, execution, damage)
+        system_alarms = closed(
+            SystemAlarms(
+                alarms,
+                hub,
+                settings.data_dir,
+                settings.certificate,
+                lambda: runs.starter(execution.program.number) if execution.running else "",
+            )
+        )
+        system_alarms.start()
         self.stop_all = StopAll(session, online, execution)
         storage.on_deleted += [view_states.forget, breakpoints.forget, session.forget_history]
         self.package_runs = PackageRuns(hub, users, locks, session, online, execution, presence, lock_takeover)
@@ -227,6 +250,19 @@ def is_stored(types: ObjectTypes, storage: Storage) -> Callable[[str], Awaitable
         return types.known(item) or await storage.identify(item) is not None
 
     return check
+
+
+def connect_alarms(
+    alarms: Alarms, scene_host: HostSession, program_host: HostSession, execution: Execution, damage: DataDamage
+) -> None:
+    """Let the alarm service record what the hosts, the program and the storage report."""
+    for host, what in ((scene_host, "scene"), (program_host, "program")):
+        alarms.watch(host.board, what)
+        host.on_death.append(lambda reason: alarms.system("host_died", None, reason, with_devices=True))
+    execution.on_error.append(alarms.failed)
+    for notice in damage.notices:
+        alarms.data_damaged(notice)
+    damage.on_report.append(alarms.data_damaged)
 
 
 def connect_edits(edits: EditNotifications, previews: Previews, breakpoints: SharedBreakpoints) -> None:

@@ -7,6 +7,7 @@ from arcor2_hw.data.rpc import Rpc
 READING: Final = frozenset(
     {
         "ActionParamValues",
+        "AlarmStatistics",
         "Authenticate",
         "CameraColorImage",
         "CameraColorParameters",

@@ -90,6 +90,11 @@ class ProgramRun:
             self._statistics.handle_paused()
 
     @property
+    def number(self) -> int:
+        """The number of the run in the history; 0 before the first one."""
+        return self._number
+
+    @property
     def position(self) -> ProgramPosition:
         """The present position of the program."""
         return ProgramPosition(self._number, [Branch(key, frames) for key, frames in self._frames.items()])

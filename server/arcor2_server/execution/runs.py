@@ -220,6 +220,17 @@ class Runs:
             self._hub.broadcast(make_event(TRACE, call.entry(self._trace_of)))
 
     # -------------------------------------------------------------------------------- queries
+    def starter(self, number: int) -> str:
+        """Return who started a run; empty if it is unknown."""
+        run = self._runs.get(number)
+        return "" if run is None or isinstance(run.started_by, Unset) else run.started_by
+
+    def last_action(self, number: int) -> str:
+        """Return the name of the action of a run that started last; empty if there is none."""
+        if self._trace_of != number or not self._trace:
+            return ""
+        return next(reversed(self._trace.values())).entry(number).name
+
     def find(self, args: ListRunsArgs) -> list[Run]:
         """Return the runs selected by the arguments of ListRuns, newest first."""
         found = (

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import time
+from collections.abc import Callable
 from typing import Final
 
 import msgspec
@@ -79,6 +80,8 @@ class Execution(PackageLibrary):
         self._runs = runs
         self._secrets = secrets
         self._messages = messages
+        self.on_error: list[Callable[[m.ErrorData, int, str], None]] = []
+        """Called with the error that ends a program, before its devices are gone, the run, and the last action."""
         self._over: asyncio.Future[None] | None = None
         self._killing: asyncio.TimerHandle | None = None
         self._background = BackgroundTasks()
@@ -363,6 +366,10 @@ class Execution(PackageLibrary):
     def _program_changed(self, host: CellHost, message: m.ProgramChanged) -> None:
         if message.state == "stopped":
             self.program.handle_end(message.error)
+            if message.error is not None and self.program.stopped_by is None:
+                run = self.program.number
+                for notify in self.on_error:
+                    notify(message.error, run, self._runs.last_action(run))
             self._ended()
             self._background.spawn(host.wait_or_kill(), "end of the program's host")
         elif self.state is not S.STOPPING:

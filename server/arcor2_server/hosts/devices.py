@@ -84,6 +84,10 @@ class DeviceBoard:
         """Called after each change of a connection."""
         self.on_obstacles_changed: list[Callable[[], None]] = []
         """Called when a collision object was enabled or disabled, or a robot gripped or released a part."""
+        self.on_report: list[Callable[[DeviceChanged], None]] = []
+        """Called with each report of a device, and with the last reports again when the objects are known."""
+        self.on_clear: list[Callable[[list[str]], None]] = []
+        """Called with the ids of the objects that are no longer observed."""
         self._hub = hub
         self._overlaid: Mapping[str, list[str]] = {}
         self._objects: dict[str, SceneObject] = {}
@@ -106,6 +110,8 @@ class DeviceBoard:
     def clear(self, reason: Message | None = None) -> None:
         """Remove all devices, and publish those that were connected as offline with a reason."""
         before, self._reports = self._reports, {}
+        for forget in self.on_clear:
+            forget(list(before))
         for report in before.values():
             if report.connection is not Connection.OFFLINE:
                 self._publish(_state(report.object_id, Connection.OFFLINE, reason))
@@ -128,6 +134,12 @@ class DeviceBoard:
         """
         self._objects = {obj.id: obj for obj in objects}
         self._overlaid = overlaid
+        for report in self._reports.values():
+            self._notify_report(report)
+
+    def _notify_report(self, report: DeviceChanged) -> None:
+        for notify in self.on_report:
+            notify(report)
 
     def add(self, obj: SceneObject, overlaid: list[str]) -> None:
         """Add an object, and the names of its settings that the cell file overrides."""
@@ -151,6 +163,7 @@ class DeviceBoard:
             self._hub.broadcast(make_event("ObjectValues", _values(message)))
         if _obstacles(before) != _obstacles(message):
             self._notify_obstacles()
+        self._notify_report(message)
 
     def healths(self) -> list[ObjectHealthData]:
         """Return the health of every object, in the order of the scene."""

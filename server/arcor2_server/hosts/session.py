@@ -42,6 +42,8 @@ class HostSession:
         """The encoded event PackageInfo while a program runs. Set by the owner of the session."""
         self.board = DeviceBoard(hub)
         self.streams = RobotStreams(hub, self.send, to_all_clients=to_all_clients)
+        self.on_death: list[Callable[[Message], None]] = []
+        """Called with the reason when the host has ended by itself, before the devices are gone."""
         self._on_message: Callable[[CellHost, m.ServerBound], None] = lambda _host, _message: None
         self._on_end: Callable[[Message], None] = lambda _reason: None
         self._pool = pool
@@ -106,6 +108,8 @@ class HostSession:
     def host_ended(self, host: CellHost, reason: Message) -> None:
         """Report that the host has ended."""
         if host is self.host:
+            for notify in self.on_death:
+                notify(reason)
             self._on_end(reason)
 
     async def close(self) -> None:

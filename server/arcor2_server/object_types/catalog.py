@@ -99,6 +99,11 @@ class TypeCatalog:
         """Return the folders of installed types, sorted."""
         return sorted({Path(each.folder) for each in self._installed.values() if each.folder})
 
+    def installed_folder(self, name: str) -> Path | None:
+        """Return the folder of an installed type that is not shadowed by an uploaded one, otherwise None."""
+        found = None if name in self._uploaded else self._installed.get(name)
+        return Path(found.folder) if found is not None and found.folder else None
+
     @property
     def digest(self) -> str:
         """A digest of all types, robots and actions, which does not depend on the process."""

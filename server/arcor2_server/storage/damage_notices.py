@@ -1,5 +1,6 @@
 """Notices about damaged files of the data directory, shown until a user has received them."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TypeVar
 
@@ -32,6 +33,8 @@ class DataDamage:
         self._hub = hub
         self._notices: list[Message] = []
         self._waiting = False
+        self.on_report: list[Callable[[str], None]] = []
+        """Called with each new notice."""
 
     @property
     def notices(self) -> list[Message]:
@@ -54,6 +57,8 @@ class DataDamage:
         log.error("data damaged", notice=notice.text)
         self._notices.append(notice)
         self._hub.broadcast(_event(notice))
+        for notify in self.on_report:
+            notify(notice)
         self._waiting = True
         try:
             write_private(self._path, msgspec.json.encode(self._notices))

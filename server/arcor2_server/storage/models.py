@@ -141,6 +141,15 @@ class RunTraceRow(Base):
     document: Mapped[bytes] = mapped_column(LargeBinary)
 
 
+class AlarmRow(Base):
+    """One record of an alarm, as JSON."""
+
+    __tablename__ = "alarm"
+
+    number: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=False)
+    document: Mapped[bytes] = mapped_column(LargeBinary)
+
+
 class CalibrationRow(Base):
     """The record of one calibration, as JSON."""
 

@@ -1,0 +1,1 @@
+"""Alarms: their declarations, the records of their occurrences, and the alarms of the system itself."""
