@@ -4,6 +4,15 @@
  * A field with `?` may be omitted. Lengths are in m, angles in rad, quaternions x, y, z, w.
  */
 
+/** Arguments of AcknowledgeAlarm: number of the record, and a note. */
+export interface AcknowledgeAlarmArgs {
+  number: number;
+  note?: string;
+}
+
+/** The least role that may acknowledge an alarm. */
+export type AcknowledgeRole = "operator" | "technician";
+
 /** Arguments of AcknowledgeStop: the stop or fault of a robot; with `code`, an alarm of any device. */
 export interface AcknowledgeStopArgs {
   object_id: string;
@@ -247,6 +256,81 @@ export interface Alarm {
   since: string;
   text_message?: Message;
   remedy_message?: Message;
+}
+
+/** What an alarm is about. */
+export type AlarmCategory = "connection" | "control" | "safety" | "device" | "supply" | "process" | "program" | "system";
+
+/** Which alarms are listed: those that need attention, the shelved ones, or the whole history. */
+export type AlarmFilter = "retained" | "shelved" | "all";
+
+/** How often, and how long in s, an alarm of an object was active in a period. */
+export interface AlarmFrequency {
+  kind: string;
+  code: string;
+  text: string;
+  count: number;
+  duration: number;
+  text_message?: Message;
+  object_id?: string;
+  object_name?: string;
+}
+
+/**
+ * One occurrence of an alarm.
+ *
+ * number: number of the record. kind: group and number of its declaration, such as `conveyor-3`. object_id,
+ * object_name: omitted for alarms of the program and the system. remedy_message, text_message: for translation, if the
+ * text or the remedy has values. active: whether its condition persists. cleared: when the condition ended. retain:
+ * whether it still needs attention: it is active, or it latches and is not acknowledged. first_up: number of the
+ * record that came first of those with the same cause; its own number for the first one. count: how often the
+ * condition occurred while the record was open. run: number of the run. action: name of the action that failed.
+ */
+export interface AlarmRecord {
+  number: number;
+  kind: string;
+  code: string;
+  priority: Priority;
+  category: AlarmCategory;
+  text: string;
+  raised: string;
+  first_up: number;
+  cause: string;
+  remedy: string;
+  text_message?: Message;
+  remedy_message?: Message;
+  object_id?: string;
+  object_name?: string;
+  object_type?: string;
+  latching: boolean;
+  acknowledge: AcknowledgeRole;
+  can_be_shelved: boolean;
+  active: boolean;
+  acknowledged: boolean;
+  retain: boolean;
+  count: number;
+  cleared?: string;
+  acknowledged_at?: string;
+  acknowledged_by?: string;
+  note?: string;
+  shelved_until?: string;
+  shelved_by?: string;
+  run?: number;
+  action?: string;
+  picture?: string;
+}
+
+/** Arguments of AlarmStatistics: number of past days, and maximum number of alarms in each list. */
+export interface AlarmStatisticsArgs {
+  days?: number;
+  limit?: number;
+}
+
+/** Answer to AlarmStatistics: start of the period, the most frequent alarms, and those that were active longest. */
+export interface AlarmStatisticsData {
+  since: string;
+  by_count: AlarmFrequency[];
+  by_duration: AlarmFrequency[];
 }
 
 /** An assumption of a dry run, as a sentence. action_id: the action that it concerns. */
@@ -988,6 +1072,20 @@ export interface Joint {
   value: number;
 }
 
+/** Arguments of ListAlarms: which records, maximum number, number before which they are listed, object, run. */
+export interface ListAlarmsArgs {
+  show?: AlarmFilter;
+  limit?: number;
+  before?: number;
+  object_id?: string;
+  run?: number;
+}
+
+/** Answer to ListAlarms: records, newest first. */
+export interface ListAlarmsData {
+  alarms: AlarmRecord[];
+}
+
 /** Arguments of ListCalibrations: maximum number, latest date, object, kind. */
 export interface ListCalibrationsArgs {
   limit?: number;
@@ -1539,6 +1637,9 @@ export interface Presence {
   view: string;
   camera?: Pose;
 }
+
+/** How soon an alarm needs a person (ISA-18.2), least first. */
+export type Priority = "low" | "medium" | "high" | "urgent";
 
 /** Data of the event ProcessState. */
 export interface ProcessStateData {
@@ -2153,6 +2254,13 @@ export interface SetViewStateData {
 /** Severity of an alarm. */
 export type Severity = "info" | "warning" | "error" | "critical";
 
+/** Arguments of ShelveAlarm: number of the record, time in s (0 ends the shelving), and a note. */
+export interface ShelveAlarmArgs {
+  number: number;
+  seconds: number;
+  note?: string;
+}
+
 /** Data of the event ShowMainScreen. */
 export interface ShowMainScreenData {
   what: MainScreen;
@@ -2615,6 +2723,7 @@ export interface WriteUnlockArgs {
 
 /** Arguments and response data of each request. */
 export interface Requests {
+  AcknowledgeAlarm: { args: AcknowledgeAlarmArgs; data: undefined };
   AcknowledgeStop: { args: AcknowledgeStopArgs; data: undefined };
   ActionParamValues: { args: ActionParamValuesArgs; data: string[] };
   AddAction: { args: AddActionArgs; data: undefined };
@@ -2633,6 +2742,7 @@ export interface Requests {
   AddSceneObject: { args: AddObjectToSceneArgs; data: undefined };
   AddSceneShape: { args: AddVirtualCollisionObjectToSceneArgs; data: undefined };
   AddVirtualCollisionObjectToScene: { args: AddVirtualCollisionObjectToSceneArgs; data: undefined };
+  AlarmStatistics: { args: AlarmStatisticsArgs | undefined; data: AlarmStatisticsData };
   Authenticate: { args: AuthenticateArgs; data: AuthenticateData };
   BuildProject: { args: BuildProjectArgs; data: BuildProjectData };
   CalibrateCamera: { args: CalibrateCameraArgs; data: undefined };
@@ -2684,6 +2794,7 @@ export interface Requests {
   ImportScript: { args: ScriptArgs; data: ImportScriptData };
   InverseKinematics: { args: InverseKinematicsArgs; data: Joint[] };
   JogRobot: { args: JogRobotArgs; data: JogRobotData };
+  ListAlarms: { args: ListAlarmsArgs | undefined; data: ListAlarmsData };
   ListCalibrations: { args: ListCalibrationsArgs | undefined; data: ListCalibrationsData };
   ListLocks: { args: undefined; data: LockHolder[] };
   ListPackages: { args: undefined; data: PackageSummary[] };
@@ -2745,6 +2856,7 @@ export interface Requests {
   SetBreakpoints: { args: SetBreakpointsArgs; data: ProjectBreakpoints };
   SetEefPerpendicularToWorld: { args: SetEefPerpendicularToWorldArgs; data: undefined };
   SetViewState: { args: SetViewStateArgs; data: SetViewStateData };
+  ShelveAlarm: { args: ShelveAlarmArgs; data: undefined };
   StartDryRun: { args: StartDryRunArgs | undefined; data: DryRunHead };
   StartScene: { args: undefined; data: undefined };
   StartSceneKeepGoing: { args: undefined; data: undefined };
@@ -2801,6 +2913,7 @@ export interface Events {
   ActionResult: ActionResultData;
   ActionStateAfter: ActionStateAfterData;
   ActionStateBefore: ActionStateBeforeData;
+  AlarmChanged: AlarmRecord;
   BreakpointsChanged: ProjectBreakpoints;
   ChangedObjectTypes: ObjectTypeMeta[];
   DryRunChanged: DryRunHead;
@@ -2874,6 +2987,7 @@ export const ROLES = {
 
 /** Lowest role that may send each request. */
 export const LEAST_ROLE: Record<keyof Requests, number> = {
+  AcknowledgeAlarm: 1,
   AcknowledgeStop: 1,
   ActionParamValues: 2,
   AddAction: 2,
@@ -2892,6 +3006,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   AddSceneObject: 4,
   AddSceneShape: 4,
   AddVirtualCollisionObjectToScene: 4,
+  AlarmStatistics: 1,
   Authenticate: 1,
   BuildProject: 2,
   CalibrateCamera: 4,
@@ -2943,6 +3058,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   ImportScript: 2,
   InverseKinematics: 2,
   JogRobot: 2,
+  ListAlarms: 1,
   ListCalibrations: 1,
   ListLocks: 1,
   ListPackages: 1,
@@ -3004,6 +3120,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   SetBreakpoints: 2,
   SetEefPerpendicularToWorld: 2,
   SetViewState: 1,
+  ShelveAlarm: 4,
   StartDryRun: 2,
   StartScene: 2,
   StartSceneKeepGoing: 2,
@@ -3053,6 +3170,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
 
 /** Additional events, sent only to clients that subscribed to them. */
 export const ADDITIONAL_EVENTS = [
+  "AlarmChanged",
   "BreakpointsChanged",
   "DryRunChanged",
   "ExecutionTrace",

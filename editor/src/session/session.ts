@@ -6,7 +6,13 @@
 import { t } from "@lingui/core/macro";
 import type { ConnectionState, ProtocolClient } from "../protocol/client";
 import { Refused } from "../protocol/errors";
-import { ADDITIONAL_EVENTS, type ObjectObservationsData, ROLES, type ServerEvent } from "../protocol/types";
+import {
+  ADDITIONAL_EVENTS,
+  type AlarmRecord,
+  type ObjectObservationsData,
+  ROLES,
+  type ServerEvent,
+} from "../protocol/types";
 import { isRunning } from "../store/selectors";
 import { OFFLINE, type State } from "../store/state";
 import { applyEvent, notify, now, setConnection, store } from "../store/store";
@@ -32,6 +38,8 @@ declare module "../store/runtime" {
     session?: Session;
     /** Receives the observations of devices, which bypass the store, while trends are shown. */
     takeObservations?: ((data: ObjectObservationsData) => void) | undefined;
+    /** Receive changed alarms, which bypass the store, while they are shown. */
+    takeAlarm?: Set<(record: AlarmRecord) => void>;
   }
 }
 
@@ -97,6 +105,7 @@ export class Session {
     if (event.event === "RobotJoints") telemetry.takeJoints(event.data);
     else if (event.event === "RobotEef") telemetry.takeEef(event.data);
     else if (event.event === "ObjectObservations") now().runtime.takeObservations?.(event.data);
+    else if (event.event === "AlarmChanged") for (const take of now().runtime.takeAlarm ?? []) take(event.data);
     else {
       // Frequent events would push everything else out of the diary.
       if (event.event !== "MovePreview" && event.event !== "UserPresence")

@@ -4,12 +4,13 @@
  */
 
 import { t } from "@lingui/core/macro";
-import { type ComponentType, useEffect, useState } from "react";
+import { type ComponentType, Suspense, useEffect, useState } from "react";
 import * as commands from "../../commands/run";
 import { storeGeneralState } from "../../commands/viewstate";
 import { ago } from "../../formats";
 import { shownMessage, splitAddress } from "../../program/messages";
 import { dismissal, lastRun, type Result, resultOf, undismissedRun } from "../../program/results";
+import { serves } from "../../session/connection";
 import { theSession } from "../../session/session";
 import { usersOfDocument } from "../../store/absentUsers";
 import { whyUnavailable } from "../../store/permissions";
@@ -17,8 +18,11 @@ import { isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";
 import { withNames } from "../../viewmodel/names";
+import { AlarmCard } from "../alarms/AlarmCard";
+import { useAlarms } from "../alarms/useAlarms";
 import { Icon, type IconName } from "../kit/icons";
 import { Button } from "../kit/kit";
+import { lazyComponent } from "../kit/lazy";
 import { Notices } from "../notices/Notices";
 import { People } from "../people/People";
 import { endName, History } from "../run/History";
@@ -30,6 +34,8 @@ import { CurrentStep } from "./CurrentStep";
 import { Production } from "./Production";
 import "../run/run.css";
 import "./operator.css";
+
+const AlarmList = lazyComponent(() => import("../alarms/AlarmList"));
 
 const TONES: Record<Result["tone"], string> = { good: "done", bad: "broken", warn: "interrupted", "": "idle" };
 
@@ -124,14 +130,14 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
             </Button>
           )}
         </section>
-        {!runs && <Devices />}
+        {!runs && <Alarms />}
         {runs ? (
           <>
             <div className="operator-buttons">
               <RunButtons />
             </div>
             {doc && <Cell />}
-            <Devices />
+            <Alarms />
           </>
         ) : (
           <section className="operator-start" aria-label={t`Start`}>
@@ -174,6 +180,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
         )}
         <Production />
         <History />
+        {serves("ListAlarms") && <AllAlarms />}
       </main>
       <Notices />
     </div>
@@ -203,12 +210,41 @@ function LastRun() {
   return <p className="operator-advice">{t`Last run ${ago(run.ended ?? run.started)}: ${endName(run.end)}`}</p>;
 }
 
-/** List the devices that are not connected; nothing if there are none. */
-function Devices() {
+/** Show the alarm to look at first, and the devices that are not connected and have no alarm. */
+function Alarms() {
+  const alarms = useAlarms("retained") ?? [];
+  return (
+    <>
+      <AlarmCard alarms={alarms} />
+      <Devices known={new Set(alarms.map((each) => each.object_id))} />
+    </>
+  );
+}
+
+/** The list of all alarms, on demand. */
+function AllAlarms() {
+  const [open, setOpen] = useState(false);
+  return (
+    <section className="run-part" aria-label={t`All alarms`}>
+      <Button look="plain" icon="list" aria-expanded={open} onPress={() => setOpen(!open)}>
+        {t`All alarms`}
+      </Button>
+      {open && (
+        <Suspense fallback={null}>
+          <AlarmList />
+        </Suspense>
+      )}
+    </section>
+  );
+}
+
+/** List the devices that are not connected, without `known` ones; nothing if there are none. */
+function Devices({ known }: { known: ReadonlySet<string | undefined> }) {
   const live = useEditor((state) => state.live);
   const doc = useEditor((state) => state.doc);
   const wrong = Object.values(live.objects).filter(
-    (each) => each.state === "lost" || each.state === "failed" || each.answering === false,
+    (each) =>
+      !known.has(each.object_id) && (each.state === "lost" || each.state === "failed" || each.answering === false),
   );
   if (!doc || wrong.length === 0) return null;
   return (
