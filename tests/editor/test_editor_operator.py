@@ -33,12 +33,14 @@ async def at_the_machine(screen: Screen, kiosk: bool = False) -> None:
     await screen.join("Olga", f"/?q=low#/operator{'?kiosk' if kiosk else ''}")
 
 
-async def with_message(client: Client, scene: Scene, project: Project, text: str) -> None:
-    """Let the open project start with a message."""
+async def with_message(client: Client, scene: Scene, project: Project, method: str, text: str) -> None:
+    """Let the open project start with a message or an alarm."""
     flow = next(each.id for each in scene.objects if each.type == "FlowActions")
     first = next(each for each in project.logic if each.start == START)
     point, parameters = project.action_points[0].id, [ActionParameter("text", "string", json.dumps(text))]
-    await client.call("AddAction", rpc.AddActionArgs(point, "say", f"{flow}/show_message", parameters, [Flow()]))
+    if method == "raise_alarm":
+        parameters.append(ActionParameter("level", "string_enum", '"error"'))
+    await client.call("AddAction", rpc.AddActionArgs(point, "say", f"{flow}/{method}", parameters, [Flow()]))
     await client.call("SaveProject")
     points = (await client.get_project(project.id)).action_points
     say = next(action.id for each in points for action in each.actions if action.name == "say")
@@ -47,11 +49,11 @@ async def with_message(client: Client, scene: Scene, project: Project, text: str
     await client.call("SaveProject")
 
 
-async def built(cell: Cell, colleague: Client, message: str = "") -> PackageSummary:
+async def built(cell: Cell, colleague: Client, message: str = "", method: str = "show_message") -> PackageSummary:
     """Build the package of the project and close the project."""
     scene, project = await cell.open(colleague)
     if message:
-        await with_message(colleague, scene, project, message)
+        await with_message(colleague, scene, project, method, message)
     package_id = await cell.build(colleague, project)
     return next(each for each in await colleague.list_packages() if each.id == package_id)
 
@@ -73,7 +75,8 @@ async def test_built_package_appears_runs_and_its_error_is_shown(
         # Without a board, the reader finds no code.
         state = page.get_by_role("status", name="State")
         await expect(state).to_contain_text("Run failed in scan")
-        await expect(state).to_contain_text("no code was read")
+        card = page.get_by_role("region", name="Alarm", exact=True)
+        await expect(card.get_by_role("heading", name="No code was read.")).to_be_visible()
         assert [each.end.value for each in (await colleague.call("ListRuns")).runs] == ["failed"]
         for name, size in VIEWPORTS.items():
             await page.set_viewport_size(size)  # type: ignore[arg-type]
@@ -165,6 +168,47 @@ async def test_pause_step_and_stop(cell: Cell, colleague: Client, browser: Brows
         assert (run.end.value, run.stopped_by) == ("stopped", "Olga")
         await screen.press("Open the editor")
         await page.get_by_role("heading", name=texts.HOME_HEADING).wait_for()
+
+
+async def test_alarm_is_acknowledged_during_a_run(cell: Cell, colleague: Client, browser: Browser) -> None:
+    text = "The box for bad parts is full."
+    package = await built(cell, colleague, text, "raise_alarm")
+    async with screen_of(browser, cell.url, touch=True) as screen:
+        page = screen.page
+        await at_the_machine(screen, kiosk=True)
+        await colleague.call("RunPackage", rpc.RunPackageArgs(package.id, start_paused=True))
+        await page.get_by_text("before say").wait_for(timeout=BEGUN)
+        await screen.press(texts.STEP)
+        card = page.get_by_role("region", name="Alarm", exact=True)
+        await expect(card.get_by_role("heading", name=text)).to_be_visible()
+        await expect(card).to_contain_text("Do what the text says")
+        for name, size in VIEWPORTS.items():
+            await page.set_viewport_size(size)  # type: ignore[arg-type]
+            await screen.settle()
+            assert await screen.faults() == [], name
+            await screen.picture(f"operator, alarm {name}")
+        await card.get_by_role("button", name="Acknowledge").click()
+        await expect(card).to_contain_text("acknowledged by Olga")
+        await expect(card.get_by_role("button", name="Acknowledge")).to_have_count(0)
+        state = page.get_by_role("status", name="State")
+        await expect(state).to_contain_text("Paused")
+        await screen.press("All alarms")
+        everything = page.get_by_role("complementary", name="All alarms")
+        await expect(everything).to_contain_text(text)
+        await screen.settle()
+        assert await screen.faults() == []
+        await screen.picture("operator, all alarms")
+        # The alarm ends with the program, and is then only in the history.
+        await colleague.call("StopPackage")
+        await expect(everything).to_contain_text("No alarms.")
+        await screen.press("All alarms")
+        await page.get_by_role("button", name="Start", exact=True).wait_for()
+        await expect(card).to_have_count(0)
+        await screen.press("All alarms")
+        await everything.get_by_role("radio", name="History").check(force=True)
+        await expect(everything).to_contain_text("acknowledged by Olga")
+        await everything.get_by_role("radio", name="Statistics").check(force=True)
+        await expect(everything).to_contain_text("Most frequent in 7 days")
 
 
 async def test_operator_takes_over_a_project_left_open_and_locked(

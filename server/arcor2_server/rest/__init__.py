@@ -10,6 +10,7 @@ from arcor2_server.collaboration.tasks import Tasks
 
 # Imported for their operations.
 from arcor2_server.rest import (  # noqa: F401
+    alarms,
     api_page,
     assets,
     audit_trail,

@@ -32,7 +32,7 @@ export function AlarmCard({ alarms }: { alarms: readonly AlarmRecord[] }) {
   const count = others.length;
   return (
     <section className="alarms" aria-label={t`Alarm`}>
-      <div className="alarm" role="alert" data-priority={first.priority} data-acknowledged={first.acknowledged}>
+      <div className="alarm-card" role="alert" data-priority={first.priority} data-acknowledged={first.acknowledged}>
         <Icon name={first.acknowledged ? "check" : "warn"} size={64} />
         <div className="alarm-texts">
           <p className="alarm-where">

@@ -10,6 +10,7 @@ import { storeGeneralState } from "../../commands/viewstate";
 import { ago } from "../../formats";
 import { shownMessage, splitAddress } from "../../program/messages";
 import { dismissal, lastRun, type Result, resultOf, undismissedRun } from "../../program/results";
+import type { AlarmRecord } from "../../protocol/types";
 import { serves } from "../../session/connection";
 import { theSession } from "../../session/session";
 import { usersOfDocument } from "../../store/absentUsers";
@@ -67,6 +68,8 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   const packages = [...(lists.packages ?? [])].sort((a, b) => b.package_meta.built.localeCompare(a.package_meta.built));
   const [chosen, setChosen] = useState("");
   const [starting, setStarting] = useState(false);
+  const [listing, setListing] = useState(false);
+  const alarms = useAlarms("retained") ?? [];
   const known =
     packages.find((each) => each.id === chosen) ??
     packages.find((each) => each.id === program.packageId) ??
@@ -74,6 +77,8 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   const idle = !runs && !starting;
   const run = idle ? undismissedRun(state) : null;
   const result = resultOf(run ?? undefined);
+  // The card of an alarm says more than the error of the run.
+  const explained = alarms.some((each) => !each.acknowledged && each.run === run?.number);
   useTicking();
   const { tone, word, icon } = shownState(state, starting, result);
   // The shown screen is not part of the state, so the session does not notice the change by itself.
@@ -96,16 +101,32 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   };
   const message = runs ? shownMessage(state) : "";
   return (
-    <div className="operator" data-tone={tone}>
+    <div className="operator" data-tone={tone} data-alarm={alarms.some((each) => !each.acknowledged)}>
       <header className="bar">
         {!kiosk && (
           <Button look="plain" icon="home" aria-label={t`Open the editor`} onPress={() => (location.hash = "")} />
         )}
         <h1 data-name={runs || undefined}>{runs ? program.packageName || t`Program` : t`Operator`}</h1>
+        {serves("ListAlarms") && (
+          <Button
+            look="plain"
+            icon="list"
+            aria-label={t`All alarms`}
+            aria-pressed={listing}
+            onPress={() => setListing(!listing)}
+          />
+        )}
         <People />
         <Settings />
       </header>
-      <main data-runs={runs}>
+      {listing && (
+        <aside className="alarm-panel" aria-label={t`All alarms`}>
+          <Suspense fallback={null}>
+            <AlarmList />
+          </Suspense>
+        </aside>
+      )}
+      <main data-runs={runs} hidden={listing}>
         <section className="operator-state" aria-label={t`State`} role="status">
           <Icon name={icon} size={56} />
           <div>
@@ -117,8 +138,8 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
                 {result.name}, {ago(run.ended ?? run.started)}
               </p>
             )}
-            {result?.detail && <Reason>{withNames(state, result.detail)}</Reason>}
-            {result?.tone === "bad" && (
+            {result?.detail && !explained && <Reason>{withNames(state, result.detail)}</Reason>}
+            {result?.tone === "bad" && !explained && (
               <p className="operator-advice">{t`Fix the cause, then press Start. If it fails again, call for help.`}</p>
             )}
             {idle && !run && <LastRun />}
@@ -130,14 +151,14 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
             </Button>
           )}
         </section>
-        {!runs && <Alarms />}
+        {!runs && <Alarms alarms={alarms} />}
         {runs ? (
           <>
             <div className="operator-buttons">
               <RunButtons />
             </div>
+            <Alarms alarms={alarms} />
             {doc && <Cell />}
-            <Alarms />
           </>
         ) : (
           <section className="operator-start" aria-label={t`Start`}>
@@ -180,7 +201,6 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
         )}
         <Production />
         <History />
-        {serves("ListAlarms") && <AllAlarms />}
       </main>
       <Notices />
     </div>
@@ -211,30 +231,12 @@ function LastRun() {
 }
 
 /** Show the alarm to look at first, and the devices that are not connected and have no alarm. */
-function Alarms() {
-  const alarms = useAlarms("retained") ?? [];
+function Alarms({ alarms }: { alarms: readonly AlarmRecord[] }) {
   return (
     <>
       <AlarmCard alarms={alarms} />
       <Devices known={new Set(alarms.map((each) => each.object_id))} />
     </>
-  );
-}
-
-/** The list of all alarms, on demand. */
-function AllAlarms() {
-  const [open, setOpen] = useState(false);
-  return (
-    <section className="run-part" aria-label={t`All alarms`}>
-      <Button look="plain" icon="list" aria-expanded={open} onPress={() => setOpen(!open)}>
-        {t`All alarms`}
-      </Button>
-      {open && (
-        <Suspense fallback={null}>
-          <AlarmList />
-        </Suspense>
-      )}
-    </section>
   );
 }
 
