@@ -124,7 +124,7 @@ def test_the_how_to_states_the_length_of_its_example() -> None:
     written = {
         title.group(1): sum(bool(line.strip()) for line in block.splitlines())
         for _, info, block in BLOCK.findall(text)
-        if (title := re.search(r'title="([\w./-]+)"', info))
+        if (title := re.search(r'title="([\w./-]+\.py)"', info))
     }
     stated = re.search(r"The example has (\d+) lines of driver\s+and (\d+) lines of a fake", text)
     assert stated is not None

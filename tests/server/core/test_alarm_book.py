@@ -1,14 +1,23 @@
 """The book of alarms: merging, first-up, shelving, latching; and the checks of the system."""
 
+import asyncio
+import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from arcor2_hw.data.alarms import AlarmCategory, AlarmFilter, AlarmKind, Priority
+from arcor2_hw.data.alarms import AlarmCategory, AlarmFilter, AlarmKind, AlarmRecord, Priority
+from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc import ListAlarmsArgs
 from arcor2_hw.exceptions import Refused
 from arcor2_hw.messages import Message
 from arcor2_server.alarms.book import MAX_RECORDS, SAME_CAUSE_WITHIN, AlarmBook, Occurrence
+from arcor2_server.alarms.kinds import AlarmKinds
+from arcor2_server.alarms.service import Alarms
+from arcor2_server.alarms.system import SystemAlarms
+from arcor2_server.websocket.hub import Hub
 
 AT = "2026-01-01T00:00:00+00:00"
 LATER = "2026-01-01T00:01:00+00:00"
@@ -143,3 +152,41 @@ def test_statistics_count_and_measure_within_the_period() -> None:
     assert (found["x"].count, found["x"].duration) == (2, 150.0)
     assert (found["y"].count, found["y"].duration) == (1, 0.0)
     assert [each.code for each in book.frequencies(LATER, 90.0, seconds)] == ["x"]
+
+
+class NoStore:
+    """A store that forgets."""
+
+    async def all(self) -> list[AlarmRecord]:
+        return []
+
+    async def put(self, records: object, deleted: object) -> None:
+        pass
+
+
+async def test_roles_shelving_that_ends_by_itself_and_clock() -> None:
+    store: Any = NoStore()
+    hub: Any = Hub()
+    alarms = Alarms(hub, store, AlarmKinds(lambda _: None), lambda: 0)
+    system = SystemAlarms(alarms, hub, Path(), None, lambda: "")
+    system.check_disk(1_000_000)
+    system.check_clock(time.time() - time.monotonic() - 60.0)
+    system.check_clock(time.time() - time.monotonic() - 60.0)
+    clock, disk = await alarms.find(ListAlarmsArgs(AlarmFilter.ALL))
+    assert (disk.code, disk.text, disk.active) == (
+        "disk_nearly_full",
+        "The disk of the server has only 1 MB left.",
+        True,
+    )
+    assert (clock.code, clock.count, clock.first_up) == ("clock_jumped", 1, clock.number)
+    with pytest.raises(Refused, match="needs the role technician"):
+        await alarms.acknowledge(disk.number, "Olga", Role.OPERATOR, "")
+    await alarms.shelve(disk.number, 0.05, "Theo", "")
+    assert [each.number for each in await alarms.find(ListAlarmsArgs(AlarmFilter.SHELVED))] == [disk.number]
+    async with asyncio.timeout(10.0):
+        while await alarms.find(ListAlarmsArgs(AlarmFilter.SHELVED)):
+            await asyncio.sleep(0.01)
+    await alarms.acknowledge(disk.number, "Theo", Role.TECHNICIAN, "")
+    system.check_disk(10**12)
+    assert [each.code for each in await alarms.find(ListAlarmsArgs())] == ["clock_jumped"]
+    await alarms.close()
