@@ -176,9 +176,9 @@ class Alarms:
         what = Occurrence("", code, kind, now(), moment, text, run=run, momentary=momentary, session=session)
         self._changed(self._book.raised(what))
 
-    def data_damaged(self, notice: str) -> None:
+    def data_damaged(self, notice: Message) -> None:
         """Record that a file of the data directory is damaged. Each file has its own alarm."""
-        self.system(f"data_damaged:{crc32(notice.encode()):08x}", None, Message.of(notice))
+        self.system(f"data_damaged:{crc32(notice.text.encode()):08x}", None, notice)
 
     # -------------------------------------------------------------------------------- requests
     async def find(self, args: ListAlarmsArgs) -> list[AlarmRecord]:

@@ -33,7 +33,7 @@ class DataDamage:
         self._hub = hub
         self._notices: list[Message] = []
         self._waiting = False
-        self.on_report: list[Callable[[str], None]] = []
+        self.on_report: list[Callable[[Message], None]] = []
         """Called with each new notice."""
 
     @property
