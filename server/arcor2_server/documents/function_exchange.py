@@ -110,7 +110,8 @@ def import_function(
     Args:
         document: the document.
         export: the exported functions.
-        points: ids or names of action points of the document, by ids or names of exported action points.
+        points: ids or names of action points of the document, by ids or names of exported action points. Without them,
+            functions that the exported one calls are not added if the document contains them unchanged.
 
     Raises:
         Missing: the document lacks items; the message lists all of them.
@@ -124,7 +125,7 @@ def import_function(
     if found.missing:
         raise Missing("The project lacks: {missing}.", missing="; ".join(found.missing))
     try:
-        return _Importing(document, export, ids).changes()
+        return _Importing(document, export, ids, keep=not points).changes()
     except KeyError as error:
         key = error.args[0][-1] if isinstance(error.args[0], tuple) else error.args[0]
         raise InvalidData("The exported function is damaged: {id} is missing.", id=key) from error
@@ -190,12 +191,24 @@ class _Found:
 
 
 class _Importing:
-    """One import. `ids`: the items of the document by kind and id of a reference."""
+    """One import.
 
-    def __init__(self, document: Document, export: FunctionExport, ids: Mapping[tuple[str, str], str]) -> None:
+    Args:
+        document: the document.
+        export: the exported functions.
+        ids: the items of the document by kind and id of a reference.
+        keep: whether to call functions of the document that equal exported ones, instead of adding copies.
+    """
+
+    def __init__(
+        self, document: Document, export: FunctionExport, ids: Mapping[tuple[str, str], str], *, keep: bool
+    ) -> None:
         self._document, self._export, self._ids = document, export, ids
         self._names = Names(document)
-        self._functions = {function.id: new_id("pfu") for function in export.functions}
+        called = export.functions[:-1] if keep else []
+        kept = {function.id for function in called if document.find_function(function.id) == function}
+        self._new = [function for function in export.functions if function.id not in kept]
+        self._functions = {each.id: each.id if each.id in kept else new_id("pfu") for each in export.functions}
         actions = [action.id for function in export.functions for action in function.actions]
         self._actions = {key: new_id("act") for key in actions}
         if len(self._functions) < len(export.functions) or len(self._actions) < len(actions):
@@ -204,9 +217,9 @@ class _Importing:
     def changes(self) -> tuple[list[Change], list[str]]:
         """Return the changes, and the ids of the functions. Raise KeyError or ValueError if the export is damaged."""
         changes: list[Change] = []
-        for function in self._export.functions:
+        for function in self._new:
             changes += self._document.changes_to_add(self._function(function))
-        return changes, list(self._functions.values())
+        return changes, [self._functions[function.id] for function in self._new]
 
     def _mapped(self, link: tuple[str, str, int]) -> str:
         return f"{self._actions[link[0]]}/{link[1]}/{link[2]}"

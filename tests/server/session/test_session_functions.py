@@ -187,10 +187,21 @@ async def test_a_function_moves_to_another_project_of_the_scene(alice: Person, w
     assert {(each["kind"], each["name"]) for each in exported["references"]} == {("object", "rnd"), ("object", "time")}
     before = project_of(work)
     ids = (await ask("ImportFunction", function=exported))["ids"]
-    assert [each.name for each in project_of(work).functions] == ["inner", "outer", "inner_2", "outer_2"]
+    # The project contains `inner`, which the copy calls.
+    assert [each.name for each in project_of(work).functions] == ["inner", "outer", "outer_2"]
+    copied = function_of(work, "outer_2")
+    assert [copied.id] == ids
+    assert next(action.type for action in copied.actions) == f"{function_of(work, 'inner').id}/call"
+    await ask("Undo")
+    assert project_of(work) == before
+    # A called function that has changed since the export is added, too.
+    await ask("RenameFunction", function_id=function_of(work, "inner").id, new_name="deep")
+    ids = (await ask("ImportFunction", function=exported))["ids"]
+    assert [each.name for each in project_of(work).functions] == ["deep", "outer", "inner", "outer_2"]
     copied = function_of(work, "outer_2")
     assert copied.id == ids[-1]
-    assert next(action.type for action in copied.actions) == f"{function_of(work, 'inner_2').id}/call"
+    assert next(action.type for action in copied.actions) == f"{function_of(work, 'inner').id}/call"
+    await ask("Undo")
     await ask("Undo")
     assert project_of(work) == before
 
