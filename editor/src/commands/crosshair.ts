@@ -2,7 +2,7 @@
 
 import type { Orientation, Position } from "../protocol/types";
 import { theEngine } from "../session/engine";
-import { DOWN } from "./program";
+import { DOWN } from "./startingValues";
 
 /** Return the point at the crosshair and the orientation of a tool facing that surface; null if there is none. */
 export function aimedPlace(): { position: Position; orientation: Orientation } | null {

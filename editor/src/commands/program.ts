@@ -1,19 +1,16 @@
 /** The program: actions, their parameters, and connections. */
 
 import { t } from "@lingui/core/macro";
-import { compared } from "../formats";
 import { insertion, type Slot } from "../program/chain";
 import { fieldsOf } from "../program/comparisons";
-import { cannotLead, END, freeStep, incoming, outgoing } from "../program/logic";
-import { actionNames, freeName, newOutputs } from "../program/naming";
-import { initial } from "../program/values";
+import { calledBy, cannotLead, END, freeStep, incoming, outgoing, placeKey } from "../program/logic";
+import { actionNames, freeName, newOutputs, resultNames } from "../program/naming";
 import type { CallOptions } from "../protocol/client";
 import type {
   Action,
   ActionParameter,
   LogicWhen,
   ObjectAction,
-  Orientation,
   Position,
   ProjectLogicIf,
   Requests,
@@ -21,22 +18,20 @@ import type {
 } from "../protocol/types";
 import { call } from "../session/connection";
 import { whyUnavailable } from "../store/permissions";
-import { put } from "../store/records";
+import { scopeOf } from "../store/scope";
 import { isClosed } from "../store/selectors";
 import type { State } from "../store/state";
 import { notify, now, select, setUi, store } from "../store/store";
 import { awaited } from "./awaited";
 import { addErrorExit } from "./errorExits";
 import { ask, held, newStep, refusal, sentence } from "./requests";
+import { startingParameters, type Where } from "./startingValues";
 
 /** Return why a request cannot edit the program now; an empty string if it can. */
 export function notEditable(state: State, request: keyof Requests = "UpdateAction"): string {
   if (!state.doc?.project) return t`Open a project first. A scene has no program.`;
   return whyUnavailable(state, request) || (isClosed(state) ? t`Stop the program first.` : "");
 }
-
-/** Where to add an action: at a point, or at a position in the world, where a point is added. */
-export type Where = { pointId: string; orientationId?: string } | { position: Position; orientation: Orientation };
 
 /**
  * Add an action with names for its results, and the point and orientation that it needs, and connect it in a slot of
@@ -54,14 +49,19 @@ export async function addAction(
   try {
     const step = newStep();
     const objectId = await serviceObject(object, step);
-    const at = where ?? (await anyPlace(objectId, slot, step));
-    const pointId = "pointId" in at ? at.pointId : await newPoint(`${meta.name}_point`, at.position, step);
+    const called = now().doc?.functions[objectId];
+    const base = called?.name ?? meta.name;
+    const inFunction = (now().doc?.path.length ?? 0) > 0; // its actions need no point
+    const at = where ?? (inFunction ? { pointId: "" } : await anyPlace(objectId, slot, step));
+    const pointId = "pointId" in at ? at.pointId : await newPoint(`${base}_point`, at.position, step);
     const parameters = await startingParameters(objectId, meta, pointId, at, step);
     const { doc } = now();
     if (!doc) return undefined;
-    const name = freeName(meta.name, actionNames(doc));
-    const flows = [{ type: "default" as const, outputs: newOutputs(doc, meta.name, meta.returns.length) }];
-    const action = { action_point_id: pointId, name, type: `${objectId}/${meta.name}`, parameters, flows };
+    const name = freeName(base, actionNames(doc));
+    const outputs = called ? resultNames(doc, called) : newOutputs(doc, base, meta.returns.length);
+    const flows = [{ type: "default" as const, outputs }];
+    const action_point_id = scopeOf(doc) || pointId;
+    const action = { action_point_id, name, type: `${objectId}/${meta.name}`, parameters, flows };
     await call("AddAction", action, step);
     const added = await awaited((state) => Object.values(state.doc?.actions ?? {}).find((each) => each.name === name));
     if (slot) await insert(added.id, slot, step);
@@ -77,7 +77,7 @@ export async function addAction(
 async function serviceObject(object: string, step: CallOptions): Promise<string> {
   const of = (state: State) => Object.values(state.doc?.objects ?? {}).find((each) => each.type === object)?.id;
   const { doc } = now();
-  if (doc && object in doc.objects) return object;
+  if (doc && (object in doc.objects || object in doc.functions)) return object;
   const known = of(now());
   if (known !== undefined) return known;
   const name = freeName(
@@ -121,112 +121,6 @@ async function newPoint(base: string, position: Position, step: CallOptions): Pr
   return (await awaited((state) => Object.values(state.doc?.points ?? {}).find((each) => each.name === name))).id;
 }
 
-/** The tool points down, which suits a gripper above a table. */
-export const DOWN: Orientation = { x: 1, y: 0, z: 0, w: 0 };
-
-async function orientationOf(pointId: string, where: Where, step: CallOptions): Promise<string> {
-  if ("pointId" in where && where.orientationId) return where.orientationId;
-  const on = (state: State) =>
-    Object.values(state.doc?.orientations ?? {}).find((each) => each.pointId === pointId)?.id;
-  const there = on(now());
-  if (there) return there;
-  const orientation = "orientation" in where ? where.orientation : DOWN;
-  await held(pointId, () =>
-    call("AddActionPointOrientation", { action_point_id: pointId, orientation, name: "default" }, step),
-  );
-  return awaited(on);
-}
-
-/** Return joints of a robot at a point; they are read from the robot if there are none. */
-async function jointsOf(pointId: string, robotId: string, step: CallOptions): Promise<string> {
-  const on = (state: State) =>
-    Object.values(state.doc?.joints ?? {}).find((each) => each.pointId === pointId && each.robot_id === robotId)?.id;
-  const there = on(now());
-  if (there) return there;
-  const taken = Object.values(now().doc?.joints ?? {})
-    .filter((each) => each.pointId === pointId)
-    .map((each) => each.name);
-  const name = freeName("default", taken);
-  await held(pointId, () =>
-    call("AddActionPointJointsUsingRobot", { action_point_id: pointId, robot_id: robotId, name }, step),
-  );
-  return awaited(on);
-}
-
-async function startingParameters(
-  objectId: string,
-  meta: ObjectAction,
-  pointId: string,
-  where: Where,
-  step: CallOptions,
-): Promise<ActionParameter[]> {
-  const parameters: ActionParameter[] = [];
-  for (const wanted of meta.parameters) {
-    const { name, type } = wanted;
-    const value =
-      type === "pose"
-        ? JSON.stringify(await orientationOf(pointId, where, step))
-        : type === "joints"
-          ? JSON.stringify(await jointsOf(pointId, objectId, step))
-          : type === "position"
-            ? JSON.stringify(pointId)
-            : await startingValue(objectId, wanted);
-    if (value === undefined) {
-      const other = imageFor(type);
-      if (!other) throw new Error(t`${name} is the result of another action. Add that action first.`);
-      parameters.push({ name, type: "link", value: JSON.stringify(other) });
-    } else parameters.push({ name, type, value });
-  }
-  return parameters;
-}
-
-async function startingValue(
-  objectId: string,
-  wanted: ObjectAction["parameters"][number],
-): Promise<string | undefined> {
-  if (wanted.dynamic_value && wanted.default_value === undefined && wanted.type === "string") {
-    const values = await dynamicValues(objectId, wanted.name, []).catch(() => null);
-    if (values?.[0] !== undefined) return JSON.stringify(values[0]);
-  }
-  return initial(wanted);
-}
-
-/** Return an existing result of a type as a link. */
-function imageFor(type: string): string | undefined {
-  const { doc, types } = now();
-  for (const action of Object.values(doc?.actions ?? {})) {
-    const [objectId = "", method] = action.type.split("/");
-    const returns =
-      types.actions[doc?.objects[objectId]?.type ?? ""]?.find((each) => each.name === method)?.returns ?? [];
-    const index = returns.indexOf(type);
-    if (index >= 0 && action.flows[0]?.outputs[index]) return `${action.id}/default/${index}`;
-  }
-  return undefined;
-}
-
-const dynamicKey = (objectId: string, name: string, parents: { id: string; value: string }[]) =>
-  JSON.stringify([objectId, name, parents]);
-
-export function lastDynamicValues(
-  objectId: string,
-  name: string,
-  parents: { id: string; value: string }[],
-): string[] | undefined {
-  return now().dynamicValues[dynamicKey(objectId, name, parents)];
-}
-
-/** Return the possible values of a parameter according to the device. Reject if it cannot be reached. */
-export async function dynamicValues(
-  objectId: string,
-  name: string,
-  parents: { id: string; value: string }[],
-): Promise<string[]> {
-  const found = await call("ActionParamValues", { id: objectId, param_id: name, parent_params: parents });
-  const values = [...found].sort((a, b) => compared(a, b));
-  store.setState((state) => ({ dynamicValues: put(state.dynamicValues, dynamicKey(objectId, name, parents), values) }));
-  return values;
-}
-
 // ------------------------------------------------------------------------------------------------ actions
 
 /** Change a parameter. Return why it was refused, for the form. */
@@ -259,12 +153,12 @@ export async function duplicateAction(action: Action & { pointId: string }): Pro
   if (!doc) return;
   const name = freeName(action.name, actionNames(doc));
   const count = action.flows[0]?.outputs.length ?? 0;
-  const flows = [
-    { type: "default" as const, outputs: newOutputs(doc, action.type.split("/")[1] ?? action.name, count) },
-  ];
+  const called = calledBy(doc, action);
+  const outputs = newOutputs(doc, called?.name ?? action.type.split("/")[1] ?? action.name, count);
+  const flows = [{ type: "default" as const, outputs }];
   if (
     !(await ask("AddAction", {
-      action_point_id: action.pointId,
+      action_point_id: scopeOf(doc) || action.pointId,
       name,
       type: action.type,
       parameters: action.parameters,
@@ -367,7 +261,7 @@ export const removeStep = (logic_item_id: string) => ask("RemoveLogicItem", { lo
 
 /** Show the puck of an action, START or END at a position, on this page only; undefined: at its own position. */
 export function showPuck(id: string, position: unknown): void {
-  const key = `place/${id}`;
+  const key = placeKey(now().doc, id);
   store.setState(({ view }) => {
     const { [key]: _, ...rest } = view.shared;
     return { view: { ...view, shared: position ? { ...rest, [key]: position } : rest } };
@@ -377,9 +271,9 @@ export function showPuck(id: string, position: unknown): void {
 /** Move the puck of an action, START or END, for all users; null: back to its own position. */
 export async function placePuck(id: string, position: Position | null): Promise<void> {
   const document = now().doc?.project?.id ?? "";
-  const before = now().view.shared[`place/${id}`];
+  const key = placeKey(now().doc, id);
+  const before = now().view.shared[key];
   // The server sends changes of the view state to everybody except the user who made them.
   showPuck(id, position);
-  if (!(await ask("SetViewState", { scope: "shared", document, values: { [`place/${id}`]: position } })))
-    showPuck(id, before);
+  if (!(await ask("SetViewState", { scope: "shared", document, values: { [key]: position } }))) showPuck(id, before);
 }

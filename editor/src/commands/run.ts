@@ -1,6 +1,7 @@
 /** Run the open project, packages and single actions; breakpoints. */
 
 import { t } from "@lingui/core/macro";
+import type { ProgramStep } from "../protocol/types";
 import { call, serves } from "../session/connection";
 import { whyUnavailable } from "../store/permissions";
 import { isClosed } from "../store/selectors";
@@ -44,7 +45,8 @@ export const runPackage = (id: string, paused = false) =>
   );
 export const pause = () => ask("PausePackage");
 export const resume = () => ask("ResumePackage");
-export const step = () => ask("StepAction");
+/** Run until the next action: `into` a called function, `out` of the present one, or `over` a call. */
+export const step = (mode: ProgramStep = "over") => ask("StepAction", { mode });
 /** Stop at once, without confirmation; the program can be started again. */
 export const stop = () => ask("StopPackage");
 

@@ -98,7 +98,7 @@ export interface PuckItem extends Base {
   count: number;
   /** The pucks of the point lie around it; else they are stacked, and the uppermost shows their number. */
   open: boolean;
-  role: "action" | "start" | "end";
+  role: "action" | "call" | "start" | "end";
   running: boolean;
   breakpoint: boolean;
   /** Color index of its object, so that all actions of an object look the same. */

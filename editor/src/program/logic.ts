@@ -9,10 +9,12 @@ import type {
   LogicWhen,
   ObjectAction,
   Operator,
+  ParameterMeta,
   ProjectLogicIf,
   ProjectParameter,
 } from "../protocol/types";
-import type { Of, OpenDocument, State } from "../store/state";
+import { perObject } from "../store/memo";
+import type { Of, OpenDocument, OpenFunction, State } from "../store/state";
 import { decoded } from "./decoded";
 import { errorWords } from "./errorKinds";
 import {
@@ -40,8 +42,57 @@ export function metaOf(
   action: Pick<Action, "type">,
 ): ObjectAction | undefined {
   const [objectId = "", method] = action.type.split("/");
+  const called = doc.functions[objectId];
+  if (called) return callMeta(types, doc, called);
   const type = doc.objects[objectId]?.type;
   return type === undefined ? undefined : types.actions[type]?.find((each) => each.name === method);
+}
+
+/** Method of an action that calls a function. */
+export const CALL = "call";
+/** Type of a parameter that passes a parameter of the function on. */
+export const PASSED_ON = "function_parameter";
+
+/** Return the function that an action calls; undefined if it calls none. */
+export const calledBy = (doc: OpenDocument, action: Pick<Action, "type"> | undefined): OpenFunction | undefined =>
+  doc.functions[action?.type.split("/")[0] ?? ""];
+
+const callMetas = perObject((_: OpenDocument) => perObject((_: State["types"]) => new Map<string, ObjectAction>()));
+
+/** Return the description of the calls of a function; its parameters have the range of their first use. */
+export function callMeta(types: State["types"], doc: OpenDocument, called: OpenFunction): ObjectAction {
+  const known = callMetas(doc)(types);
+  const meta = known.get(called.id) ?? {
+    name: CALL,
+    parameters: called.parameters.map(({ name, type }): ParameterMeta => {
+      const { extra, description } = firstUse(types, doc, called, name) ?? {};
+      return {
+        name,
+        type,
+        dynamic_value: false,
+        ...(extra !== undefined && { extra }),
+        ...(description !== undefined && { description }),
+      };
+    }),
+    returns: called.returns.map((each) => each.type),
+    disabled: false,
+    meta: { composite: true, hidden: false, cancellable: false },
+  };
+  known.set(called.id, meta);
+  return meta;
+}
+
+function firstUse(
+  types: State["types"],
+  doc: OpenDocument,
+  { actions }: OpenFunction,
+  name: string,
+): ParameterMeta | undefined {
+  for (const action of Object.values(actions)) {
+    const use = action.parameters.find((each) => each.type === PASSED_ON && decoded(each.value) === name);
+    if (use) return metaOf(types, doc, action)?.parameters.find((each) => each.name === use.name);
+  }
+  return undefined;
 }
 
 function reached(doc: OpenDocument, from: string, next: (doc: OpenDocument, id: string) => string[]): Set<string> {

@@ -22,6 +22,8 @@ const stateOf = (...trace: TraceEntry[]) =>
         wait: { type: "obj_flow/wait" },
         other: { type: "obj_other/show_message" },
       },
+      program: { actions: {}, logic: {} },
+      functions: {},
     },
     program: { trace },
   }) as unknown as State;

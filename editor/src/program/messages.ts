@@ -1,11 +1,12 @@
 /** Messages of the running program for the operator. */
 
+import { anyAction } from "../store/scope";
 import type { State } from "../store/state";
 
 /** Return the text of the latest `show_message` of the running program, an empty string if there is none. */
 export function shownMessage({ doc, program }: Pick<State, "doc" | "program">): string {
   const shows = (id: string) => {
-    const [object = "", method] = doc?.actions[id]?.type.split("/") ?? [];
+    const [object = "", method] = (doc && anyAction(doc, id))?.type.split("/") ?? [];
     return method === "show_message" && doc?.objects[object]?.type === "FlowActions";
   };
   const text = program.trace.findLast((each) => shows(each.action_id))?.parameters?.[0];

@@ -2,7 +2,8 @@
 
 import { translate } from "../i18n/serverMessages";
 import type { Action } from "../protocol/types";
-import type { OpenDocument } from "../store/state";
+import { scopeOf } from "../store/scope";
+import type { OpenDocument, OpenFunction } from "../store/state";
 
 /** Return a name, with the first number that makes it unique. */
 export function freeName(base: string, taken: Iterable<string>): string {
@@ -19,18 +20,21 @@ export function words(name: string): string {
   return translate({ text: name.replaceAll("_", " ") });
 }
 
+/** Return the names of all actions of the program and of functions, which have to be unique. */
 export function actionNames(doc: OpenDocument): string[] {
-  return Object.values(doc.actions).map((each) => each.name);
+  const bodies = [doc.program, ...Object.values(doc.functions)];
+  return bodies.flatMap(({ actions }) => Object.values(actions).map((each) => each.name));
 }
 
-/** Return the names of all variables, and of stored results and errors, which have to be unique. */
+/** Return the names of variables, parameters, stored results and errors, which have to be unique in what is open. */
 export function outputNames(doc: OpenDocument): string[] {
   const variables = Object.values(doc.parameters).flatMap((each) => (each.variable ? [each.name] : []));
   const stored = Object.values(doc.actions).flatMap(({ flows, error_output }) => [
     ...flows.flatMap((flow) => flow.outputs),
     ...(error_output ? [error_output] : []),
   ]);
-  return [...variables, ...stored];
+  const passed = doc.functions[scopeOf(doc)]?.parameters.map((each) => each.name) ?? [];
+  return [...variables, ...passed, ...stored];
 }
 
 /** Return names for the results of a new action. */
@@ -42,6 +46,18 @@ export function newOutputs(doc: OpenDocument, method: string, count: number): st
     names.push(freeName(base, [...taken, ...names]));
   }
   return names;
+}
+
+/** Return names for the results of a call: those that they have in the function, as far as these are free. */
+export function resultNames(doc: OpenDocument, { actions, returns }: OpenFunction): string[] {
+  const taken = outputNames(doc);
+  return returns.map(({ link }) => {
+    const [id = "", , index] = link.split("/");
+    const inner = actions[id]?.flows.find((each) => each.type === "default")?.outputs[Number(index)];
+    const name = freeName(inner ?? "result", taken);
+    taken.push(name);
+    return name;
+  });
 }
 
 /** Return a name for the error of an action. */

@@ -7,10 +7,6 @@ const PARALLEL = "functions/parallel";
 
 export const isParallel = ({ type }: Pick<Action, "type">): boolean => type === PARALLEL;
 
-/** Return whether an action runs functions, and not a device. */
-export const runsFunctions = (action: Pick<Action, "type">): boolean =>
-  isParallel(action) || action.type.endsWith("/call");
-
 /** Return the parallel action of each of its calls. */
 export const parallelOf = (doc: OpenDocument): Map<string, string> =>
   new Map(

@@ -2,12 +2,15 @@
 
 import { t } from "@lingui/core/macro";
 import type { Action } from "../protocol/types";
+import { inScope, scopeOf } from "../store/scope";
 import type { Of, OpenDocument, State } from "../store/state";
 import { isComplete } from "./comparisons";
 import { decoded } from "./decoded";
 import { errorAt, hasFailed, linkToError, partNames } from "./errorExits";
+import { onAllPaths, resultOf } from "./functions";
 import {
   after,
+  calledBy,
   canHaveFailed,
   END,
   hasComparisons,
@@ -18,6 +21,7 @@ import {
   nextSteps,
   operandAt,
   outgoing,
+  PASSED_ON,
   placeOf,
   resultAt,
   resultsOf,
@@ -25,7 +29,7 @@ import {
   variableNamed,
   whenOf,
 } from "./logic";
-import { parallelOf, runsFunctions } from "./parallel";
+import { isParallel, parallelOf } from "./parallel";
 import { reachOfAction } from "./reach";
 
 export interface Problem {
@@ -34,15 +38,37 @@ export interface Problem {
   text: string;
   /** A warning does not prevent a run. */
   level: "error" | "warn";
+  /** Id of the function that contains the item; an empty string for the program. */
+  scope: string;
 }
 
+/** Return the problems of the program and of all functions. */
 export function problemsOf(doc: OpenDocument, types: State["types"], reach: State["reach"] = {}): Problem[] {
+  const functions = Object.values(doc.functions).flatMap(({ id, name }) =>
+    problemsIn(inScope(doc, [id]), types, reach).map((each) => ({ ...each, text: t`${name}: ${each.text}` })),
+  );
+  return [...problemsIn(inScope(doc, []), types, reach), ...functions];
+}
+
+/** Return the problems of what is open. */
+export const problemsHere = (doc: OpenDocument | null, problems: readonly Problem[]): Problem[] =>
+  problems.filter((each) => doc !== null && each.scope === scopeOf(doc));
+
+function problemsIn(doc: OpenDocument, types: State["types"], reach: State["reach"]): Problem[] {
   const { project } = doc;
+  const scope = scopeOf(doc);
   if (!project) return [];
   const found: Problem[] = [];
-  const error = (id: string, text: string) => found.push({ id, text, level: "error" });
-  const warn = (id: string, text: string) => found.push({ id, text, level: "warn" });
+  const error = (id: string, text: string) => found.push({ id, text, level: "error", scope });
+  const warn = (id: string, text: string) => found.push({ id, text, level: "warn", scope });
   if (project.has_logic) ofLogic(doc, types, error, warn);
+  const open = doc.functions[scope];
+  for (const { link } of open?.returns ?? []) {
+    const result = open && resultOf(open, link);
+    if (!result) error(END, t`A result of the function no longer exists.`);
+    else if (!onAllPaths(doc, link.split("/")[0] ?? ""))
+      error(END, t`The result ${result.name} is missing if ${result.action} does not run.`);
+  }
   for (const action of Object.values(doc.actions)) {
     ofAction(doc, types, action, error, warn);
   }
@@ -111,7 +137,7 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
   }
   for (const item of Object.values(doc.logic)) {
     const missing = whenOf(item).comparisons.some(
-      ({ what }) => !operandAt(doc, types, what) && !isResultOfFunction(doc, what),
+      ({ what }) => !operandAt(doc, types, what),
     );
     if (missing && typesKnown(doc, types)) {
       error(
@@ -129,12 +155,6 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
   }
 }
 
-/** Return whether a link leads to a result of a call of a function, whose results are not known here. */
-function isResultOfFunction(doc: OpenDocument, link: string): boolean {
-  const source = doc.actions[placeOf(link)];
-  return source !== undefined && runsFunctions(source);
-}
-
 function typesKnown(doc: OpenDocument, types: State["types"]): boolean {
   return Object.values(doc.objects).every((object) => object.type in types.actions);
 }
@@ -147,10 +167,10 @@ function ofAction(
   warn: Tell,
 ): void {
   const [objectId = ""] = action.type.split("/");
-  const object = doc.objects[objectId];
-  if (runsFunctions(action)) return;
+  if (isParallel(action)) return;
+  const object = doc.objects[objectId] ?? calledBy(doc, action);
   if (!object) return error(action.id, t`${action.name}: its device is no longer in the scene.`);
-  if (!(object.type in types.actions)) return;
+  if ("type" in object && !(object.type in types.actions)) return;
   const meta = metaOf(types, doc, action);
   if (!meta) return error(action.id, t`${action.name}: ${object.name} no longer has this action.`);
   if (meta.disabled)
@@ -166,13 +186,16 @@ function ofAction(
     } else if (parameter.type === "project_parameter") {
       if (!(String(value) in doc.parameters))
         error(action.id, t`${action.name}: the variable used for ${wanted.name} no longer exists.`);
+    } else if (parameter.type === PASSED_ON) {
+      if (!doc.functions[scopeOf(doc)]?.parameters.some((each) => each.name === value))
+        error(action.id, t`${action.name}: the parameter of the function used for ${wanted.name} no longer exists.`);
     } else if (parameter.type === "link") {
       const link = String(value);
       const problem = /^[^/]*\/error\//.test(link)
         ? errorProblem(doc, action, wanted.name, link)
         : failedProblem(doc, action, wanted.name, link);
       if (problem) error(action.id, problem);
-      if (problem !== undefined || isResultOfFunction(doc, link)) continue;
+      if (problem !== undefined) continue;
       const result = resultAt(doc, types, link);
       if (!result) error(action.id, t`${action.name}: the result used for ${wanted.name} no longer exists.`);
       else if (doc.project?.has_logic && !after(doc, result.action.id).has(action.id)) {

@@ -2,11 +2,13 @@
 
 import { t } from "@lingui/core/macro";
 import type { Action, ActionParameter, TraceEntry } from "../protocol/types";
+import { anyAction } from "../store/scope";
 import type { Of, OpenDocument, State } from "../store/state";
 import { decoded } from "./decoded";
 import { errorAt } from "./errorExits";
-import { metaOf } from "./logic";
+import { calledBy, metaOf } from "./logic";
 import { words } from "./naming";
+import { innermost, pathWords } from "./position";
 import { type Extra, extraOf, shownUnit, textOf } from "./values";
 
 /** Largest number of shown parameters. */
@@ -35,15 +37,15 @@ export interface Step {
 export function stepsOf(state: State): Step[] {
   const { doc, types, program } = state;
   if (!doc) return [];
-  return program.running.flatMap((id) => {
-    const action = doc.actions[id];
+  return innermost(state).flatMap((id) => {
+    const action = anyAction(doc, id);
     if (!action) return [];
     const calls = program.trace.filter((each) => each.action_id === id);
     return [
       {
         id,
-        name: action.name,
-        device: doc.objects[action.type.split("/")[0] ?? ""]?.name ?? "",
+        name: pathWords(state, id),
+        device: doc.objects[action.type.split("/")[0] ?? ""]?.name ?? calledBy(doc, action)?.name ?? "",
         does: firstSentence(metaOf(types, doc, action)?.description),
         values: valuesOf(doc, types, action),
         started: startOf(calls),

@@ -7,6 +7,10 @@ import type { OpenDocument } from "../store/state";
 export const START = "START";
 export const END = "END";
 
+/** Return the key of the view state for the position of a puck; Start and End of each function have their own. */
+export const placeKey = (doc: Pick<OpenDocument, "path"> | null, id: string): string =>
+  doc?.path.length && (id === START || id === END) ? `place/${doc.path.at(-1)}/${id}` : `place/${id}`;
+
 /** Return the action, START or END at one end of a connection, without the name of the flow. */
 export const placeOf = (end: string): string => end.split("/")[0] ?? end;
 

@@ -9,10 +9,11 @@ import { END, errorExits, outgoing, placeOf, START } from "./steps";
 export function takenExit(state: State): LogicItem | undefined {
   const { doc, program } = state;
   if (!doc || !isRunning(state)) return undefined;
-  const failed = program.trace.findLastIndex((each) => each.error !== undefined);
-  const entry = program.trace[failed];
+  const trace = program.trace.filter((each) => each.action_id in doc.actions); // not those of functions that it calls
+  const failed = trace.findLastIndex((each) => each.error !== undefined);
+  const entry = trace[failed];
   if (!entry) return undefined;
-  const later = program.trace.slice(failed + 1).filter((each) => each.thread_id === entry.thread_id);
+  const later = trace.slice(failed + 1).filter((each) => each.thread_id === entry.thread_id);
   if (later[0]?.attempt !== undefined) return undefined; // the action is repeated
   const first = placeOf(outgoing(doc, START)[0]?.end ?? "");
   const exits = errorExits(doc, entry.action_id);

@@ -49,7 +49,7 @@ export function withoutUnit(description: string, type: string, extra: Extra): st
   return description.replace(new RegExp(`,? \\[?${unit.replace("/", "\\/")}\\]?(?=[;.,]|$)`), "");
 }
 
-export type Source = "value" | "link" | "project_parameter";
+export type Source = "value" | "link" | "project_parameter" | "function_parameter";
 
 /** Project parameters that the server maintains for scripts. */
 export const OWN_PARAMETERS: ReadonlySet<string> = new Set(["scene_id", "project_id"]);
@@ -88,7 +88,8 @@ export function extraOf(meta: Pick<ParameterMeta, "extra"> | undefined): Extra {
 }
 
 export function sourceOf(parameter: ActionParameter): Source {
-  return parameter.type === "link" || parameter.type === "project_parameter" ? parameter.type : "value";
+  const { type } = parameter;
+  return type === "link" || type === "project_parameter" || type === "function_parameter" ? type : "value";
 }
 
 /** Return a value as the text of a field. */

@@ -2,6 +2,7 @@
 
 import { inUserLanguage } from "../i18n/serverMessages";
 import { SERVICES } from "../program/services";
+import type { ProgramPosition } from "../protocol/types";
 import { withRuns } from "../store/reduce";
 import { isRunning } from "../store/selectors";
 import type { State } from "../store/state";
@@ -31,6 +32,8 @@ export class ProgramDetails implements Follower {
     if (isRunning(state) && !this.traced && serves("GetExecutionTrace")) {
       this.traced = true;
       void call("GetExecutionTrace", { limit: 1000 }).then(takeTrace, () => {});
+      // The calls around the present action were announced before.
+      if (serves("GetProgramPosition")) void call("GetProgramPosition").then(takePosition, () => {});
     }
     if (!isRunning(state)) this.traced = false;
   }
@@ -61,6 +64,14 @@ export class ProgramDetails implements Follower {
       }
     }
   }
+}
+
+function takePosition(position: ProgramPosition): void {
+  const ids = position.branches.flatMap(({ frames }) => frames.slice(0, -1).map((each) => each.action_id));
+  store.setState(({ program }) => {
+    const running = [...ids, ...program.running.filter((id) => !ids.includes(id))];
+    return { program: { ...program, position, running: isRunning(now()) ? running : program.running } };
+  });
 }
 
 function takeTrace({ run, entries }: { run: number; entries: State["program"]["trace"] }): void {

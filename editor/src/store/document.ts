@@ -2,6 +2,7 @@
 
 import type { Action, ActionPoint, Project, Scene, ServerEvent } from "../protocol/types";
 import { byId, keep, put, without } from "./records";
+import { functionOf, inScope } from "./scope";
 import type { OpenDocument } from "./state";
 
 /** Return a scene and its project, split into records by id. */
@@ -18,16 +19,21 @@ export function opened(scene: Scene, project: Project | null): OpenDocument {
     joints: {},
     actions: {},
     logic: {},
+    program: { actions: {}, logic: {} },
+    functions: {},
+    path: [],
     parameters: {},
     overrides: {},
   };
   if (!project) return doc;
-  const { action_points, parameters, functions: _, logic, object_overrides, ...bareProject } = project;
+  const { action_points, parameters, functions, logic, object_overrides, ...bareProject } = project;
   let full: OpenDocument = { ...doc, project: bareProject, logic: byId(logic), parameters: byId(parameters) };
   for (const point of action_points) full = withPoint(full, point);
   full.overrides = Object.fromEntries(
     object_overrides.map((each) => [each.id, Object.fromEntries(each.parameters.map((one) => [one.name, one]))]),
   );
+  full.program = { actions: full.actions, logic: full.logic };
+  full.functions = byId(functions.map(functionOf));
   return full;
 }
 
@@ -78,8 +84,18 @@ export function itemOf(doc: OpenDocument | null, id: string): unknown {
   return doc?.objects[id] ?? doc?.points[id] ?? doc?.orientations[id];
 }
 
-/** Return the document after an event; the same object if the event concerns something else. */
+/** Return the document after an event, with the same function open; the same object if it concerns something else. */
 export function changed(doc: OpenDocument, event: ServerEvent): OpenDocument {
+  const program = inScope(doc, []);
+  const after = afterEvent(program, event);
+  if (after === program) return doc;
+  const { actions, logic } = after;
+  const same = actions === program.actions && logic === program.logic;
+  return inScope(same ? after : { ...after, program: { actions, logic } }, doc.path);
+}
+
+/** Return a document whose program is open after an event. */
+function afterEvent(doc: OpenDocument, event: ServerEvent): OpenDocument {
   const removed = event.change_type === "remove";
   switch (event.event) {
     case "SceneSaved":
@@ -114,6 +130,11 @@ export function changed(doc: OpenDocument, event: ServerEvent): OpenDocument {
     case "LogicItemChanged": {
       const logic = removed ? without(doc.logic, event.data.id) : put(doc.logic, event.data.id, event.data);
       return { ...doc, logic, unsaved: true };
+    }
+    case "FunctionChanged": {
+      const { id } = event.data;
+      const functions = removed ? without(doc.functions, id) : put(doc.functions, id, functionOf(event.data));
+      return { ...doc, functions, unsaved: true };
     }
     case "ProjectParameterChanged": {
       const { id } = event.data;

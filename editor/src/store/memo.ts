@@ -21,3 +21,13 @@ export function stable<Input, Result>(
     return last.result;
   };
 }
+
+/** Like `memoized`, for any number of objects: each result lives as long as its object. */
+export function perObject<Input extends object, Result>(compute: (input: Input) => Result): (input: Input) => Result {
+  const known = new WeakMap<Input, { result: Result }>();
+  return (input) => {
+    const found = known.get(input) ?? { result: compute(input) };
+    known.set(input, found);
+    return found.result;
+  };
+}

@@ -7,6 +7,7 @@ import type { Run, ServerEvent, TaskProgress, TaskStateData } from "../protocol/
 import { changed, itemOf, opened } from "./document";
 import { translatedType } from "./objectTypeTexts";
 import { put, without } from "./records";
+import { inScope } from "./scope";
 import { NO_PROGRAM, type Notice, OFFLINE, type OpenDocument, type State } from "./state";
 import type { Draft, Selection } from "./ui";
 
@@ -149,7 +150,10 @@ function over(
 
 function open(state: State, doc: NonNullable<State["doc"]>): Partial<State> {
   const sameScene = state.doc?.scene.id === doc.scene.id;
-  if (sameScene && state.doc?.project?.id === doc.project?.id) return { doc, ui: screenOf(state, doc) };
+  if (state.doc && sameScene && state.doc.project?.id === doc.project?.id) {
+    const still = inScope(doc, state.doc.path);
+    return { doc: still, ui: screenOf(state, still) };
+  }
   // A project that is created on the open scene has the tools of the scene, too: the user may have just opened one.
   const tool = sameScene && !state.doc?.project ? state.ui.tool : "";
   return { ...CLOSED, doc, ui: { ...shut(state), tool } };
@@ -158,7 +162,7 @@ function open(state: State, doc: NonNullable<State["doc"]>): Partial<State> {
 /** Return the screen state without what belonged to the open document. */
 function shut(state: State): State["ui"] {
   const { draft: _, ...ui } = state.ui;
-  return { ...ui, selection: null, connecting: null, ghost: null, mode: "3d", tool: "" };
+  return { ...ui, selection: null, connecting: null, picked: null, ghost: null, mode: "3d", tool: "" };
 }
 
 /** Return the screen state for a changed document. */
@@ -327,6 +331,7 @@ function program(state: State, event: ServerEvent): Partial<State> | null {
         state: next,
         packageId: package_id || now.packageId,
         running: next === "stopped" ? [] : now.running,
+        position: next === "stopped" ? null : now.position,
       });
     }
     case "PackageInfo":
@@ -341,6 +346,8 @@ function program(state: State, event: ServerEvent): Partial<State> | null {
     }
     case "ActionStateAfter":
       return become({ running: now.running.filter((each) => each !== event.data.action_id) });
+    case "ProgramPosition":
+      return become({ position: event.data });
     case "ExecutionTrace": {
       const { run, number, error, action_id } = event.data;
       const rest = now.trace.filter((each) => each.run === run && each.number !== number);

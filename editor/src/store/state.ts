@@ -24,6 +24,8 @@ import type {
   PackageStateEnum,
   PackageSummary,
   Parameter,
+  ProgramPosition,
+  ProjectFunction,
   ProjectParameter,
   ProjectRobotJoints,
   ReachabilityData,
@@ -57,6 +59,15 @@ export interface Connection {
 
 export type Of<T> = T & { pointId: string };
 
+/** Actions and connections of the program, or of a function. */
+export interface Body {
+  actions: Record<string, Of<Action>>;
+  logic: Record<string, LogicItem>;
+}
+
+/** A function. An action of it is shown at the point that it uses, or at that of the action before. */
+export type OpenFunction = Omit<ProjectFunction, "actions" | "logic"> & Body;
+
 /** The open scene, and the project if one is open. */
 export interface OpenDocument {
   scene: BareScene;
@@ -68,8 +79,13 @@ export interface OpenDocument {
   points: Record<string, BareActionPoint>;
   orientations: Record<string, Of<NamedOrientation>>;
   joints: Record<string, Of<ProjectRobotJoints>>;
+  /** Actions and connections of the function that is open, else of the program. */
   actions: Record<string, Of<Action>>;
   logic: Record<string, LogicItem>;
+  program: Body;
+  functions: Record<string, OpenFunction>;
+  /** Ids of the functions that were opened one from the other; the last one is shown. Empty: the program is shown. */
+  path: readonly string[];
   parameters: Record<string, ProjectParameter>;
   /** By object, then by name of the parameter. */
   overrides: Record<string, Record<string, Parameter>>;
@@ -136,6 +152,8 @@ export interface Program {
   /** Actions that are running. */
   running: string[];
   trace: TraceEntry[];
+  /** Its call stacks; null while it is not known. */
+  position: ProgramPosition | null;
   /** The run history of the server, newest first. */
   runs: Run[];
   /** The newest dry run of the open project; null if it is not known. */
@@ -221,6 +239,7 @@ export const NO_PROGRAM: Program = {
   packageName: "",
   running: [],
   trace: [],
+  position: null,
   runs: [],
   dryRun: null,
   watched: 0,

@@ -4,6 +4,7 @@ import { useStore } from "zustand";
 import { createStore } from "zustand/vanilla";
 import type { ServerEvent } from "../protocol/types";
 import { notice, reduce } from "./reduce";
+import { inScope, pathTo } from "./scope";
 import { type Connection, initialState, type Notice, type State } from "./state";
 import type { FormDraft, Selection, Ui } from "./ui";
 
@@ -34,8 +35,21 @@ export function keepForm(key: string, draft: FormDraft | null): void {
   setUi({ forms: draft ? { ...others, [key]: draft } : others });
 }
 
+/** Select an item. An action or connection is shown in the program or function that contains it. */
 export function select(selection: Selection | null): void {
+  const { doc } = now();
+  const inside = selection?.kind === "action" || selection?.kind === "logic";
+  const path = inside && doc ? pathTo(doc, selection.id) : undefined;
+  if (path && path !== doc?.path) show(path);
   setUi({ selection });
+}
+
+/** Show the last one of these functions in all views; without any, the program. */
+export function show(path: readonly string[]): void {
+  store.setState(({ doc, ui }) => ({
+    doc: doc && inScope(doc, path),
+    ui: { ...ui, selection: null, connecting: null, picked: null },
+  }));
 }
 
 export function notify(level: Notice["level"], text: string): void {

@@ -146,6 +146,8 @@ export interface Ui {
   draft?: Draft | undefined;
   mode: Mode;
   connecting: Connecting | null;
+  /** Actions that are being selected for a function; null unless several are selected. */
+  picked: readonly string[] | null;
   /** Whether the view follows the running action. */
   follow: boolean;
   ghost: Ghost | null;
@@ -183,6 +185,7 @@ export function initialUi(): Ui {
     selection: null,
     mode: "3d",
     connecting: null,
+    picked: null,
     follow: false,
     ghost: null,
     tool: "",

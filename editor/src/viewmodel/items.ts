@@ -4,9 +4,9 @@ import { t } from "@lingui/core/macro";
 import type { Item, LinkItem, RobotItem } from "../engine/items";
 import { decimal } from "../formats";
 import { errorWords } from "../program/errorKinds";
-import { whenOf, whenWords } from "../program/logic";
+import { calledBy, whenOf, whenWords } from "../program/logic";
 import { reachOfAction, worse } from "../program/reach";
-import { type BranchKind, branchKind, hasComparisons } from "../program/steps";
+import { type BranchKind, branchKind, hasComparisons, placeKey } from "../program/steps";
 import { takenExit } from "../program/taken";
 import type { LogicItem, Pose, Position, Reach } from "../protocol/types";
 import { isRunning } from "../store/selectors";
@@ -45,17 +45,18 @@ export class ItemMaker {
       this.known.set(id, stored);
       found.push(stored.item);
     };
-    const { selection, draft } = state.ui;
+    const { selection, draft, picked } = state.ui;
+    const isSelected = (id: string) => selection?.id === id || (picked?.includes(id) ?? false);
     const me = state.connection.user;
     const faint = faintness(state);
     const common = (id: string, name: string) => ({
       id,
       name,
-      selected: selection?.id === id,
+      selected: isSelected(id),
       lockedBy: lockedBy(state, id, me),
       faint: faint(id),
     });
-    const notify = (id: string) => [selection?.id === id, lockedBy(state, id, me), faint(id)];
+    const notify = (id: string) => [isSelected(id), lockedBy(state, id, me), faint(id)];
 
     const axes = state.view.user.hide_axes !== true;
     for (const object of Object.values(doc.objects)) {
@@ -128,7 +129,7 @@ export class ItemMaker {
     const exit = takenExit(state)?.id;
     for (const item of Object.values(doc.logic)) {
       const [from, to] = [item.start, item.end].map((id) => doc.actions[id]?.pointId);
-      const moved = [item.start, item.end].some((id) => isPosition(state.view.shared[`place/${id}`]));
+      const moved = [item.start, item.end].some((id) => isPosition(state.view.shared[placeKey(doc, id)]));
       const inside = from !== undefined && from === to && !moved && !open(from);
       const pale = dim(item.id);
       const taken = item.id === exit;
@@ -158,7 +159,7 @@ export class ItemMaker {
     const levels = new Map<string, number>();
     const counts = new Map<string, number>();
     for (const { pointId } of Object.values(doc.actions)) counts.set(pointId, (counts.get(pointId) ?? 0) + 1);
-    const colours = Object.keys(doc.objects);
+    const colours = [...Object.keys(doc.objects), ...Object.keys(doc.functions)];
     for (const action of Object.values(doc.actions)) {
       const level = levels.get(action.pointId) ?? 0;
       levels.set(action.pointId, level + 1);
@@ -166,13 +167,14 @@ export class ItemMaker {
       const running = state.program.running.includes(action.id) || state.live.executing === action.id;
       const breakpoint = action.id in state.breakpoints;
       const colour = Math.max(0, colours.indexOf(action.type.split("/")[0] ?? ""));
-      const place = state.view.shared[`place/${action.id}`];
+      const place = state.view.shared[placeKey(doc, action.id)];
       const open = opened(action.pointId);
       const pale = dim(action.id);
       const reach = reachOfAction(action, state.reach)?.reach ?? "";
+      const called = calledBy(doc, action);
       add(
         action.id,
-        [action, level, count, open, pale, running, breakpoint, colour, place, reach, ...notify(action.id)],
+        [action, called, level, count, open, pale, running, breakpoint, colour, place, reach, ...notify(action.id)],
         () => ({
           ...common(action.id, action.name),
           kind: "action",
@@ -181,7 +183,7 @@ export class ItemMaker {
           count,
           open,
           dim: pale,
-          role: "action",
+          role: called ? "call" : "action",
           running,
           breakpoint,
           colour,
@@ -195,7 +197,7 @@ export class ItemMaker {
       [START, "start"],
       [END, "end"],
     ] as const) {
-      const place = state.view.shared[`place/${id}`];
+      const place = state.view.shared[placeKey(doc, id)];
       const pale = dim(id);
       add(id, [place, places, pale, ...notify(id)], () => ({
         ...common(id, role === "start" ? t`Start` : t`End`),

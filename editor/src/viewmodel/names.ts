@@ -2,6 +2,7 @@
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
+import { anyAction, pathTo } from "../store/scope";
 import type { State } from "../store/state";
 import type { Kind, Selection } from "../store/ui";
 
@@ -25,7 +26,13 @@ export function nameOf(state: State, id: string): string {
   if (!doc) return "";
   const step = doc.logic[id];
   if (step) return `${nameOf(state, step.start)} → ${nameOf(state, step.end)}`;
-  const named = doc.objects[id] ?? doc.points[id] ?? doc.orientations[id] ?? doc.joints[id] ?? doc.actions[id];
+  const named =
+    doc.objects[id] ??
+    doc.points[id] ??
+    doc.orientations[id] ??
+    doc.joints[id] ??
+    doc.functions[id] ??
+    anyAction(doc, id);
   return named?.name ?? "";
 }
 
@@ -48,5 +55,7 @@ export function selectionOf(state: State, id: string): Selection | null {
     logic: doc.logic,
   };
   for (const [kind, record] of Object.entries(kinds)) if (id in record) return { kind: kind as Kind, id };
+  // Outside of what is open.
+  if (pathTo(doc, id)) return { kind: anyAction(doc, id) ? "action" : "logic", id };
   return null;
 }

@@ -26,6 +26,8 @@ import { type Context, Thing } from "../thing";
 /** Radius of a puck, of START and END, height of the first one above its point, and distance between pucks, m. */
 const RADIUS = 0.018;
 const BORDER = 0.03;
+/** Radius of the lower edge of a call, whose puck is a square, m. */
+const CALL = 0.026;
 const FIRST = 0.035;
 const NEXT = 0.006;
 /** Thickness of a puck, and distance of the pucks in a stack, m. */
@@ -75,13 +77,16 @@ export class PuckThing extends Thing<PuckItem> {
   constructor(item: PuckItem, context: Context) {
     super(context);
     this.item = item;
-    const edge = item.role === "action";
+    const { role } = item;
+    const edge = role === "action" || role === "call";
     this.batch = context.batches.of(
-      edge ? "puck" : "start and end",
+      edge ? role : "start and end",
       () => [
-        (edge
+        (role === "action"
           ? new CylinderGeometry(RADIUS, RADIUS, THICK, context.quality === "low" ? 12 : 24)
-          : new CylinderGeometry(BORDER, BORDER, 0.014, 6)
+          : role === "call"
+            ? new CylinderGeometry(RADIUS, CALL, THICK, 4).rotateY(Math.PI / 4)
+            : new CylinderGeometry(BORDER, BORDER, 0.014, 6)
         ).rotateX(Math.PI / 2),
         new MeshLambertMaterial(),
       ],
@@ -142,8 +147,9 @@ export class PuckThing extends Thing<PuckItem> {
   }
 
   override resized(): boolean {
-    const wanted =
-      (LEAST * this.context.metresPerPixel(this.anchor(up))) / (this.item.role === "action" ? RADIUS : BORDER);
+    const { role } = this.item;
+    const border = role === "start" || role === "end";
+    const wanted = (LEAST * this.context.metresPerPixel(this.anchor(up))) / (border ? BORDER : RADIUS);
     const grown = Math.min(MOST, Math.max(1, 2 ** (Math.ceil(Math.log2(wanted) * 2) / 2)));
     if (grown === this.grown) return false;
     this.grown = grown;

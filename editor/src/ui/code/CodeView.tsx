@@ -10,6 +10,7 @@ import type { CheckScriptData, ScriptProblem } from "../../protocol/types";
 import { call } from "../../session/connection";
 import { FILE_DEADLINE, rest } from "../../session/rest";
 import { whyUnavailable } from "../../store/permissions";
+import { anyAction } from "../../store/scope";
 import { isClosed } from "../../store/selectors";
 import { notify, now, select, setUi, useEditor } from "../../store/store";
 import type { ScriptDraft } from "../../store/ui";
@@ -226,12 +227,12 @@ function Script({ text, whyReadOnly, hidden, onEdit, check, onReady }: ScriptPro
   const editor = useRef<CodeMirror | null>(null);
   const handlers = useRef({ onEdit, check });
   handlers.current = { onEdit, check };
-  const actions = useEditor((state) => state.doc?.actions);
+  const program = useEditor((state) => state.doc);
   const selected = useEditor((state) => state.doc?.actions[state.ui.selection?.id ?? ""]?.name ?? "");
   const running = useEditor((state) => state.program.running);
   const breakpoints = useEditor((state) => state.breakpoints);
   const marks: Marks = useMemo(() => {
-    const nameOfAction = (each: string) => actions?.[each]?.name ?? "";
+    const nameOfAction = (each: string) => (program && anyAction(program, each)?.name) ?? "";
     return {
       selected,
       running: running.map(nameOfAction),
@@ -242,7 +243,7 @@ function Script({ text, whyReadOnly, hidden, onEdit, check, onReady }: ScriptPro
         return document?.name ?? nameOf(now(), each);
       },
     };
-  }, [actions, selected, running, breakpoints]);
+  }, [program, selected, running, breakpoints]);
 
   // Later texts are loaded below.
   useEffect(() => {
@@ -284,7 +285,9 @@ function Script({ text, whyReadOnly, hidden, onEdit, check, onReady }: ScriptPro
 }
 
 function actionNamed(name: string): string | undefined {
-  return Object.values(now().doc?.actions ?? {}).find((each) => each.name === name)?.id;
+  const { doc } = now();
+  const bodies = doc ? [doc.program, ...Object.values(doc.functions)] : [];
+  return bodies.flatMap(({ actions }) => Object.values(actions)).find((each) => each.name === name)?.id;
 }
 
 /** Return a problem at its place in the text; nothing if it concerns the whole script. */

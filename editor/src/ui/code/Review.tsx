@@ -15,6 +15,7 @@ const KINDS: Record<string, MessageDescriptor> = {
   action: msg`Action`,
   logic: msg`Step`,
   parameter: msg`Variable`,
+  function: msg`Function`,
   action_point: msg`Action point`,
   project: msg`Comments and formatting`,
 };

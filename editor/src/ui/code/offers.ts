@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { decoded } from "../../program/decoded";
-import { metaOf } from "../../program/logic";
+import { CALL, metaOf } from "../../program/logic";
 import { freeName } from "../../program/naming";
 import { typeName } from "../../program/values";
 import type { ObjectAction, ParameterMeta } from "../../protocol/types";
@@ -73,6 +73,19 @@ function objectsIn(source: string): Map<string, string> {
 const actionsOf = (doc: OpenDocument, types: State["types"], objectId: string): ObjectAction[] =>
   (types.actions[doc.objects[objectId]?.type ?? ""] ?? []).filter((each) => !each.disabled && !each.meta.hidden);
 
+/** Return the description of `object.method`, or of the function with a name. */
+function described(
+  objects: Map<string, string>,
+  doc: OpenDocument,
+  types: State["types"],
+  object: string,
+  method: string,
+): ObjectAction | undefined {
+  const called = object ? undefined : Object.values(doc.functions).find((each) => identifier(each.name) === method);
+  const found = metaOf(types, doc, { type: called ? `${called.id}/${CALL}` : `${objects.get(object)}/${method}` });
+  return called && found ? { ...found, name: method } : found;
+}
+
 /** A variable that is assigned on all paths to a line. */
 interface Variable {
   name: string;
@@ -94,10 +107,10 @@ function variables(source: string, at: number, doc: OpenDocument, types: State["
     if (indent > open) continue;
     open = indent;
     if (indent === 0) break;
-    const assigned = /^\s*(\w+(?:, *\w+)*) = (?:(\w+)\.(\w+)\(|(.*))/.exec(line);
+    const assigned = /^\s*(\w+(?:, *\w+)*) = (?:(?:(\w+)\.)?(\w+)\(|(.*))/.exec(line);
     if (!assigned) continue;
     const [, names = "", object = "", method = ""] = assigned;
-    const action = metaOf(types, doc, { type: `${objects.get(object)}/${method}` });
+    const action = described(objects, doc, types, object, method);
     names.split(/, */).forEach((name, n) => {
       const parameter = Object.values(doc.parameters).find((each) => each.name === name);
       const type = object === "res" && method === "caught" ? "error" : (action?.returns[n] ?? parameter?.type ?? "");
@@ -192,6 +205,10 @@ export function offersAt(source: string, at: number, doc: OpenDocument, types: S
     if (actionsOf(doc, types, id).length > 0)
       offers.push({ label: name, type: "variable", detail: types.byName[type]?.display_name ?? type });
   }
+  for (const { name } of Object.values(doc.functions)) {
+    const action = described(objectsIn(source), doc, types, "", identifier(name));
+    if (action) offers.push(callOf(source, action));
+  }
   offers.push({ label: "aps", type: "variable", detail: t`action points` });
   return { from, offers };
 }
@@ -242,9 +259,9 @@ export function signatureAt(source: string, at: number, doc: OpenDocument, types
     else if (character === "," && depth === 0) {
       if (commas++ === 0) last = n + 1;
     } else if ("([{".includes(character) && depth-- === 0) {
-      const called = /(\w+)\.(\w+)$/.exec(text.slice(0, n));
+      const called = /(?:(\w+)\.)?(\w+)$/.exec(text.slice(0, n));
       const [, object = "", method = ""] = called ?? [];
-      const action = metaOf(types, doc, { type: `${objectsIn(source).get(object)}/${method}` });
+      const action = described(objectsIn(source), doc, types, object, method);
       if (!action || character !== "(") return null;
       const keyword = /^\s*(\w+)\s*=/.exec(text.slice(commas === 0 ? n + 1 : last))?.[1];
       const active = keyword === undefined ? commas : action.parameters.findIndex((each) => each.name === keyword);

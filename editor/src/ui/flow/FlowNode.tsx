@@ -10,7 +10,16 @@ import { ReachBadge } from "../points/Reach";
 import { type Box, type Branch, lastIn } from "./graph";
 
 export type FlowNodeType = Node<
-  { box: Box; running: boolean; breakpoint: boolean; paused: boolean; fault: string; target: boolean; from: boolean },
+  {
+    box: Box;
+    running: boolean;
+    breakpoint: boolean;
+    paused: boolean;
+    fault: string;
+    target: boolean;
+    from: boolean;
+    picked: boolean;
+  },
   "box"
 >;
 
@@ -20,19 +29,30 @@ export const FAILS = "fails";
 const onError = (): Branch => ({ id: "error", label: t`On error` });
 
 export function FlowNode({ data, selected }: NodeProps<FlowNodeType>) {
-  const { box, running, paused, breakpoint, fault, target, from } = data;
+  const { box, running, paused, breakpoint, fault, target, from, picked } = data;
   return (
-    <div className={`flow-node ${box.kind}`} data-running={running} data-target={target} data-from={from}>
+    <div
+      className={`flow-node ${box.kind} ${box.called ? "call" : ""}`}
+      data-running={running}
+      data-target={target}
+      data-from={from}
+      data-picked={picked}
+    >
       {box.kind !== "start" && (
         <Handle type="target" position={Position.Top} className="flow-into" isConnectableStart={false} aria-hidden />
       )}
       <div className="flow-name">
         {box.kind === "fold" && <Icon name="list" size={18} />}
-        {box.kind === "action" && <Drawing path={deviceIcon(box)} size={18} />}
+        {box.called ? (
+          <Icon name="function" size={18} />
+        ) : (
+          box.kind === "action" && <Drawing path={deviceIcon(box)} size={18} />
+        )}
         {breakpoint && <span className="breakpoint-dot" data-on="true" role="img" aria-label={t`pauses here`} />}
         <span className="flow-title">{box.name}</span>
         {box.kind === "action" && <ReachBadge id={box.id} />}
         {running && <span className="tag good">{paused ? t`next` : t`runs`}</span>}
+        {picked && <Icon name="check" size={18} />}
         {fault && (
           <span className="flow-fault" role="img" aria-label={fault} title={fault}>
             <Icon name="warn" size={16} />

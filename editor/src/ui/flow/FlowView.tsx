@@ -15,9 +15,10 @@ import {
 import { useMemo, useRef } from "react";
 import "@xyflow/react/dist/base.css";
 import { addErrorExit } from "../../commands/errorExits";
+import { pickAction, startPicking } from "../../commands/functions";
 import { connect, finishConnecting, notEditable, removeAction, removeStep } from "../../commands/program";
 import { cannotLead } from "../../program/logic";
-import { problemsOf } from "../../program/problems";
+import { problemsHere, problemsOf } from "../../program/problems";
 import { placeOf } from "../../program/steps";
 import { takenExit } from "../../program/taken";
 import { notify, now, select, setUi, useEditor } from "../../store/store";
@@ -64,6 +65,12 @@ function useChoose(): (box: Pick<Box, "id" | "kind" | "run">) => void {
       return;
     }
     if (ended.current === id) return;
+    if (now().ui.picked) {
+      ended.current = id;
+      setTimeout(() => (ended.current = ""));
+      for (const each of box.kind === "fold" ? box.run : [id]) pickAction(each);
+      return;
+    }
     if (box.kind === "fold") return unfold(box.run);
     select(selectionOf(now(), id));
     setUi({ tool: "" });
@@ -82,6 +89,7 @@ function Flow() {
   const doc = useEditor((state) => state.doc);
   const types = useEditor((state) => state.types);
   const running = useEditor((state) => state.program.running);
+  const picked = useEditor((state) => state.ui.picked);
   const executing = useEditor((state) => state.live.executing);
   const paused = useEditor((state) => state.program.state === "paused");
   const breakpoints = useEditor((state) => state.breakpoints);
@@ -90,7 +98,7 @@ function Flow() {
   const connecting = useEditor((state) => state.ui.connecting);
   const dark = useEditor((state) => state.ui.theme === "dark" || (state.ui.theme === "system" && state.ui.systemDark));
   const reach = useEditor((state) => state.reach);
-  const problems = useMemo(() => (doc ? problemsOf(doc, types, reach) : []), [doc, types, reach]);
+  const problems = useMemo(() => problemsHere(doc, doc ? problemsOf(doc, types, reach) : []), [doc, types, reach]);
   const folds = useFolds(problems);
   const latest = useMemo(
     () => (doc ? graphOf(doc, types, folds.folded) : { boxes: [], lines: [] }),
@@ -123,6 +131,7 @@ function Flow() {
           doc !== null &&
           cannotLead(doc, connecting.from, firstIn(box), connecting.item, connecting.error || undefined) === "",
         from: connecting?.from === lastIn(box),
+        picked: picked?.includes(firstIn(box)) ?? false,
       },
     }),
   );
@@ -158,7 +167,8 @@ function Flow() {
   });
 
   const step = doc?.logic[selected];
-  const { moved, whole } = useViewport(graph.boxes, running.at(-1) ?? executing, step ? placeOf(step.start) : selected);
+  const runs = running.findLast((id) => doc !== null && id in doc.actions) ?? executing;
+  const { moved, whole } = useViewport(graph.boxes, runs, step ? placeOf(step.start) : selected);
 
   const box = (id: string): Pick<Box, "id" | "kind" | "run" | "branches"> =>
     graph.boxes.find((each) => each.id === id) ?? { id, kind: "action", run: [], branches: [] };
@@ -224,6 +234,15 @@ function Flow() {
           <ControlButton aria-label={t`Show the whole program`} onClick={whole}>
             <Icon name="zoom" />
           </ControlButton>
+          {doc && Object.keys(doc.actions).length > 0 && !picked && (
+            <ControlButton
+              className="flow-fold-all"
+              aria-label={t`Select several actions`}
+              onClick={() => startPicking()}
+            >
+              {t`Select`}
+            </ControlButton>
+          )}
           {folds.runs > 0 && (
             <ControlButton
               className="flow-fold-all"

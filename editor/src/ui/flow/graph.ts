@@ -2,9 +2,11 @@
 
 import { Graph, layout } from "@dagrejs/dagre";
 import { plural, t } from "@lingui/core/macro";
+import { detailOf } from "../../program/functions";
 import {
   type BranchKind,
   branchKind,
+  calledBy,
   conditionWords,
   END,
   hasComparisons,
@@ -14,7 +16,7 @@ import {
   resultsOf,
   START,
 } from "../../program/logic";
-import { branchNames, isParallel, parallelOf, runsFunctions } from "../../program/parallel";
+import { parallelOf } from "../../program/parallel";
 import { valuesOf } from "../../program/step";
 import type { OpenDocument, State } from "../../store/state";
 
@@ -40,6 +42,8 @@ export interface Box {
   detail: string;
   /** Its most telling parameters as text; empty if it has none. */
   values: string;
+  /** Id of the function that it calls. */
+  called?: string | undefined;
   /** Icon that the type of its device declares. */
   icon?: string | undefined;
   branches: Branch[];
@@ -102,6 +106,7 @@ export function graphOf(
           kind: "action" as const,
           name: action.name,
           detail: detailOf(doc, action),
+          called: calledBy(doc, action)?.id,
           values,
           icon: types.byName[doc.objects[action.type.split("/")[0] ?? ""]?.type ?? ""]?.icon,
           run: [],
@@ -121,15 +126,6 @@ export function graphOf(
   ];
   const places = placed(bare, lines);
   return { boxes: bare.map((box) => ({ ...box, ...(places.get(box.id) ?? { x: 0, y: 0 }) })), lines };
-}
-
-/** Return the device and the point of an action as text; the calls of parallel work. */
-function detailOf(doc: OpenDocument, action: OpenDocument["actions"][string]): string {
-  const point = doc.points[action.pointId]?.name ?? "?";
-  if (isParallel(action)) return branchNames(doc, action);
-  if (runsFunctions(action)) return point;
-  const object = doc.objects[action.type.split("/")[0] ?? ""]?.name ?? "?";
-  return t`${object} at ${point}`;
 }
 
 /** Last and first action of a node. */

@@ -2,13 +2,14 @@
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
+import { startPicking } from "../../commands/functions";
 import { stopMotion } from "../../commands/operation";
 import { duplicateAction, notEditable, removeAction, renameAction } from "../../commands/program";
 import { breakAt, cancel, execute, notRunnable, runTo } from "../../commands/run";
 import { ago } from "../../formats";
-import { metaOf } from "../../program/logic";
+import { calledBy, metaOf } from "../../program/logic";
 import { whyUnavailable } from "../../store/permissions";
-import { useEditor } from "../../store/store";
+import { select, useEditor } from "../../store/store";
 import { Field } from "../kit/Field";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/section";
@@ -26,11 +27,16 @@ const ActionCommands: Section["Body"] = ({ selection: { id } }) => {
   const running = live.executing === id;
   const notNow =
     notEditable(state, "ExecuteAction") ||
+    (calledBy(doc, action) ? t`Run the project to run a function.` : "") ||
     (live.state !== "started"
       ? t`Go online first. The action runs on the devices.`
       : live.executing
         ? t`Another action is running.`
         : "");
+  const pick = () => {
+    select(null);
+    startPicking([id]);
+  };
   const stays = doc.project?.has_logic ? notRunnable(state) : t`The project has no program.`;
   return (
     <>
@@ -82,6 +88,11 @@ const ActionCommands: Section["Body"] = ({ selection: { id } }) => {
           <Button look="plain" why={why} onPress={() => setRenaming(true)}>
             {t`Rename`}
           </Button>
+          {doc.project?.has_logic && (
+            <Button look="plain" why={notEditable(state, "MakeFunction")} onPress={pick}>
+              {t`Make a function`}
+            </Button>
+          )}
           <Button look="plain" why={why} onPress={() => void duplicateAction(action)}>
             {t`Duplicate`}
           </Button>

@@ -4,14 +4,17 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { awaited } from "../../commands/awaited";
+import { addFunctionParameter, freeParameterName } from "../../commands/functions";
 import { addParameter } from "../../commands/parameters";
-import { dynamicValues, lastDynamicValues, notEditable, setParameter } from "../../commands/program";
+import { notEditable, setParameter } from "../../commands/program";
+import { dynamicValues, lastDynamicValues } from "../../commands/startingValues";
 import { decoded } from "../../program/decoded";
 import { linkToError, usableErrors } from "../../program/errorExits";
 import { linkTo, metaOf, usable } from "../../program/logic";
 import { freeName, words } from "../../program/naming";
 import { extraOf, initial, SIMPLE, type Source, sourceOf, typeName } from "../../program/values";
 import type { ActionParameter, ParameterMeta } from "../../protocol/types";
+import { scopeOf } from "../../store/scope";
 import type { State } from "../../store/state";
 import { now, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
@@ -24,6 +27,7 @@ const SOURCES: Record<Source, MessageDescriptor> = {
   value: msg`Value`,
   link: msg`Result`,
   project_parameter: msg`Project`,
+  function_parameter: msg`Parameter`,
 };
 
 const ActionParameters: Section["Body"] = ({ selection: { id } }) => {
@@ -73,6 +77,8 @@ function One({
   const constants = Object.values(doc.parameters).filter(
     (each) => each.type === type && each.name !== "scene_id" && each.name !== "project_id",
   );
+  const open = doc.functions[scopeOf(doc)];
+  const present = chosen === "value" ? (parameter?.value ?? initial(wanted)) : initial(wanted);
   const sources: Source[] =
     type === "image"
       ? ["link"]
@@ -80,6 +86,7 @@ function One({
           "value",
           ...(results.length + errors.length > 0 || chosen === "link" ? (["link"] as const) : []),
           ...(simple ? (["project_parameter"] as const) : []),
+          ...(open ? (["function_parameter"] as const) : []),
         ];
   const set = (of: Source, json: string) =>
     setParameter(actionId, { name, type: of === "value" ? type : of, value: json });
@@ -92,7 +99,7 @@ function One({
           state={state}
           actionId={actionId}
           wanted={wanted}
-          json={chosen === "value" ? (parameter?.value ?? initial(wanted)) : undefined}
+          json={chosen === "value" ? present : undefined}
           field={field}
           onSet={(json) => set("value", json)}
         />
@@ -114,6 +121,24 @@ function One({
           hint={t`result of an earlier action`}
           onSet={(json) => set("link", json)}
         />
+      ) : source === "function_parameter" ? (
+        <ValueField
+          {...field}
+          type="string"
+          json={chosen === "function_parameter" ? parameter?.value : undefined}
+          choices={[
+            ...(open?.parameters ?? [])
+              .filter((each) => each.type === type)
+              .map((each) => ({ json: JSON.stringify(each.name), label: words(each.name) })),
+            { json: NEW, label: t`New parameter…` },
+          ]}
+          hint={t`stated by each call of the function`}
+          onSet={async (json) => {
+            if (json !== NEW) return set("function_parameter", json);
+            const free = freeParameterName(name);
+            return (await addFunctionParameter(free, type, present)) || set("function_parameter", JSON.stringify(free));
+          }}
+        />
       ) : (
         <ValueField
           {...field}
@@ -129,11 +154,7 @@ function One({
           hint={t`shared by all actions`}
           onSet={async (json) => {
             if (json !== NEW) return set("project_parameter", json);
-            const made = await sharedFrom(
-              name,
-              type,
-              chosen === "value" ? (parameter?.value ?? initial(wanted)) : initial(wanted),
-            );
+            const made = await sharedFrom(name, type, present);
             return "problem" in made ? made.problem : set("project_parameter", JSON.stringify(made.id));
           }}
         />

@@ -15,17 +15,21 @@ import {
 } from "react-aria-components";
 import { createPortal } from "react-dom";
 import { aimedPlace } from "../../commands/crosshair";
-import { addAction, notEditable, type Where } from "../../commands/program";
+import { addAction, notEditable } from "../../commands/program";
+import { takesPlace, type Where } from "../../commands/startingValues";
 import { byName } from "../../formats";
-import { needsPlace, pointFor, type Slot, slotFor, slotKey, slotsOf } from "../../program/chain";
+import { pointFor, type Slot, slotFor, slotKey, slotsOf } from "../../program/chain";
 import { errorWords } from "../../program/errorKinds";
+import { recursive } from "../../program/functions";
+import { callMeta, metaOf } from "../../program/logic";
 import { words } from "../../program/naming";
 import { SERVICES } from "../../program/services";
 import type { ObjectAction } from "../../protocol/types";
 import { whyUnavailable } from "../../store/permissions";
-import type { State } from "../../store/state";
+import type { OpenDocument, State } from "../../store/state";
 import { notify, now, select, setUi, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
+import { NewFunction, OpenButton } from "../functions/FunctionOffers";
 import { Pick } from "../kit/fields";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
@@ -40,8 +44,12 @@ interface Offer {
   object: string;
   category: string;
   meta: ObjectAction;
+  /** Name of the function, if it calls one. */
+  called?: string;
   why: string;
 }
+
+const titleOf = ({ called, meta }: Offer): string => called ?? words(meta.name);
 
 export function AddAction() {
   const doc = useEditor((state) => state.doc);
@@ -65,7 +73,7 @@ export function AddAction() {
   const offers = useMemo(() => offersOf(now(), onPoint), [doc, types, onPoint, online]);
   const wanted = search.trim().toLowerCase();
   const found = offers.filter((each) =>
-    `${each.object} ${words(each.meta.name)} ${each.meta.description ?? ""} ${words(each.category)}`
+    `${each.object} ${titleOf(each)} ${each.meta.description ?? ""} ${words(each.category)}`
       .toLowerCase()
       .includes(wanted),
   );
@@ -73,17 +81,17 @@ export function AddAction() {
 
   const add = async (offer: Offer) => {
     const why = cannot || offer.why;
-    if (why) return notify("info", `${words(offer.meta.name)}: ${why}`);
-    const where = needsPlace(offer.meta) ? placeFor(onPoint) : null;
-    if (needsPlace(offer.meta) && !where)
-      return notify("info", t`Nothing at the crosshair. Aim at the table or an object.`);
+    if (why) return notify("info", `${titleOf(offer)}: ${why}`);
+    const placed = takesPlace(offer.objectId, offer.meta);
+    const where = placed ? placeFor(onPoint) : null;
+    if (placed && !where) return notify("info", t`Nothing at the crosshair. Aim at the table or an object.`);
     setBusy(offer.key);
     setUi({ recentActions: [offer.key, ...recent.filter((each) => each !== offer.key)].slice(0, RECENT) });
     setLast((await addAction(offer.objectId, offer.meta, where, chosen)) ?? "");
     setBusy("");
   };
   const row = (offer: Offer, prefix = "") => (
-    <li key={prefix + offer.key}>
+    <li key={prefix + offer.key} className={offer.called && "offer-call"}>
       <AriaButton
         className="offer"
         aria-disabled={offer.why !== "" || cannot !== "" || undefined}
@@ -91,11 +99,12 @@ export function AddAction() {
         onPress={() => void add(offer)}
       >
         <span className="offer-name">
-          {words(offer.meta.name)}
+          {titleOf(offer)}
           {prefix && <span className="quiet small"> · {offer.object}</span>}
         </span>
         <span className="quiet small">{offer.why || offer.meta.description?.split("\n")[0]}</span>
       </AriaButton>
+      {offer.called && <OpenButton id={offer.objectId} name={offer.called} />}
     </li>
   );
   return (
@@ -157,12 +166,14 @@ export function AddAction() {
       {groups(found).map(([object, of]) => (
         <section key={object} className="offers" aria-label={object}>
           <h3>
-            <Icon name={CATEGORY_ICONS[of[0]?.category ?? ""] ?? "box"} /> {object}{" "}
+            <Icon name={of[0]?.called ? "function" : (CATEGORY_ICONS[of[0]?.category ?? ""] ?? "box")} /> {object}{" "}
             {of[0]?.category && <span className="tag">{words(of[0].category)}</span>}
           </h3>
           <ul>{of.map((offer) => row(offer))}</ul>
+          {of[0]?.called && <NewFunction />}
         </section>
       ))}
+      {doc?.project?.has_logic && !found.some((each) => each.called) && <NewFunction />}
       {found.length === 0 && (
         <p className="quiet">{offers.length ? t`No action matches.` : t`No device in this scene has actions.`}</p>
       )}
@@ -204,7 +215,22 @@ function offersOf(state: State, pointId: string): Offer[] {
   const objects = Object.values(doc?.objects ?? {}).sort((a, b) => rank(a.type) - rank(b.type) || byName(a, b));
   const present = new Set(objects.map((each) => each.type));
   const services = SERVICES.filter((type) => !present.has(type) && type in types.byName);
-  return [
+  const calls = Object.values(doc?.functions ?? {})
+    .sort(byName)
+    .map((called): Offer => {
+      const meta = callMeta(types, doc as OpenDocument, called);
+      const recurs = recursive(doc as OpenDocument, called.id) ? t`A function cannot call itself.` : "";
+      return {
+        key: `${called.id}/${meta.name}`,
+        objectId: called.id,
+        object: t`Functions`,
+        category: "",
+        meta: { ...meta, description: meta.parameters.map((each) => words(each.name)).join(", ") },
+        called: called.name,
+        why: recurs || whyNot(state, called.id, meta, pointId),
+      };
+    });
+  const ofObjects = [
     ...objects.map(({ id, name, type }) => ({ id, name, type })),
     ...services.map((type) => ({ id: type, name: types.byName[type]?.display_name ?? type, type })),
   ].flatMap(({ id, name, type }) =>
@@ -217,12 +243,13 @@ function offersOf(state: State, pointId: string): Offer[] {
       why: services.includes(type) ? whyUnavailable(state, "AddSceneObject") : whyNot(state, id, meta, pointId),
     })),
   );
+  return [...calls, ...ofObjects];
 }
 
 /** Return why an action cannot be added now; an empty string if it can. */
 function whyNot(state: State, objectId: string, meta: ObjectAction, pointId: string): string {
   if (meta.disabled) return meta.problem ?? t`Not available.`;
-  const needsJoints = meta.parameters.some((each) => each.type === "joints");
+  const needsJoints = takesPlace(objectId, meta) && meta.parameters.some((each) => each.type === "joints");
   if (needsJoints && state.live.state !== "started") {
     const there = Object.values(state.doc?.joints ?? {}).some(
       (each) => each.pointId === pointId && each.robot_id === objectId,
@@ -232,12 +259,9 @@ function whyNot(state: State, objectId: string, meta: ObjectAction, pointId: str
   const needsImage = meta.parameters.some((each) => each.type === "image");
   if (needsImage) {
     const { doc, types } = state;
-    const given = Object.values(doc?.actions ?? {}).some((action) => {
-      const [id = "", method] = action.type.split("/");
-      return types.actions[doc?.objects[id]?.type ?? ""]
-        ?.find((each) => each.name === method)
-        ?.returns.includes("image");
-    });
+    const given = Object.values(doc?.actions ?? {}).some(
+      (action) => doc && metaOf(types, doc, action)?.returns.includes("image"),
+    );
     if (!given) return t`Needs a picture. Add an action that takes one first.`;
   }
   return "";

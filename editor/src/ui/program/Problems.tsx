@@ -4,7 +4,8 @@ import { t } from "@lingui/core/macro";
 import { Button as AriaButton } from "react-aria-components";
 import type { Problem } from "../../program/problems";
 import { theEngine } from "../../session/engine";
-import { now, select, setUi, useEditor } from "../../store/store";
+import { scopeOf } from "../../store/scope";
+import { now, select, setUi, show, useEditor } from "../../store/store";
 import { selectionOf, withNames } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 
@@ -30,6 +31,7 @@ export function Problems({ problems }: { problems: Problem[] }) {
           <AriaButton
             className={`fault ${each.level}`}
             onPress={() => {
+              if (each.scope !== scopeOf(now().doc ?? { path: [] })) show(each.scope ? [each.scope] : []);
               select(selectionOf(now(), each.id));
               setUi({ tool: "" });
               theEngine()?.focus(each.id);

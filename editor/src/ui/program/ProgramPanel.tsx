@@ -4,7 +4,7 @@ import { i18n } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { useMemo } from "react";
 import { ToggleButton, ToggleButtonGroup } from "react-aria-components";
-import { problemsOf } from "../../program/problems";
+import { problemsHere, problemsOf } from "../../program/problems";
 import { setUi, useEditor } from "../../store/store";
 import { AddAction } from "./AddAction";
 import { Parameters } from "./Parameters";
@@ -49,7 +49,7 @@ export default function ProgramPanel() {
         ))}
       </ToggleButtonGroup>
       {tab === "add" && <AddAction />}
-      {tab === "steps" && <Steps problems={problems} />}
+      {tab === "steps" && <Steps problems={problemsHere(doc, problems)} />}
       {tab === "problems" && <Problems problems={problems} />}
       {tab === "parameters" && <Parameters />}
     </>

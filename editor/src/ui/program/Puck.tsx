@@ -3,13 +3,14 @@
 import { t } from "@lingui/core/macro";
 import { aimedPlace } from "../../commands/crosshair";
 import { notEditable, placePuck } from "../../commands/program";
+import { placeKey } from "../../program/steps";
 import { notify, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/section";
 import "./program.css";
 
 const Puck: Section["Body"] = ({ selection: { id, kind } }) => {
-  const placed = useEditor((state) => `place/${id}` in state.view.shared);
+  const placed = useEditor((state) => placeKey(state.doc, id) in state.view.shared);
   const why = useEditor((state) => notEditable(state, "PreviewMove"));
   const move = () => {
     const place = aimedPlace();

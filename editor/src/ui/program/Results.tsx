@@ -3,8 +3,8 @@
 import { t } from "@lingui/core/macro";
 import { Fragment, useId, useState } from "react";
 import { nameResults, notEditable } from "../../commands/program";
-import { metaOf, variableNamed } from "../../program/logic";
-import { newOutputs } from "../../program/naming";
+import { calledBy, metaOf, variableNamed } from "../../program/logic";
+import { newOutputs, resultNames } from "../../program/naming";
 import { usersOf } from "../../program/problems";
 import { typeName } from "../../program/values";
 import { select, useEditor } from "../../store/store";
@@ -21,6 +21,8 @@ const Results: Section["Body"] = ({ selection: { id } }) => {
   if (!doc || !action) return null;
   const returns = metaOf(types, doc, action)?.returns ?? [];
   const outputs = action.flows[0]?.outputs ?? [];
+  const called = calledBy(doc, action);
+  const method = called?.name ?? action.type.split("/")[1] ?? action.name;
   const why = notEditable(state);
   if (returns.length === 0) return <p className="quiet small">{t`Nothing.`}</p>;
   if (outputs.length === 0) {
@@ -30,7 +32,7 @@ const Results: Section["Body"] = ({ selection: { id } }) => {
         <Button
           why={why}
           onPress={() =>
-            void nameResults(id, newOutputs(doc, action.type.split("/")[1] ?? action.name, returns.length)).then(
+            void nameResults(id, called ? resultNames(doc, called) : newOutputs(doc, method, returns.length)).then(
               setProblem,
             )
           }
@@ -56,7 +58,7 @@ const Results: Section["Body"] = ({ selection: { id } }) => {
             id,
             outputs.map((each, at) => (at === index ? name : each)),
           );
-        const own = newOutputs(doc, action.type.split("/")[1] ?? action.name, 1)[0] ?? output;
+        const own = newOutputs(doc, method, 1)[0] ?? output;
         return (
           <Fragment key={`${id}/${index}`}>
             {!stored && (

@@ -6,12 +6,16 @@
 import { t } from "@lingui/core/macro";
 import { useEffect, useMemo, useRef, useState } from "react";
 import { Button as AriaButton, ToggleButton } from "react-aria-components";
+import { pickAction, startPicking } from "../../commands/functions";
+import { notEditable } from "../../commands/program";
 import { breakAt } from "../../commands/run";
 import { storeViewState } from "../../commands/viewstate";
+import { detailOf } from "../../program/functions";
 import { listingOf, type Row } from "../../program/listing";
-import { branchKind, conditionWords } from "../../program/logic";
+import { branchKind, calledBy, conditionWords } from "../../program/logic";
 import { movableRuns } from "../../program/moving";
 import type { Problem } from "../../program/problems";
+import { valuesOf } from "../../program/step";
 import { END, placeOf } from "../../program/steps";
 import { takenExit } from "../../program/taken";
 import { theEngine } from "../../session/engine";
@@ -21,6 +25,7 @@ import type { State } from "../../store/state";
 import { notify, now, select, setUi, useEditor } from "../../store/store";
 import { nameOf, selectionOf, withNames } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
+import { Button } from "../kit/kit";
 import { ReachBadge } from "../points/Reach";
 import { type Drag, MoveHandle } from "./MoveHandle";
 import { at, useRows } from "./useRows";
@@ -46,7 +51,7 @@ export function Steps({ problems }: { problems: Problem[] }) {
     rows.map((row) => HEIGHT[row.kind]),
   );
 
-  const running = program.running.at(-1) ?? live.executing;
+  const running = program.running.findLast((id) => doc !== null && id in doc.actions) ?? live.executing;
   const active = isRunning(state);
   const followed = useRef(true);
   useEffect(() => {
@@ -78,6 +83,11 @@ export function Steps({ problems }: { problems: Problem[] }) {
         />
         <span>{t`Show steps in the 3D view`}</span>
       </label>
+      {doc.project?.has_logic && !ui.picked && (
+        <Button look="plain" icon="function" why={notEditable(state, "MakeFunction")} onPress={() => startPicking()}>
+          {t`Select several actions`}
+        </Button>
+      )}
       <ol className="steps" ref={list} style={{ height: at(tops, rows.length) }} aria-label={t`Program`}>
         {rows.slice(first, last).map((row, n) => {
           const index = first + n;
@@ -90,7 +100,7 @@ export function Steps({ problems }: { problems: Problem[] }) {
               data-action={row.kind === "action" ? id : undefined}
               data-depth={row.depth}
               data-running={program.running.includes(id) || live.executing === id}
-              data-selected={ui.selection?.id === id}
+              data-selected={ui.selection?.id === id || ui.picked?.includes(id)}
               data-taken={exit === id}
               data-drop={drag && drag.over === id ? drag.side : undefined}
               style={{
@@ -134,9 +144,10 @@ interface ActionRowProps {
 }
 
 function ActionRow({ state, id, problem, run, drag, onDrag }: ActionRowProps) {
-  const { doc, breakpoints, program, live } = state;
+  const { doc, types, breakpoints, program, live, ui } = state;
   const action = doc?.actions[id];
   if (!doc || !action) return null;
+  const called = calledBy(doc, action);
   const cannot = whyUnavailable(state, "SetBreakpoints");
   const running = program.running.includes(id) || live.executing === id;
   return (
@@ -149,8 +160,14 @@ function ActionRow({ state, id, problem, run, drag, onDrag }: ActionRowProps) {
       >
         <span className="breakpoint-dot" aria-hidden="true" />
       </ToggleButton>
-      <AriaButton className="step" data-name onPress={() => goTo(id)}>
+      <AriaButton
+        className="step"
+        data-name
+        aria-pressed={ui.picked?.includes(id)}
+        onPress={() => (ui.picked ? pickAction(id) : goTo(id))}
+      >
         <span className="step-head">
+          {called && <Icon name="function" size={16} />}
           <span className="step-name">{action.name}</span>
           <ReachBadge id={id} />
           {running && <span className="tag good">{program.state === "paused" ? t`waiting` : t`running`}</span>}
@@ -161,7 +178,7 @@ function ActionRow({ state, id, problem, run, drag, onDrag }: ActionRowProps) {
           </span>
         ) : (
           <span className="quiet small step-more">
-            {t`${nameOf(state, action.type.split("/")[0] ?? "")} at ${nameOf(state, action.pointId)}`}
+            {[detailOf(doc, action), called && valuesOf(doc, types, action)].filter(Boolean).join(" · ")}
           </span>
         )}
       </AriaButton>

@@ -1,14 +1,33 @@
 /** Sections of the panel about actions, connections, START and END; their bodies are loaded when they are needed. */
 
 import { msg } from "@lingui/core/macro";
-import { metaOf } from "../../program/logic";
-import { isErrorExit } from "../../program/steps";
+import { calledBy, metaOf } from "../../program/logic";
+import { END, isErrorExit, START } from "../../program/steps";
 import { lazyComponent } from "../kit/lazy";
 import type { Section } from "../workplace/section";
 
 const isAction: Section["applies"] = ({ kind }) => kind === "action";
 
 export const programSections: readonly Section[] = [
+  {
+    id: "function",
+    title: msg`Function`,
+    applies: ({ kind, id }, { doc }) =>
+      kind === "action" && doc !== null && calledBy(doc, doc.actions[id]) !== undefined,
+    Body: lazyComponent(() => import("../functions/CallSection")),
+  },
+  {
+    id: "taken",
+    title: msg`Parameters of the function`,
+    applies: ({ id }, { doc }) => id === START && doc !== null && doc.path.length > 0,
+    Body: lazyComponent(() => import("../functions/Signature")),
+  },
+  {
+    id: "returned",
+    title: msg`Results of the function`,
+    applies: ({ id }, { doc }) => id === END && doc !== null && doc.path.length > 0,
+    Body: lazyComponent(() => import("../functions/Signature")),
+  },
   { id: "try", title: msg`Do`, applies: isAction, Body: lazyComponent(() => import("./ActionCommands")) },
   {
     id: "parameters",

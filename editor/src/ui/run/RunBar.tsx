@@ -3,9 +3,12 @@
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import * as commands from "../../commands/run";
+import { calledBy } from "../../program/logic";
+import { doingWords, innermost, stackOf } from "../../program/position";
 import { whyUnavailable } from "../../store/permissions";
-import { useEditor } from "../../store/store";
-import { nameOf } from "../../viewmodel/names";
+import { anyAction } from "../../store/scope";
+import { select, useEditor } from "../../store/store";
+import { selectionOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
 
 const STATES: Record<string, MessageDescriptor> = {
@@ -25,17 +28,20 @@ export function phaseName(phase: string): string | undefined {
 
 export default function RunBar() {
   const state = useEditor((each) => each);
-  const { state: phase, running } = state.program;
-  const doing = running
-    .map((id) => nameOf(state, id))
-    .filter(Boolean)
-    .join(", ");
+  const { state: phase } = state.program;
+  const doing = doingWords(state);
+  const [inner] = innermost(state);
   return (
     <div className="runbar" role="group" aria-label={t`The program`}>
       <span className="runbar-state" role="status">
         <strong>{phaseName(phase)}</strong>
         {doing && <span className="small quiet"> {phase === "paused" ? t`before ${doing}` : doing}</span>}
       </span>
+      {inner !== undefined && state.doc && !(inner in state.doc.actions) && selectionOf(state, inner) && (
+        <Button icon="function" onPress={() => select(selectionOf(state, inner))}>
+          {t`Show`}
+        </Button>
+      )}
       <RunButtons />
     </div>
   );
@@ -45,6 +51,11 @@ export default function RunBar() {
 export function RunButtons() {
   const phase = useEditor((state) => state.program.state);
   const why = useEditor((state) => whyUnavailable(state, "StopPackage"));
+  const inside = useEditor((state) => innermost(state).some((id) => stackOf(state, id).length > 1));
+  const beforeCall = useEditor(({ doc, program }) => {
+    const last = doc && anyAction(doc, program.running.at(-1) ?? "");
+    return doc !== null && calledBy(doc, last ?? undefined) !== undefined;
+  });
   return (
     <>
       {phase === "running" && (
@@ -60,6 +71,16 @@ export function RunButtons() {
           <Button icon="step" why={why} onPress={() => void commands.step()}>
             {t`Step`}
           </Button>
+          {beforeCall && (
+            <Button why={why} onPress={() => void commands.step("into")}>
+              {t`Step into`}
+            </Button>
+          )}
+          {inside && (
+            <Button why={why} onPress={() => void commands.step("out")}>
+              {t`Step out`}
+            </Button>
+          )}
         </>
       )}
       {(phase === "running" || phase === "paused" || phase === "pausing" || phase === "resuming") && (

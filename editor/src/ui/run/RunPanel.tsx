@@ -4,6 +4,7 @@ import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { notEditable } from "../../commands/program";
 import { breakAt, build, notRunnable, run } from "../../commands/run";
+import { doingWords } from "../../program/position";
 import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import { select, setUi, useEditor } from "../../store/store";
@@ -30,7 +31,7 @@ export default function RunPanel() {
     await run({ paused });
     setBusy(false);
   };
-  const doing = program.running.map((id) => nameOf(state, id)).join(", ");
+  const doing = doingWords(state);
   const broken = Object.keys(breakpoints).filter((id) => nameOf(state, id));
   return (
     <>

@@ -7,6 +7,7 @@ import { clock, duration } from "../../formats";
 import { metaOf } from "../../program/logic";
 import { words } from "../../program/naming";
 import type { TraceEntry } from "../../protocol/types";
+import { anyAction } from "../../store/scope";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { Values } from "../program/Values";
@@ -34,7 +35,9 @@ export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {
               aria-expanded={open === entry.number}
               onPress={() => setOpen(open === entry.number ? 0 : entry.number)}
             >
-              <span className="trace-name">{entry.name || t`an action`}</span>
+              <span className="trace-name" data-inside={entry.call !== undefined}>
+                {entry.name || t`an action`}
+              </span>
               <span className="quiet small">
                 {entry.error !== undefined
                   ? t`failed`
@@ -55,7 +58,7 @@ export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {
 }
 
 function Detail({ entry, onChoose }: { entry: TraceEntry; onChoose: (actionId: string) => void }) {
-  const action = useEditor((state) => state.doc?.actions[entry.action_id]);
+  const action = useEditor((state) => state.doc && anyAction(state.doc, entry.action_id));
   const meta = useEditor((state) => (action && state.doc ? metaOf(state.types, state.doc, action) : undefined));
   const names = meta?.parameters.map((each) => words(each.name)) ?? [];
   return (

@@ -4,6 +4,7 @@ import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 import * as documents from "../../commands/documents";
 import { notPredictable, startDryRun } from "../../commands/dryRun";
+import { openFunction } from "../../commands/functions";
 import { chooseLanguage } from "../../commands/language";
 import { goOffline, goOnline, stopMotion } from "../../commands/operation";
 import { storeGeneralState } from "../../commands/viewstate";
@@ -24,7 +25,10 @@ import type { Entry } from "./matches";
 import { openOverlay } from "./overlay";
 
 export function entriesOf(state: State): Entry[] {
-  return [...(state.doc ? [...ofWorkplace(state), ...things(state)] : ofHome(state)), ...everywhere(state)];
+  return [
+    ...(state.doc ? [...ofWorkplace(state), ...things(state), ...inFunctions(state)] : ofHome(state)),
+    ...everywhere(state),
+  ];
 }
 
 /** Start a dry run, and show its panel. */
@@ -104,6 +108,26 @@ function things(state: State): Entry[] {
       theEngine()?.focus(id);
     },
   }));
+}
+
+/** Return the functions, and the actions of those that are not open. */
+function inFunctions({ doc }: State): Entry[] {
+  if (!doc) return [];
+  return Object.values(doc.functions).flatMap(({ id, name, actions }) => {
+    const hidden = Object.values(actions).filter((each) => !(each.id in doc.actions));
+    return [
+      { id, words: name, detail: t`function`, why: "", act: () => openFunction(id) },
+      ...hidden.map(
+        (each): Entry => ({
+          id: each.id,
+          words: each.name,
+          detail: t`action of ${name}`,
+          why: "",
+          act: () => select({ kind: "action", id: each.id }),
+        }),
+      ),
+    ];
+  });
 }
 
 function ofHome(state: State): Entry[] {

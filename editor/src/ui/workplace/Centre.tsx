@@ -17,6 +17,8 @@ import "./centre.css";
 const RobotChip = lazyComponent(() => import("../robot/RobotChip"));
 const FlowView = lazyComponent(() => import("../flow/FlowView"));
 const ConnectingBanner = lazyComponent(() => import("../program/ConnectingBanner"));
+const PickingBanner = lazyComponent(() => import("../functions/PickingBanner"));
+const ScopeBar = lazyComponent(() => import("../functions/ScopeBar"));
 const RunBar = lazyComponent(() => import("../run/RunBar"));
 const CodeView = lazyComponent(() => import("../code/CodeView"));
 const WORDS: Record<Mode, MessageDescriptor> = { "3d": msg`3D`, flow: msg`Flow`, split: msg`Split`, code: msg`Code` };
@@ -26,6 +28,8 @@ export function Centre() {
   const project = useEditor((state) => state.doc?.project);
   const running = useEditor(isRunning);
   const connecting = useEditor((state) => state.ui.connecting !== null);
+  const picking = useEditor((state) => state.ui.picked !== null);
+  const inFunction = useEditor((state) => state.doc !== null && state.doc.path.length > 0);
   const chosen = useEditor((state) => state.ui.mode);
   const modes: Mode[] = project?.has_logic ? ["3d", "flow", "split", "code"] : ["3d", "code"];
   const mode = project && modes.includes(chosen) ? chosen : "3d";
@@ -64,7 +68,9 @@ export function Centre() {
         </Suspense>
         <Suspense fallback={null}>
           {running && <RunBar />}
+          {inFunction && mode !== "code" && <ScopeBar />}
           {connecting && <ConnectingBanner />}
+          {picking && <PickingBanner />}
         </Suspense>
       </div>
     </div>

@@ -2,6 +2,7 @@
 
 import { notEditable, placePuck, showPuck } from "../../commands/program";
 import type { Engine } from "../../engine/engine";
+import { placeKey } from "../../program/steps";
 import { now } from "../../store/store";
 
 /** Distance after which a touch is a drag, pixels. */
@@ -40,7 +41,7 @@ export function dragPucks(engine: Engine, canvas: HTMLCanvasElement): () => void
       y,
       moved: false,
       pointer: event.pointerId,
-      before: now().view.shared[`place/${selection.id}`],
+      before: now().view.shared[placeKey(now().doc, selection.id)],
     };
     engine.view.enable(false);
     canvas.setPointerCapture(event.pointerId);

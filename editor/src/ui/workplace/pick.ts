@@ -12,6 +12,11 @@ export function pick(ids: readonly string[]): void {
     if (target) void import("../../commands/program").then(({ finishConnecting }) => finishConnecting(target.id));
     return;
   }
+  if (state.ui.picked) {
+    const action = found.find(({ kind }) => kind === "action");
+    if (action) void import("../../commands/functions").then(({ pickAction }) => pickAction(action.id));
+    return;
+  }
   // So every item can be selected.
   const at = found.findIndex((each) => each.id === state.ui.selection?.id);
   const next = found[(at + 1) % Math.max(1, found.length)] ?? null;

@@ -3,6 +3,7 @@
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { Suspense } from "react";
+import { calledBy } from "../../../program/logic";
 import { words } from "../../../program/naming";
 import { theEngine } from "../../../session/engine";
 import { heldBy } from "../../../store/selectors";
@@ -22,12 +23,14 @@ const Body: Section["Body"] = ({ selection: { kind, id } }) => {
   const description = useEditor((state) => state.types.byName[type]?.description ?? "");
   const action = useEditor((state) => state.doc?.actions[id]);
   const by = useEditor((state) => (action ? nameOf(state, action.type.split("/")[0] ?? "") : ""));
+  const method = action?.type.split("/")[1] ?? "";
+  const called = useEditor((state) => state.doc !== null && calledBy(state.doc, action) !== undefined);
   const state = useEditor((each) => each.live.objects[id]);
   const limited = useEditor((each) => uncontrolledOnline(each).some((one) => one.id === id));
   return (
     <>
       <p>
-        {action ? `${by}: ${words(action.type.split("/")[1] ?? "")}` : typeName || kindName(kind)}
+        {called ? t`Calls ${by}` : action ? `${by}: ${words(method)}` : typeName || kindName(kind)}
         {state && (
           <span className={`tag ${limited ? "warn" : (TONE[state.state] ?? "")}`}>{stateName(state.state)}</span>
         )}

@@ -1,0 +1,42 @@
+/** The function that an action calls: open it, or replace the call by its actions. */
+
+import { plural, t } from "@lingui/core/macro";
+import { dissolve, openFunction } from "../../commands/functions";
+import { notEditable } from "../../commands/program";
+import { callsOf } from "../../program/functions";
+import { calledBy } from "../../program/logic";
+import { useEditor } from "../../store/store";
+import { Button } from "../kit/kit";
+import type { Section } from "../workplace/section";
+import { FunctionMenu } from "./FunctionMenu";
+
+const CallSection: Section["Body"] = ({ selection: { id } }) => {
+  const doc = useEditor((state) => state.doc);
+  const why = useEditor((state) => notEditable(state, "DissolveCall"));
+  const called = doc && calledBy(doc, doc.actions[id]);
+  if (!doc || !called) return null;
+  const calls = callsOf(doc, called.id).length;
+  const actions = plural(Object.keys(called.actions).length, { one: "# action", other: "# actions" });
+  return (
+    <>
+      <p>
+        <strong>{called.name}</strong>{" "}
+        <span className="quiet small">
+          {actions}
+          {" · "}
+          {plural(calls, { one: "# call", other: "# calls" })}
+        </span>
+      </p>
+      <div className="row">
+        <Button icon="function" onPress={() => openFunction(called.id)}>
+          {t`Open function`}
+        </Button>
+        <Button look="plain" why={why} onPress={() => void dissolve(id)}>
+          {t`Replace by its actions`}
+        </Button>
+        <FunctionMenu id={called.id} />
+      </div>
+    </>
+  );
+};
+export default CallSection;

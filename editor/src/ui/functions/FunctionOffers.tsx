@@ -1,0 +1,81 @@
+/** The group “Functions” of the list of actions: open a function, add an empty one, import one from a file. */
+
+import { t } from "@lingui/core/macro";
+import { Suspense, useRef, useState } from "react";
+import {
+  addFunction,
+  type FunctionFile,
+  freeFunctionName,
+  importFunction,
+  openFunction,
+  readFunction,
+} from "../../commands/functions";
+import { notEditable } from "../../commands/program";
+import { functionNames } from "../../program/functions";
+import { notify, useEditor } from "../../store/store";
+import { Button } from "../kit/kit";
+import { lazyComponent } from "../kit/lazy";
+import "./functions.css";
+import { AskName } from "../kit/lazyControls";
+
+const ImportDialog = lazyComponent(() => import("./ImportDialog"));
+
+export function OpenButton({ id, name }: { id: string; name: string }) {
+  return <Button look="plain" icon="function" aria-label={t`Open ${name}`} onPress={() => openFunction(id)} />;
+}
+
+export function NewFunction() {
+  const doc = useEditor((state) => state.doc);
+  const why = useEditor((state) => notEditable(state, "AddFunction"));
+  const input = useRef<HTMLInputElement>(null);
+  const [naming, setNaming] = useState(false);
+  const [file, setFile] = useState<FunctionFile | null>(null);
+  const take = async (chosen: File | undefined) => {
+    if (!chosen) return;
+    try {
+      const found = await readFunction(chosen);
+      if (found.points.length > 0) return setFile(found);
+      const refused = await importFunction(found, {});
+      if (refused) notify("error", refused);
+    } catch (error) {
+      notify("error", error instanceof Error ? error.message : String(error));
+    }
+  };
+  return (
+    <div className="row">
+      <Button icon="plus" why={why} onPress={() => setNaming(true)}>
+        {t`New function`}
+      </Button>
+      <Button look="plain" why={why} onPress={() => input.current?.click()}>
+        {t`Import a function`}
+      </Button>
+      <input
+        ref={input}
+        type="file"
+        accept=".json"
+        className="hidden-but-read"
+        tabIndex={-1}
+        aria-hidden="true"
+        onChange={(event) => {
+          void take(event.target.files?.[0]);
+          event.target.value = ""; // the same file can be selected again
+        }}
+      />
+      {naming && doc && (
+        <AskName
+          title={t`New function`}
+          initial={freeFunctionName("function_1")}
+          yes={t`Add`}
+          taken={functionNames(doc)}
+          onYes={(name) => void addFunction(name)}
+          onClose={() => setNaming(false)}
+        />
+      )}
+      {file && (
+        <Suspense fallback={null}>
+          <ImportDialog file={file} onClose={() => setFile(null)} />
+        </Suspense>
+      )}
+    </div>
+  );
+}
