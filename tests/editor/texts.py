@@ -57,6 +57,7 @@ DISMISS: Final = "Dismiss"
 # ------------------------------------------------------------------------------------------------ view and program
 AT_CROSSHAIR: Final = "At the crosshair"
 GRAPH: Final = "Program graph"
+SELECT_SEVERAL: Final = "Select several actions"
 TAP_NEXT_STEP: Final = "Tap the step that follows"
 NEXT_STEP: Final = "Next step"
 PARAMETERS: Final = "Parameters"

@@ -1,6 +1,7 @@
 /**
- * The state of the editor. Everything except `ui` and `connection` comes from the server and is changed only by its
- * events: an edit is a request, and its effect comes back as an event. Telemetry at 30 Hz is in telemetry.ts.
+ * The state of the editor. Everything except `ui`, `connection` and the open function comes from the server and is
+ * changed only by its events: an edit is a request, and its effect comes back as an event. Telemetry at 30 Hz is in
+ * telemetry.ts.
  */
 
 import type {

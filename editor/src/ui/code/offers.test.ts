@@ -113,3 +113,21 @@ test("names are converted as in generated scripts", () => {
     "speed: number = 1.0",
   );
 });
+
+test("functions are completed and have a signature", () => {
+  const called = {
+    ...{ id: "pfu", name: "handle board", actions: {}, logic: {}, returns: [{ type: "boolean", link: "x/default/0" }] },
+    parameters: [{ name: "code", type: "string", value: "" }],
+  };
+  const known = { ...doc, functions: { pfu: called } };
+  const source = "def main(res: Resources) -> None:\n    while True:\n        fine = handle_board(";
+  expect(signatureAt(source, source.length, known, types)?.action.parameters.map((each) => each.name)).toEqual([
+    "code",
+  ]);
+  const offer = offersAt(source, source.length, known, types)?.offers.find((each) => each.label === "handle_board");
+  // biome-ignore lint/suspicious/noTemplateCurlyInString: fields of a snippet
+  expect(offer?.snippet).toBe('handle_board(${code}, an="${handle_board}")');
+  const later = `${source}"A", an="handle")\n        `;
+  const fine = offersAt(later, later.length, known, types)?.offers.find((each) => each.label === "fine");
+  expect(fine?.detail).toBe("yes or no");
+});
