@@ -29,7 +29,7 @@ import {
   variableNamed,
   whenOf,
 } from "./logic";
-import { isParallel, parallelOf } from "./parallel";
+import { isParallel, parallelOf, runnerOf } from "./parallel";
 import { reachOfAction } from "./reach";
 
 export interface Problem {
@@ -136,9 +136,7 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
     }
   }
   for (const item of Object.values(doc.logic)) {
-    const missing = whenOf(item).comparisons.some(
-      ({ what }) => !operandAt(doc, types, what),
-    );
+    const missing = whenOf(item).comparisons.some(({ what }) => !operandAt(doc, types, what));
     if (missing && typesKnown(doc, types)) {
       error(
         item.id,
@@ -198,7 +196,7 @@ function ofAction(
       if (problem !== undefined) continue;
       const result = resultAt(doc, types, link);
       if (!result) error(action.id, t`${action.name}: the result used for ${wanted.name} no longer exists.`);
-      else if (doc.project?.has_logic && !after(doc, result.action.id).has(action.id)) {
+      else if (doc.project?.has_logic && !after(doc, runnerOf(doc, result.action.id)).has(runnerOf(doc, action.id))) {
         warn(
           action.id,
           t`${action.name}: ${wanted.name} uses a result of ${result.action.name}, which does not run before it.`,

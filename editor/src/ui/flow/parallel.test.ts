@@ -2,6 +2,7 @@ import { describe, expect, it } from "vitest";
 import { listingOf } from "../../program/listing";
 import { problemsOf } from "../../program/problems";
 import { program, TYPES } from "../../program/testing";
+import { functionOf } from "../../store/scope";
 import { graphOf } from "./graph";
 
 describe("parallel work", () => {
@@ -13,6 +14,22 @@ describe("parallel work", () => {
   for (const id of ["one", "two"]) {
     const call = doc.actions[id];
     if (call) doc.actions[id] = { ...call, type: `pfu_${id}/call`, flows: [{ type: "default", outputs: [`r_${id}`] }] };
+  }
+  for (const id of ["one", "two"]) {
+    doc.functions[`pfu_${id}`] = functionOf({
+      ...{ id: `pfu_${id}`, name: id, parameters: [], returns: [{ type: "integer", link: `count_${id}/default/0` }] },
+      actions: [
+        {
+          ...{ id: `count_${id}`, name: `count_${id}`, type: "device/count" },
+          parameters: [{ name: "by", type: "integer", value: "1" }],
+          flows: [{ type: "default", outputs: [`n_${id}`] }],
+        },
+      ],
+      logic: [
+        { id: `in_${id}`, start: "START", end: `count_${id}` },
+        { id: `out_${id}`, start: `count_${id}`, end: "END" },
+      ],
+    });
   }
   const { both, show } = doc.actions;
   if (both) doc.actions.both = { ...both, type: "functions/parallel", branches: ["one", "two"] };
