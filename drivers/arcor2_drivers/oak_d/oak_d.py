@@ -191,11 +191,14 @@ class OakD(ImageStream, Camera):
         sample = color[::SAMPLE_STEP, ::SAMPLE_STEP]
         white = float((sample.min(axis=2) >= WHITE).mean())
         if white > self._config.white_limit:
-            text = "{device}: {white:.0%} of the image is white"
             if shot.exposure is None:
-                raise Overexposed(text, device=self.who, white=white)
-            text = "{device}: {white:.0%} of the image is white with an exposure of {exposure:g} ms"
-            raise Overexposed(text, device=self.who, white=white, exposure=shot.exposure * 1e3)
+                raise Overexposed("{device}: {white:.0%} of the image is white", device=self.who, white=white)
+            raise Overexposed(
+                "{device}: {white:.0%} of the image is white with an exposure of {exposure:g} ms",
+                device=self.who,
+                white=white,
+                exposure=shot.exposure * 1e3,
+            )
         if (mean := float(sample.mean())) < BLACK:
             raise DeviceFault(
                 "{device}: the image is black. Check that the lens is not covered and the light is on.",

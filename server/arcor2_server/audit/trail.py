@@ -84,13 +84,13 @@ class AuditTrail:
             return None
         try:
             found = self._file.check()
-            problem = found.problem
+            problem: str | Message = found.problem
             if not problem:
                 self._file.open()
                 log.info("audit trail", last=found.last, digest=found.digest)
                 return None
         except StorageError as error:
-            problem = str(error)
+            problem = error.message
         self._file.close()
         stored = aside(path, now())
         try:

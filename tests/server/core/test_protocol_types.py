@@ -18,6 +18,7 @@ ADDED = {
     "AddAction.Request.Args": {"error_output", "retry"},
     "AddLogicItem.Request.Args": {"error_kinds", "when"},
     "AddProjectParameter.Request.Args": {"variable"},
+    "Project": {"script"},
     "ProjectParameter": {"variable"},
     "LogicItem": {"error_kinds", "when"},
     "UpdateAction.Request.Args": {"error_output", "retry"},
