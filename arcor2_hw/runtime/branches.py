@@ -13,16 +13,20 @@ class Action:
     """One call of an action. `id` is None in a project that declares no actions.
 
     number: Counts the calls of a run from 1. call: The number of the call around it, 0 for none. frame: Its place in
-    the position of the program; None for parallel work, which is not part of the stacks of its branches.
+    the position of the program; None for parallel work, which is not part of the stacks of its branches. attempt:
+    Counts the attempts of an action that is retried. failed_after: Duration of an action at whose failure the program
+    was held, s.
     """
 
-    __slots__ = ("began", "call", "frame", "id", "number", "waited")
+    __slots__ = ("attempt", "began", "call", "failed_after", "frame", "id", "number", "waited")
 
-    def __init__(self, number: int, action_id: str | None, call: int, frame: Frame | None) -> None:
+    def __init__(self, number: int, action_id: str | None, call: int, frame: Frame | None, attempt: int = 1) -> None:
         self.number = number
         self.id = action_id
         self.call = call
         self.frame = frame
+        self.attempt = attempt
+        self.failed_after: float | None = None
         self.began = 0.0
         self.waited = 0.0
 

@@ -244,6 +244,7 @@ class Host:
             shared_breakpoints=frozenset(message.shared_breakpoints),
             cell_file=message.cell,
             secrets=message.secrets,
+            held=(lambda held: self.link.post(m.ProgramHeld(held))) if message.hold_on_error else None,
         )
         self._cell = program.cell
         self._cell.assets, self._cell.updates = message.assets, self._updates
@@ -362,6 +363,21 @@ class Host:
                 self.program.gate.step(message.mode, message.branch)
             case m.SetBreakpoints() if self.program is not None:
                 self.program.set_shared_breakpoints(frozenset(message.shared_breakpoints))
+            case m.DecideHeld():
+                self._decide(message)
+
+    def _decide(self, message: m.DecideHeld) -> None:
+        """Continue the held program."""
+        recovery = None if self.program is None else self.program.recovery
+        try:
+            if recovery is None:
+                raise Refused("The program is not held.")
+            recovery.decide(message)
+        except Arcor2Error as error:
+            self.link.post(m.CallFailed(message.id, error_data(error)))
+        else:
+            self.link.post(m.CallDone(message.id))
+            recovery.release()
 
     def _stopping(self, device: Device) -> None:
         self._holds.stopping(device)

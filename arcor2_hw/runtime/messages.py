@@ -11,6 +11,7 @@ from msgspec import Struct, field
 from arcor2_hw import framing
 from arcor2_hw.data.cell import Cell
 from arcor2_hw.data.device import Alarm, Connection, Health
+from arcor2_hw.data.held import HeldData, HoldChoice
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.data.position import MAIN_BRANCH, Frame, ProgramStep
@@ -108,7 +109,8 @@ class RunPackage(ToHost, frozen=True):
 
     cell: settings of devices in this cell, which override those of the package. breakpoints: ids of action points and
     actions, all of which must exist. shared_breakpoints: further ids; those that the project lacks are ignored. assets,
-    bodies, calibrations, secrets: as in OpenScene.
+    bodies, calibrations, secrets: as in OpenScene. hold_on_error: whether a failed action holds the program, see
+    ProgramHeld.
     """
 
     package_id: str
@@ -122,6 +124,7 @@ class RunPackage(ToHost, frozen=True):
     bodies: list[AddedBody] = field(default_factory=list)
     calibrations: dict[str, KinematicCalibration] = field(default_factory=dict)
     secrets: dict[str, ObjectSecrets] = field(default_factory=dict)
+    hold_on_error: bool = False
 
 
 class AddBody(ToHost, frozen=True):
@@ -231,6 +234,20 @@ class SetBreakpoints(ToHost, frozen=True):
     """Replace the shared breakpoints. Those of RunPackage remain."""
 
     shared_breakpoints: list[str]
+
+
+class DecideHeld(ToHost, frozen=True):
+    """Continue a held program. Answer: CallDone or CallFailed with this id, before the program continues.
+
+    number: of the action at which it is held. results: each as JSON, for the choice `result`. exit: id of the logic
+    item, for the choice `error_exit`; empty for the first one.
+    """
+
+    id: int
+    number: int
+    choice: HoldChoice
+    results: list[str] = field(default_factory=list)
+    exit: str = ""
 
 
 class StopProgram(ToHost, frozen=True):
@@ -355,6 +372,12 @@ class ProgramChanged(ToServer, frozen=True):
     error: ErrorData | None = None
 
 
+class ProgramHeld(ToServer, frozen=True):
+    """The program is held at an action; `run` is not set. ProgramChanged reports `paused` when no action runs."""
+
+    held: HeldData
+
+
 class HandTeachingEnded(ToServer, frozen=True):
     """A robot has left hand teaching mode without a request. `error`: the reason."""
 
@@ -410,6 +433,7 @@ HostBound = (
     | Resume
     | Step
     | SetBreakpoints
+    | DecideHeld
     | StopProgram
     | CloseScene
 )
@@ -427,6 +451,7 @@ ServerBound = (
     | ProgramEvent
     | ActionFailed
     | ProgramChanged
+    | ProgramHeld
     | DeviceChanged
     | LogLine
 )

@@ -57,6 +57,8 @@ class Gate:
         self._reported = False
         self._running = 0
         self._stopped = False
+        self._hold: object = None
+        """Identity of the present hold, None if the program is not held."""
         self._changed = threading.Condition()
 
     # -------------------------------------------------------------------------------- commands
@@ -94,9 +96,8 @@ class Gate:
         with self._changed:
             self._mode = mode
             self._steps = 1
-            self._reported = False
-            self._notify("running")
-            self._changed.notify_all()
+            if self._hold is None:
+                self._report_running()
 
     # -------------------------------------------------------------------------------- actions
     def set_breakpoints(self, breakpoints: Set[str]) -> None:
@@ -126,13 +127,59 @@ class Gate:
             if not is_call:
                 self._running += 1
 
-    def after(self, branch: Branch) -> None:
-        """Record the end of an action, then wait while the program is paused. Raises ProgramStopped."""
+    def after(self, branch: Branch, *, counted: bool = True) -> None:
+        """Record the end of an action, then wait while the program is paused. Raises ProgramStopped.
+
+        counted: whether the action still counts as running, which it does not after `hold_program`.
+        """
         if self._mode is _Mode.PAUSE:
             self._settle()
         with self._changed:
-            self._running -= 1
+            self._running -= counted
             self._wait(branch)
+
+    # -------------------------------------------------------------------------------- holds
+    def hold_program(self, branch: Branch, begin: Callable[[], None]) -> None:
+        """Hold the program until `release`, in the thread of an action, which does not count as running any more.
+
+        Other branches wait before their next action. Only one branch holds the program at a time.
+
+        Args:
+            branch: the branch of the action.
+            begin: called when the hold begins, before "paused" is reported. The gate is locked.
+
+        Raises:
+            ProgramStopped: the program, or this branch, was stopped.
+        """
+        with self._changed:
+            self._running -= 1
+            self._wait_not_held(branch)
+            own = self._hold = object()
+            begin()
+            self._report_paused()
+            while self._hold is own and not self._stopped and not branch.held:
+                self._changed.wait()
+            if self._hold is own and not self._stopped:  # another branch has failed, which ends this one
+                self._hold = None
+                self._report_running()
+            self._check(branch)
+
+    def release(self) -> None:
+        """End the hold."""
+        with self._changed:
+            self._hold = None
+            self._report_running()
+
+    def before_decided(self, branch: Branch) -> None:
+        """Let an action start that a person has decided on, also while the program is paused. Raises ProgramStopped."""
+        with self._changed:
+            self._wait_not_held(branch)
+            self._running += 1
+
+    def _wait_not_held(self, branch: Branch) -> None:
+        while self._hold is not None and not self._stopped and not branch.held:
+            self._changed.wait()
+        self._check(branch)
 
     def sleep(self, branch: Branch, seconds: float) -> None:
         """Wait for a time between two actions. Raises ProgramStopped as soon as the program is stopped."""
@@ -147,7 +194,7 @@ class Gate:
         return self._mode is _Mode.PAUSE
 
     def _wait(self, branch: Branch) -> None:
-        while self._is_blocked(branch) and not self._stopped and not branch.held:
+        while (self._is_blocked(branch) or self._hold is not None) and not self._stopped and not branch.held:
             self._waiting.setdefault(branch)
             self._report_paused()
             self._changed.wait()
@@ -196,7 +243,13 @@ class Gate:
         with self._changed:
             self._changed.wait_for(lambda: condition() or (stop and self._stopped), timeout)
 
+    def _report_running(self) -> None:
+        self._reported = False
+        self._notify("running")
+        self._changed.notify_all()
+
     def _report_paused(self) -> None:
-        if self._mode is _Mode.PAUSE and not self._running and not self._reported:
+        paused = self._mode is _Mode.PAUSE or self._hold is not None
+        if paused and not self._running and not self._reported:
             self._reported = True
             self._notify("paused")

@@ -5,7 +5,7 @@ import itertools
 import threading
 import time
 import traceback
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple, Protocol
 
@@ -20,6 +20,7 @@ from arcor2_hw.data.events import (
     ProjectExceptionData,
 )
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.held import HeldData
 from arcor2_hw.data.position import MAIN_BRANCH, Frame
 from arcor2_hw.data.project import CALL, Project, ProjectRobotJoints
 from arcor2_hw.data.secret import ObjectSecrets
@@ -37,6 +38,7 @@ from arcor2_hw.runtime.branches import Action, Branches
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
 from arcor2_hw.runtime.pacing import Gate
+from arcor2_hw.runtime.recovery import ActionCall, Decision, Recovery, mark_decided
 from arcor2_hw.runtime.stopping import SentStop, wait_stopped
 from arcor2_hw.runtime.values import encode_shown, results
 
@@ -47,6 +49,8 @@ STANDSTILL_TIMEOUT: Final = 2.0
 
 ATTEMPT: Final = contextvars.ContextVar("attempt", default=1)
 """Number of the attempt of an action that is retried, from 1."""
+RETRIES: Final = contextvars.ContextVar("retries", default=0)
+"""How often an action is repeated automatically if it fails."""
 
 _encode = msgspec.json.Encoder().encode
 
@@ -104,6 +108,7 @@ class Program:
         shared_breakpoints: Set[str] = frozenset(),
         cell_file: CellFile | None = None,
         secrets: Mapping[str, ObjectSecrets] = MappingProxyType({}),
+        held: Callable[[HeldData], None] | None = None,
     ) -> None:
         self.channel = channel
         self.cell_file = cell_file
@@ -119,6 +124,10 @@ class Program:
             start_paused=start_paused,
             breakpoints=self.breakpoints | shared_breakpoints,
         )
+        self.recovery: Recovery | None = None
+        """Holds the program after a failure; None if it ends."""
+        if held is not None:
+            self.recovery = Recovery(self.gate, self.cell, lambda: self.cell.wait_standstill(STANDSTILL_TIMEOUT), held)
         self.stop_requested = False
         self.ended = False
         """Whether the script has ended. The devices are being closed then, which a stop must not interrupt."""
@@ -147,6 +156,8 @@ class Program:
         types = {action.id: action.type.partition("/") for action in project.all_actions()}
         self._functions = {key: called for key, (called, _, method) in types.items() if method == CALL}
         self._joints_points = {j.id: point.id for point in project.action_points for j in point.robot_joints}
+        if self.recovery is not None:
+            self.recovery.load(project)
         if unknown := self.breakpoints.difference((p.id for p in project.action_points), self._action_ids.values()):
             raise NotFound(
                 "a breakpoint is at {unknown}, which is not an action point or action",
@@ -203,7 +214,16 @@ class Program:
         """Report that a function is called, as an action without a device. `action_begins` states the arguments."""
         return self._begin("", what, name, arguments, is_call=True)
 
-    def _begin(self, device: str, what: str, name: str | None, arguments: Sequence[Any], *, is_call: bool) -> Action:
+    def action_repeats(
+        self, former: Action, device: str, what: str, name: str | None, arguments: Sequence[Any]
+    ) -> Action:
+        """Report that an action starts again because a person has decided so. `action_begins` states the arguments."""
+        return self._begin(device, what, name, arguments, is_call=False, attempt=former.attempt + 1)
+
+    def _begin(
+        self, device: str, what: str, name: str | None, arguments: Sequence[Any], *, is_call: bool, attempt: int = 0
+    ) -> Action:
+        """Report an action or call. attempt: of an action that a person has decided to repeat, which does not pause."""
         self.check()
         action_id: str | None = None
         if self._action_ids:
@@ -230,7 +250,8 @@ class Program:
             points or msgspec.UNSET,
             msgspec.UNSET if thread is None else thread,
         )
-        action = Action(next(self._numbers), action_id, calls[-1].number if calls else 0, frame)
+        caller_number = calls[-1].number if calls else 0
+        action = Action(next(self._numbers), action_id, caller_number, frame, attempt or ATTEMPT.get())
         encoded = _encode(Event("ActionStateBefore", data=data))
         self.channel.event(
             "ActionStateBefore",
@@ -242,12 +263,17 @@ class Program:
             call=action.call,
             frames=[*frames, frame],
             branch=branch.id,
-            attempt=ATTEMPT.get(),
+            attempt=action.attempt,
         )
         announced = time.monotonic()
         # The action that uses a pose pauses at its action point, not the call that passes it on.
         ids = set() if is_call else points
-        self.gate.before(branch, ids if action_id is None else ids | {action_id}, len(calls), is_call=is_call)
+        if attempt:
+            self.gate.before_decided(branch)
+        else:
+            self.gate.before(branch, ids if action_id is None else ids | {action_id}, len(calls), is_call=is_call)
+        if not is_call:
+            self._hold_if_lost(action, name or what)
         action.began = time.monotonic()
         action.waited = action.began - announced
         if is_call:
@@ -257,12 +283,12 @@ class Program:
     def action_ended(self, action: Action, value: Any) -> None:
         """Report the result of an action, then wait while the program is paused. Raises ProgramStopped."""
         self._report_end(action, value)
-        self._leave()
+        self._leave(counted=action.failed_after is None)
 
-    def _leave(self) -> None:
+    def _leave(self, *, counted: bool = True) -> None:
         branch = self.branches.current
         branch.device = ""
-        self.gate.after(branch)
+        self.gate.after(branch, counted=counted)
 
     def function_ended(self, call: Action, value: Any) -> None:
         """Report the result of a function."""
@@ -278,7 +304,7 @@ class Program:
         self.channel.action_over(call.number, time.monotonic() - call.began, message_of(error), call.waited)
 
     def _report_end(self, action: Action, value: Any) -> None:
-        duration = time.monotonic() - action.began
+        duration = time.monotonic() - action.began if action.failed_after is None else action.failed_after
         if action.id is None:
             self.channel.action_over(action.number, duration, None, action.waited)
         else:
@@ -290,10 +316,49 @@ class Program:
 
     def action_failed(self, action: Action, error: BaseException) -> None:
         """Report that an action has failed, then wait while the program is paused. Raises ProgramStopped."""
+        self._report_failure(action, error)
+        self._leave()
+
+    def hold(self, action: Action, name: str, device: Device, method: Any, error: BaseException) -> Decision | None:
+        """Hold the program because an action has failed, and return the decision; None if the error is to be raised.
+
+        Raises:
+            ProgramStopped: The program was stopped.
+            Arcor2Error: The decision is to end the program, or to take an error exit.
+        """
+        branch, call = self.branches.current, self._call_of(action, name)
+        if self.recovery is None or self.stop_requested or branch.held or not self.recovery.holds(call, error):
+            if action.attempt > ATTEMPT.get():
+                mark_decided(error)
+            return None
+        if action.attempt == ATTEMPT.get() and RETRIES.get() and not isinstance(error, ENDS_PROGRAM):
+            return None
+        self._report_failure(action, error)
+        action.failed_after = time.monotonic() - action.began
+        decision = self.recovery.after_failure(branch, call, device, method, error)
+        if decision.error is not None:
+            branch.failure.action = decision.error, action
+            self.record_error_source(device, decision.error)
+            raise decision.error
+        return decision
+
+    def _hold_if_lost(self, action: Action, name: str) -> None:
+        """Hold the program before an action while the connection of a device is lost."""
+        branch = self.branches.current
+        while self.recovery is not None and (found := self.recovery.before_action(branch, self._call_of(action, name))):
+            if found.error is not None:
+                branch.failure.action = found.error, action
+                raise found.error
+            self.gate.before_decided(branch)
+
+    def _call_of(self, action: Action, name: str) -> ActionCall:
+        around = (call.id or "" for call in reversed(self.branches.current.calls))
+        return ActionCall(action.number, name, [action.id or "", *around])
+
+    def _report_failure(self, action: Action, error: BaseException) -> None:
         self.branches.current.failure.action = error, action
         duration = time.monotonic() - action.began
         self.channel.action_over(action.number, duration, message_of(error), action.waited)
-        self._leave()
 
     def pause_before_retry(self, seconds: float) -> None:
         """Wait before an action is repeated. Raises ProgramStopped if the program is stopped."""
@@ -337,7 +402,15 @@ class Program:
         self.gate.stop()
 
     def device_lost(self, device: Device, reason: Message | None) -> bool:
-        """Stop the program because the connection of a device is lost. Return whether the program was still running."""
+        """Stop the program because the connection of a device is lost. Return whether the program was still running.
+
+        A program that can be held continues, and is held before its next action.
+        """
+        if self.recovery is not None and self.recovery.active:
+            why = reason or Message.of("unknown reason")
+            lost = ConnectionLost("{name}: the connection is lost: {reason}", name=device.name, reason=why)
+            self.recovery.lost(device, lost)
+            return False
         error = ConnectionLost(
             "{name}: the program was stopped, because the connection is lost: {reason}",
             name=device.name,

@@ -7,6 +7,7 @@ from typing import Any, cast
 
 from arcor2_hw.actions import deadline_of, metadata_of
 from arcor2_hw.actions.decorator import with_present_names
+from arcor2_hw.data.held import HoldChoice
 from arcor2_hw.exceptions import InvalidData, ProgramFinished, ProgramStopped
 from arcor2_hw.objects import Generic
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device
@@ -63,19 +64,28 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
         action = program.action_begins(device.id, what, an, shown)
         if an is not None:
             keywords["an"] = an
-        try:
-            value = lane.call(name, bound, arguments, keywords, deadline)
-        except ProgramFinished:
-            program.action_ended(action, None)
-            raise
-        except BaseException as error:
-            program.action_failed(action, error)
-            if program.stop_requested and isinstance(error, Exception):
-                raise ProgramStopped from error
-            program.record_error_source(device, error)
-            raise
-        program.action_ended(action, value)
-        return value
+        while True:
+            try:
+                if program.recovery is not None:
+                    program.recovery.take_control(device)
+                value = lane.call(name, bound, arguments, keywords, deadline)
+            except ProgramFinished:
+                program.action_ended(action, None)
+                raise
+            except BaseException as error:
+                decision = program.hold(action, an or what, device, bound, error)
+                if decision is None:
+                    program.action_failed(action, error)
+                    if program.stop_requested and isinstance(error, Exception):
+                        raise ProgramStopped from error
+                    program.record_error_source(device, error)
+                    raise
+                value = decision.value
+                if decision.choice is HoldChoice.RETRY:
+                    action = program.action_repeats(action, device.id, what, an, shown)
+                    continue
+            program.action_ended(action, value)
+            return value
 
     def call(*arguments: Any, an: str | None = None, **keywords: Any) -> Any:
         if on_any_lane():

@@ -7,7 +7,8 @@ from arcor2_hw.actions import metadata_of
 from arcor2_hw.data.object_type import Again
 from arcor2_hw.exceptions import ENDS_PROGRAM, Arcor2Error, InvalidData
 from arcor2_hw.objects import Generic
-from arcor2_hw.runtime.program import ATTEMPT, Program
+from arcor2_hw.runtime.program import ATTEMPT, RETRIES, Program
+from arcor2_hw.runtime.recovery import is_decided
 
 
 class Retrying:
@@ -38,14 +39,15 @@ class Retrying:
 
         def call(*arguments: Any, **keywords: Any) -> Any:
             for attempt in range(1, self._count + 2):
-                token = ATTEMPT.set(attempt)
+                token, retries = ATTEMPT.set(attempt), RETRIES.set(self._count + 1 - attempt)
                 try:
                     return method(*arguments, **keywords)
                 except Arcor2Error as error:
-                    if attempt > self._count or isinstance(error, ENDS_PROGRAM):
+                    if attempt > self._count or isinstance(error, ENDS_PROGRAM) or is_decided(error):
                         raise
                 finally:
                     ATTEMPT.reset(token)
+                    RETRIES.reset(retries)
                 self._program.pause_before_retry(self._pause)
             raise AssertionError("the last attempt returns or raises")
 

@@ -66,6 +66,11 @@ def _inherited(cls: type, name: str) -> Mapping[str, Any]:
     return hints
 
 
+def return_hint(bound: types.MethodType) -> Any:
+    """Return the type hint of the result of a method; None if it returns nothing or has no hint."""
+    return _inherited(type(bound.__self__), bound.__name__).get("return")
+
+
 def _decode(raw: bytes, hint: Any) -> Any:
     name = hint if isinstance(hint, str) else getattr(hint, "__name__", "")
     module = "" if isinstance(hint, str) else getattr(hint, "__module__", "")
