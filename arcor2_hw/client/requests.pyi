@@ -52,6 +52,7 @@ from arcor2_hw.data.events import (
     ShowMainScreenData,
 )
 from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.held import HeldData, HoldChoice, HoldDecidedData, OnError
 from arcor2_hw.data.object_type import ObjectAction, ObjectModel, ObjectTypeMeta, ParameterMeta
 from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHoldData
 from arcor2_hw.data.package import PackageSummary
@@ -78,7 +79,7 @@ from arcor2_hw.data.rpc.alarms import AlarmStatisticsData, ListAlarmsData
 from arcor2_hw.data.rpc.calibrations import ListCalibrationsData
 from arcor2_hw.data.rpc.dry_runs import GetDryRunData
 from arcor2_hw.data.rpc.editor import GetExecutionTraceData, ListRunsData, SetViewStateData
-from arcor2_hw.data.rpc.execution import BuildProjectData
+from arcor2_hw.data.rpc.execution import BuildProjectData, GetHeldData
 from arcor2_hw.data.rpc.functions import (
     AddFunctionData,
     DissolveCallData,
@@ -361,6 +362,18 @@ class Requests(ABC):
     async def copy_scene(self, *, source_id: str, target_name: str, timeout: float | None = None) -> str:
         """CopyScene. Needs the role technician."""
 
+    async def decide_held(
+        self,
+        *,
+        number: int,
+        choice: HoldChoice,
+        results: list[str] | Unset = UNSET,
+        exit_id: str | Unset = UNSET,
+        confirmed: bool = False,
+        timeout: float | None = None,
+    ) -> None:
+        """DecideHeld. Needs the role operator."""
+
     async def delete_object_types(
         self, items: set[str] | None = None, *, dry_run: bool = False, timeout: float | None = None
     ) -> list[DeleteObjectTypesData]:
@@ -460,6 +473,9 @@ class Requests(ABC):
         self, robot_id: str, *, arm_id: str | Unset = UNSET, timeout: float | None = None
     ) -> set[str]:
         """GetGrippers. Needs the role operator."""
+
+    async def get_held(self, *, timeout: float | None = None) -> GetHeldData:
+        """GetHeld. Needs the role operator."""
 
     async def get_object_types(self, *, timeout: float | None = None) -> list[ObjectTypeMeta]:
         """GetObjectTypes. Needs the role operator."""
@@ -918,6 +934,7 @@ class Requests(ABC):
         start_paused: bool = False,
         breakpoints: set[str] | Unset = UNSET,
         shared_breakpoints: bool | Unset = UNSET,
+        on_error: OnError | Unset = UNSET,
         timeout: float | None = None,
     ) -> None:
         """RunPackage. Needs the role operator."""
@@ -1061,6 +1078,7 @@ class Requests(ABC):
         start_paused: bool = False,
         breakpoints: set[str] | Unset = UNSET,
         shared_breakpoints: bool | Unset = UNSET,
+        on_error: OnError | Unset = UNSET,
         timeout: float | None = None,
     ) -> None:
         """TemporaryPackage. Needs the role standard user."""
@@ -1304,9 +1322,15 @@ class Requests(ABC):
         self, name: Literal["HandTeachingMode"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[HandTeachingModeData]]: ...
     @overload
+    def follow(self, name: Literal["Held"], /, *, limit: int = LIMIT) -> EventStream[TypedEvent[HeldData]]: ...
+    @overload
     def follow(
         self, name: Literal["HistoryChanged"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[HistoryChangedData]]: ...
+    @overload
+    def follow(
+        self, name: Literal["HoldDecided"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[HoldDecidedData]]: ...
     @overload
     def follow(
         self, name: Literal["JointsChanged"], /, *, limit: int = LIMIT

@@ -7,6 +7,7 @@ from msgspec import Meta, field
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, TranslatableData, Unset
 from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.held import ActionHold
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.messages import Message
 
@@ -185,7 +186,7 @@ class RunStatistics(Data, frozen=True):
     cycle and of all cycles, s, without cycles during which the program was paused; omitted before the first one. good,
     bad: results of actions that judge a part (`verdict`); omitted if the program has no such action. counters: counters
     that the program has used. variables: all variables of the
-    project; omitted if it has none.
+    project; omitted if it has none. held: time for which the program was held at failed actions, s; omitted for none.
     """
 
     cycles: int = 0
@@ -195,6 +196,7 @@ class RunStatistics(Data, frozen=True):
     bad: int | Unset = UNSET
     counters: list[CounterValue] = field(default_factory=list)
     variables: list[VariableValue] | Unset = UNSET
+    held: float | Unset = UNSET
 
 
 class RunStatisticsData(RunStatistics, frozen=True, kw_only=True):
@@ -246,7 +248,8 @@ class TraceEntry(TranslatableData, frozen=True):
     s, without a pause before it; omitted while it runs. parameters, results: as in ActionStateBefore and
     ActionStateAfter. error: why it failed, with `key` and `values`. thread_id: omitted in the main thread of the
     script. call: number of the call of the function that contains the action; omitted in the program itself. attempt:
-    number of the attempt of a retried action; omitted for the first one.
+    number of the attempt of a retried action; omitted for the first one. hold: how long the program was held at it, and
+    who decided.
     """
 
     run: int
@@ -261,6 +264,7 @@ class TraceEntry(TranslatableData, frozen=True):
     thread_id: int | Unset = UNSET
     attempt: int | Unset = UNSET
     call: int | Unset = UNSET
+    hold: ActionHold | Unset = UNSET
 
 
 # ---------------------------------------------------------------------------------------------- reachability

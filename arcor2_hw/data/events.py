@@ -22,6 +22,7 @@ from arcor2_hw.data.editor import (
     ViewState,
 )
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.held import HeldData, HoldDecidedData
 from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHoldData
 from arcor2_hw.data.package import CollisionModels, PackageStateEnum, PackageSummary
@@ -369,7 +370,9 @@ EVENTS: Final = {
         EventType("DryRunChanged", DryRunHead, Role.OPERATOR, additional=True),
         EventType("ExecutionTrace", TraceEntry, Role.OPERATOR, additional=True),
         EventType("FunctionChanged", ProjectFunction, Role.OPERATOR, additional=True),
+        EventType("Held", HeldData, Role.OPERATOR, additional=True),
         EventType("HistoryChanged", HistoryChangedData, Role.OPERATOR, additional=True),
+        EventType("HoldDecided", HoldDecidedData, Role.OPERATOR, additional=True),
         EventType("MovePreview", MovePreviewData, Role.OPERATOR, additional=True),
         EventType("ProgramPosition", ProgramPosition, Role.OPERATOR, additional=True),
         EventType("ReachabilityChanged", ReachabilityData, Role.OPERATOR, additional=True),

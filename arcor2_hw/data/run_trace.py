@@ -6,6 +6,7 @@ from typing import Any, Final
 from msgspec import UNSET, field
 
 from arcor2_hw.data.base import Data, Timestamp, Unset
+from arcor2_hw.data.held import ActionHold
 
 
 class Span(Data, frozen=True):
@@ -16,7 +17,8 @@ class Span(Data, frozen=True):
     before it, as JSON; omitted without a condition. error: why the action failed. thread_id: omitted in the main thread
     of the script. call: number of the call of the function that contains the action; omitted in the program itself. The
     span of a call has no device. attempt: number of the attempt of a retried action; omitted for the first one. lane:
-    id of the branch that executed the action at the same time as others; omitted in the program itself.
+    id of the branch that executed the action at the same time as others; omitted in the program itself. hold: how long
+    the program was held at the action, which is not part of its duration, and who decided.
     """
 
     number: int
@@ -31,6 +33,7 @@ class Span(Data, frozen=True):
     call: int | Unset = UNSET
     attempt: int | Unset = UNSET
     lane: str | Unset = UNSET
+    hold: ActionHold | Unset = UNSET
 
 
 class TracedDevice(Data, frozen=True):

@@ -239,7 +239,7 @@ class SetBreakpoints(ToHost, frozen=True):
 class DecideHeld(ToHost, frozen=True):
     """Continue a held program. Answer: CallDone or CallFailed with this id, before the program continues.
 
-    number: of the action at which it is held. results: each as JSON, for the choice `result`. exit: id of the logic
+    number: of the action at which it is held. results: each as JSON, for the choice `result`. exit_id: id of the logic
     item, for the choice `error_exit`; empty for the first one.
     """
 
@@ -247,7 +247,7 @@ class DecideHeld(ToHost, frozen=True):
     number: int
     choice: HoldChoice
     results: list[str] = field(default_factory=list)
-    exit: str = ""
+    exit_id: str = ""
 
 
 class StopProgram(ToHost, frozen=True):

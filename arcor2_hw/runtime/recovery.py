@@ -222,7 +222,7 @@ class Recovery:
             case HoldChoice.RESULT:
                 decision = Decision(choice, _decoded(hold, message.results))
             case HoldChoice.ERROR_EXIT:
-                decision = Decision(choice, error=self._forced(hold, message.exit))
+                decision = Decision(choice, error=self._forced(hold, message.exit_id))
             case HoldChoice.END:
                 decision = Decision(choice, error=hold.error)
         self._present, self._decision = None, decision

@@ -151,10 +151,10 @@ class Run:
         self.host.expect_state("paused")
         return found
 
-    def decide(self, held: HeldData, choice: HoldChoice, *results: Any, exit: str = "", number: int = 0) -> Any:
+    def decide(self, held: HeldData, choice: HoldChoice, *results: Any, exit_id: str = "", number: int = 0) -> Any:
         encoded = [json.dumps(result) for result in results]
         self.host._calls += 1
-        self.host.send(m.DecideHeld(self.host._calls, number or held.number, choice, encoded, exit))
+        self.host.send(m.DecideHeld(self.host._calls, number or held.number, choice, encoded, exit_id))
         return self.host.answer(self.host._calls)
 
     def ended(self) -> m.ProgramChanged:
@@ -255,8 +255,8 @@ def test_an_error_exit_is_taken_by_decision(run: Run, fault: str) -> None:
     held = run.held()
     assert held.choices == ["retry", "skip", "error_exit", "end"]
     assert held.exits == [HoldExit("lit_late", ["device_timeout"], "other")]
-    assert run.decide(held, HoldChoice.ERROR_EXIT, exit="lit_other").code == "invalid_data"
-    assert run.decide(held, HoldChoice.ERROR_EXIT, exit="lit_late") is None
+    assert run.decide(held, HoldChoice.ERROR_EXIT, exit_id="lit_other").code == "invalid_data"
+    assert run.decide(held, HoldChoice.ERROR_EXIT, exit_id="lit_late") is None
     assert run.ended().finished
     assert run.notes()[2].startswith(f"exit tool {held.kind} ")
     assert "other" in run.notes()

@@ -3,6 +3,7 @@
 from typing import Final
 
 from arcor2_hw.data.base import UNSET, Data, Unset
+from arcor2_hw.data.held import HeldData, HoldChoice, OnError
 from arcor2_hw.data.package import PackageSummary
 from arcor2_hw.data.position import ProgramPosition, ProgramStep
 from arcor2_hw.data.role import Role
@@ -40,22 +41,26 @@ class RunPackageArgs(IdArgs, frozen=True):
     """Arguments of RunPackage.
 
     shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
+    on_error: what the program does when an action fails and no error exit applies.
     """
 
     start_paused: bool = False
     breakpoints: set[str] | Unset = UNSET
     shared_breakpoints: bool | Unset = UNSET
+    on_error: OnError | Unset = UNSET
 
 
 class TemporaryPackageArgs(Data, frozen=True):
     """Arguments of TemporaryPackage.
 
     shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
+    on_error: what the program does when an action fails and no error exit applies.
     """
 
     start_paused: bool = False
     breakpoints: set[str] | Unset = UNSET
     shared_breakpoints: bool | Unset = UNSET
+    on_error: OnError | Unset = UNSET
 
 
 class StepActionArgs(Data, frozen=True):
@@ -63,6 +68,27 @@ class StepActionArgs(Data, frozen=True):
 
     mode: ProgramStep = ProgramStep.OVER
     branch: str | Unset = UNSET
+
+
+class DecideHeldArgs(Data, frozen=True):
+    """Arguments of DecideHeld.
+
+    number: of the action at which the program is held. results: for `result`, the results of the action, each as JSON
+    in a text. exit_id: for `error_exit`, the id of the logic item; default: the first exit. confirmed: for `retry` of
+    an action that is not safe to repeat, whether a person has confirmed it.
+    """
+
+    number: int
+    choice: HoldChoice
+    results: list[str] | Unset = UNSET
+    exit_id: str | Unset = UNSET
+    confirmed: bool = False
+
+
+class GetHeldData(Data, frozen=True):
+    """Answer to GetHeld; `held` is omitted while the program is not held."""
+
+    held: HeldData | Unset = UNSET
 
 
 class UploadPackageArgs(Data, frozen=True):
@@ -75,8 +101,10 @@ class UploadPackageArgs(Data, frozen=True):
 EXECUTION_RPCS: Final = (
     Rpc("BuildProject", BuildProjectArgs, BuildProjectData, Role.STANDARD_USER),
     Rpc("CancelAction", None, None, Role.OPERATOR),
+    Rpc("DecideHeld", DecideHeldArgs, None, Role.OPERATOR, additional=True),
     Rpc("DeletePackage", IdArgs, None, Role.ADVANCED_USER),
     Rpc("ExecuteAction", ExecuteActionArgs, None, Role.STANDARD_USER, dry_run=True),
+    Rpc("GetHeld", None, GetHeldData, Role.OPERATOR, additional=True),
     Rpc("GetProgramPosition", None, ProgramPosition, Role.OPERATOR, additional=True),
     Rpc("ListPackages", None, list[PackageSummary], Role.OPERATOR),
     Rpc("PausePackage", None, None, Role.OPERATOR),

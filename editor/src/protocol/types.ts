@@ -50,6 +50,19 @@ export interface ActionExecutionData {
 }
 
 /**
+ * How long a program was held at an action, and who decided.
+ *
+ * duration: s; omitted while the program is held. choice, by: the decision, and the name of a user or token; omitted
+ * while the program is held, and if it was stopped.
+ */
+export interface ActionHold {
+  since: string;
+  duration?: number;
+  choice?: HoldChoice;
+  by?: string;
+}
+
+/**
  * How an action is executed. `composite` actions may call others; `hidden` ones are not offered to users.
  *
  * verdict (not in ARCOR2): whether the returned boolean says that a part is good. again (not in ARCOR2): whether the
@@ -623,6 +636,21 @@ export interface Cylinder {
   height: number;
 }
 
+/**
+ * Arguments of DecideHeld.
+ *
+ * number: of the action at which the program is held. results: for `result`, the results of the action, each as JSON
+ * in a text. exit_id: for `error_exit`, the id of the logic item; default: the first exit. confirmed: for `retry` of
+ * an action that is not safe to repeat, whether a person has confirmed it.
+ */
+export interface DecideHeldArgs {
+  number: number;
+  choice: HoldChoice;
+  results?: string[];
+  exit_id?: string;
+  confirmed?: boolean;
+}
+
 /** Answer to DeleteObjectTypes. */
 export interface DeleteObjectTypesData {
   id: string;
@@ -864,6 +892,11 @@ export interface GetGrippersArgs {
   arm_id?: string;
 }
 
+/** Answer to GetHeld; `held` is omitted while the program is not held. */
+export interface GetHeldData {
+  held?: HeldData;
+}
+
 /** Arguments of GetRobotArms. */
 export interface GetRobotArmsArgs {
   robot_id: string;
@@ -904,6 +937,33 @@ export interface HandTeachingModeData {
 
 /** Condition of a device (NAMUR NE 107). */
 export type Health = "normal" | "check_function" | "off_spec" | "maintenance_required" | "failure";
+
+/**
+ * Data of the event Held: the action at which the program is held, its error, and how it may continue.
+ *
+ * run: number of the run. number: of the action in the run. device: id of the object. kind: code of the error. text:
+ * the error, with `key` and `values`. again: whether the action is safe to retry, or the person has to be asked;
+ * omitted if a retry is not possible or nothing is repeated. returns: types of the results for the choice `result`.
+ * exits: error exits for the choice `error_exit`. before: whether the action has not started, because the connection
+ * of a device was lost.
+ */
+export interface HeldData {
+  run: number;
+  number: number;
+  action_id: string;
+  action_name: string;
+  device: string;
+  kind: string;
+  text: string;
+  choices: HoldChoice[];
+  since: string;
+  again?: Again;
+  returns?: ResultType[];
+  exits?: HoldExit[];
+  before?: boolean;
+  key?: string;
+  values?: Record<string, string | Message>;
+}
 
 /** One lock: the locked item, its name if it has one, and the time. `type` is omitted for a read lock. */
 export interface HeldLock {
@@ -971,6 +1031,30 @@ export interface HistoryStep {
   text: string;
   key?: string;
   values?: Record<string, string | Message>;
+}
+
+/**
+ * How a held program continues.
+ *
+ * RETRY repeats the action, or starts it if the program is held before it. RESULT continues with results that a person
+ * supplies. SKIP continues as if an action without results had succeeded. ERROR_EXIT takes an error exit although it
+ * does not name this error. END ends the program with the error.
+ */
+export type HoldChoice = "retry" | "result" | "skip" | "error_exit" | "end";
+
+/** Data of the event HoldDecided: who decided about the action with this number, and how. */
+export interface HoldDecidedData {
+  run: number;
+  number: number;
+  choice: HoldChoice;
+  by: string;
+}
+
+/** An error exit: id of its logic item, the kinds that it names, and the name of the next action (empty: END). */
+export interface HoldExit {
+  id: string;
+  kinds: string[];
+  next: string;
 }
 
 /** Arguments of HoldHandTeaching; `hold`, `sent_ms` and `valid_ms` as in JogRobot. */
@@ -1505,6 +1589,9 @@ export interface Observation {
   quality: Quality;
 }
 
+/** What a program does when an action fails and no error exit applies: end, or hold until a person decides. */
+export type OnError = "end" | "hold";
+
 /** Data of the event OpenProject. */
 export interface OpenProjectData {
   scene: Scene;
@@ -1952,6 +2039,16 @@ export interface RestoreRevisionData {
   revision: number;
 }
 
+/**
+ * Type of a result that a person may supply: boolean, integer, double, string, integer_enum or string_enum.
+ *
+ * members: the values of an enumeration, JSON in a text.
+ */
+export interface ResultType {
+  type: string;
+  members: string[];
+}
+
 /** How often an action is repeated at most after it has failed, and the pause before each repetition, s. */
 export interface Retry {
   count: number;
@@ -2118,12 +2215,14 @@ export type RunEnd = "running" | "finished" | "stopped" | "failed" | "lost";
  * Arguments of RunPackage.
  *
  * shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
+ * on_error: what the program does when an action fails and no error exit applies.
  */
 export interface RunPackageArgs {
   id: string;
   start_paused?: boolean;
   breakpoints?: string[];
   shared_breakpoints?: boolean;
+  on_error?: OnError;
 }
 
 /**
@@ -2133,7 +2232,7 @@ export interface RunPackageArgs {
  * cycle and of all cycles, s, without cycles during which the program was paused; omitted before the first one. good,
  * bad: results of actions that judge a part (`verdict`); omitted if the program has no such action. counters: counters
  * that the program has used. variables: all variables of the
- * project; omitted if it has none.
+ * project; omitted if it has none. held: time for which the program was held at failed actions, s; omitted for none.
  */
 export interface RunStatistics {
   cycles: number;
@@ -2143,6 +2242,7 @@ export interface RunStatistics {
   bad?: number;
   counters: CounterValue[];
   variables?: VariableValue[];
+  held?: number;
 }
 
 /** Data of the event RunStatistics; `run` is the number of the run. */
@@ -2154,6 +2254,7 @@ export interface RunStatisticsData {
   bad?: number;
   counters: CounterValue[];
   variables?: VariableValue[];
+  held?: number;
   run: number;
 }
 
@@ -2275,7 +2376,8 @@ export interface ShowMainScreenData {
  * before it, as JSON; omitted without a condition. error: why the action failed. thread_id: omitted in the main thread
  * of the script. call: number of the call of the function that contains the action; omitted in the program itself. The
  * span of a call has no device. attempt: number of the attempt of a retried action; omitted for the first one. lane:
- * id of the branch that executed the action at the same time as others; omitted in the program itself.
+ * id of the branch that executed the action at the same time as others; omitted in the program itself. hold: how long
+ * the program was held at the action, which is not part of its duration, and who decided.
  */
 export interface Span {
   number: number;
@@ -2290,6 +2392,7 @@ export interface Span {
   call?: number;
   attempt?: number;
   lane?: string;
+  hold?: ActionHold;
 }
 
 /** A sphere around its origin, m. */
@@ -2442,11 +2545,13 @@ export interface TaskStateData {
  * Arguments of TemporaryPackage.
  *
  * shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
+ * on_error: what the program does when an action fails and no error exit applies.
  */
 export interface TemporaryPackageArgs {
   start_paused?: boolean;
   breakpoints?: string[];
   shared_breakpoints?: boolean;
+  on_error?: OnError;
 }
 
 /**
@@ -2456,7 +2561,8 @@ export interface TemporaryPackageArgs {
  * s, without a pause before it; omitted while it runs. parameters, results: as in ActionStateBefore and
  * ActionStateAfter. error: why it failed, with `key` and `values`. thread_id: omitted in the main thread of the
  * script. call: number of the call of the function that contains the action; omitted in the program itself. attempt:
- * number of the attempt of a retried action; omitted for the first one.
+ * number of the attempt of a retried action; omitted for the first one. hold: how long the program was held at it, and
+ * who decided.
  */
 export interface TraceEntry {
   run: number;
@@ -2471,6 +2577,7 @@ export interface TraceEntry {
   thread_id?: number;
   attempt?: number;
   call?: number;
+  hold?: ActionHold;
   key?: string;
   values?: Record<string, string | Message>;
 }
@@ -2759,6 +2866,7 @@ export interface Requests {
   CopyActionPoint: { args: CopyActionPointArgs; data: undefined };
   CopyProject: { args: CopyProjectArgs; data: undefined };
   CopyScene: { args: CopySceneArgs; data: string };
+  DecideHeld: { args: DecideHeldArgs; data: undefined };
   DeleteObjectTypes: { args: string[] | undefined; data: DeleteObjectTypesData[] };
   DeleteOverride: { args: DeleteOverrideArgs; data: undefined };
   DeletePackage: { args: IdArgs; data: undefined };
@@ -2778,6 +2886,7 @@ export interface Requests {
   GetEndEffectors: { args: GetEndEffectorsArgs; data: string[] };
   GetExecutionTrace: { args: GetExecutionTraceArgs | undefined; data: GetExecutionTraceData };
   GetGrippers: { args: GetGrippersArgs; data: string[] };
+  GetHeld: { args: undefined; data: GetHeldData };
   GetObjectTypes: { args: undefined; data: ObjectTypeMeta[] };
   GetProgramPosition: { args: undefined; data: ProgramPosition };
   GetProject: { args: IdArgs; data: Project };
@@ -2920,7 +3029,9 @@ export interface Events {
   ExecutionTrace: TraceEntry;
   FunctionChanged: ProjectFunction;
   HandTeachingMode: HandTeachingModeData;
+  Held: HeldData;
   HistoryChanged: HistoryChangedData;
+  HoldDecided: HoldDecidedData;
   JointsChanged: ProjectRobotJoints;
   LogicItemChanged: LogicItem;
   MovePreview: MovePreviewData;
@@ -3023,6 +3134,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   CopyActionPoint: 2,
   CopyProject: 2,
   CopyScene: 4,
+  DecideHeld: 1,
   DeleteObjectTypes: 5,
   DeleteOverride: 3,
   DeletePackage: 3,
@@ -3042,6 +3154,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   GetEndEffectors: 1,
   GetExecutionTrace: 1,
   GetGrippers: 1,
+  GetHeld: 1,
   GetObjectTypes: 1,
   GetProgramPosition: 1,
   GetProject: 1,
@@ -3175,7 +3288,9 @@ export const ADDITIONAL_EVENTS = [
   "DryRunChanged",
   "ExecutionTrace",
   "FunctionChanged",
+  "Held",
   "HistoryChanged",
+  "HoldDecided",
   "MovePreview",
   "ObjectHealth",
   "ObjectObservations",

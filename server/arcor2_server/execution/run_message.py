@@ -6,6 +6,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
+from arcor2_hw.data.held import OnError
 from arcor2_hw.runtime import messages as m
 from arcor2_server.execution.breakpoints import SharedBreakpoints
 from arcor2_server.execution.runs import How
@@ -39,6 +40,7 @@ class RunMessages:
             self._settings.streaming_period,
             self._settings.cell,
             assets=self._host_world.shape_files(),
+            hold_on_error=how.on_error is OnError.HOLD,
         )
 
     async def complete(self, message: m.RunPackage, shared_of: str) -> m.RunPackage:

@@ -63,6 +63,7 @@ class RunStatisticsCollector:
         self._last: float | None = None
         self._total = 0.0
         self._timed = 0
+        self._held = 0.0
         self._judged = {True: 0, False: 0}
         self._values: dict[str, int] = {}
         self._given: dict[str, list[str]] = {}
@@ -85,7 +86,12 @@ class RunStatisticsCollector:
             self._judged[False] if self._verdicts else UNSET,
             [CounterValue(each, self._counters[each].name, value) for each, value in self._values.items()],
             [VariableValue(one.id, name, self._present[name]) for name, one in self._variables.items()] or UNSET,
+            round(self._held, 3) or UNSET,
         )
+
+    def set_held(self, seconds: float) -> None:
+        """Set the time for which the program was held, s."""
+        self._held = seconds
 
     def handle_paused(self) -> None:
         """Exclude the present cycle from the durations, because the program is paused."""

@@ -6,9 +6,11 @@ from typing import Final
 
 import msgspec
 from msgspec import UNSET, Struct
+from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.events import PackageInfoData
+from arcor2_hw.data.held import ActionHold
 from arcor2_hw.data.position import MAIN_BRANCH
 from arcor2_hw.data.run_trace import RunTrace, Span, traced_devices
 from arcor2_hw.runtime import messages as m
@@ -35,6 +37,7 @@ class RunTraceCollector:
         self._spans: deque[Span] = deque(maxlen=MAX_SPANS)
         self._began: float | None = None
         self._ended = 0
+        self._holds: dict[int, ActionHold] = {}
         self._names: dict[str, str] = {}
         self._branches: dict[tuple[str, str], str] = {}
         self._last: dict[int | Unset, str] = {}
@@ -52,6 +55,10 @@ class RunTraceCollector:
     def started(self, announced: m.ProgramEvent) -> None:
         """Handle the start of an action."""
         self._running[announced.number] = announced
+
+    def set_hold(self, number: int, hold: ActionHold) -> None:
+        """Set how long the program was held at an action."""
+        self._holds[number] = hold
 
     def ended(self, number: int, duration: float, waited: float, error: str | Unset = UNSET) -> None:
         """Handle the end of an action.
@@ -96,6 +103,7 @@ class RunTraceCollector:
         if self._began is None:
             return RunTrace(self.run)
         spans = sorted(self._spans, key=lambda span: span.number)
+        spans = [replace(span, hold=self._holds.get(span.number, UNSET)) for span in spans]
         return RunTrace(
             self.run,
             datetime.fromtimestamp(self._began, UTC).isoformat(timespec="microseconds"),

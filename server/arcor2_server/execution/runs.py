@@ -15,6 +15,7 @@ from msgspec.structs import replace
 from arcor2_hw.data.base import Unset, now
 from arcor2_hw.data.editor import ActionOfRun, Run, RunEnd, RunStatistics, RunStatisticsData, TraceEntry
 from arcor2_hw.data.events import ActionStateAfterData, ActionStateBeforeData, PackageInfoData
+from arcor2_hw.data.held import ActionHold, OnError
 from arcor2_hw.data.rpc import ListRunsArgs
 from arcor2_hw.data.run_trace import RunTrace
 from arcor2_hw.exceptions import NotFound, StorageError
@@ -47,11 +48,14 @@ class _After(Struct):
 class _Call:
     """The published events of an action. They are decoded only on request."""
 
-    __slots__ = ("before", "end")
+    __slots__ = ("before", "end", "failure", "hold")
 
     def __init__(self, before: m.ProgramEvent) -> None:
         self.before = before
         self.end: m.ProgramEvent | m.ActionFailed | None = None
+        self.failure: m.ActionFailed | None = None
+        """The failure at which the program was held, if the action has a result nevertheless."""
+        self.hold: ActionHold | Unset = UNSET
 
     def entry(self, run: int) -> TraceEntry:
         announced, end = self.before, self.end
@@ -66,7 +70,10 @@ class _Call:
             thread_id=before.thread_id,
             attempt=announced.attempt if announced.attempt > 1 else UNSET,
             call=announced.call or UNSET,
+            hold=self.hold,
         )
+        if (failure := self.failure) is not None and failure.error is not None:
+            entry = replace(entry, error=failure.error.text, **failure.error.translation())
         match end:
             case m.ProgramEvent():
                 after = msgspec.json.decode(end.encoded, type=_After).data
@@ -85,12 +92,14 @@ class How(Struct, frozen=True):
         breakpoints: ids of action points and actions.
         shared_breakpoints: pause also at the shared breakpoints of the project.
         by: name of the user.
+        on_error: what the program does when an action fails and no error exit applies.
     """
 
     start_paused: bool = False
     breakpoints: Collection[str] = ()
     shared_breakpoints: bool = False
     by: str = ""
+    on_error: OnError = OnError.END
 
 
 class Runs:
@@ -212,7 +221,16 @@ class Runs:
                 error = UNSET if announced.error is None else announced.error.text
                 self._spans.ended(announced.number, announced.duration, announced.waited, error)
         if (call := self._trace.get(announced.number)) is not None:
+            if isinstance(call.end, m.ActionFailed):
+                call.failure = call.end
             call.end = announced
+            self._publish(call)
+
+    def set_hold(self, action: int, hold: ActionHold) -> None:
+        """Record that the program is or was held at an action of the present run."""
+        self._spans.set_hold(action, hold)
+        if (call := self._trace.get(action)) is not None:
+            call.hold = hold
             self._publish(call)
 
     def _publish(self, call: "_Call") -> None:

@@ -3,8 +3,8 @@
 import asyncio
 import contextlib
 import time
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Callable, Mapping
+from typing import Any, Final
 
 import msgspec
 import structlog
@@ -14,6 +14,8 @@ from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.events import Event, MainScreen, ProjectExceptionData
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.position import ProgramStep
+from arcor2_hw.data.rpc import DecideHeldArgs
+from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, NotFound
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
@@ -21,12 +23,13 @@ from arcor2_server.background import BackgroundTasks
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, encode, make_event
 from arcor2_server.execution.breakpoints import SharedBreakpoints
+from arcor2_server.execution.holds import ProgramHold
 from arcor2_server.execution.packages import PackageLibrary
 from arcor2_server.execution.program_run import ProgramRun
 from arcor2_server.execution.run_message import RunMessages
 from arcor2_server.execution.runs import How, Runs
 from arcor2_server.hosts.devices import DeviceBoard, overlay_for
-from arcor2_server.hosts.process import CellHost
+from arcor2_server.hosts.process import CellHost, json_of
 from arcor2_server.hosts.session import HostSession
 from arcor2_server.hosts.streams import RobotStreams
 from arcor2_server.object_types.registry import ObjectTypes
@@ -73,6 +76,8 @@ class Execution(PackageLibrary):
         self._reserved = False
         self.program = ProgramRun(runs)
         """The present or last run."""
+        self.hold = ProgramHold(hub, runs)
+        """The hold of the present run."""
         self._host = host
         self._online = online
         self._settings = settings
@@ -199,6 +204,7 @@ class Execution(PackageLibrary):
         self._require_idle()
         self._online.last_stop.require_none_since(requested_at)
         self.program = program = ProgramRun(self._runs, package_id, project_id)
+        self.hold.reset()
         self._host.package_info = None
         self.board.clear()
         self._enter(S.STARTED)
@@ -251,6 +257,7 @@ class Execution(PackageLibrary):
 
     def _stop(self, by: str) -> None:
         self.program.stopped_by = by
+        self._end_hold()
         self._enter(S.STOPPING)
         if self._host.host is not None:
             self._killing = asyncio.get_running_loop().call_later(self.stop_within, self._kill, self._host.host)
@@ -269,6 +276,7 @@ class Execution(PackageLibrary):
 
     def resume(self) -> None:
         """Resume a paused program."""
+        self.hold.require_none()
         host = self._require({S.PAUSED}, "resumed")
         self._enter(S.RESUMING)
         host.send(m.Resume())
@@ -281,13 +289,42 @@ class Execution(PackageLibrary):
             branch: id of the branch; empty for the one that waits longest.
 
         Raises:
-            RequestRefused: the program is not paused, or has no such branch.
+            RequestRefused: the program is not paused or is held, or has no such branch.
         """
+        self.hold.require_none()
         host = self._require({S.PAUSED}, "stepped")
         if branch and branch not in (one.id for one in self.program.position.branches):
             raise RequestRefused("The program has no branch {branch}.", branch=branch)
         self._enter(S.RESUMING)
         host.send(m.Step(mode, branch))
+
+    async def decide(self, args: DecideHeldArgs, by: str) -> None:
+        """Continue the held program as a user has decided."""
+        await self.hold.decide(self._host.host, args, by)
+
+    def device_of_hold(self, object_id: str) -> SceneObject:
+        """Return a device of the held program, on which a user may act. Raise RequestRefused unless it is held."""
+        if self.hold.present is None:
+            raise RequestRefused("A program is running. Its devices are available while it is held at a failed action.")
+        return self.board.object(object_id)
+
+    async def call(self, object_id: str, method: str, args: Mapping[str, Any], deadline: float) -> bytes:
+        """Call a method of a device of the held program; return the result as JSON.
+
+        Args:
+            object_id: the device.
+            method: the name of the method.
+            args: its arguments.
+            deadline: time limit, s.
+
+        Raises:
+            CellError: the device refused the call or failed.
+            ConnectionLost: the host ended.
+            DeviceTimeout: the device or the host did not answer in time.
+        """
+        host = self._require({S.PAUSING, S.PAUSED}, "operated")
+        encoded = {name: json_of(value) for name, value in args.items()}
+        return await host.call(object_id, method, encoded, deadline=deadline)
 
     def _breakpoints_changed(self, project_id: str, ids: set[str]) -> None:
         if self.program.shared_of == project_id and self.state not in _IDLE:
@@ -334,6 +371,8 @@ class Execution(PackageLibrary):
                 self._runs.ended(message)
                 if self.program.action_over(message.number):
                     self._publish_position()
+            case m.ProgramHeld():
+                self._held(message)
             case m.ProgramChanged():
                 self._program_changed(host, message)
             case _:
@@ -363,6 +402,18 @@ class Execution(PackageLibrary):
                     found.add(action.id)
         return found
 
+    def _held(self, message: m.ProgramHeld) -> None:
+        if self.state is S.STOPPING:
+            return
+        if self.state is not S.PAUSING:  # until no action runs
+            self._enter(S.PAUSING)
+        self.hold.begin(self.program.number, message.held)
+
+    def _end_hold(self) -> None:
+        if self.hold.present is not None:
+            self.hold.end()
+            self.program.handle_held(self.hold.seconds)
+
     def _program_changed(self, host: CellHost, message: m.ProgramChanged) -> None:
         if message.state == "stopped":
             self.program.handle_end(message.error)
@@ -374,6 +425,8 @@ class Execution(PackageLibrary):
             self._background.spawn(host.wait_or_kill(), "end of the program's host")
         elif self.state is not S.STOPPING:
             state = S(message.state)
+            if state is S.RUNNING:
+                self._end_hold()
             if self.state is not state:
                 self._enter(state)
             if state is S.PAUSED:
@@ -392,6 +445,7 @@ class Execution(PackageLibrary):
 
     def _ended(self, *, lost: bool = False) -> None:
         self._host.host = None
+        self._end_hold()
         self.program.end(lost=lost)
         self._publish_position()
         self.streams.clear()

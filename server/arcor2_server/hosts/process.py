@@ -6,13 +6,14 @@ import itertools
 import os
 import signal
 import socket
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, Protocol, TypeVar, cast
 
 import msgspec
 import structlog
 
 from arcor2_hw.actions.json_values import encode
+from arcor2_hw.data.held import HoldChoice
 from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout
 from arcor2_hw.messages import Message
@@ -228,6 +229,22 @@ class CellHost:
         """
         limit = HOLD_TIMEOUT + ANSWER_TIMEOUT
         return await self._request(m.Lease, object_id, hold, kind, until, limit=limit, **motion)
+
+    async def decide(self, number: int, choice: HoldChoice, results: Sequence[str], exit_id: str) -> None:
+        """Continue a held program.
+
+        Args:
+            number: the number of the action at which it is held.
+            choice: the decision.
+            results: for `result`, the results of the action, each as JSON.
+            exit_id: for `error_exit`, the id of the logic item; empty for the first exit.
+
+        Raises:
+            CellError: the program is not held at this action, or the decision is not possible.
+            ConnectionLost: the host ended.
+            DeviceTimeout: the host did not answer in time.
+        """
+        await self._request(m.DecideHeld, number, choice, list(results), exit_id, limit=ANSWER_TIMEOUT)
 
     async def retry(self, object_id: str) -> None:
         """Create and connect a failed object again. Raise CellError or ConnectionLost if that is impossible."""

@@ -12,6 +12,7 @@ from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.events import MoveEventType
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.rpc import InverseKinematicsArgs
+from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, NotInControl
 from arcor2_server.documents import Session
 from arcor2_server.errors import RequestRefused
@@ -59,8 +60,12 @@ class RobotMotion:
 
     def require_feature(self, robot_id: str, feature: str) -> None:
         """Raise RequestRefused if the robot's type does not have the feature."""
-        robot = self._online.robot(robot_id)
-        if not getattr(self._types.robot_meta(robot.type).features, feature):
+        self.require_feature_of(self._online.robot(robot_id), feature)
+
+    def require_feature_of(self, robot: SceneObject, feature: str) -> None:
+        """Raise RequestRefused if an object is not a robot, or its type does not have the feature."""
+        is_robot = self._types.derives_from(robot.type, "Robot")
+        if not is_robot or not getattr(self._types.robot_meta(robot.type).features, feature):
             raise RequestRefused("{name} cannot {features}.", name=robot.name, features=FEATURES[feature])
 
     def require_not_moving(self, robot_id: str, *, held: bool = False) -> None:

@@ -5,10 +5,13 @@ from dataclasses import dataclass
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.events import ActionExecutionData, ChangeType
+from arcor2_hw.data.held import OnError
 from arcor2_hw.data.package import PackageSummary
 from arcor2_hw.data.position import ProgramPosition
 from arcor2_hw.data.rpc import (
+    DecideHeldArgs,
     ExecuteActionArgs,
+    GetHeldData,
     IdArgs,
     RenamePackageArgs,
     RunPackageArgs,
@@ -33,7 +36,8 @@ from arcor2_server.rpc.registry import Context, rpc
 
 def _run_options(context: Context, args: RunPackageArgs | TemporaryPackageArgs) -> How:
     breakpoints = frozenset[str]() if isinstance(args.breakpoints, Unset) else args.breakpoints
-    return How(args.start_paused, breakpoints, args.shared_breakpoints is True, context.client.name)
+    on_error = OnError.END if isinstance(args.on_error, Unset) else args.on_error
+    return How(args.start_paused, breakpoints, args.shared_breakpoints is True, context.client.name, on_error)
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +174,17 @@ class ExecutionRequests:
             self._execution.step()
         else:
             self._execution.step(args.mode, args.branch or "")
+
+    @rpc("GetHeld")
+    async def get_held(self, context: Context, args: None) -> GetHeldData:
+        """Return the action at which the program is held, if it is."""
+        held = self._execution.hold.present
+        return GetHeldData() if held is None else GetHeldData(context.translatable([held])[0])
+
+    @rpc("DecideHeld")
+    async def decide_held(self, context: Context, args: DecideHeldArgs) -> None:
+        """Continue the held program. HoldDecided publishes the decision."""
+        await self._execution.decide(args, context.client.name)
 
     @rpc("GetProgramPosition")
     async def get_program_position(self, context: Context, args: None) -> ProgramPosition:

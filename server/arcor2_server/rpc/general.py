@@ -143,5 +143,7 @@ class GeneralRequests:
             events += self._tasks.running_events()
         if "ReachabilityChanged" in args.events:
             self._reachability.schedule()
+        if "Held" in args.events and (held := self._execution.hold.present) is not None:
+            events.append(make_event("Held", held))
         if "HistoryChanged" in args.events:
             events.append(self._edit_notifications.history_of(client))

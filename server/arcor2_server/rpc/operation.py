@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
+import msgspec
 import structlog
 
 from arcor2_hw.data.base import Unset
@@ -29,6 +30,7 @@ from arcor2_server.documents import Session
 from arcor2_server.errors import RequestRefused
 from arcor2_server.execution.service import Execution
 from arcor2_server.execution.stop_all import StopAll
+from arcor2_server.hosts.session import READ_TIMEOUT
 from arcor2_server.hosts.streams import OBSERVATIONS
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.motion import RobotMotion
@@ -199,6 +201,9 @@ class OperationRequests:
     async def acknowledge_stop(self, context: Context, args: AcknowledgeStopArgs) -> None:
         """Acknowledge a stop, a fault or an alarm on behalf of the user."""
         user = context.user
+        if self._execution.busy:
+            await self._acknowledge_of_program(context, args, user)
+            return
         cell, session = self._online, self._session
         session.require_scene_open()
         cell.require_online()
@@ -214,4 +219,18 @@ class OperationRequests:
         state: RobotState = await cell.ask(RobotState, args.object_id, "state")
         method = _acknowledging_method(found.name, state.safety, context.client.role)
         await cell.call(args.object_id, method, {"confirmed_by": user}, deadline=ACKNOWLEDGED_WITHIN)
+        log.warning("stop acknowledged", object=found.name, safety=state.safety.value, confirmed_by=user)
+
+    async def _acknowledge_of_program(self, context: Context, args: AcknowledgeStopArgs, user: str) -> None:
+        """Acknowledge a stop, a fault or an alarm of a device of the held program."""
+        execution = self._execution
+        found = execution.device_of_hold(args.object_id)
+        if not isinstance(args.code, Unset):
+            await execution.call(found.id, "acknowledge", {"code": args.code}, ACKNOWLEDGED_WITHIN)
+            log.warning("alarm acknowledged", object=found.name, code=args.code, confirmed_by=user)
+            return
+        self._motion.require_feature_of(found, "acknowledge_stop")
+        state = msgspec.json.decode(await execution.call(found.id, "state", {}, READ_TIMEOUT), type=RobotState)
+        method = _acknowledging_method(found.name, state.safety, context.client.role)
+        await execution.call(found.id, method, {"confirmed_by": user}, ACKNOWLEDGED_WITHIN)
         log.warning("stop acknowledged", object=found.name, safety=state.safety.value, confirmed_by=user)

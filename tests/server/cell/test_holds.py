@@ -1,0 +1,151 @@
+"""A program that is held at a failed action, as clients see it."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from msgspec import UNSET
+
+from arcor2_hw.data.editor import RunEnd
+from arcor2_hw.data.geometry import Position
+from arcor2_hw.data.project import Action, ActionPoint, Flow, Project
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.errors import RequestRefused
+from tests.runtime.conftest import Package, scene_object
+
+from .conftest import Recorder, Server, serving
+from .test_execution_history import newest, subscribe
+
+BOX = """
+class Box(Generic):
+    _ABSTRACT = False
+    full = True
+    @action
+    def put(self, *, an: str | None = None) -> None:
+        if Box.full:
+            raise Refused("{name} is full", name=self.name)
+    @action
+    def weigh(self, *, an: str | None = None) -> float:
+        raise DeviceTimeout("no answer")
+    def acknowledge(self, code: str) -> None:
+        if code != "full":
+            raise NotFound("there is no alarm {code}", code=code)
+        Box.full = False
+"""
+ACTIONS = [
+    Action("put", "obj_box/put", "act_put"),
+    Action("weigh", "obj_box/weigh", "act_weigh", flows=[Flow(outputs=["mass"])]),
+]
+PROJECT = Project(
+    "project", "scn_1", id="pro_1", action_points=[ActionPoint("p", Position(), id="acp_1", actions=ACTIONS)]
+)
+
+
+def write(server: Server, body: str) -> Path:
+    directory = server.services.settings.packages_dir / "pkg_1"
+    lines = 'box = res.objects["obj_box"]\n' + body
+    return Package(directory).write({"Box": BOX}, [scene_object("box", "Box")], PROJECT, lines)
+
+
+async def held(server: Server, client: Recorder | None = None) -> dict[str, Any]:
+    client = client or server.client
+    data = await client.event("Held")
+    await client.state("paused", "PackageState")
+    return data
+
+
+@serving()
+async def test_operator_recovers_a_held_program(server: Server) -> None:
+    subscribe(server, "Held", "HoldDecided", "ExecutionTrace", "RunStatistics")
+    old = Recorder("old")
+    server.services.hub.add(old)  # type: ignore[arg-type]
+    write(server, 'box.put(an="put")')
+    await server.ask("RunPackage", {"id": "pkg_1", "on_error": "hold"})
+    data = await held(server)
+    assert data | {"since": ""} == {
+        "run": 1,
+        "number": 1,
+        "action_id": "act_put",
+        "action_name": "put",
+        "device": "obj_box",
+        "kind": "refused",
+        "text": "box is full",
+        "key": "{name} is full",
+        "values": {"name": "box"},
+        "choices": ["retry", "skip", "end"],
+        "again": "ask",
+        "since": "",
+    }
+    assert (await server.ask("GetHeld")).held.number == 1
+
+    # A client that does not know holds only sees that the program is paused.
+    await old.state("paused", "PackageState")
+    assert "Held" not in json.dumps(old.got)
+    for name in ("ResumePackage", "StepAction"):
+        with pytest.raises(RequestRefused, match="held at put, and needs a decision: try again, done by hand, end"):
+            await server.ask(name, client=old)
+
+    # The cause is acknowledged, then the action is repeated.
+    with pytest.raises(RequestRefused, match="put may have been executed partly"):
+        await server.ask("DecideHeld", {"number": 1, "choice": "retry"})
+    with pytest.raises(Arcor2Error, match="there is no alarm empty"):
+        await server.ask("AcknowledgeStop", {"object_id": "obj_box", "code": "empty"})
+    await server.ask("AcknowledgeStop", {"object_id": "obj_box", "code": "full"}, client=old)
+    await server.ask("DecideHeld", {"number": 1, "choice": "retry", "confirmed": True}, client=old)
+    with pytest.raises(RequestRefused, match="old has already decided: try again"):
+        await server.ask("DecideHeld", {"number": 1, "choice": "end"})
+    assert await server.client.event("HoldDecided") == {"run": 1, "number": 1, "choice": "retry", "by": "old"}
+    await server.client.state("stopped", "PackageState")
+    assert (await server.ask("GetHeld")).held is UNSET
+
+    run = await newest(server)
+    assert run.end is RunEnd.FINISHED
+    assert run.statistics.held > 0  # type: ignore[union-attr, operator]
+    again, first = (await server.ask("GetExecutionTrace", {})).entries
+    assert (first.error, first.hold.choice, first.hold.by) == ("box is full", "retry", "old")
+    assert (again.attempt, again.number) == (2, 2)
+    spans = (await server.services.runs.run_trace(1)).spans
+    assert spans[0].hold == first.hold
+    assert first.hold.duration >= 0
+
+
+@serving()
+async def test_entered_result_is_in_the_trace_next_to_the_error(server: Server) -> None:
+    write(server, 'assert box.weigh(an="weigh") == 0.5')
+    await server.ask("RunPackage", {"id": "pkg_1", "on_error": "hold"})
+    await server.client.state("paused", "PackageState")
+    with pytest.raises(RequestRefused, match="Choices: try again, enter the result, end the program"):
+        await server.ask("DecideHeld", {"number": 1, "choice": "skip"})
+    with pytest.raises(Arcor2Error, match="wrong type"):
+        await server.ask("DecideHeld", {"number": 1, "choice": "result", "results": ['"heavy"']})
+    await server.ask("DecideHeld", {"number": 1, "choice": "result", "results": ["0.5"]})
+    after = await server.client.event("ActionStateAfter")
+    assert after == {"action_id": "act_weigh", "results": ["0.5"]}
+    await server.client.state("stopped", "PackageState")
+    [entry] = (await server.ask("GetExecutionTrace", {})).entries
+    assert (entry.results, entry.error, entry.hold.choice) == (["0.5"], "no answer", "result")
+    assert (await newest(server)).end is RunEnd.FINISHED
+
+
+@serving()
+async def test_stop_during_a_hold_and_without_the_option(server: Server) -> None:
+    subscribe(server, "Held")
+    write(server, 'box.put(an="put")')
+    await server.ask("RunPackage", {"id": "pkg_1", "on_error": "hold"})
+    await held(server)
+    with pytest.raises(RequestRefused, match="cannot be paused"):
+        await server.ask("PausePackage")
+    await server.ask("StopPackage")
+    await server.client.state("stopped", "PackageState")
+    with pytest.raises(RequestRefused, match="not held"):
+        await server.ask("DecideHeld", {"number": 1, "choice": "end"})
+    run = await newest(server)
+    assert (run.end, run.stopped_by) == (RunEnd.STOPPED, "alice")
+    [entry] = (await server.ask("GetExecutionTrace", {})).entries
+    assert isinstance(entry.hold.duration, float)
+    assert not isinstance(entry.hold.by, str)
+    server.client.got.clear()
+    await server.ask("RunPackage", {"id": "pkg_1"})
+    await server.client.event("ProjectException")
+    assert not any(event["event"] == "Held" for event in server.client.got)
