@@ -26,7 +26,7 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.device import Connection
 from arcor2_hw.data.position import MAIN_BRANCH, Frame
-from arcor2_hw.exceptions import Arcor2Error, ProgramFinished, ProgramStopped, Refused
+from arcor2_hw.exceptions import Arcor2Error, Conflict, ProgramFinished, ProgramStopped, Refused
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.calls import Calls, error_data
@@ -371,7 +371,7 @@ class Host:
         recovery = None if self.program is None else self.program.recovery
         try:
             if recovery is None:
-                raise Refused("The program is not held.")
+                raise Conflict("The program is not held at this action.")
             recovery.decide(message)
         except Arcor2Error as error:
             self.link.post(m.CallFailed(message.id, error_data(error)))

@@ -211,7 +211,7 @@ class Recovery:
         """
         hold, choice = self._present, message.choice
         if hold is None or hold.data.number != message.number:
-            raise Conflict("The program is not held at this action any more.")
+            raise Conflict("The program is not held at this action.")
         if choice not in hold.data.choices:
             raise InvalidData("{choice} is not possible here. Choices: {choices}.", choice=choice.value,
                               choices=", ".join(hold.data.choices))  # fmt: skip

@@ -22,6 +22,9 @@ export function notRunnable(state: State): string {
   return whyUnavailable(state, "TemporaryPackage");
 }
 
+/** Options of a run: a failed action holds the program, so that a person can decide how it continues. */
+const holding = () => (serves("DecideHeld") ? { on_error: "hold" as const } : {});
+
 /** Run the open project; save it first if necessary. Return whether it was started. */
 export async function run({ paused = false } = {}): Promise<boolean> {
   try {
@@ -29,7 +32,7 @@ export async function run({ paused = false } = {}): Promise<boolean> {
     const shared = serves("SetBreakpoints")
       ? { shared_breakpoints: true }
       : { breakpoints: Object.keys(now().breakpoints) };
-    await call("TemporaryPackage", { start_paused: paused, ...shared }, { deadline: BUILT_WITHIN });
+    await call("TemporaryPackage", { start_paused: paused, ...shared, ...holding() }, { deadline: BUILT_WITHIN });
     return true;
   } catch (error) {
     notify("error", t`Not started. ${sentence(error)}`);
@@ -40,7 +43,7 @@ export async function run({ paused = false } = {}): Promise<boolean> {
 export const runPackage = (id: string, paused = false) =>
   ask(
     "RunPackage",
-    { id, start_paused: paused, ...(serves("SetBreakpoints") ? { shared_breakpoints: true } : {}) },
+    { id, start_paused: paused, ...(serves("SetBreakpoints") ? { shared_breakpoints: true } : {}), ...holding() },
     { deadline: BUILT_WITHIN },
   );
 export const pause = () => ask("PausePackage");

@@ -332,8 +332,13 @@ function program(state: State, event: ServerEvent): Partial<State> | null {
         packageId: package_id || now.packageId,
         running: next === "stopped" ? [] : now.running,
         position: next === "stopped" ? null : now.position,
+        held: next === "pausing" || next === "paused" ? now.held : null,
       });
     }
+    case "Held":
+      return become({ held: event.data });
+    case "HoldDecided":
+      return become({ held: null });
     case "PackageInfo":
       return {
         ...open(state, { ...opened(event.data.scene, event.data.project), unsaved: false, closed: true }),

@@ -11,6 +11,7 @@ import type {
   BareProject,
   BareScene,
   GetDryRunData,
+  HeldData,
   HistoryChangedData,
   ListProjectsData,
   ListScenesData,
@@ -155,6 +156,8 @@ export interface Program {
   trace: TraceEntry[];
   /** Its call stacks; null while it is not known. */
   position: ProgramPosition | null;
+  /** The action at which the program is held; null if it is not. */
+  held: HeldData | null;
   /** The run history of the server, newest first. */
   runs: Run[];
   /** The newest dry run of the open project; null if it is not known. */
@@ -241,6 +244,7 @@ export const NO_PROGRAM: Program = {
   running: [],
   trace: [],
   position: null,
+  held: null,
   runs: [],
   dryRun: null,
   watched: 0,

@@ -28,7 +28,7 @@ import { Notices } from "../notices/Notices";
 import { People } from "../people/People";
 import { endName, History } from "../run/History";
 import { ICONS } from "../run/Result";
-import { phaseName, RunButtons } from "../run/RunBar";
+import { Held, phaseName, RunButtons } from "../run/RunBar";
 import { Settings } from "../settings/Settings";
 import { useTicking } from "../times";
 import { CurrentStep } from "./CurrentStep";
@@ -51,9 +51,11 @@ function shownState(state: State, starting: boolean, result: Result | null): Sho
   const { state: phase } = state.program;
   if (starting) return { tone: "idle", word: t`Starting…`, icon: "play" };
   if (isRunning(state))
-    return phase === "paused"
-      ? { tone: "paused", word: phaseName(phase), icon: "pause" }
-      : { tone: "running", word: phaseName(phase), icon: "play" };
+    return state.program.held
+      ? { tone: "interrupted", word: phaseName(state.program), icon: "warn" }
+      : phase === "paused"
+        ? { tone: "paused", word: phaseName(state.program), icon: "pause" }
+        : { tone: "running", word: phaseName(state.program), icon: "play" };
   if (result) return { tone: TONES[result.tone], word: result.title, icon: ICONS[result.tone] };
   if (state.live.state === "started" && usersOfDocument(state).length > 0)
     return { tone: "idle", word: t`Devices are in use by the editor`, icon: "plug" };
@@ -126,12 +128,13 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
           </Suspense>
         </aside>
       )}
-      <main data-runs={runs} hidden={listing}>
+      <main data-runs={runs} data-held={program.held !== null} hidden={listing}>
+        <Held />
         <section className="operator-state" aria-label={t`State`} role="status">
           <Icon name={icon} size={56} />
           <div>
             <p className="operator-word">{word}</p>
-            {runs && <CurrentStep />}
+            {runs && !program.held && <CurrentStep />}
             {message && <p className="operator-message">{message}</p>}
             {run && result && (
               <p>

@@ -2,14 +2,19 @@
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
+import { Suspense } from "react";
 import * as commands from "../../commands/run";
 import { calledBy } from "../../program/logic";
 import { doingWords, innermost, stackOf } from "../../program/position";
 import { whyUnavailable } from "../../store/permissions";
 import { anyAction } from "../../store/scope";
+import type { Program } from "../../store/state";
 import { select, useEditor } from "../../store/store";
 import { selectionOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
+import { lazyComponent } from "../kit/lazy";
+
+const HeldCard = lazyComponent(() => import("../held/HeldCard"));
 
 const STATES: Record<string, MessageDescriptor> = {
   started: msg`Starting…`,
@@ -20,9 +25,9 @@ const STATES: Record<string, MessageDescriptor> = {
   stopping: msg`Stopping…`,
 };
 
-/** Return the name of a state of the program as shown to users. */
-export function phaseName(phase: string): string | undefined {
-  const name = STATES[phase];
+/** Return the name of the state of the program as shown to users. */
+export function phaseName({ state, held }: Program): string | undefined {
+  const name = held ? msg`Held` : STATES[state];
   return name && i18n._(name);
 }
 
@@ -32,24 +37,38 @@ export default function RunBar() {
   const doing = doingWords(state);
   const [inner] = innermost(state);
   return (
-    <div className="runbar" role="group" aria-label={t`The program`}>
-      <span className="runbar-state" role="status">
-        <strong>{phaseName(phase)}</strong>
-        {doing && <span className="small quiet"> {phase === "paused" ? t`before ${doing}` : doing}</span>}
-      </span>
-      {inner !== undefined && state.doc && !(inner in state.doc.actions) && selectionOf(state, inner) && (
-        <Button icon="function" onPress={() => select(selectionOf(state, inner))}>
-          {t`Show`}
-        </Button>
-      )}
-      <RunButtons />
-    </div>
+    <>
+      <div className="runbar" role="group" aria-label={t`The program`}>
+        <span className="runbar-state" role="status">
+          <strong>{phaseName(state.program)}</strong>
+          {doing && <span className="small quiet"> {phase === "paused" ? t`before ${doing}` : doing}</span>}
+        </span>
+        {inner !== undefined && state.doc && !(inner in state.doc.actions) && selectionOf(state, inner) && (
+          <Button icon="function" onPress={() => select(selectionOf(state, inner))}>
+            {t`Show`}
+          </Button>
+        )}
+        <RunButtons />
+      </div>
+      <Held />
+    </>
   );
+}
+
+/** What happened and how to continue, while the program is held at a failed action. */
+export function Held() {
+  const held = useEditor((state) => state.program.held);
+  return held ? (
+    <Suspense fallback={null}>
+      <HeldCard key={held.number} held={held} />
+    </Suspense>
+  ) : null;
 }
 
 /** Pause, resume, step and stop, as far as the state allows. */
 export function RunButtons() {
   const phase = useEditor((state) => state.program.state);
+  const held = useEditor((state) => state.program.held !== null);
   const why = useEditor((state) => whyUnavailable(state, "StopPackage"));
   const inside = useEditor((state) => innermost(state).some((id) => stackOf(state, id).length > 1));
   const beforeCall = useEditor(({ doc, program }) => {
@@ -63,7 +82,7 @@ export function RunButtons() {
           {t`Pause`}
         </Button>
       )}
-      {phase === "paused" && (
+      {phase === "paused" && !held && (
         <>
           <Button icon="play" look="primary" why={why} onPress={() => void commands.resume()}>
             {t`Resume`}

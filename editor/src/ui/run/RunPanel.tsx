@@ -38,7 +38,7 @@ export default function RunPanel() {
       {!runs && !busy && doc?.project && <LastResult projectId={doc.project.id} />}
       {(runs || busy) && (
         <p className="run-state" role="status">
-          <strong>{runs ? phaseName(program.state) : t`Building…`}</strong>
+          <strong>{runs ? phaseName(program) : t`Building…`}</strong>
           {program.running.length > 0 && <span> {program.state === "paused" ? t`before ${doing}` : doing}</span>}
         </p>
       )}

@@ -1,0 +1,258 @@
+/** What happened to a program that is held at a failed action, what to do, and how it may continue. */
+
+import { t } from "@lingui/core/macro";
+import { type ReactNode, useState } from "react";
+import { acknowledge, type Decision, decide } from "../../commands/held";
+import { translate, translatedAlarm } from "../../i18n/serverMessages";
+import { splitAddress } from "../../program/messages";
+import type { HeldData, ResultType } from "../../protocol/types";
+import { whyUnavailable } from "../../store/permissions";
+import { useEditor } from "../../store/store";
+import { nameOf, withNames } from "../../viewmodel/names";
+import { Icon } from "../kit/icons";
+import { Button } from "../kit/kit";
+import { Confirm } from "../kit/lazyControls";
+import { ValueField } from "../program/ValueField";
+import "./held.css";
+
+export default function HeldCard({ held }: { held: HeldData }) {
+  const state = useEditor((each) => each);
+  const device = nameOf(state, held.device) || t`the device`;
+  const action = held.action_name;
+  const { text, address } = splitAddress(withNames(state, translate(held)));
+  const [entering, setEntering] = useState(false);
+  const why = whyUnavailable(state, "DecideHeld");
+  const offers = (choice: Decision["choice"]) => held.choices.includes(choice);
+  return (
+    <section className="held" aria-label={t`The program is held`}>
+      <div role="alert">
+        <h2>
+          <Icon name="warn" /> {held.before ? t`Held before ${action}` : t`Held at ${action}`}
+        </h2>
+        <p className="held-what">{text}</p>
+      </div>
+      {address && (
+        <details>
+          <summary>{t`Details`}</summary>
+          <p data-name>{address}</p>
+        </details>
+      )}
+      <Remedies held={held} />
+      <p>{t`Fix the cause first. The program starts nothing until you decide. What is switched on stays on, such as a belt.`}</p>
+      {entering ? (
+        <ResultForm held={held} onClose={() => setEntering(false)} />
+      ) : (
+        <div className="held-choices">
+          {offers("retry") && <Retry held={held} why={why} />}
+          {offers("skip") && (
+            <Choice
+              text={t`Done by hand, continue`}
+              hint={t`You have done by hand what ${action} does. The program continues after it.`}
+              why={why}
+              act={() => decide(held, { choice: "skip" })}
+            />
+          )}
+          {offers("result") && (
+            <Choice
+              text={t`Enter the result`}
+              hint={t`You find out by yourself what ${device} would have reported.`}
+              why={why}
+              act={() => setEntering(true)}
+            />
+          )}
+          {held.exits?.map((exit) => (
+            <Choice
+              key={exit.id}
+              text={exit.next ? t`Continue with ${exit.next}` : t`Continue at the end`}
+              hint={t`This part of the program is meant for other errors of ${action}.`}
+              why={why}
+              act={() => decide(held, { choice: "error_exit", exit_id: exit.id })}
+            />
+          ))}
+          <Choice
+            look="danger"
+            text={t`End the program`}
+            hint={t`All devices are stopped.`}
+            why={why}
+            act={() => decide(held, { choice: "end" })}
+          />
+        </div>
+      )}
+    </section>
+  );
+}
+
+interface ChoiceProps {
+  text: string;
+  hint: string;
+  why: string;
+  look?: "primary" | "danger";
+  act: () => unknown;
+}
+
+function Choice({ text, hint, why, look, act }: ChoiceProps) {
+  const [busy, setBusy] = useState(false);
+  const press = async () => {
+    setBusy(true);
+    await act();
+    setBusy(false);
+  };
+  return (
+    <div>
+      <Button look={look ?? ""} why={why} isDisabled={busy} onPress={() => void press()}>
+        {text}
+      </Button>
+      <p className="small">{hint}</p>
+    </div>
+  );
+}
+
+/** Repeat the action, or start it after the connection was lost. An action that may do harm asks first. */
+function Retry({ held, why }: { held: HeldData; why: string }) {
+  const device = useEditor((state) => nameOf(state, held.device)) || t`the device`;
+  const action = held.action_name;
+  const [asking, setAsking] = useState(false);
+  const retry = () => decide(held, { choice: "retry", confirmed: true });
+  return (
+    <>
+      <Choice
+        look="primary"
+        text={held.before ? t`Continue` : t`Try again`}
+        hint={
+          held.before
+            ? t`Possible as soon as ${device} is connected again.`
+            : t`${action} starts at once. Keep clear of the devices.`
+        }
+        why={why}
+        act={() => (held.again === "ask" ? setAsking(true) : retry())}
+      />
+      {asking && (
+        <Confirm
+          title={t`Try ${action} again?`}
+          yes={t`Try again`}
+          onYes={() => void retry()}
+          onClose={() => setAsking(false)}
+        >
+          <p>{t`It may have been executed partly. Check that nothing is done twice, for example a part placed on another one.`}</p>
+        </Confirm>
+      )}
+    </>
+  );
+}
+
+/** The alarms of devices with their remedies, which can be acknowledged. */
+function Remedies({ held }: { held: HeldData }) {
+  const state = useEditor((each) => each);
+  const why = whyUnavailable(state, "AcknowledgeStop");
+  const [refused, setRefused] = useState("");
+  const alarms = (state.live.health[held.device]?.alarms ?? []).map(translatedAlarm);
+  const type = state.doc?.objects[held.device]?.type ?? "";
+  const stops = state.types.robots[type]?.features?.acknowledge_stop === true;
+  if (alarms.length === 0 && held.kind !== "safety_stop") return null;
+  const confirm = (code: string) => void acknowledge(held.device, stops ? "" : code).then(setRefused);
+  return (
+    <div className="held-alarms">
+      {alarms.map((alarm) => (
+        <Alarm key={alarm.code} text={[alarm.text, alarm.remedy].filter(Boolean).join(": ")}>
+          {!stops && (
+            <Button why={why} onPress={() => confirm(alarm.code)}>
+              {t`Acknowledge`}
+            </Button>
+          )}
+        </Alarm>
+      ))}
+      {stops && (
+        <Alarm text={t`Check the robot and its surroundings. Then acknowledge the stop.`}>
+          <Button why={why} icon="check" onPress={() => confirm("")}>
+            {t`Acknowledge`}
+          </Button>
+        </Alarm>
+      )}
+      {refused && (
+        <p className="error" role="alert">
+          {refused}
+        </p>
+      )}
+    </div>
+  );
+}
+
+function Alarm({ text, children }: { text: string; children: ReactNode }) {
+  return (
+    <div className="held-alarm">
+      <p>{text}</p>
+      {children}
+    </div>
+  );
+}
+
+/** The results of the action, entered by the user. */
+function ResultForm({ held, onClose }: { held: HeldData; onClose: () => void }) {
+  const state = useEditor((each) => each);
+  const types = held.returns ?? [];
+  const outputs = state.doc?.actions[held.action_id]?.flows.find((flow) => flow.type === "default")?.outputs ?? [];
+  const [values, setValues] = useState<Record<number, string>>({});
+  const [problem, setProblem] = useState("");
+  const missing = types.some((_, index) => values[index] === undefined);
+  const send = async () => {
+    const results = types.map((_, index) => values[index] ?? "null");
+    setProblem(await decide(held, { choice: "result", results }, false));
+  };
+  return (
+    <form
+      className="held-result"
+      aria-label={t`Result of ${held.action_name}`}
+      onSubmit={(event) => event.preventDefault()}
+    >
+      {types.map((type, index) => (
+        <ResultField
+          key={index}
+          type={type}
+          name={outputs[index] ?? t`Result ${index + 1}`}
+          json={values[index]}
+          onSet={(json) => setValues((known) => ({ ...known, [index]: json }))}
+        />
+      ))}
+      {problem && (
+        <p className="error" role="alert">
+          {problem}
+        </p>
+      )}
+      <div className="row">
+        <Button
+          look="primary"
+          why={missing ? t`Enter all results first.` : whyUnavailable(state, "DecideHeld")}
+          onPress={() => void send()}
+        >
+          {t`Continue with this result`}
+        </Button>
+        <Button onPress={onClose}>{t`Back`}</Button>
+      </div>
+    </form>
+  );
+}
+
+interface ResultFieldProps {
+  type: ResultType;
+  name: string;
+  json: string | undefined;
+  onSet: (json: string) => void;
+}
+
+function ResultField({ type, name, json, onSet }: ResultFieldProps) {
+  const members = type.members ?? [];
+  return (
+    <ValueField
+      label={name}
+      name={name}
+      type={type.type}
+      json={json}
+      extra={members.length > 0 ? { allowed_values: members.map((each) => JSON.parse(each)) } : {}}
+      onTyped={onSet}
+      onSet={async (typed) => {
+        onSet(typed);
+        return "";
+      }}
+    />
+  );
+}
