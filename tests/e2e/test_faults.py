@@ -11,8 +11,11 @@ import pytest
 from arcor2_hw.client import Client, RequestFailed
 from arcor2_hw.data import rpc
 from arcor2_hw.data.base import Unset
+from arcor2_hw.data.editor import RunEnd
 from arcor2_hw.data.events import SceneStateEnum
 from arcor2_hw.data.geometry import Position
+from arcor2_hw.data.held import HoldChoice, OnError
+from arcor2_hw.data.object_type import Again
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.project import Project
 from arcor2_hw.exceptions import ConnectionLost
@@ -153,6 +156,37 @@ async def test_a_protective_stop_is_named_and_stays_until_unlocked(running: Cell
     assert "protective stop" in text.lower(), text
     await assert_stays(running, 6.0)  # the controller refuses to unlock for 5 s: no attempt may follow
     assert (await arm(running))["safety"] == "PROTECTIVE_STOP"
+
+
+async def test_operator_recovers_a_program_held_by_a_protective_stop(running: Cell) -> None:
+    client = await running.client("operator")
+    await client.subscribe_events({"Held"})
+    _, project = await running.open(client, boards=1)
+    package = await running.build(client, project)
+    await client.call("RunPackage", rpc.RunPackageArgs(package, on_error=OnError.HOLD))
+    await until(lambda: moving(running), "the arm moves")
+    await running.tell("robot", "protective_stop")
+    held = (await client.next_event("Held", timeout=30)).data
+    assert (held.action_name, held.kind, held.again) == ("pick", "safety_stop", Again.ASK)
+    await until(lambda: is_stopped(running), "standstill")
+
+    async def acknowledged() -> bool:
+        try:  # the controller refuses to unlock for 5 s
+            await client.call("AcknowledgeStop", rpc.AcknowledgeStopArgs(held.device))
+        except RequestFailed:
+            return False
+        return True
+
+    await until(acknowledged, "the stop is acknowledged")
+    await assert_stays(running, 1.0)
+    with pytest.raises(RequestFailed, match="Confirm"):
+        await client.call("DecideHeld", rpc.DecideHeldArgs(held.number, HoldChoice.RETRY))
+    await assert_stays(running, 0.5)
+    await client.call("DecideHeld", rpc.DecideHeldArgs(held.number, HoldChoice.RETRY, confirmed=True))
+    assert await program_ends_with(client) == ""
+    trace = (await client.call("GetExecutionTrace")).entries
+    assert [entry.name for entry in trace if not isinstance(entry.hold, Unset)] == ["pick"]
+    assert (await client.call("ListRuns")).runs[0].end is RunEnd.FINISHED
 
 
 async def test_nothing_moves_after_a_safeguard_stop_until_a_new_command(cell: Cell) -> None:

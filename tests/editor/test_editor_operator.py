@@ -72,17 +72,42 @@ async def test_built_package_appears_runs_and_its_error_is_shown(
         await page.get_by_role("radio", name=project.name).wait_for()
         await screen.press("Start")
         await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=BEGUN)
-        # Without a board, the reader finds no code.
+        # Without a board, the reader finds no code. The operator enters it.
+        card = page.get_by_role("region", name="The program is held")
+        await expect(card).to_contain_text("Held at scan", timeout=BEGUN)
+        await expect(card).to_contain_text("no code was read")
         state = page.get_by_role("status", name="State")
-        await expect(state).to_contain_text("Run failed in scan")
-        card = page.get_by_role("region", name="Alarm", exact=True)
-        await expect(card.get_by_role("heading", name="No code was read.")).to_be_visible()
+        await expect(state).to_contain_text("Held")
+        await expect(page.get_by_role("button", name=texts.RESUME)).to_have_count(0)
+        await pictures(screen, "held")
+        await card.get_by_role("button", name="Enter the result").click()
+        code = card.get_by_label("code")
+        await code.fill("B-1")
+        await pictures(screen, "held, result")
+        await screen.press("Continue with this result")
+        # Nothing can be picked in this cell. The retry asks first and fails again; then the operator ends the program.
+        for _ in ("pick", "pick again"):
+            await expect(card).to_contain_text("Held at pick", timeout=BEGUN)
+            await card.get_by_role("button", name="Try again").click()
+            asked = page.get_by_role("alertdialog", name="Try pick again?")
+            await expect(asked).to_contain_text("It may have been executed partly.")
+            await asked.get_by_role("button", name="Try again").click()
+            await expect(asked).to_have_count(0)
+        await expect(card).to_contain_text("Held at pick", timeout=BEGUN)
+        await screen.press("End the program")
+        await expect(state).to_contain_text("Run failed in pick")
+        await expect(card).to_have_count(0)
         assert [each.end.value for each in (await colleague.call("ListRuns")).runs] == ["failed"]
-        for name, size in VIEWPORTS.items():
-            await page.set_viewport_size(size)  # type: ignore[arg-type]
-            await screen.settle()
-            assert await screen.faults() == [], name
-            await screen.picture(f"operator {name}")
+        await pictures(screen, "operator")
+
+
+async def pictures(screen: Screen, name: str) -> None:
+    """Check the layout on every device, and take pictures."""
+    for device, size in VIEWPORTS.items():
+        await screen.page.set_viewport_size(size)  # type: ignore[arg-type]
+        await screen.settle()
+        assert await screen.faults() == [], device
+        await screen.picture(f"{name} {device}")
 
 
 async def test_failed_run_is_shown_on_every_screen_until_it_is_dismissed(
