@@ -7,11 +7,13 @@ from typing import Annotated
 
 import msgspec
 from cyclopts import App, Parameter
+from rich.markup import escape
 from rich.table import Table
 
 from arcor2_hw.client import RequestFailed, Rest
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.editor import Run
+from arcor2_hw.data.held import HoldChoice, OnError
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.data.run_trace import RunTrace
 from arcor2_hw.exceptions import ConnectionLost, InvalidData, NotFound
@@ -162,19 +164,25 @@ def run_package(
     ],
     *,
     paused: Annotated[bool, Parameter(help="Pause before the first action.")] = False,
+    hold: Annotated[
+        bool,
+        Parameter(help="Hold the program at a failed action until a person decides. Without it, the program ends."),
+    ] = False,
     server: Server = HERE,
 ) -> int:
     """Run a package on a running server, and show its progress until it ends."""
     try:
-        return run("package run", lambda: _run(server, package, paused))
+        return run("package run", lambda: _run(server, package, paused, OnError.HOLD if hold else OnError.END))
     except KeyboardInterrupt:
         reason = "interrupted; the program continues, stop it in the editor"
         return fail("package run", reason, ExitStatus.INTERRUPTED)
 
 
-async def _run(server: Server, wanted: str, paused: bool) -> ExitStatus:
+async def _run(server: Server, wanted: str, paused: bool, on_error: OnError) -> ExitStatus:
     out = console()
     async with server.client() as client:
+        if on_error is OnError.HOLD:
+            await client.subscribe_events({"Held"})
         summaries = await client.list_packages()
         named = sorted(
             (summary for summary in summaries if wanted in (summary.id, summary.package_meta.name)),
@@ -184,7 +192,8 @@ async def _run(server: Server, wanted: str, paused: bool) -> ExitStatus:
             raise NotFound("The server at {url} has no package {wanted}.", url=client.url, wanted=wanted)
         chosen = named[-1].id
         try:
-            await client.run_package(chosen, start_paused=paused)
+            hold = {"on_error": on_error} if on_error is OnError.HOLD else {}
+            await client.run_package(chosen, start_paused=paused, **hold)
         except RequestFailed as error:
             raise Failed(ExitStatus.PROGRAM_FAILED, str(error)) from error
         actions: dict[str, str] = {}
@@ -197,6 +206,9 @@ async def _run(server: Server, wanted: str, paused: bool) -> ExitStatus:
                     out.print(actions.get(event.data.action_id, event.data.action_id))
                 case "ActionStateAfter" if not isinstance(event.data.results, Unset):
                     out.print(f"  -> {', '.join(event.data.results)}")
+                case "Held":
+                    out.print(escape(f"held at {event.data.action_name}: {event.data.text}"))
+                    out.print(f"  decide: {', '.join(event.data.choices)}")
                 case "ProjectException":
                     problem = event.data.message
                 case "PackageState" if event.data.package_id == chosen:
@@ -208,3 +220,31 @@ async def _run(server: Server, wanted: str, paused: bool) -> ExitStatus:
         if problem:
             return fail("package run", problem, ExitStatus.PROGRAM_FAILED)
     return ExitStatus.OK
+
+
+@app.command
+def decide(
+    choice: Annotated[HoldChoice, Parameter(help="How the program continues.")],
+    results: Annotated[list[str] | None, Parameter(help="For `result`: the results, each as JSON.")] = None,
+    *,
+    exit_id: Annotated[str, Parameter(help="For `error_exit`: id of the logic item; default: the first exit.")] = "",
+    yes: Annotated[bool, Parameter(help="Repeat an action that may have been executed partly.")] = False,
+    server: Server = HERE,
+) -> int:
+    """Decide how a program continues that is held at a failed action."""
+
+    async def work() -> ExitStatus:
+        async with server.client() as client:
+            held = (await client.get_held()).held
+            if isinstance(held, Unset):
+                return fail("package decide", "The program is not held.", ExitStatus.PROGRAM_FAILED)
+            try:
+                await client.decide_held(
+                    number=held.number, choice=choice, results=results or [], exit_id=exit_id, confirmed=yes
+                )
+            except RequestFailed as error:
+                raise Failed(ExitStatus.PROGRAM_FAILED, str(error)) from error
+            console().print(f"{held.action_name}: {choice}")
+        return ExitStatus.OK
+
+    return run("package decide", work)

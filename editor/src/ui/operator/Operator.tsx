@@ -51,11 +51,9 @@ function shownState(state: State, starting: boolean, result: Result | null): Sho
   const { state: phase } = state.program;
   if (starting) return { tone: "idle", word: t`Starting…`, icon: "play" };
   if (isRunning(state))
-    return state.program.held
-      ? { tone: "interrupted", word: phaseName(state.program), icon: "warn" }
-      : phase === "paused"
-        ? { tone: "paused", word: phaseName(state.program), icon: "pause" }
-        : { tone: "running", word: phaseName(state.program), icon: "play" };
+    return phase === "paused"
+      ? { tone: "paused", word: phaseName(state.program), icon: "pause" }
+      : { tone: "running", word: phaseName(state.program), icon: "play" };
   if (result) return { tone: TONES[result.tone], word: result.title, icon: ICONS[result.tone] };
   if (state.live.state === "started" && usersOfDocument(state).length > 0)
     return { tone: "idle", word: t`Devices are in use by the editor`, icon: "plug" };
@@ -130,30 +128,34 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
       )}
       <main data-runs={runs} data-held={program.held !== null} hidden={listing}>
         <Held />
-        <section className="operator-state" aria-label={t`State`} role="status">
-          <Icon name={icon} size={56} />
-          <div>
-            <p className="operator-word">{word}</p>
-            {runs && !program.held && <CurrentStep />}
-            {message && <p className="operator-message">{message}</p>}
-            {run && result && (
-              <p>
-                {result.name}, {ago(run.ended ?? run.started)}
-              </p>
+        {!program.held && (
+          <section className="operator-state" aria-label={t`State`} role="status">
+            <Icon name={icon} size={56} />
+            <div>
+              <p className="operator-word">{word}</p>
+              {runs && <CurrentStep />}
+              {message && <p className="operator-message">{message}</p>}
+              {run && result && (
+                <p>
+                  {result.name}, {ago(run.ended ?? run.started)}
+                </p>
+              )}
+              {result?.detail && !explained && <Reason>{withNames(state, result.detail)}</Reason>}
+              {result?.tone === "bad" && !explained && (
+                <p className="operator-advice">
+                  {t`Fix the cause, then press Start. If it fails again, call for help.`}
+                </p>
+              )}
+              {idle && !run && <LastRun />}
+              {idle && !result && !why && <p className="operator-advice">{t`Choose a package, then press Start.`}</p>}
+            </div>
+            {run && (
+              <Button className="operator-dismiss" onPress={() => storeGeneralState(dismissal(run))}>
+                {t`Dismiss`}
+              </Button>
             )}
-            {result?.detail && !explained && <Reason>{withNames(state, result.detail)}</Reason>}
-            {result?.tone === "bad" && !explained && (
-              <p className="operator-advice">{t`Fix the cause, then press Start. If it fails again, call for help.`}</p>
-            )}
-            {idle && !run && <LastRun />}
-            {idle && !result && !why && <p className="operator-advice">{t`Choose a package, then press Start.`}</p>}
-          </div>
-          {run && (
-            <Button className="operator-dismiss" onPress={() => storeGeneralState(dismissal(run))}>
-              {t`Dismiss`}
-            </Button>
-          )}
-        </section>
+          </section>
+        )}
         {!runs && <Alarms alarms={alarms} />}
         {runs ? (
           <>
