@@ -68,7 +68,8 @@ def _inherited(cls: type, name: str) -> Mapping[str, Any]:
 
 def return_hint(bound: types.MethodType) -> Any:
     """Return the type hint of the result of a method; None if it returns nothing or has no hint."""
-    return _inherited(type(bound.__self__), bound.__name__).get("return")
+    cls: type = type(bound.__self__)
+    return _inherited(cls, bound.__name__).get("return")
 
 
 def _decode(raw: bytes, hint: Any) -> Any:

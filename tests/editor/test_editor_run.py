@@ -132,6 +132,11 @@ async def test_run_to_an_action_step_and_show_the_failure(work: Work, browser: B
     await expect(work.panel.get_by_role("button", name="Remove breakpoint at scan")).to_have_count(0)
 
     await work.tap_button(texts.STEP, bar)
+    card = page.get_by_role("region", name="The program is held")
+    await expect(card).to_contain_text("no code was read")
+    await expect(bar).to_contain_text("Held")
+    await screen.picture("run held")
+    await work.tap_button("End the program", card)
     fault = work.panel.get_by_role("region", name="Last run").filter(has_text="Run failed in scan")
     await fault.wait_for()
     await expect(fault).to_contain_text("no code was read")

@@ -10,7 +10,7 @@ export type Decision = Omit<DecideHeldArgs, "number">;
 /** Restarting the safety system of a controller takes 20 s. */
 const ACKNOWLEDGED_WITHIN = 40;
 
-/** Decide how the program continues. Return why it was refused, and notify the user of it unless `notifies` is false. */
+/** Decide how the program continues. Return why it was refused; notify the user of it if `notifies`. */
 export async function decide(held: HeldData, decision: Decision, notifies = true): Promise<string> {
   const why = await refusal(() => call("DecideHeld", { number: held.number, ...decision }));
   if (why && notifies) notify("error", why);

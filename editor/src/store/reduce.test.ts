@@ -271,6 +271,34 @@ describe("operation", () => {
   });
 });
 
+describe("a held program", () => {
+  const held: ServerEvent = {
+    event: "Held",
+    data: {
+      run: 1,
+      number: 2,
+      action_id: "a",
+      action_name: "scan",
+      device: "obj",
+      kind: "device_timeout",
+      text: "no answer",
+      choices: ["retry", "end"],
+      since: "2026-01-01T00:00:00Z",
+    },
+  };
+  const state = (name: "pausing" | "paused" | "running" | "stopping"): ServerEvent => ({
+    event: "PackageState",
+    data: { state: name },
+  });
+
+  test("is held until a decision, or until it runs or stops", () => {
+    expect(after(state("pausing"), held, state("paused")).program.held?.number).toBe(2);
+    const decided: ServerEvent = { event: "HoldDecided", data: { run: 1, number: 2, choice: "retry", by: "Eva" } };
+    for (const end of [decided, state("running"), state("stopping")])
+      expect(after(state("pausing"), held, end).program.held).toBeNull();
+  });
+});
+
 describe("a document that a program closes", () => {
   const CLOSED: ServerEvent = { event: "ProjectClosed", data: undefined };
   const stopped: ServerEvent = { event: "PackageState", data: { state: "stopped" } };

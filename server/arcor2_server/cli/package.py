@@ -172,16 +172,16 @@ def run_package(
 ) -> int:
     """Run a package on a running server, and show its progress until it ends."""
     try:
-        return run("package run", lambda: _run(server, package, paused, OnError.HOLD if hold else OnError.END))
+        return run("package run", lambda: _run(server, package, paused, hold))
     except KeyboardInterrupt:
         reason = "interrupted; the program continues, stop it in the editor"
         return fail("package run", reason, ExitStatus.INTERRUPTED)
 
 
-async def _run(server: Server, wanted: str, paused: bool, on_error: OnError) -> ExitStatus:
+async def _run(server: Server, wanted: str, paused: bool, hold: bool) -> ExitStatus:
     out = console()
     async with server.client() as client:
-        if on_error is OnError.HOLD:
+        if hold:
             await client.subscribe_events({"Held"})
         summaries = await client.list_packages()
         named = sorted(
@@ -192,8 +192,7 @@ async def _run(server: Server, wanted: str, paused: bool, on_error: OnError) -> 
             raise NotFound("The server at {url} has no package {wanted}.", url=client.url, wanted=wanted)
         chosen = named[-1].id
         try:
-            hold = {"on_error": on_error} if on_error is OnError.HOLD else {}
-            await client.run_package(chosen, start_paused=paused, **hold)
+            await client.run_package(chosen, start_paused=paused, on_error=OnError.HOLD if hold else UNSET)
         except RequestFailed as error:
             raise Failed(ExitStatus.PROGRAM_FAILED, str(error)) from error
         actions: dict[str, str] = {}

@@ -38,7 +38,10 @@ export default function HeldCard({ held }: { held: HeldData }) {
         </details>
       )}
       <Remedies held={held} />
-      <p>{t`Fix the cause first. The program starts nothing until you decide. What is switched on stays on, such as a belt.`}</p>
+      <p>
+        {t`Fix the cause first. The program starts nothing until you decide.`}{" "}
+        {t`What is switched on stays on, such as a belt.`}
+      </p>
       {entering ? (
         <ResultForm held={held} onClose={() => setEntering(false)} />
       ) : (
@@ -133,7 +136,10 @@ function Retry({ held, why }: { held: HeldData; why: string }) {
           onYes={() => void retry()}
           onClose={() => setAsking(false)}
         >
-          <p>{t`It may have been executed partly. Check that nothing is done twice, for example a part placed on another one.`}</p>
+          <p>
+            {t`It may have been executed partly.`}{" "}
+            {t`Check that nothing is done twice, for example a part placed on another one.`}
+          </p>
         </Confirm>
       )}
     </>

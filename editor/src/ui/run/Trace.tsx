@@ -6,7 +6,7 @@ import { Button as AriaButton } from "react-aria-components";
 import { clock, duration } from "../../formats";
 import { metaOf } from "../../program/logic";
 import { words } from "../../program/naming";
-import type { TraceEntry } from "../../protocol/types";
+import type { ActionHold, HoldChoice, TraceEntry } from "../../protocol/types";
 import { anyAction } from "../../store/scope";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
@@ -57,6 +57,18 @@ export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {
   );
 }
 
+/** Return how long the program was held at an action, and who decided how it continues. */
+function heldWords({ duration: held = 0, choice, by = "" }: ActionHold): string {
+  const words: Record<HoldChoice, string> = {
+    retry: t`Try again`,
+    result: t`Enter the result`,
+    skip: t`Done by hand, continue`,
+    error_exit: t`error exit`,
+    end: t`End the program`,
+  };
+  return t`Held for ${duration(held)}. ${by}: ${choice ? words[choice] : ""}`;
+}
+
 function Detail({ entry, onChoose }: { entry: TraceEntry; onChoose: (actionId: string) => void }) {
   const action = useEditor((state) => state.doc && anyAction(state.doc, entry.action_id));
   const meta = useEditor((state) => (action && state.doc ? metaOf(state.types, state.doc, action) : undefined));
@@ -65,6 +77,7 @@ function Detail({ entry, onChoose }: { entry: TraceEntry; onChoose: (actionId: s
     <div className="trace-detail">
       {entry.attempt !== undefined && <p className="small">{t`Attempt ${entry.attempt}`}</p>}
       {entry.error !== undefined && <p className="error">{entry.error}</p>}
+      {entry.hold?.choice && <p className="small">{heldWords(entry.hold)}</p>}
       {entry.parameters && entry.parameters.length > 0 && <Values names={names} values={entry.parameters} />}
       {entry.results && entry.results.length > 0 && (
         <>
