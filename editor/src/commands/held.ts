@@ -1,5 +1,6 @@
 /** Continue a program that is held at a failed action. */
 
+import { t } from "@lingui/core/macro";
 import type { DecideHeldArgs, HeldData } from "../protocol/types";
 import { call } from "../session/connection";
 import { notify } from "../store/store";
@@ -18,8 +19,10 @@ export async function decide(held: HeldData, decision: Decision, notifies = true
 }
 
 /** Acknowledge a safety stop of a robot (without a code), or an alarm. Return why it was refused. */
-export function acknowledge(object_id: string, code: string): Promise<string> {
-  return refusal(() =>
+export async function acknowledge(object_id: string, code: string): Promise<string> {
+  const why = await refusal(() =>
     call("AcknowledgeStop", { object_id, ...(code ? { code } : {}) }, { deadline: ACKNOWLEDGED_WITHIN }),
   );
+  if (!why) notify("info", t`Acknowledged.`);
+  return why;
 }
