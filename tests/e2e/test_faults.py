@@ -165,7 +165,7 @@ async def test_operator_recovers_a_program_held_by_a_protective_stop(running: Ce
     package = await running.build(client, project)
     await client.call("RunPackage", rpc.RunPackageArgs(package, on_error=OnError.HOLD))
     await until(lambda: moving(running), "the arm moves")
-    await running.tell("robot", "protective_stop")
+    await running.command_fake("robot", "protective_stop")
     held = (await client.next_event("Held", timeout=30)).data
     assert (held.action_name, held.kind, held.again) == ("pick", "safety_stop", Again.ASK)
     await until(lambda: is_stopped(running), "standstill")
