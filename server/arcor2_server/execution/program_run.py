@@ -84,11 +84,6 @@ class ProgramRun:
         self._runs.set_statistics(self._number, self._statistics.statistics())
         self._runs.collect_spans(self._number, info)
 
-    @property
-    def number(self) -> int:
-        """The number of the run."""
-        return self._number
-
     def handle_held(self, seconds: float) -> None:
         """Store for how long the program was held so far, s."""
         if self._statistics is not None:
