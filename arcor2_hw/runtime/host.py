@@ -25,6 +25,7 @@ import msgspec
 from msgspec.structs import replace
 
 from arcor2_hw.data.device import Connection
+from arcor2_hw.data.held import HeldData
 from arcor2_hw.data.position import MAIN_BRANCH, Frame
 from arcor2_hw.exceptions import Arcor2Error, Conflict, ProgramFinished, ProgramStopped, Refused
 from arcor2_hw.messages import Message
@@ -244,7 +245,7 @@ class Host:
             shared_breakpoints=frozenset(message.shared_breakpoints),
             cell_file=message.cell,
             secrets=message.secrets,
-            held=(lambda held: self.link.post(m.ProgramHeld(held))) if message.hold_on_error else None,
+            held=self._held if message.hold_on_error else None,
         )
         self._cell = program.cell
         self._cell.assets, self._cell.updates = message.assets, self._updates
@@ -278,7 +279,9 @@ class Host:
         why = program.error or problem
         self.link.post(
             m.ProgramChanged(
-                "stopped", not failed and problem is None, None if why is None else _described(program, why)
+                "stopped",
+                not failed and problem is None,
+                None if why is None else _described(why, program.source_of(why)),
             )
         )
 
@@ -366,6 +369,10 @@ class Host:
             case m.DecideHeld():
                 self._decide(message)
 
+    def _held(self, held: HeldData, device: Device, error: BaseException) -> None:
+        """Report that the program is held."""
+        self.link.post(m.ProgramHeld(held, _described(error, device)))
+
     def _decide(self, message: m.DecideHeld) -> None:
         """Continue the held program."""
         recovery = None if self.program is None else self.program.recovery
@@ -432,9 +439,9 @@ class Host:
             raise ProgramStopped
 
 
-def _described(program: Program, error: BaseException) -> m.ErrorData:
-    """Return the error that ended a program, with its device."""
-    data, device = error_data(error), program.source_of(error)
+def _described(error: BaseException, device: Device | None) -> m.ErrorData:
+    """Return an error with its device."""
+    data = error_data(error)
     if device is None:
         return data
     return replace(data, object_id=device.id, object_name=device.name, object_type=device.recipe.cls.__name__)

@@ -376,6 +376,7 @@ class ProgramHeld(ToServer, frozen=True):
     """The program is held at an action; `run` is not set. ProgramChanged reports `paused` when no action runs."""
 
     held: HeldData
+    error: ErrorData
 
 
 class HandTeachingEnded(ToServer, frozen=True):

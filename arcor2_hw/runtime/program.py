@@ -5,7 +5,7 @@ import itertools
 import threading
 import time
 import traceback
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence, Set
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple, Protocol
 
@@ -20,7 +20,6 @@ from arcor2_hw.data.events import (
     ProjectExceptionData,
 )
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.data.held import HeldData
 from arcor2_hw.data.position import MAIN_BRANCH, Frame
 from arcor2_hw.data.project import CALL, Project, ProjectRobotJoints
 from arcor2_hw.data.secret import ObjectSecrets
@@ -38,7 +37,7 @@ from arcor2_hw.runtime.branches import Action, Branches
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
 from arcor2_hw.runtime.pacing import Gate
-from arcor2_hw.runtime.recovery import ActionCall, Decision, Recovery, mark_decided
+from arcor2_hw.runtime.recovery import ActionCall, Decision, Post, Recovery, mark_decided
 from arcor2_hw.runtime.stopping import SentStop, wait_stopped
 from arcor2_hw.runtime.values import encode_shown, results
 
@@ -108,7 +107,7 @@ class Program:
         shared_breakpoints: Set[str] = frozenset(),
         cell_file: CellFile | None = None,
         secrets: Mapping[str, ObjectSecrets] = MappingProxyType({}),
-        held: Callable[[HeldData], None] | None = None,
+        held: Post | None = None,
     ) -> None:
         self.channel = channel
         self.cell_file = cell_file

@@ -36,6 +36,7 @@ from arcor2_hw.runtime.values import return_hint
 _SIMPLE: Final = {bool: "boolean", int: "integer", float: "double", str: "string"}
 _GONE: Final = (Connection.LOST, Connection.FAILED)
 _DECIDED: Final = "_arcor2_decided"
+Post = Callable[[HeldData, Device, BaseException], None]
 
 
 class Decision(NamedTuple):
@@ -82,10 +83,10 @@ class Recovery:
         gate: holds the threads of the script.
         cell: the devices.
         settle: waits until no device moves.
-        post: sends what clients are to know of a hold; called while the gate is locked.
+        post: sends what clients are to know of a hold, with its device and error; called while the gate is locked.
     """
 
-    def __init__(self, gate: Gate, cell: Cell, settle: Callable[[], object], post: Callable[[HeldData], None]) -> None:
+    def __init__(self, gate: Gate, cell: Cell, settle: Callable[[], object], post: Post) -> None:
         self._gate, self._cell, self._settle, self._post = gate, cell, settle, post
         self.active = False
         self._actions: dict[str, Action] = {}
@@ -185,7 +186,7 @@ class Recovery:
     def _wait(self, branch: Branch, hold: _Hold) -> Decision:
         def begin() -> None:
             self._present, self._decision = hold, None
-            self._post(hold.data)
+            self._post(hold.data, hold.device, hold.error)
 
         try:
             self._gate.hold_program(branch, begin)

@@ -12,6 +12,7 @@ import structlog
 from arcor2_hw.data.alarms import AcknowledgeRole, AlarmFilter, AlarmRecord
 from arcor2_hw.data.base import UNSET, Timestamp, Unset, now
 from arcor2_hw.data.device import Alarm, Connection
+from arcor2_hw.data.held import HoldDecidedData
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import AlarmStatisticsArgs, AlarmStatisticsData, ListAlarmsArgs
 from arcor2_hw.exceptions import Arcor2Error, NotFound, Refused, StorageError
@@ -153,6 +154,17 @@ class Alarms:
                 )
             )
         )
+
+    def decided(self, decided: HoldDecidedData) -> None:
+        """Acknowledge the ended alarms of a run, as far as an operator may: a person has decided about their cause."""
+        for record in self._book.records(AlarmFilter.RETAINED):
+            if (
+                record.run == decided.run
+                and not record.active
+                and not record.acknowledged
+                and record.acknowledge is AcknowledgeRole.OPERATOR
+            ):
+                self._changed(self._book.acknowledged(record.number, decided.by, "", now()))
 
     def system(
         self, code: str, active: bool | None, text: Message | None = None, *, with_devices: bool = False

@@ -260,6 +260,7 @@ def connect_alarms(
         alarms.watch(host.board, what)
         host.on_death.append(lambda reason: alarms.system("host_died", None, reason, with_devices=True))
     execution.on_error.append(alarms.failed)
+    execution.on_decided.append(alarms.decided)
     for notice in damage.notices:
         alarms.data_damaged(notice)
     damage.on_report.append(alarms.data_damaged)

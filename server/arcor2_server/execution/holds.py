@@ -62,6 +62,11 @@ class ProgramHold:
         """Forget the holds of the run before."""
         self.present, self._record, self._last, self.seconds = None, None, None, 0.0
 
+    @property
+    def ended_program(self) -> bool:
+        """Whether a person has decided to end the present run, so that its error is known already."""
+        return self._last is not None and self._last.choice is HoldChoice.END
+
     def begin(self, run: int, held: HeldData) -> None:
         """Handle that the program is held."""
         self.present = replace(held, run=run)
@@ -71,18 +76,19 @@ class ProgramHold:
         log.warning("program held", run=run, action=held.action_name, device=held.device, reason=held.text)
         self._hub.broadcast(make_event(HELD, self.present))
 
-    def end(self) -> None:
-        """Handle that the program continues or is stopped. Without a decision, it was stopped."""
+    def end(self) -> HoldDecidedData | None:
+        """Handle that the program continues or is stopped. Return the decision; without one, it was stopped."""
         if self._record is None or self.present is None:
-            return
+            return None
         duration = time.monotonic() - self._began
         self.seconds += duration
         self._runs.set_hold(self.present.number, replace(self._record, duration=round(duration, 3)))
-        decided = self._last
-        if decided is not None and decided.number == self.present.number:
+        decided = self._last if self._last is not None and self._last.number == self.present.number else None
+        if decided is not None:
             log.warning("held program continues", number=decided.number, choice=decided.choice.value, by=decided.by)
             self._hub.broadcast(make_event(DECIDED, decided))
         self.present, self._record = None, None
+        return decided
 
     def require_none(self) -> None:
         """Raise RequestRefused, with the choices, while the program is held."""

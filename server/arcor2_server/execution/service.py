@@ -12,6 +12,7 @@ import structlog
 from arcor2_hw.data import events as e
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.events import Event, MainScreen, ProjectExceptionData
+from arcor2_hw.data.held import HoldDecidedData
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.position import ProgramStep
 from arcor2_hw.data.rpc import DecideHeldArgs
@@ -86,7 +87,9 @@ class Execution(PackageLibrary):
         self._secrets = secrets
         self._messages = messages
         self.on_error: list[Callable[[m.ErrorData, int, str], None]] = []
-        """Called with the error that ends a program, before its devices are gone, the run, and the last action."""
+        """Called with the error that ends or holds a program, before its devices are gone, the run, and the action."""
+        self.on_decided: list[Callable[[HoldDecidedData], None]] = []
+        """Called with each decision about a held program."""
         self._over: asyncio.Future[None] | None = None
         self._killing: asyncio.TimerHandle | None = None
         self._background = BackgroundTasks()
@@ -407,17 +410,23 @@ class Execution(PackageLibrary):
             return
         if self.state is not S.PAUSING:  # until no action runs
             self._enter(S.PAUSING)
-        self.hold.begin(self.program.number, message.held)
+        run = self.program.number
+        self.hold.begin(run, message.held)
+        for notify in self.on_error:
+            notify(message.error, run, message.held.action_name)
 
     def _end_hold(self) -> None:
-        if self.hold.present is not None:
-            self.hold.end()
-            self.program.handle_held(self.hold.seconds)
+        if self.hold.present is None:
+            return
+        if (decided := self.hold.end()) is not None:
+            for notify in self.on_decided:
+                notify(decided)
+        self.program.handle_held(self.hold.seconds)
 
     def _program_changed(self, host: CellHost, message: m.ProgramChanged) -> None:
         if message.state == "stopped":
             self.program.handle_end(message.error)
-            if message.error is not None and self.program.stopped_by is None:
+            if message.error is not None and self.program.stopped_by is None and not self.hold.ended_program:
                 run = self.program.number
                 for notify in self.on_error:
                     notify(message.error, run, self._runs.last_action(run))
