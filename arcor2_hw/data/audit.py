@@ -3,7 +3,7 @@
 import enum
 from typing import Annotated, Any
 
-from msgspec import Meta
+from msgspec import Meta, field
 
 from arcor2_hw.data.base import Data, Timestamp
 
@@ -60,7 +60,7 @@ class AuditEntry(Data, frozen=True):
     role: str = ""
     address: str = ""
     reason: str = ""
-    changes: tuple[AuditChange, ...] = ()
+    changes: list[AuditChange] = field(default_factory=list)
 
 
 class AuditQuery(Data, frozen=True):

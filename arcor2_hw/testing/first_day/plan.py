@@ -29,7 +29,7 @@ GROUPS: Final = (
         "Reading",
         "The driver connects, reads and disconnects. It takes no control, and nothing acts on the device.",
         (
-            *("described", "translations_match", "types_complete", "long_actions_can_be_stopped"),
+            *("described", "translations_match", "alarms_declared", "types_complete", "long_actions_can_be_stopped"),
             *("capabilities_declared", "constructor_opens_nothing", "connect_is_idempotent"),
             *("disconnect_is_idempotent", "connecting_observes", "readings_can_be_read", "absent_device"),
             "units_and_frames",

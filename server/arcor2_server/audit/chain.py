@@ -47,7 +47,7 @@ create table if not exists pruned (number integer not null, digest blob not null
 
 Row = tuple[int, str, str, str, str, str, str, str, str, str]
 """The fields of an entry, with its changes as JSON."""
-_decode_changes = msgspec.json.Decoder(tuple[AuditChange, ...]).decode
+_decode_changes = msgspec.json.Decoder(list[AuditChange]).decode
 _INSERT: Final = f"insert into entry ({_COLUMNS}, digest) values ({', '.join('?' * (len(_FIELDS) + 1))})"  # noqa: S608
 _SEARCHED: Final = "lower(user || ' ' || request || ' ' || target || ' ' || address || ' ' || reason)"
 
@@ -63,7 +63,7 @@ def row_of(entry: AuditEntry) -> Row:
 
 def _entry_of(row: Row) -> AuditEntry:
     fields = dict(zip(_FIELDS, row, strict=True))
-    return msgspec.convert(fields | {"changes": _decode_changes(row[-1]) if row[-1] else ()}, AuditEntry)
+    return msgspec.convert(fields | {"changes": _decode_changes(row[-1]) if row[-1] else []}, AuditEntry)
 
 
 def _digest_after(previous: bytes, row: Row) -> bytes:

@@ -185,11 +185,11 @@ class AuditTrail:
 
 
 def _entry(number: int, noted: Noted) -> AuditEntry:
-    changes = tuple(AuditChange(each.kind, each.id, each.before, each.after) for each in noted.changes)
+    changes = [AuditChange(each.kind, each.id, each.before, each.after) for each in noted.changes]
     reason = noted.reason
     if changes and len(msgspec.json.encode(changes)) > LARGEST_CHANGES:
         reason = f"Changed items: {len(changes)}. Their values are too large for the audit trail."
-        changes = ()
+        changes = []
     return AuditEntry(
         number, noted.time, noted.outcome, noted.request, noted.target, noted.user, noted.role, noted.address, reason,
         changes,

@@ -136,7 +136,7 @@ async def test_reasons_are_redacted_and_large_changes_are_counted(path: Path) ->
     audit.close()
     large, refused = AuditFile(path).find(AuditQuery(limit=2))
     assert (refused.reason, refused.role) == ("the *** is wrong", "operator")
-    assert (large.changes, large.reason[:17]) == ((), "Changed items: 1.")
+    assert (large.changes, large.reason[:17]) == ([], "Changed items: 1.")
 
 
 async def test_entries_wait_while_the_file_cannot_be_written(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

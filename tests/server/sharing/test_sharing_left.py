@@ -49,7 +49,7 @@ async def test_locks_of_a_user_who_left_are_listed_and_taken_over(
     await leave(alice)
     (holder,) = await bob.ask("ListLocks")
     assert max(lock["since"] for lock in holder["locks"]) < holder["left"]
-    for person, role, reason in ((stranger, None, "RegisterUser"), (bob, Role.OPERATOR, "standard_user")):
+    for person, role, reason in ((stranger, None, "RegisterUser"), (bob, Role.OPERATOR, "standard user")):
         if role is not None:
             of(bob, role)
         with pytest.raises(Refused, match=reason):

@@ -110,13 +110,20 @@ function Row({ entry }: { entry: AuditEntry }) {
     <li>
       <span>
         <span className={`tag ${TONES[entry.outcome]}`}>{i18n._(OUTCOMES[entry.outcome])}</span>{" "}
-        <strong>{entry.request}</strong> {entry.target}
+        <span data-name={entry.request}>
+          <strong>{entry.request}</strong> {entry.target}
+        </span>
       </span>
       <span className="quiet small">
-        <time dateTime={entry.time}>{dateAndTime(entry.time)}</time> {entry.user || t`unknown user`}
-        {sender && ` (${sender})`}
+        <time dateTime={entry.time}>{dateAndTime(entry.time)}</time>{" "}
+        {entry.user ? <span data-name={entry.user}>{entry.user}</span> : t`unknown user`}
+        {sender && <span data-name={sender}> ({sender})</span>}
       </span>
-      {entry.reason && <span className="small">{entry.reason}</span>}
+      {entry.reason && (
+        <span className="small" data-name={entry.reason}>
+          {entry.reason}
+        </span>
+      )}
       {entry.changes.length > 0 && <Changes entry={entry} />}
     </li>
   );

@@ -162,7 +162,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
             <div className="operator-buttons">
               <RunButtons />
             </div>
-            <Alarms alarms={alarms} />
+            {program.held ? null : <Alarms alarms={alarms} />}
             {doc && <Cell />}
           </>
         ) : (

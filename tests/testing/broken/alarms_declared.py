@@ -1,0 +1,3 @@
+"""An alarm without a remedy."""
+
+from .alarming.press import BrokenPress as BrokenPress
