@@ -128,6 +128,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
       )}
       <main data-runs={runs} data-held={program.held !== null} hidden={listing}>
         <Held />
+        {!runs && <Alarms alarms={alarms} />}
         {!program.held && (
           <section className="operator-state" aria-label={t`State`} role="status">
             <Icon name={icon} size={56} />
@@ -156,7 +157,6 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
             )}
           </section>
         )}
-        {!runs && <Alarms alarms={alarms} />}
         {runs ? (
           <>
             <div className="operator-buttons">
