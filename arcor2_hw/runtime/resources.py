@@ -173,7 +173,7 @@ class Resources:
             program.check()
             program.cell.take_control()
         except SceneFault as fault:
-            with contextlib.suppress(Arcor2Error):  # an object without an instance is no device
+            with contextlib.suppress(Arcor2Error):  # the object has no instance
                 program.record_error_source(program.cell[fault.object_id], fault.error)
             raise fault.error from fault
         for device in program.cell:

@@ -48,7 +48,7 @@ describe("parallel work", () => {
     ]);
   });
 
-  it("is no problem, nor are the results of its calls", () => {
+  it("causes no problems, and its calls have results", () => {
     expect(problemsOf(doc, TYPES)).toEqual([]);
   });
 });
