@@ -1,8 +1,9 @@
 """Languages: chosen in the settings, stored with the user, switched without reload; all screens in all languages.
 
-Three pages visit every screen: in a pseudo-locale, whose texts come from the English ones, in Czech and in German. On
-each screen all texts are translated, none is cut off, and all controls can be reached, on a tablet and on a phone. Axe
-finds no serious or critical violation in Czech, which is shown in dark colours, and in German, shown in light ones.
+Three pages visit every screen: in a pseudo-locale, whose texts come from the English ones and are longer, on a tablet
+and on a phone; in Czech on a phone; and in German on a tablet. On each screen all texts are translated, none is cut
+off, and all controls can be reached. Axe finds no serious or critical violation in Czech, which is shown in dark
+colours, and in German, shown in light ones.
 """
 
 import asyncio
@@ -40,7 +41,8 @@ DEFINED_BY_DEVICES = {
 }
 """Names in models of robots, and values of settings."""
 GERMAN, CZECH = Words("de"), Words("cs")
-LANGUAGES = ("pseudo", "cs", "de")
+LANGUAGES = {"pseudo": ("ipad", "phone"), "cs": ("phone",), "de": ("ipad",)}
+"""The sizes in which each language is shown. The texts of the pseudo-locale are longer than most translations."""
 DARK = "cs"
 LONGER = "label-content-name-mismatch"
 """A rule that the pseudo-locale breaks: a short text is not lengthened, but as a part of a longer label."""
@@ -120,15 +122,16 @@ class Visitor:
         words = PseudoWords() if self.pseudo else Words(language)
         self.tour = Tour(screen, f"Visitor {language}", words, *documents, robot_host)
         self.names = names_in(*documents) | NAMES | PEOPLE | DEFINED_BY_DEVICES
-        self._sizes = ["ipad", "phone"]
+        self._sizes = list(LANGUAGES[language])
 
     async def faults(self, screens: AsyncIterator[str], *, axe: bool) -> list[str]:
-        """Visit these screens, each in both sizes; the next one is opened in the size of the second."""
+        """Visit these screens, each in all sizes; the next one is opened in the size of the last."""
         found = []
         async for shown in screens:
             faults = list(await untranslated(self.screen.page, self.names)) if self.pseudo else []
             for size in self._sizes:
-                await self.screen.page.set_viewport_size(VIEWPORTS[size])  # type: ignore[arg-type]
+                if len(self._sizes) > 1:
+                    await self.screen.page.set_viewport_size(VIEWPORTS[size])  # type: ignore[arg-type]
                 await self.screen.settle()
                 # Labels in the view are names of items, the same in every language.
                 layout = [fault for fault in await self.screen.faults() if not fault.startswith("labels ")]
@@ -150,7 +153,9 @@ async def visitors(
         found = []
         for language in LANGUAGES:
             locale = LOCALE if language == "pseudo" else language
-            opened = screen_of(browser, module_cell.url, "ipad", touch=True, locale=locale, dark=language == DARK)
+            opened = screen_of(
+                browser, module_cell.url, LANGUAGES[language][0], touch=True, locale=locale, dark=language == DARK
+            )
             screen = await stack.enter_async_context(opened)
             # Refused requests on purpose.
             screen.expected_errors = ("409 (Conflict)", "400 (Bad Request)", "404 (Not Found)")

@@ -183,8 +183,10 @@ class Tour:
             await self._select(item)
             yield f"selected {item}"
         await self._button("Branch").click()
+        await page.locator(".banner").wait_for()
         yield "connecting"
         await page.keyboard.press("Escape")
+        await page.locator(".banner").wait_for(state="detached")
         await self._button(texts.CLOSE_PANEL).click()
         for mode in ("Flow", "Code", "3D"):
             await self._choice(mode).click()
@@ -261,10 +263,11 @@ class Tour:
     async def failed(self) -> AsyncIterator[str]:
         """Visit the screens after a run that failed, from the operator's screen."""
         page, words = self.screen.page, self.words
-        await page.get_by_role("button", name=words("Dismiss"), exact=True).wait_for()
+        dismiss = page.locator(".operator").get_by_role("button", name=words("Dismiss"), exact=True)
+        await dismiss.wait_for()
         yield "operator, failed run"
-        await self._button("Dismiss").click()
-        await page.get_by_role("button", name=words("Dismiss"), exact=True).wait_for(state="detached")
+        await dismiss.click()
+        await dismiss.wait_for(state="detached")
         yield "operator"
         await page.evaluate("location.hash = ''")
         await page.get_by_role("heading", name=words(texts.HOME_HEADING)).wait_for()
