@@ -115,7 +115,8 @@ def code_digest(*packages: Path) -> str:
 
 def _digest(library: Library) -> str:
     digest = hashlib.sha256(code_digest(*(_LIBRARY / package for package in _CODE)).encode())
-    for name in library.names():
+    # Sorted: two processes may add the same sources in a different order.
+    for name in sorted(library.names()):
         if name not in BUILT_IN:
             digest.update(_encode(StoredSource.of(library.file(name))))
     return digest.hexdigest()

@@ -42,9 +42,9 @@ def library(vendor: Path) -> Library:
     return Library([SourceFile("Arm", "vendor.arm", arm.read_bytes(), str(arm))])
 
 
-def test_all_installed_types_are_restored_without_parsing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_installed_types_are_restored_without_parsing_in_any_order(monkeypatch: pytest.MonkeyPatch) -> None:
     files = [each.file for each in installed_types() if each.file is not None]
-    first, second = Library(files), Library(files)
+    first, second = Library(files), Library(reversed(files))
     stored = snapshot.take(first)
     monkeypatch.setattr(ast, "parse", None)
     assert snapshot.restore(second, stored)
