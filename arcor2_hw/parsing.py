@@ -2,6 +2,8 @@
 
 import ast
 import contextlib
+import gc
+from collections.abc import Iterator
 from typing import Any, Final
 
 ATTEMPTS: Final = 10
@@ -35,3 +37,19 @@ def _parsed(source: str | bytes, filename: str, mode: str) -> Any:
         with contextlib.suppress(SystemError):
             return ast.parse(source, filename, mode)
     return ast.parse(source, filename, mode)
+
+
+@contextlib.contextmanager
+def paused_garbage_collection() -> Iterator[None]:
+    """Pause the garbage collector while syntax trees are created, unless another thread has paused it.
+
+    They are many objects without cycles that all remain. Collection would double the time, and block all threads.
+    """
+    if not gc.isenabled():
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()

@@ -11,7 +11,7 @@ from arcor2_hw.analysis.actions import ActionReader
 from arcor2_hw.analysis.enumerations import enumerations_of
 from arcor2_hw.analysis.hierarchy import Hierarchy, is_known_library
 from arcor2_hw.analysis.keywords import keyword_only
-from arcor2_hw.analysis.module import ClassInfo, Import, Module, Value, garbage_collection_disabled
+from arcor2_hw.analysis.module import ClassInfo, Import, Module, Value
 from arcor2_hw.analysis.presentation import display_name, of_type
 from arcor2_hw.analysis.robots import robot_meta
 from arcor2_hw.analysis.settings import SettingsReader
@@ -24,6 +24,7 @@ from arcor2_hw.data.older_names import not_offered
 from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_hw.messages import translatable
+from arcor2_hw.parsing import paused_garbage_collection
 
 BUILT_IN: Final = (
     "Camera",
@@ -227,7 +228,7 @@ class Library:
             NotFound: The source does not exist.
         """
         if name not in self._analyses:
-            with garbage_collection_disabled():
+            with paused_garbage_collection():
                 self._analyses[name] = self._analyse(name)
         return self._analyses[name]
 

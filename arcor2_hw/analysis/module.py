@@ -1,8 +1,6 @@
 """The names bound in one module: classes, functions, imports and values."""
 
 import ast
-import contextlib
-import gc
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
@@ -197,15 +195,3 @@ def _extends_property(node: FunctionNode) -> bool:
         isinstance(decorator, ast.Attribute) and decorator.attr in {"setter", "getter", "deleter"}
         for decorator in node.decorator_list
     )
-
-
-@contextlib.contextmanager
-def garbage_collection_disabled() -> Iterator[None]:
-    """Disable the garbage collector: syntax trees are many objects that all remain, and it would double the time."""
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()

@@ -10,11 +10,13 @@ from msgspec.structs import replace
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, InvalidProject
+from arcor2_hw.parsing import paused_garbage_collection
 from arcor2_server.build.frame import Frame, TypeFacts
 from arcor2_server.build.functions import cycles_of
 from arcor2_server.build.style import Writer
 
 
+@paused_garbage_collection()
 def from_logic(scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> str:
     """Return the script of a project's logic. It repeats the logic until it is stopped or an action finishes it.
 
@@ -40,6 +42,7 @@ def _tree(frame: Frame) -> ast.Module:
     return frame.tree([ast.While(ast.Constant(True), program.statements(), [])], definitions)
 
 
+@paused_garbage_collection()
 def read_with_text(source: str, scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> Project:
     """Return the project updated from its script, with the script itself if it differs from the generated one.
 
