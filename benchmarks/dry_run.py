@@ -6,6 +6,7 @@ import json
 import random
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -29,6 +30,8 @@ DEMO_WITHIN: Final = 400.0
 PROJECT: Final = "Test, label and sort boards"
 BRANCHES: Final = ("into_nest", "into_bad_box")
 """The actions that follow `take_out`, for good and for bad boards."""
+PARALLEL: Final = "test_and_fetch"
+PARALLEL_CALLS: Final = ("this_board", "next_board")
 MOTIONS: Final = 1000
 REPEATS: Final = 5
 BOXES: Final = 20
@@ -62,9 +65,10 @@ async def _demo(report: Report, directory: Path) -> None:
             raise RuntimeError("The demo failed.")
     async with server(directory) as (url, _), Client(url, "benchmark", reconnect=False) as client:
         project = await _opened(client, PROJECT)
-        actions = {action.name: action.id for point in project.action_points for action in point.actions}
+        actions = {action.name: action.id for action in project.all_actions()}
         run = (await client.list_runs()).runs[0].number
-        real = real_cycles(await client.rest.run_trace(run))
+        trace = await client.rest.run_trace(run)
+        real, shorter = real_cycles(trace), shortened_by(trace)
         # With an unsaved edit, the server does not measure how much longer motions take than planned.
         await client.add_action_point(name="edit", position=Position())
         planned = {name: await _predicted(client, {actions["take_out"]: actions[name]}) for name in BRANCHES}
@@ -76,20 +80,41 @@ async def _demo(report: Report, directory: Path) -> None:
         off = {name: 100.0 * abs(times[name] / median(real[name]) - 1.0) for name in seen}
         notes = [f"{name}: {times[name]:.2f} s, real {', '.join(f'{s:.2f}' for s in real[name])} s" for name in seen]
         report.add(Metric(metric, max(off.values()), sum(len(real[name]) for name in seen), "; ".join(notes)))
+    shares = [share for found in shorter.values() for share in found]
+    notes = [f"{name}: {', '.join(f'{share:.1f}' for share in found)} %" for name, found in shorter.items() if found]
+    report.add(Metric("demo_parallel_percent", median(shares), len(shares), "; ".join(notes)))
 
 
-def real_cycles(trace: RunTrace) -> dict[str, list[float]]:
-    """Return the durations of the cycles of a run of the demo, s, by what happened to the board.
+def _cycles(trace: RunTrace) -> Iterator[tuple[str, float, dict[str, float]]]:
+    """Return for each cycle of a run of the demo what happened to the board, its duration and those of its actions, s.
 
     The first cycle is left out, because the robot starts elsewhere, and so is the last one, which ends the order.
     """
-    found: dict[str, list[float]] = {name: [] for name in BRANCHES}
     starts = [number for number, span in enumerate(trace.spans) if span.action_id == trace.spans[0].action_id]
     for begin, end in itertools.pairwise(starts[1:]):
-        names = {span.name for span in trace.spans[begin:end]}
-        if "all_sent" not in names:
-            for name in names.intersection(BRANCHES):
-                found[name].append(trace.spans[end].start - trace.spans[begin].start)
+        durations = {span.name: span.duration for span in trace.spans[begin:end]}
+        if "all_sent" not in durations:
+            for name in durations.keys() & BRANCHES:
+                yield name, trace.spans[end].start - trace.spans[begin].start, durations
+
+
+def real_cycles(trace: RunTrace) -> dict[str, list[float]]:
+    """Return the durations of the cycles of a run of the demo, s, by what happened to the board."""
+    found: dict[str, list[float]] = {name: [] for name in BRANCHES}
+    for name, cycle, _ in _cycles(trace):
+        found[name].append(cycle)
+    return found
+
+
+def shortened_by(trace: RunTrace) -> dict[str, list[float]]:
+    """Return by how much parallel work shortens each of these cycles, %.
+
+    Without it, its branches would follow each other.
+    """
+    found: dict[str, list[float]] = {name: [] for name in BRANCHES}
+    for name, cycle, durations in _cycles(trace):
+        saved = sum(durations[branch] for branch in PARALLEL_CALLS) - durations[PARALLEL]
+        found[name].append(100.0 * saved / (cycle + saved))
     return found
 
 

@@ -65,6 +65,7 @@ GOALS: Final[dict[str, tuple[str, str]]] = {
     "busy_demo_completed": ("% of runs", ">= 100"),
     "dry_run_demo_percent": ("%", "<= 10"),
     "dry_run_demo_planned_percent": ("%", ""),
+    "demo_parallel_percent": ("% of the cycle", ""),
     "dry_run_1000_s": ("s", "<= 2"),
     "oak_core_percent": ("% of a core", "<= 25"),
     "camera_pose_three_mm": ("mm", "<= 1"),

@@ -322,9 +322,12 @@ class Creation:
                 if step.object == function.name:
                     await self._add_step(step, made.function_id, places)
             waiting = await self._connect(waiting, places)
-        for parallel in self._workplace.parallel:
-            calls = [places.actions[name] for name in parallel.calls]
-            await self._client.call("MakeParallel", rpc.MakeParallelArgs(parallel.name, calls))
+            for parallel in self._workplace.parallel:
+                if parallel.name not in places.actions and places.actions.keys() >= {*parallel.calls}:
+                    calls = [places.actions[name] for name in parallel.calls]
+                    args_of = rpc.MakeParallelArgs(parallel.name, calls)
+                    joined: rpc.MakeParallelData = await self._client.call("MakeParallel", args_of)
+                    places.actions[parallel.name] = joined.action_id
 
     async def _add_step(self, step: Step, object_id: str, places: "_Places") -> None:
         kind = next((obj.type for obj in self._workplace.objects if obj.name == step.object), "")
