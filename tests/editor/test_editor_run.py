@@ -230,7 +230,7 @@ async def test_package_is_built_under_the_proposed_name(work: Work) -> None:
 
 async def test_a_dry_run_predicts_the_cycle_and_shows_what_fails(work: Work) -> None:
     """Nothing moves and the scene stays offline."""
-    page = work.screen.page
+    screen, page = work.screen, work.screen.page
     await work.tool(texts.RUN)
     predicted = work.panel.get_by_role("region", name="Dry run", exact=True)
     await work.tap_button("Dry run", predicted)
@@ -257,3 +257,13 @@ async def test_a_dry_run_predicts_the_cycle_and_shows_what_fails(work: Work) -> 
     await predicted.get_by_role("table").get_by_text("into_good_box").wait_for()
     await problem.get_by_role("button", name="Show into_good_box").click()
     await page.get_by_role("complementary").get_by_role("heading", name="into_good_box", exact=True).wait_for()
+
+    # It starts at the selected action on request, and takes another branch.
+    await work.panel.get_by_role("button", name="Dry run from here").click()
+    await predicted.get_by_role("button", name="Dry run from into_good_box").wait_for(timeout=BEGUN)
+    await predicted.get_by_text("Branches", exact=True).click()
+    await predicted.get_by_label("take_out").select_option("passed = no → into_bad_box")
+    await screen.picture("dry run from here")
+    assert await screen.faults() == []
+    await work.tap_button("Dry run", predicted)
+    await predicted.get_by_text("No problems found.").wait_for(timeout=BEGUN)

@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { translate } from "../i18n/serverMessages";
-import type { GetDryRunData, RunTrace, TraceSummary } from "../protocol/types";
+import type { GetDryRunData, RunTrace, StartDryRunArgs, TraceSummary } from "../protocol/types";
 import { call, serves } from "../session/connection";
 import { rest } from "../session/rest";
 import { whyUnavailable } from "../store/permissions";
@@ -25,7 +25,7 @@ export function notPredictable(state: State): string {
   return whyUnavailable(state, "StartDryRun");
 }
 
-export const startDryRun = () => ask("StartDryRun", {});
+export const startDryRun = (choice: StartDryRunArgs = {}) => ask("StartDryRun", choice);
 export const cancelDryRun = () => ask("CancelDryRun");
 
 /** Return a dry run with translated texts, by default the newest one of the open project; null if there is none. */

@@ -170,10 +170,20 @@ export function freeParameterName(base: string): string {
   return freeName(base, [...(open?.parameters.map((each) => each.name) ?? []), ...stored]);
 }
 
-/** Rename a parameter of the open function or change its type. Return why it was refused. */
-export const updateFunctionParameter = (name: string, change: { new_name?: string; type?: string }): Promise<string> =>
+/**
+ * Rename a parameter of the open function or change its type. Return why it was refused.
+ *
+ * `json`: the value for the present calls, by default a usual one of the type.
+ */
+export const updateFunctionParameter = (
+  name: string,
+  change: { new_name?: string; type?: string },
+  json?: string,
+): Promise<string> =>
   refusal(() => {
-    const value = change.type === undefined ? undefined : valueFor(name, change.type);
+    const { type } = change;
+    const value =
+      type === undefined ? undefined : json === undefined ? valueFor(name, type) : { name, type, value: json };
     const function_id = scopeOf(now().doc ?? { path: [] });
     return call("UpdateFunctionParameter", { function_id, name, ...change, ...(value && { value }) });
   });

@@ -1,7 +1,7 @@
 /** Parameters of the open function, shown at its start, and its results, shown at its end. */
 
 import { t } from "@lingui/core/macro";
-import { useId, useState } from "react";
+import { useId, useMemo, useState } from "react";
 import { Button as AriaButton } from "react-aria-components";
 import {
   addFunctionParameter,
@@ -11,8 +11,10 @@ import {
   removeFunctionResult,
   updateFunctionParameter,
 } from "../../commands/functions";
-import { notEditable } from "../../commands/program";
+import { notEditable, setParameter } from "../../commands/program";
+import { type EnumerationUse, enumerationsOf } from "../../program/enumerations";
 import { callsOf, freeResults, resultOf, usersOfParameter } from "../../program/functions";
+import { PASSED_ON } from "../../program/logic";
 import { END, START } from "../../program/steps";
 import { SIMPLE, typeName } from "../../program/values";
 import type { ActionParameter } from "../../protocol/types";
@@ -26,7 +28,7 @@ import type { Section } from "../workplace/section";
 import "../program/program.css";
 import "./functions.css";
 
-/** Types that a user can choose; other ones come from the actions that become a function. */
+/** Types that a user can choose, in addition to the enumerations that actions of the function take. */
 const TYPES = [...SIMPLE, "pose", "position", "joints"] as const;
 
 const Signature: Section["Body"] = ({ selection: { id } }) => {
@@ -63,12 +65,20 @@ function Taken({ open, why }: { open: OpenFunction; why: string }) {
   );
 }
 
+/** Give a parameter the enumeration that an action takes, and pass it on to this action. Return why it was refused. */
+const pass = async (name: string, { action, parameter, type, json }: EnumerationUse): Promise<string> =>
+  (await updateFunctionParameter(name, { type }, json)) ||
+  setParameter(action, { name: parameter, type: PASSED_ON, value: JSON.stringify(name) });
+
 function Parameter({ open, parameter, why }: { open: OpenFunction; parameter: ActionParameter; why: string }) {
   const { name, type } = parameter;
   const [problem, setProblem] = useState("");
   const users = usersOfParameter(open, name);
   const used = users.length > 0 ? t`Used by ${users.map((each) => each.name).join(", ")}.` : "";
-  const types = (TYPES as readonly string[]).includes(type) ? TYPES : [type, ...TYPES];
+  const doc = useEditor((state) => state.doc);
+  const known = useEditor((state) => state.types);
+  const taken = useMemo(() => (doc ? enumerationsOf(doc, known) : []), [doc, known]);
+  const types = [...new Set([type, ...TYPES])];
   return (
     <section className="signature" aria-label={name}>
       <ValueField
@@ -90,9 +100,17 @@ function Parameter({ open, parameter, why }: { open: OpenFunction; parameter: Ac
       <Pick
         label={t`Type`}
         value={type}
-        choices={types.map((each) => [each, typeName(each)])}
+        choices={[
+          ...types.map((each): [string, string] => [each, typeName(each)]),
+          ...taken.map(({ label }, n): [string, string] => [`${n}`, t`choice: ${label}`]),
+        ]}
         isDisabled={why !== "" || used !== ""}
-        onChange={(wanted) => void updateFunctionParameter(name, { type: wanted }).then(setProblem)}
+        onChange={(wanted) => {
+          const enumeration = taken[Number(wanted)];
+          void (enumeration ? pass(name, enumeration) : updateFunctionParameter(name, { type: wanted })).then(
+            setProblem,
+          );
+        }}
       />
       {problem && (
         <p className="error" role="alert">

@@ -2,6 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
+import { notPredictable, startDryRun } from "../../commands/dryRun";
 import { startPicking } from "../../commands/functions";
 import { stopMotion } from "../../commands/operation";
 import { duplicateAction, notEditable, removeAction, renameAction } from "../../commands/program";
@@ -9,7 +10,7 @@ import { breakAt, cancel, execute, notRunnable, runTo } from "../../commands/run
 import { ago } from "../../formats";
 import { calledBy, metaOf } from "../../program/logic";
 import { whyUnavailable } from "../../store/permissions";
-import { select, useEditor } from "../../store/store";
+import { select, setUi, useEditor } from "../../store/store";
 import { Field } from "../kit/Field";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/section";
@@ -37,6 +38,11 @@ const ActionCommands: Section["Body"] = ({ selection: { id } }) => {
     select(null);
     startPicking([id]);
   };
+  const predict = () => {
+    setUi({ tool: "run" });
+    void startDryRun({ from_action: id });
+  };
+  const inside = doc.path.length > 0 ? t`A dry run starts in the program, not in a function.` : "";
   const stays = doc.project?.has_logic ? notRunnable(state) : t`The project has no program.`;
   return (
     <>
@@ -53,6 +59,11 @@ const ActionCommands: Section["Body"] = ({ selection: { id } }) => {
         <Button icon="play" why={stays} onPress={() => void runTo(id)}>
           {t`Run to here`}
         </Button>
+        {doc.project?.has_logic && (
+          <Button icon="eye" why={notPredictable(state) || inside} onPress={predict}>
+            {t`Dry run from here`}
+          </Button>
+        )}
         <Button
           aria-pressed={id in breakpoints}
           why={whyUnavailable(state, "SetBreakpoints")}

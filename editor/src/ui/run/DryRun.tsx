@@ -1,7 +1,7 @@
 /** The dry run: predicted cycle time, chart, bottleneck, waits, first problem, and a comparison with other runs. */
 
 import { t } from "@lingui/core/macro";
-import { useEffect, useState } from "react";
+import { useEffect, useMemo, useState } from "react";
 import {
   cancelDryRun,
   loadTiming,
@@ -12,8 +12,10 @@ import {
   type Timing,
 } from "../../commands/dryRun";
 import { clock, decimal, duration, fixed } from "../../formats";
+import { branchings, existing } from "../../program/branchings";
 import type { GetDryRunData, Prediction, TraceSummary } from "../../protocol/types";
 import { notify, useEditor } from "../../store/store";
+import { nameOf } from "../../viewmodel/names";
 import { Gantt } from "../gantt/Gantt";
 import { Pick } from "../kit/fields";
 import { Icon } from "../kit/icons";
@@ -32,8 +34,11 @@ export function DryRun() {
   const project = state.doc?.project?.id;
   const head = found?.dry_run;
   const mine = head !== undefined && head.project_id === project;
+  const first = (mine && head.from_action) || "";
+  const from = first && nameOf(state, first);
   const running = mine && head.state === "running";
   const why = notPredictable(state);
+  const { branches, fields } = useBranches();
   // The events of a dry run do not contain its result.
   const ended = running ? 0 : (head?.number ?? 0);
   useEffect(() => void showDryRun(project, ended), [project, ended]);
@@ -51,9 +56,17 @@ export function DryRun() {
           </div>
         </>
       ) : (
-        <div className="row">
-          <Button icon="eye" why={why} onPress={() => void startDryRun()}>{t`Dry run`}</Button>
-        </div>
+        <>
+          <div className="row">
+            <Button icon="eye" why={why} onPress={() => void startDryRun({ branches })}>{t`Dry run`}</Button>
+            {from && (
+              <Button why={why} onPress={() => void startDryRun({ branches, from_action: first })}>
+                {t`Dry run from ${from}`}
+              </Button>
+            )}
+          </div>
+          {fields}
+        </>
       )}
       {!mine && <p className="quiet small">{t`Predicts the cycle without devices. Nothing moves.`}</p>}
       {mine && head.state === "failed" && <p className="error">{head.error ?? t`The dry run failed.`}</p>}
@@ -62,6 +75,33 @@ export function DryRun() {
       )}
     </section>
   );
+}
+
+/** Return the chosen branches, and the fields to choose them. */
+function useBranches() {
+  const state = useEditor((each) => each);
+  const { doc, types } = state;
+  const [chosen, setChosen] = useState<Record<string, string>>({});
+  const found = useMemo(() => (doc?.project?.has_logic ? branchings(doc, types) : []), [doc, types]);
+  const branches = existing(found, chosen);
+  const fields = found.length > 0 && (
+    <details>
+      <summary>{t`Branches`}</summary>
+      {found.map(({ id, name, ways }) => (
+        <Pick
+          key={id}
+          label={name}
+          value={branches[id] ?? ""}
+          choices={[
+            ["", t`As in the last run`],
+            ...ways.map(({ to, when }): [string, string] => [to, `${when} → ${nameOf(state, to)}`]),
+          ]}
+          onChange={(to) => setChosen((before) => ({ ...before, [id]: to }))}
+        />
+      ))}
+    </details>
+  );
+  return { branches, fields };
 }
 
 interface OutcomeProps {

@@ -1,0 +1,27 @@
+/** The ways that a program can take, for a dry run. */
+
+import { expect, test } from "vitest";
+import { branchings, existing } from "./branchings";
+import { program, TYPES } from "./testing";
+
+test("branching actions state their ways; a removed way is not chosen any more", () => {
+  const doc = program({ a: "ask", b: "act", c: "act" }, [
+    ["START", "a"],
+    ["a", "b", "true"],
+    ["a", "END", "false"],
+    ["b", "c"],
+  ]);
+  const found = branchings(doc, TYPES);
+  expect(found).toEqual([
+    {
+      id: "a",
+      name: "a",
+      ways: [
+        { to: "b", when: "yes" },
+        { to: "END", when: "no" },
+      ],
+    },
+  ]);
+  expect(existing(found, { a: "END", b: "c" })).toEqual({ a: "END" });
+  expect(existing(found, { a: "c" })).toEqual({});
+});

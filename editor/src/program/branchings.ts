@@ -1,0 +1,40 @@
+/** Actions at which a program can take one of several ways, and the words for each way. Pure functions. */
+
+import { inScope } from "../store/scope";
+import type { OpenDocument, State } from "../store/state";
+import { conditionWords } from "./logic";
+import { nextSteps, placeOf } from "./steps";
+
+export interface Branching {
+  id: string;
+  name: string;
+  /** The next action or END, and the condition in words. */
+  ways: { to: string; when: string }[];
+}
+
+/** Return the actions of the program and of its called functions with several next actions, in the order of the project. */
+export function branchings(doc: OpenDocument, types: State["types"]): Branching[] {
+  const bodies = [inScope(doc, []), ...Object.keys(doc.functions).map((id) => inScope(doc, [id]))];
+  const called = new Set(bodies.flatMap((body) => Object.values(body.actions).map(({ type }) => type.split("/")[0])));
+  return bodies
+    .filter(({ path: [id] }) => id === undefined || called.has(id))
+    .flatMap((body) =>
+      Object.values(body.actions).map(({ id, name }) => {
+        const ways = nextSteps(body, id).map((step) => ({
+          to: placeOf(step.end),
+          when: conditionWords(body, types, step),
+        }));
+        return { id, name, ways: ways.filter(({ to }, n) => ways.findIndex((each) => each.to === to) === n) };
+      }),
+    )
+    .filter(({ ways }) => ways.length > 1);
+}
+
+/** Return the chosen ways that still exist. */
+export function existing(
+  found: readonly Branching[],
+  chosen: Readonly<Record<string, string>>,
+): Record<string, string> {
+  const ways = found.flatMap(({ id, ways }) => ways.filter(({ to }) => chosen[id] === to).map(({ to }) => [id, to]));
+  return Object.fromEntries(ways);
+}
