@@ -10,7 +10,7 @@ from playwright.async_api import Browser, expect
 
 from arcor2_hw.data import rpc
 from arcor2_hw.data.package import PackageStateEnum
-from arcor2_hw.data.project import Project
+from arcor2_hw.data.project import ActionParameter, Flow, Project
 from tests.e2e.harness import Cell, until
 from tests.editor import texts
 from tests.editor.programming import Work, at_work
@@ -143,7 +143,40 @@ async def test_a_run_of_actions_becomes_a_function_that_is_called_again(work: Wo
     await (await chooser.value).set_files(path)
     await expect(crumbs).to_contain_text("check_2")
     assert sorted(_functions(await work.saved())) == ["check", "check_2"]
-    await crumbs.get_by_role("button", name="Program").click()
+
+    # The menu of the copy. A parameter takes the enumeration of an action.
+    async def choose(function: str, item: str) -> None:
+        await crumbs.get_by_role("button", name=f"Function {function}", exact=True).click()
+        await page.get_by_role("menuitem", name=item).click()
+
+    await choose("check_2", "Rename")
+    await dialog.get_by_role("textbox").fill("other")
+    await dialog.get_by_role("button", name="Rename").click()
+    await expect(crumbs).to_contain_text("other")
+    await choose("other", "Duplicate")
+    await expect(crumbs).to_contain_text("other_2")
+    other = next(each for each in (await work.saved()).functions if each.name == "other_2")
+    orientation = work.project.action_points[0].orientations[0].id
+    move = [
+        ActionParameter("pose", "pose", json.dumps(orientation)),
+        ActionParameter("move_type", "string_enum", '"linear"'),
+        ActionParameter("speed", "double", "0.5"),
+        ActionParameter("acceleration", "double", "0.5"),
+    ]
+    kind = f"{work.object('robot')}/move"
+    await work.client.call("AddAction", rpc.AddActionArgs(other.id, "approach", kind, move, [Flow()]))
+    await choose("other_2", "Parameters")
+    await panel.get_by_role("button", name="Add a parameter").click()
+    added = panel.get_by_role("region", name="value", exact=True)
+    await added.get_by_label("Type").select_option("choice: move type of approach")
+    await added.get_by_role("button", name="approach").wait_for()
+    other = next(each for each in (await work.saved()).functions if each.id == other.id)
+    assert [(each.name, each.type) for each in other.parameters][-1] == ("value", "string_enum")
+    assert ActionParameter("move_type", "function_parameter", '"value"') in other.actions[-1].parameters
+    await screen.picture("function enumeration")
+    await choose("other_2", "Remove")
+    await expect(crumbs).to_have_count(0)
+    assert sorted(_functions(await work.saved())) == ["check", "other"]
 
     # A breakpoint inside; the call runs meanwhile.
     await tap("check_board")
