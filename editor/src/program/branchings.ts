@@ -12,7 +12,7 @@ export interface Branching {
   ways: { to: string; when: string }[];
 }
 
-/** Return the actions of the program and of its called functions with several next actions, in the order of the project. */
+/** Return the actions of the program and its called functions that have several next actions. */
 export function branchings(doc: OpenDocument, types: State["types"]): Branching[] {
   const bodies = [inScope(doc, []), ...Object.keys(doc.functions).map((id) => inScope(doc, [id]))];
   const called = new Set(bodies.flatMap((body) => Object.values(body.actions).map(({ type }) => type.split("/")[0])));
