@@ -3,17 +3,18 @@
 import asyncio
 import contextlib
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from arcor2_hw.data.alarms import AlarmFilter, AlarmRecord
 from arcor2_hw.data.device import Health
 from arcor2_hw.data.rpc import ListAlarmsArgs
 from arcor2_hw.data.scene import SceneObject
-from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout
+from arcor2_hw.exceptions import DeviceError, DeviceTimeout
 from arcor2_hw.objects import Generic
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.calls import error_data
@@ -21,47 +22,17 @@ from arcor2_hw.testing import declarations
 from arcor2_hw.testing.bench import Bench
 from arcor2_server.alarms.kinds import AlarmKinds
 from arcor2_server.alarms.service import Alarms
+from arcor2_server.cli.installed_fakes import InstalledFake
 from arcor2_server.hosts.devices import DeviceBoard
 from arcor2_server.websocket.hub import Hub
-from tests.drivers.benches.barcode_reader_bench import BarcodeReaderBench
-from tests.drivers.benches.conveyor_bench import ConveyorBench
-from tests.drivers.benches.dobot_magician_bench import DobotMagicianBench
-from tests.drivers.benches.functional_tester_bench import FunctionalTesterBench
 from tests.drivers.benches.label_printer_bench import ZplPrinterBench
-from tests.drivers.benches.remote_io_bench import RemoteIOBench
-from tests.drivers.benches.robotiq_2f_bench import Robotiq2FBench
-from tests.drivers.benches.scale_bench import MtSicsScaleBench
-from tests.drivers.benches.screwdriver_bench import OpenProtocolScrewdriverBench
-from tests.drivers.benches.two_axis_robot_bench import TwoAxisRobotBench
+from tests.drivers.fault_table import CONNECTION, FAULTS, LOST, NO_ALARM, Fault, fake_of
+from tests.fakes.conftest import FakeProcess
+from tests.fakes.test_every_fake import ARGUMENTS, FOUND
 
 PATIENCE = 15.0
 """Time until a fault is reported, s."""
 FOLDERS = {each.name: Path(each.folder) for each in declarations.drivers()}
-FAULTS: dict[type[Bench], list[tuple[str, dict[str, Any], str]]] = {
-    BarcodeReaderBench: [
-        ("health", {"value": "DIRTY"}, "barcode_reader-1"),
-        ("health", {"value": "HOT"}, "barcode_reader-2"),
-    ],
-    ConveyorBench: [("emergency", {"code": 0x8130}, "conveyor-1"), ("emergency", {"code": 0x2310}, "conveyor-2")],
-    DobotMagicianBench: [("alarm", {"code": 0x22}, "dobot_magician-1")],
-    FunctionalTesterBench: [
-        ("fault", {"code": 103}, "functional_tester-3"),
-        ("emergency_stop", {"pressed": True}, "functional_tester-6"),
-    ],
-    ZplPrinterBench: [("pause", {"on": True}, "label_printer-4")],
-    RemoteIOBench: [
-        ("diagnosis", {"supply_missing": True}, "remote_io-1"),
-        ("diagnosis", {"overload": True}, "remote_io-2"),
-    ],
-    Robotiq2FBench: [("fault", {"code": 14}, "robotiq_2f-1")],
-    MtSicsScaleBench: [("put", {"kg": 9.0}, "scale-1")],
-    OpenProtocolScrewdriverBench: [("alarm", {}, "screwdriver-1")],
-    TwoAxisRobotBench: [("hardware_error", {"servo": 1}, "two_axis_robot-1")],
-}
-CASES = [(bench, fault) for bench, faults in FAULTS.items() for fault in faults] + [
-    (MtSicsScaleBench, None),
-    (FunctionalTesterBench, None),
-]
 
 
 class NoStore:
@@ -97,40 +68,101 @@ async def recording(device: Generic) -> AsyncIterator[tuple[Alarms, DeviceBoard]
     await alarms.close()
 
 
-@pytest.mark.parametrize(
-    ("kind", "fault"), CASES, ids=lambda each: each.__name__ if isinstance(each, type) else each[2] if each else "cut"
-)
-async def test_fault_is_exactly_one_alarm(kind: type[Bench], fault: tuple[str, dict[str, Any], str] | None) -> None:
-    bench: Any = kind()
+@pytest.fixture(scope="module")
+def running(request: pytest.FixtureRequest) -> Iterator[Any]:
+    """Return a bench that the faults of a driver share."""
+    bench: Bench = request.param()
     bench.start()
-    device = bench.make()
-    await asyncio.to_thread(device.connect)
-    try:
-        async with recording(device) as (alarms, board):
+    yield bench
+    bench.end()
+
+
+@pytest.fixture
+def bench(running: Any) -> Iterator[Any]:
+    running.reset()
+    yield running
+    running.release()
+    running.reset()
+
+
+def failing(action: Callable[[Any], object], device: Generic) -> DeviceError:
+    """Return the error of an action that meets a fault."""
+    with pytest.raises(DeviceError) as error:
+        action(device)
+    return error.value
+
+
+async def found_after(fault: Fault, bench: Any, device: Generic) -> list[AlarmRecord]:
+    """Return all records after a fault was injected and the action that met it has failed."""
+    async with recording(device) as (alarms, board):
+
+        async def report_once() -> list[AlarmRecord]:
             board.changed(await asyncio.to_thread(report, device))
-            assert await alarms.find(ListAlarmsArgs(AlarmFilter.ALL)) == [], "an alarm before the fault"
-            if fault is None:
-                bench.cut()
-                wanted, error = "device-1", ConnectionLost("{device}: lost", device=device.name)
-            else:
-                command, arguments, wanted = fault
-                bench.do(command, **arguments)
-                error = DeviceTimeout("{device} did not answer", device=device.name)
-            found: list[AlarmRecord] = []
-            deadline = time.monotonic() + PATIENCE
-            while not found and time.monotonic() < deadline:
+            return await alarms.find(ListAlarmsArgs(AlarmFilter.ALL))
+
+        if fault.before is not None:
+            await asyncio.to_thread(fault.before, device)
+        assert await report_once() == [], "an alarm before the fault"
+        if fault.command:
+            await asyncio.to_thread(bench.fake.control.do, fault.command, **fault.arguments)
+        if fault.trigger is not None:
+            await asyncio.to_thread(fault.trigger, device)
+        error: DeviceError
+        if fault.action is not None:
+            error = await asyncio.to_thread(failing, fault.action, device)
+        else:
+            async with asyncio.timeout(PATIENCE):
+                while not await report_once():
+                    pass
+            error = DeviceTimeout("{device} did not answer", device=device.name)
+        failed = replace(error_data(error, device.id), object_name=device.name, object_type=type(device).__name__)
+        alarms.failed(failed, 1, "step")
+        for _ in range(2):
+            await report_once()
+        return await report_once()
+
+
+@pytest.mark.parametrize(
+    ("running", "fault"),
+    [(bench, fault) for bench, faults in FAULTS.items() for fault in faults],
+    indirect=["running"],
+    ids=lambda each: each.__name__ if isinstance(each, type) else str(each),
+)
+async def test_fault_is_exactly_one_alarm(bench: Any, fault: Fault) -> None:
+    acts = fault.action or fault.before or fault.trigger
+    device = await asyncio.to_thread(bench.controlled if acts else bench.connected)
+    records = await found_after(fault, bench, device)
+    kinds = [record.kind for record in records]
+    assert kinds in [[kind] for kind in fault.kind.split()], [record.text for record in records]
+    [record] = records
+    assert (record.object_name, record.action) == (device.name, "step")
+    assert record.text
+    assert record.cause
+    assert record.remedy
+
+
+@pytest.mark.parametrize("running", [bench for bench in FAULTS if fake_of(bench)], indirect=True)
+async def test_lost_connection_is_exactly_one_alarm(bench: Any) -> None:
+    device = await asyncio.to_thread(bench.connected)
+    async with recording(device) as (alarms, board):
+        bench.cut()
+        async with asyncio.timeout(PATIENCE):
+            while not await alarms.find(ListAlarmsArgs(AlarmFilter.ALL)):
                 board.changed(await asyncio.to_thread(report, device))
-                found = await alarms.find(ListAlarmsArgs(AlarmFilter.ALL))
-            # The action that was running fails, too, and more reports follow.
-            failed = error_data(error, device.id)
-            alarms.failed(failed, 1, "step")
-            for _ in range(2):
-                board.changed(await asyncio.to_thread(report, device))
-            [record] = await alarms.find(ListAlarmsArgs(AlarmFilter.ALL))
-            assert (record.kind, record.object_name, record.action) == (wanted, device.name, "step")
-            assert record.text
-            assert record.cause
-            assert record.remedy
+        board.changed(await asyncio.to_thread(report, device))
+        [record] = await alarms.find(ListAlarmsArgs(AlarmFilter.ALL))
+    kind = "label_printer-8" if isinstance(bench, ZplPrinterBench) else LOST  # its alarm also names missing labels
+    assert (record.kind, record.object_name) == (kind, device.name)
+
+
+@pytest.mark.parametrize("fake", FOUND, ids=lambda fake: fake.name)
+def test_every_command_of_a_fake_has_an_alarm_or_needs_none(fake: InstalledFake) -> None:
+    process = FakeProcess(fake.name, *ARGUMENTS.get(fake.name, ()))
+    try:
+        commands = {each["name"] for each in process.control.do("describe")} - {"truth"}
     finally:
-        await asyncio.to_thread(device.disconnect)
-        bench.end()
+        process.end()
+    name = fake.name
+    with_alarm = {fault.command for bench, faults in FAULTS.items() if fake_of(bench) == name for fault in faults}
+    assert commands - CONNECTION == with_alarm - CONNECTION - {""} | NO_ALARM[name]
+    assert not with_alarm & NO_ALARM[name]

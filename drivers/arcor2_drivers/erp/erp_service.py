@@ -138,7 +138,10 @@ class ErpService(Connected, Generic):
         state = self._outbox.state(sender.last_error)
         if state.since is not None:
             due = datetime.fromisoformat(state.since) + timedelta(seconds=self._config.waiting_alarm)
-            if datetime.now(UTC) >= due:
+            if sender.unauthorized:
+                remedy = translatable("renew token_file or client_certificate, then go online again")
+                found.append(Alarm.of(NOT_AUTHORIZED, Severity.ERROR, sender.unauthorized, remedy, state.since))
+            elif datetime.now(UTC) >= due:
                 why = state.last_error or Message.of("delivery is running")
                 text = Message.of(
                     "{count} results have been waiting since {since}: {reason}",
@@ -148,9 +151,6 @@ class ErpService(Connected, Generic):
                 )
                 remedy = translatable("check that the service is running and reachable; the results are delivered then")
                 found.append(Alarm.of(WAITING, Severity.WARNING, text, remedy, due.isoformat(timespec="microseconds")))
-            if sender.unauthorized:
-                remedy = translatable("renew token_file or client_certificate, then go online again")
-                found.append(Alarm.of(NOT_AUTHORIZED, Severity.ERROR, sender.unauthorized, remedy, state.since))
         if refused := self._outbox.refused():
             first = refused[0]
             text = Message.of(

@@ -167,6 +167,7 @@ def register(control: ControlServer, c: Controller, rtde: RtdeServer, script: Sc
     control.command("reduced", _switch(c.reduced))
     control.command("violation", lambda: c.fault(violation=True))
     control.command("fault", lambda: c.fault(violation=False))
+    control.command("restart_safety", c.restart_safety)
     control.command("remote_control", _switch(remote))
     control.command("operational_mode", operational_mode)
     control.command("foreign_program", _switch(foreign_program))

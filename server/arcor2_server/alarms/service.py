@@ -9,7 +9,7 @@ from zlib import crc32
 
 import structlog
 
-from arcor2_hw.data.alarms import AcknowledgeRole, AlarmFilter, AlarmRecord
+from arcor2_hw.data.alarms import AcknowledgeRole, AlarmCategory, AlarmFilter, AlarmRecord
 from arcor2_hw.data.base import UNSET, Timestamp, Unset, now
 from arcor2_hw.data.device import Alarm, Connection
 from arcor2_hw.data.held import HoldDecidedData
@@ -90,10 +90,12 @@ class Alarms:
             return  # the names are not known yet; the board repeats its reports then
         key = (what, report.object_id)
         before = self._seen.get(key, set())
-        alarms = {} if report.connection in _CONNECTION else {alarm.code: alarm for alarm in report.alarms}
+        alarms = {alarm.code: alarm for alarm in report.alarms}
         codes = set(alarms)
-        if (code := _CONNECTION.get(report.connection)) is not None:
-            codes = {code, *(each for each in before if each not in _CONNECTION.values())}
+        if (lost := _CONNECTION.get(report.connection)) is not None:
+            # The driver may know why the device does not answer, such as a printer without labels.
+            known = {each for each in codes | before if self._explains_loss(device.type, each)}
+            codes = before - set(_CONNECTION.values()) | (known if known and lost not in before else {lost})
         self._seen[key] = codes
         for ended in sorted(before - codes):
             self._changed(self._book.ended(report.object_id, ended, now()))
@@ -119,6 +121,11 @@ class Alarms:
                     )
                 )
             )
+
+    def _explains_loss(self, object_type: str, code: str) -> bool:
+        """Return whether a driver declares an alarm that states why its device cannot be reached."""
+        declared = self._kinds.declares(object_type, code)
+        return declared and self._kinds.of_device(object_type, code).category is AlarmCategory.CONNECTION
 
     def _gone(self, what: str, objects: list[str]) -> None:
         for object_id in objects:

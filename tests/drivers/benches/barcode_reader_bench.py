@@ -32,6 +32,8 @@ class BarcodeReaderBench(WiredBench):
 
     def reset(self) -> None:
         self.heal()
+        self.do("health", value="OK")
+        self.do("late", seconds=0.0)
         self.do("present", code=None)
         self.fake.control.wait_until(lambda t: not t["reading"])
 

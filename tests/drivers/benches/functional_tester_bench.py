@@ -37,6 +37,7 @@ class FunctionalTesterBench(WiredBench):
     def reset(self) -> None:
         do = self.do
         self.heal()
+        do("emergency_stop", pressed=False)
         do("mode", mode="produce")
         state = self.fake.truth()["state"]
         if state in ("Execute", "Starting"):

@@ -37,6 +37,9 @@ class TwoAxisRobotBench(FakeBench):
 
     def reset(self) -> None:
         self.do("heal")
+        for servo in (1, 2):
+            self.do("absent", servo=servo, on=False)
+            self.do("temperature", servo=servo, celsius=35)
         self.do("power_cycle")
         self.fake.control.wait_until(lambda truth: all(servo["answers"] for servo in truth["servos"].values()))
 

@@ -33,6 +33,9 @@ class FakeUr(FakeProcess):
 
     def reset(self) -> None:
         self.do("heal")
+        if self.truth()["safety"] in ("VIOLATION", "FAULT"):
+            self.do("restart_safety")
+        self.do("contact", on=False)
         for command in ("safeguard_stop", "foreign_program", "fieldbus", "emergency_stop", "reduced", "recovery"):
             self.do(command, on=False)
         self.do("no_obstacle")
