@@ -12,6 +12,7 @@ from msgspec import field
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset, new_id
 from arcor2_hw.data.events import ChangeType
+from arcor2_hw.data.held import OnError
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
@@ -74,8 +75,14 @@ class BreakpointsQuery(Data, frozen=True):
     breakpoints: list[str] = field(default_factory=list)
 
 
-class DebugQuery(Data, frozen=True, rename="camel"):
-    """Whether the program pauses before its first action."""
+class StartQuery(Data, frozen=True, rename="camel"):
+    """What the program does when an action fails and no error exit applies."""
+
+    on_error: OnError = OnError.END
+
+
+class DebugQuery(StartQuery, frozen=True, rename="camel"):
+    """Whether the program pauses before its first action, and what it does when an action fails."""
 
     break_on_first_action: bool = False
 
@@ -168,9 +175,9 @@ class ExecutionOperations:
 
     # ------------------------------------------------------------------------------------------------ the program
     @operation("PUT", "/packages/{id}/start", EXECUTION, Role.OPERATOR)
-    async def start_package(self, id: str, person: str) -> None:  # noqa: A002
+    async def start_package(self, id: str, query: StartQuery, person: str) -> None:  # noqa: A002
         """Run a package. A document left open by users who disconnected does not prevent it."""
-        await self._package_runs.run_package(id, How(by=person))
+        await self._package_runs.run_package(id, How(by=person, on_error=query.on_error))
 
     @operation("PUT", "/packages/{id}/breakpoints", EXECUTION, Role.OPERATOR)
     async def put_breakpoints(self, id: str, query: BreakpointsQuery) -> None:  # noqa: A002
@@ -188,7 +195,8 @@ class ExecutionOperations:
     async def debug_package(self, id: str, query: DebugQuery, person: str) -> None:  # noqa: A002
         """Run a package with its breakpoints."""
         breakpoints = await ProjectTables(self._storage).breakpoints(id)
-        await self._package_runs.run_package(id, How(query.break_on_first_action, breakpoints, by=person))
+        how = How(query.break_on_first_action, breakpoints, by=person, on_error=query.on_error)
+        await self._package_runs.run_package(id, how)
 
     @operation("PUT", "/packages/stop", EXECUTION, Role.OPERATOR)
     async def stop_package(self, person: str) -> None:

@@ -241,6 +241,19 @@ async def test_a_program_is_run_paused_stepped_and_stopped(server: ServerProcess
         info = await until_state(http, "Faulted")
         assert "acp_nowhere" in info["exceptionMessage"]
 
+        # With onError=hold, a failed action pauses the program instead of ending it.
+        failing = COUNT.replace("time.sleep(0.02)", 'raise RuntimeError("no board")')
+        granted(await http.put("/object-types", json={"id": "Counter", "name": "Counter", "source": failing}))
+        granted(await http.post("/packages/pkg_h", files=as_file(await published(http))))
+        refused(await http.put("/packages/pkg_h/start", params={"onError": "wait"}), 400, "Argument")
+        for command in ("start", "debug"):
+            granted(await http.put(f"/packages/pkg_h/{command}", params={"onError": "hold"}))
+            await until_state(http, "Paused")
+            granted(await http.put("/packages/stop"))
+            await until_state(http, "Completed")
+        granted(await http.put("/packages/pkg_h/start"))
+        await until_state(http, "Faulted")
+
         # Each run has its user and its result.
         runs = granted(await http.get("/api/runs", params={"package_id": "pkg_r", "limit": 2}))
         assert [(run["end"], run["start_paused"], run["project_id"]) for run in runs] == [
