@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 
 import pytest
 import pytest_asyncio
@@ -13,7 +13,9 @@ from arcor2_hw.data import rpc
 from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.data.project import START, ActionParameter, Flow, Project
+from arcor2_hw.data.role import Role
 from arcor2_hw.data.scene import Scene
+from arcor2_server.access.tokens import TokenFile
 from tests.e2e.harness import Cell
 from tests.editor import texts
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
@@ -29,8 +31,18 @@ async def colleague(cell: Cell) -> AsyncIterator[Client]:
     yield await cell.client("colleague")
 
 
-async def at_the_machine(screen: Screen, kiosk: bool = False) -> None:
-    await screen.join("Olga", f"/?q=low#/operator{'?kiosk' if kiosk else ''}")
+async def at_the_machine(screen: Screen, kiosk: bool = False, token: str = "") -> None:
+    await screen.join("Olga", f"/?{token and f'token={token}&'}q=low#/operator{'?kiosk' if kiosk else ''}")
+
+
+@pytest.fixture
+def token(cell: Cell, colleague: Client) -> Iterator[str]:
+    """Return a token of the role operator. Clients that are connected already need none."""
+    tokens = TokenFile(cell.data_dir)
+    secret = tokens.add("tablet", Role.OPERATOR)[1]
+    yield secret
+    for each in tokens.all():
+        tokens.revoke(each.id)
 
 
 async def with_message(client: Client, scene: Scene, project: Project, method: str, text: str) -> None:
@@ -59,11 +71,11 @@ async def built(cell: Cell, colleague: Client, message: str = "", method: str = 
 
 
 async def test_built_package_appears_runs_and_its_error_is_shown(
-    cell: Cell, colleague: Client, browser: Browser
+    cell: Cell, colleague: Client, browser: Browser, token: str
 ) -> None:
     async with screen_of(browser, cell.url, touch=True) as screen:
         page = screen.page
-        await at_the_machine(screen, kiosk=True)
+        await at_the_machine(screen, kiosk=True, token=token)
         await screen.sees("No packages yet.")
         assert await page.get_by_role("button", name="Open the editor").count() == 0
         # A package built by another user appears by itself.
@@ -94,6 +106,15 @@ async def test_built_package_appears_runs_and_its_error_is_shown(
             await asked.get_by_role("button", name="Try again").click()
             await expect(asked).to_have_count(0)
         await expect(card).to_contain_text("Held at pick", timeout=BEGUN)
+        # The robot goes into a protective stop, which the operator acknowledges in the card.
+        await cell.command_fake("robot", "protective_stop")
+        recognised = card.get_by_role("button", name="Acknowledge")
+        await expect(card).to_contain_text("Find out why the arm was stopped, then acknowledge the protective stop.")
+        await pictures(screen, "held, protective stop", scrolled="phone")
+        while await recognised.count():  # the controller refuses for 5 s
+            await recognised.click()
+            await screen.settle()
+        assert (await cell.command_fake("robot", "truth"))["safety"] == "NORMAL"
         await screen.press("End the program")
         await expect(state).to_contain_text("Run failed in pick")
         await expect(card).to_have_count(0)
@@ -101,13 +122,14 @@ async def test_built_package_appears_runs_and_its_error_is_shown(
         await pictures(screen, "operator")
 
 
-async def pictures(screen: Screen, name: str) -> None:
-    """Check the layout on every device, and take pictures."""
+async def pictures(screen: Screen, name: str, scrolled: str = "") -> None:
+    """Check the layout on every device, and take pictures. On the device `scrolled`, the page is longer."""
     for device, size in VIEWPORTS.items():
         await screen.page.set_viewport_size(size)  # type: ignore[arg-type]
         await screen.settle()
-        assert await screen.faults() == [], device
         await screen.picture(f"{name} {device}")
+        if device != scrolled:
+            assert await screen.faults() == [], device
 
 
 async def test_failed_run_is_shown_on_every_screen_until_it_is_dismissed(
@@ -195,12 +217,12 @@ async def test_pause_step_and_stop(cell: Cell, colleague: Client, browser: Brows
         await page.get_by_role("heading", name=texts.HOME_HEADING).wait_for()
 
 
-async def test_alarm_is_acknowledged_during_a_run(cell: Cell, colleague: Client, browser: Browser) -> None:
+async def test_alarm_is_acknowledged_during_a_run(cell: Cell, colleague: Client, browser: Browser, token: str) -> None:
     text = "The box for bad parts is full."
     package = await built(cell, colleague, text, "raise_alarm")
     async with screen_of(browser, cell.url, touch=True) as screen:
         page = screen.page
-        await at_the_machine(screen, kiosk=True)
+        await at_the_machine(screen, kiosk=True, token=token)
         await colleague.call("RunPackage", rpc.RunPackageArgs(package.id, start_paused=True))
         await page.get_by_text("before say").wait_for(timeout=BEGUN)
         await screen.press(texts.STEP)
@@ -234,6 +256,20 @@ async def test_alarm_is_acknowledged_during_a_run(cell: Cell, colleague: Client,
         await expect(everything).to_contain_text("acknowledged by Olga")
         await everything.get_by_role("radio", name="Statistics").check(force=True)
         await expect(everything).to_contain_text("Most frequent in 7 days")
+    # A technician finds the same list in the workplace.
+    await cell.open(colleague)
+    async with screen_of(browser, cell.url) as screen:
+        await screen.join("Theo", f"/?token={TokenFile(cell.data_dir).add('desk', Role.TECHNICIAN)[1]}&q=low")
+        await screen.press(texts.DEVICES)
+        await screen.page.get_by_text("All alarms", exact=True).click()
+        listed = screen.page.get_by_role("group", name="All alarms")
+        await listed.get_by_role("radio", name="History").check(force=True)
+        await expect(listed).to_contain_text("acknowledged by Olga")
+        for name, size in VIEWPORTS.items():
+            await screen.page.set_viewport_size(size)  # type: ignore[arg-type]
+            await screen.settle()
+            assert await screen.faults() == [], name
+            await screen.picture(f"workplace, all alarms {name}")
 
 
 async def test_operator_takes_over_a_project_left_open_and_locked(

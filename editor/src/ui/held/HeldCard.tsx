@@ -160,14 +160,14 @@ function Remedies({ held }: { held: HeldData }) {
     <div className="held-alarms">
       {alarms.map((alarm) => (
         <Alarm key={alarm.code} text={[alarm.text, alarm.remedy].filter(Boolean).join(": ")}>
-          {!stops && (
-            <Button why={why} onPress={() => confirm(alarm.code)}>
+          {(!stops || alarm === alarms[0]) && (
+            <Button why={why} icon={stops ? "check" : undefined} onPress={() => confirm(alarm.code)}>
               {t`Acknowledge`}
             </Button>
           )}
         </Alarm>
       ))}
-      {stops && (
+      {stops && alarms.length === 0 && (
         <Alarm text={t`Check the robot and its surroundings. Then acknowledge the stop.`}>
           <Button why={why} icon="check" onPress={() => confirm("")}>
             {t`Acknowledge`}

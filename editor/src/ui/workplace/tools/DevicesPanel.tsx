@@ -1,6 +1,7 @@
 /** Connection and health of each device; a failed one can be retried. */
 
 import { t } from "@lingui/core/macro";
+import { lazy, Suspense, useState } from "react";
 import { retryObject } from "../../../commands/operation";
 import { byName } from "../../../formats";
 import { translatedAlarm } from "../../../i18n/serverMessages";
@@ -12,6 +13,9 @@ import { useEditor } from "../../../store/store";
 import { Button } from "../../kit/kit";
 import { stateName, TONE } from "../sections/about";
 import { uncontrolledOnline } from "../uncontrolled";
+import "../../alarms/alarms.css";
+
+const AlarmList = lazy(() => import("../../alarms/AlarmList"));
 
 export default function Panel() {
   const live = useEditor((state) => state.live);
@@ -81,6 +85,22 @@ export default function Panel() {
           );
         })}
       </ul>
+      {serves("ListAlarms") && <Alarms />}
     </>
+  );
+}
+
+/** All alarms, loaded when they are opened. */
+function Alarms() {
+  const [open, setOpen] = useState(false);
+  return (
+    <details className="all-alarms" aria-label={t`All alarms`} onToggle={(event) => setOpen(event.currentTarget.open)}>
+      <summary>{t`All alarms`}</summary>
+      {open && (
+        <Suspense>
+          <AlarmList />
+        </Suspense>
+      )}
+    </details>
   );
 }
