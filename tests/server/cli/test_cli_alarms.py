@@ -39,7 +39,7 @@ def test_alarm_is_listed_shelved_and_acknowledged(server: ServerProcess, capsys:
     assert alarms("list")[1] == "There are no alarms.\n"
     assert "shelved until" in alarms("list", "--show", "shelved")[1]
     assert alarms("shelve", "1", "--hours", "0")[0] == ExitStatus.OK
-    assert alarms("shelve", "1", "--hours", "9")[0] == ExitStatus.FAILED
+    assert alarms("shelve", "1", "--hours", "9")[0] != ExitStatus.OK
 
     assert alarms("acknowledge", "1", "--user", "Theo")[0] == ExitStatus.OK
     assert alarms("list")[1] == "There are no alarms.\n"
