@@ -205,6 +205,36 @@ class Conflict(Arcor2Error):
     code = "conflict"
 
 
+class PartError(Conflict):
+    """An action does not agree with the books of parts."""
+
+    code = "part"
+
+
+class PlaceOccupied(PartError):
+    """There is a part already where the action puts one."""
+
+    code = "place_occupied"
+
+
+class PlaceEmpty(PartError):
+    """There is no part where the action takes one."""
+
+    code = "place_empty"
+
+
+class WrongPart(PartError):
+    """Another part is at the place than expected, or the part does not belong where the action puts it."""
+
+    code = "wrong_part"
+
+
+class PartUnconfirmed(PartError):
+    """It is not known where a part is. A person has to confirm its place."""
+
+    code = "part_unconfirmed"
+
+
 class InvalidProject(Arcor2Error):
     """A project cannot be converted to a program."""
 

@@ -2,9 +2,10 @@
 
 import builtins
 import enum
+import inspect
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Final, TypeVar, overload
+from typing import Final, NamedTuple, TypeVar, overload
 
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.object_type import ActionMetadata, Again
@@ -16,6 +17,15 @@ OLDER_DEADLINE: Final = 3600.0
 """Time limit of an action marked in the older way, s, which has no time limit of its own."""
 
 NOTHING_RENAMED: Final[Mapping[str, str]] = MappingProxyType({})
+
+
+class PartFlow(NamedTuple):
+    """What an action does with a part. takes_from, puts_to: names of the parameters with the places; empty: none."""
+
+    takes_from: str = ""
+    puts_to: str = ""
+    identifies: bool = False
+
 
 F = TypeVar("F", bound=Callable[..., object])
 V = TypeVar("V")
@@ -53,6 +63,9 @@ def action(
     renamed: Mapping[str, str] = NOTHING_RENAMED,
     verdict: bool = False,
     again: str = Again.ASK,
+    takes_from: str = "",
+    puts_to: str = "",
+    identifies: bool = False,
 ) -> Callable[[F], F]: ...
 
 
@@ -69,6 +82,9 @@ def action(
     renamed: Mapping[str, str] = NOTHING_RENAMED,
     verdict: bool = False,
     again: str = Again.ASK,
+    takes_from: str = "",
+    puts_to: str = "",
+    identifies: bool = False,
 ) -> F | Callable[[F], F]:
     """Mark a method as an action.
 
@@ -84,14 +100,27 @@ def action(
         verdict: Whether the returned boolean says that a part is good. Good and bad parts of a run are counted.
         again: "safe" if repeating it after it has failed does no harm, so that a program may retry it: it only reads,
             scans or measures. "never" if it must not be repeated, else "ask".
+        takes_from: Name of the parameter with the pose at which the device takes a part.
+        puts_to: Name of the parameter with the pose at which the device puts its part.
+        identifies: Whether the returned text is the serial number of the part at the place of the action.
+
+    Raises:
+        TypeError: The method has no parameter that `takes_from` or `puts_to` names, or both are stated.
     """
     repeated = UNSET if again == Again.ASK else Again(again)
+    flow = PartFlow(takes_from, puts_to, identifies)
 
     def mark(function: F) -> F:
+        if takes_from or puts_to:
+            if takes_from and puts_to:
+                raise TypeError("an action cannot declare both takes_from and puts_to")
+            if (takes_from or puts_to) not in inspect.signature(function).parameters:
+                raise TypeError(f"the action has no parameter {takes_from or puts_to!r}, which is to name a place")
         function.__action__ = ActionMetadata(composite, hidden, verdict=verdict or UNSET, again=repeated)  # type: ignore[attr-defined]
         function.__deadline__ = deadline  # type: ignore[attr-defined]
         function.__quick__ = quick  # type: ignore[attr-defined]
         function.__renamed__ = renamed  # type: ignore[attr-defined]
+        function.__part_flow__ = flow  # type: ignore[attr-defined]
         return function
 
     return mark if method is None else mark(method)
@@ -101,6 +130,12 @@ def metadata_of(method: object) -> ActionMetadata | None:
     """Return the metadata of an action, None for any other method."""
     found = getattr(method, "__action__", None)
     return found if isinstance(found, ActionMetadata) else None
+
+
+def part_flow_of(method: object) -> PartFlow:
+    """Return what an action does with a part."""
+    found = getattr(method, "__part_flow__", None)
+    return found if isinstance(found, PartFlow) else PartFlow()
 
 
 def is_quick(method: object) -> bool:

@@ -57,6 +57,7 @@ from arcor2_hw.data.object_type import ObjectAction, ObjectModel, ObjectTypeMeta
 from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHoldData
 from arcor2_hw.data.package import PackageSummary
 from arcor2_hw.data.parameter import IdValue, Parameter
+from arcor2_hw.data.parts import ConfirmedPart, PartBooks
 from arcor2_hw.data.position import ProgramPosition, ProgramStep
 from arcor2_hw.data.project import (
     ActionParameter,
@@ -349,6 +350,12 @@ class Requests(ABC):
     async def close_scene(self, *, force: bool = False, dry_run: bool = False, timeout: float | None = None) -> None:
         """CloseScene. Needs the role standard user."""
 
+    async def confirm_parts(self, *, scene_id: str, parts: list[ConfirmedPart], timeout: float | None = None) -> None:
+        """ConfirmParts: where a person has found parts. No parts: only that a program was interrupted.
+
+        Needs the role operator.
+        """
+
     async def copy_action_point(
         self, id: str, *, position: Position | Unset = UNSET, dry_run: bool = False, timeout: float | None = None
     ) -> None:
@@ -479,6 +486,9 @@ class Requests(ABC):
 
     async def get_object_types(self, *, timeout: float | None = None) -> list[ObjectTypeMeta]:
         """GetObjectTypes. Needs the role operator."""
+
+    async def get_parts(self, *, timeout: float | None = None) -> list[PartBooks]:
+        """GetParts. Needs the role operator."""
 
     async def get_program_position(self, *, timeout: float | None = None) -> ProgramPosition:
         """GetProgramPosition. Needs the role operator."""
@@ -935,6 +945,7 @@ class Requests(ABC):
         breakpoints: set[str] | Unset = UNSET,
         shared_breakpoints: bool | Unset = UNSET,
         on_error: OnError | Unset = UNSET,
+        checkpoints: bool | Unset = UNSET,
         timeout: float | None = None,
     ) -> None:
         """RunPackage. Needs the role operator."""
@@ -1079,6 +1090,7 @@ class Requests(ABC):
         breakpoints: set[str] | Unset = UNSET,
         shared_breakpoints: bool | Unset = UNSET,
         on_error: OnError | Unset = UNSET,
+        checkpoints: bool | Unset = UNSET,
         timeout: float | None = None,
     ) -> None:
         """TemporaryPackage. Needs the role standard user."""
@@ -1397,6 +1409,8 @@ class Requests(ABC):
     def follow(
         self, name: Literal["PackageState"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[PackageStateData]]: ...
+    @overload
+    def follow(self, name: Literal["PartsChanged"], /, *, limit: int = LIMIT) -> EventStream[TypedEvent[PartBooks]]: ...
     @overload
     def follow(
         self, name: Literal["ProcessState"], /, *, limit: int = LIMIT

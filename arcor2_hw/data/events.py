@@ -27,6 +27,7 @@ from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHoldData
 from arcor2_hw.data.package import CollisionModels, PackageStateEnum, PackageSummary
 from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.parts import PartBooks
 from arcor2_hw.data.position import ProgramPosition
 from arcor2_hw.data.project import (
     BareAction,
@@ -374,6 +375,7 @@ EVENTS: Final = {
         EventType("HistoryChanged", HistoryChangedData, Role.OPERATOR, additional=True),
         EventType("HoldDecided", HoldDecidedData, Role.OPERATOR, additional=True),
         EventType("MovePreview", MovePreviewData, Role.OPERATOR, additional=True),
+        EventType("PartsChanged", PartBooks, Role.OPERATOR, additional=True),
         EventType("ProgramPosition", ProgramPosition, Role.OPERATOR, additional=True),
         EventType("ReachabilityChanged", ReachabilityData, Role.OPERATOR, additional=True),
         EventType("RunChanged", Run, Role.OPERATOR, additional=True),

@@ -8,6 +8,7 @@ from arcor2_hw.actions import action
 from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction, Observation, Severity
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models
+from arcor2_hw.data.parts import PlaceKind
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2NotImplemented, NotFound
 from arcor2_hw.messages import Message
@@ -34,6 +35,8 @@ class Generic(abc.ABC):
         display_name: Name of the type in the editor, such as "Luxonis OAK-D"; not inherited. Default: the class name.
         category: Category in the editor.
         icon: Icon in the editor.
+        place_kind: As what kind of place of parts the object counts; None if it holds no parts.
+        place_capacity: How many parts fit in it; 0: any number.
     """
 
     _ABSTRACT: ClassVar[bool] = True
@@ -45,6 +48,8 @@ class Generic(abc.ABC):
     display_name: ClassVar[str] = ""
     category: ClassVar[str] = ""
     icon: ClassVar[str] = ""
+    place_kind: PlaceKind | None = None
+    place_capacity: ClassVar[int] = 1
 
     def __init__(self, obj_id: str, name: str, settings: Settings | None = None) -> None:
         self.id = obj_id
@@ -132,6 +137,14 @@ class Generic(abc.ABC):
         Round them, because every change is sent to all clients.
         """
         return {}
+
+    def part_present(self) -> bool | None:
+        """Return whether a sensor detects a part in the object; None without a sensor. Any thread may call it.
+
+        Raises:
+            DeviceError: The sensor cannot be read.
+        """
+        return None
 
     def identify(self) -> Identity:
         """Read the identity of the device."""

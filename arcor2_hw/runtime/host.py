@@ -38,6 +38,7 @@ from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.holding import Holds
 from arcor2_hw.runtime.link import Link
 from arcor2_hw.runtime.program import Program, set_current, traceback_text
+from arcor2_hw.runtime.record import RunRecord
 from arcor2_hw.runtime.script import execute, save_traceback
 from arcor2_hw.runtime.stopping import wait_stopped
 from arcor2_hw.runtime.streaming import RatedStreams, Streams
@@ -246,6 +247,7 @@ class Host:
             cell_file=message.cell,
             secrets=message.secrets,
             held=self._held if message.hold_on_error else None,
+            record=self._record(message),
         )
         self._cell = program.cell
         self._cell.assets, self._cell.updates = message.assets, self._updates
@@ -276,6 +278,8 @@ class Host:
         problem = program.settle(failed)
         self._calls.settle()  # before the devices are closed
         problem = program.cell.close() or problem
+        if program.record is not None:
+            program.record.close()
         why = program.error or problem
         self.link.post(
             m.ProgramChanged(
@@ -283,6 +287,17 @@ class Host:
                 not failed and problem is None,
                 None if why is None else _described(why, program.source_of(why)),
             )
+        )
+
+    def _record(self, message: m.RunPackage) -> RunRecord | None:
+        if not message.records:
+            return None
+        return RunRecord(
+            Path(message.records),
+            message.run,
+            message.package_id,
+            lambda books: self.link.post(m.PartsChanged(books)),
+            each_action=message.checkpoints,
         )
 
     # -------------------------------------------------------------------------------- channel of the program
@@ -368,6 +383,8 @@ class Host:
                 self.program.set_shared_breakpoints(frozenset(message.shared_breakpoints))
             case m.DecideHeld():
                 self._decide(message)
+            case m.ConfirmParts():
+                self._confirm_parts(message)
 
     def _held(self, held: HeldData, device: Device, error: BaseException) -> None:
         """Report that the program is held."""
@@ -386,6 +403,18 @@ class Host:
             self.link.post(m.CallDone(message.id))
             recovery.release()
 
+    def _confirm_parts(self, message: m.ConfirmParts) -> None:
+        """Record where a person has found parts."""
+        record = None if self.program is None else self.program.record
+        try:
+            if record is None:
+                raise Conflict("The program keeps no books of parts.")
+            record.confirm(message.parts)
+        except Arcor2Error as error:
+            self.link.post(m.CallFailed(message.id, error_data(error)))
+        else:
+            self.link.post(m.CallDone(message.id))
+
     def _stopping(self, device: Device) -> None:
         self._holds.stopping(device)
 
@@ -395,6 +424,8 @@ class Host:
         watchdog.daemon = True
         watchdog.start()
         self._shutting_down.set()
+        if self.program is not None and self.program.record is not None:
+            self.program.record.interrupt()
         self._cell.stop_all()
         self._stop_program()
         self._cell.abandon()

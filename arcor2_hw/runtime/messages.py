@@ -14,6 +14,7 @@ from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.data.held import HeldData, HoldChoice
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.operation import HoldKind
+from arcor2_hw.data.parts import ConfirmedPart, PartBooks
 from arcor2_hw.data.position import MAIN_BRANCH, Frame, ProgramStep
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.robot import Joint, KinematicCalibration
@@ -110,7 +111,8 @@ class RunPackage(ToHost, frozen=True):
     cell: settings of devices in this cell, which override those of the package. breakpoints: ids of action points and
     actions, all of which must exist. shared_breakpoints: further ids; those that the project lacks are ignored. assets,
     bodies, calibrations, secrets: as in OpenScene. hold_on_error: whether a failed action holds the program, see
-    ProgramHeld.
+    ProgramHeld. run: number of the run. records: directory of the books of parts and of checkpoints; empty to store
+    nothing. checkpoints: whether the state is stored before and after each action.
     """
 
     package_id: str
@@ -125,6 +127,9 @@ class RunPackage(ToHost, frozen=True):
     calibrations: dict[str, KinematicCalibration] = field(default_factory=dict)
     secrets: dict[str, ObjectSecrets] = field(default_factory=dict)
     hold_on_error: bool = False
+    run: int = 0
+    records: str = ""
+    checkpoints: bool = True
 
 
 class AddBody(ToHost, frozen=True):
@@ -248,6 +253,13 @@ class DecideHeld(ToHost, frozen=True):
     choice: HoldChoice
     results: list[str] = field(default_factory=list)
     exit_id: str = ""
+
+
+class ConfirmParts(ToHost, frozen=True):
+    """Record where a person has found parts. Answer: CallDone or CallFailed with this id."""
+
+    id: int
+    parts: list[ConfirmedPart]
 
 
 class StopProgram(ToHost, frozen=True):
@@ -379,6 +391,12 @@ class ProgramHeld(ToServer, frozen=True):
     error: ErrorData
 
 
+class PartsChanged(ToServer, frozen=True):
+    """The books of parts have changed."""
+
+    books: PartBooks
+
+
 class HandTeachingEnded(ToServer, frozen=True):
     """A robot has left hand teaching mode without a request. `error`: the reason."""
 
@@ -435,6 +453,7 @@ HostBound = (
     | Step
     | SetBreakpoints
     | DecideHeld
+    | ConfirmParts
     | StopProgram
     | CloseScene
 )
@@ -453,6 +472,7 @@ ServerBound = (
     | ActionFailed
     | ProgramChanged
     | ProgramHeld
+    | PartsChanged
     | DeviceChanged
     | LogLine
 )

@@ -37,6 +37,7 @@ from arcor2_hw.runtime.branches import Action, Branches
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
 from arcor2_hw.runtime.pacing import Gate
+from arcor2_hw.runtime.record import RunRecord
 from arcor2_hw.runtime.recovery import ActionCall, Decision, Post, Recovery, mark_decided
 from arcor2_hw.runtime.stopping import SentStop, wait_stopped
 from arcor2_hw.runtime.values import encode_shown, results
@@ -108,8 +109,11 @@ class Program:
         cell_file: CellFile | None = None,
         secrets: Mapping[str, ObjectSecrets] = MappingProxyType({}),
         held: Post | None = None,
+        record: RunRecord | None = None,
     ) -> None:
         self.channel = channel
+        self.record = record
+        """Keeps the books of parts and stores checkpoints; None if nothing is stored."""
         self.cell_file = cell_file
         """Settings of devices in this cell, which override those of the package."""
         self.secrets = secrets

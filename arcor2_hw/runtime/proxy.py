@@ -64,15 +64,25 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
         action = program.action_begins(device.id, what, an, shown)
         if an is not None:
             keywords["an"] = an
+        record, step = program.record, None
         while True:
             try:
                 if program.recovery is not None:
                     program.recovery.take_control(device)
+                if record is not None:
+                    branch = program.branches.current
+                    step = record.begin(action, an or what, branch, device, bound, arguments, keywords)
                 value = lane.call(name, bound, arguments, keywords, deadline)
+                if record is not None and step is not None:
+                    record.end(step, value)
             except ProgramFinished:
+                if record is not None and step is not None:
+                    record.end(step, None)
                 program.action_ended(action, None)
                 raise
             except BaseException as error:
+                if record is not None and step is not None:
+                    record.fail(step)
                 decision = program.hold(action, an or what, device, bound, error)
                 if decision is None:
                     program.action_failed(action, error)
@@ -84,6 +94,8 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
                 if decision.choice is HoldChoice.RETRY:
                     action = program.action_repeats(action, device.id, what, an, shown)
                     continue
+                if record is not None and step is not None:  # the action counts as done
+                    record.end(step, value)
             program.action_ended(action, value)
             return value
 

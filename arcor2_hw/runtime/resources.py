@@ -176,6 +176,8 @@ class Resources:
             with contextlib.suppress(Arcor2Error):  # the object has no instance
                 program.record_error_source(program.cell[fault.object_id], fault.error)
             raise fault.error from fault
+        if program.record is not None:
+            program.record.open(data.project, program.cell, self._directory)
         for device in program.cell:
             self.objects[device.id] = proxy(device, program)
         name = package_name(self._directory, program.package_id)

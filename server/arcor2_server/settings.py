@@ -107,6 +107,11 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return self.data_dir / "journal.sqlite"
 
     @property
+    def checkpoints_dir(self) -> Path:
+        """The books of parts and the checkpoints of runs."""
+        return self.data_dir / "checkpoints"
+
+    @property
     def analysis_file(self) -> Path:
         """The cached analysis of object types. It may be deleted."""
         return self.data_dir / "analysis.msgpack"

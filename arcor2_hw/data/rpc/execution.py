@@ -5,6 +5,7 @@ from typing import Final
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.held import HeldData, HoldChoice, OnError
 from arcor2_hw.data.package import PackageSummary
+from arcor2_hw.data.parts import ConfirmedPart, PartBooks
 from arcor2_hw.data.position import ProgramPosition, ProgramStep
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc.envelope import Rpc
@@ -41,26 +42,29 @@ class RunPackageArgs(IdArgs, frozen=True):
     """Arguments of RunPackage.
 
     shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
-    on_error: what the program does when an action fails and no error exit applies.
+    on_error: what the program does when an action fails and no error exit applies. checkpoints: whether the state is
+    stored before and after each action; default: true.
     """
 
     start_paused: bool = False
     breakpoints: set[str] | Unset = UNSET
     shared_breakpoints: bool | Unset = UNSET
     on_error: OnError | Unset = UNSET
+    checkpoints: bool | Unset = UNSET
 
 
 class TemporaryPackageArgs(Data, frozen=True):
     """Arguments of TemporaryPackage.
 
     shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
-    on_error: what the program does when an action fails and no error exit applies.
+    on_error: what the program does when an action fails and no error exit applies. checkpoints: as in RunPackage.
     """
 
     start_paused: bool = False
     breakpoints: set[str] | Unset = UNSET
     shared_breakpoints: bool | Unset = UNSET
     on_error: OnError | Unset = UNSET
+    checkpoints: bool | Unset = UNSET
 
 
 class StepActionArgs(Data, frozen=True):
@@ -91,6 +95,13 @@ class GetHeldData(Data, frozen=True):
     held: HeldData | Unset = UNSET
 
 
+class ConfirmPartsArgs(Data, frozen=True):
+    """Arguments of ConfirmParts: where a person has found parts. No parts: only that a program was interrupted."""
+
+    scene_id: str
+    parts: list[ConfirmedPart]
+
+
 class UploadPackageArgs(Data, frozen=True):
     """Arguments of UploadPackage."""
 
@@ -101,10 +112,12 @@ class UploadPackageArgs(Data, frozen=True):
 EXECUTION_RPCS: Final = (
     Rpc("BuildProject", BuildProjectArgs, BuildProjectData, Role.STANDARD_USER),
     Rpc("CancelAction", None, None, Role.OPERATOR),
+    Rpc("ConfirmParts", ConfirmPartsArgs, None, Role.OPERATOR, additional=True),
     Rpc("DecideHeld", DecideHeldArgs, None, Role.OPERATOR, additional=True),
     Rpc("DeletePackage", IdArgs, None, Role.ADVANCED_USER),
     Rpc("ExecuteAction", ExecuteActionArgs, None, Role.STANDARD_USER, dry_run=True),
     Rpc("GetHeld", None, GetHeldData, Role.OPERATOR, additional=True),
+    Rpc("GetParts", None, list[PartBooks], Role.OPERATOR, additional=True),
     Rpc("GetProgramPosition", None, ProgramPosition, Role.OPERATOR, additional=True),
     Rpc("ListPackages", None, list[PackageSummary], Role.OPERATOR),
     Rpc("PausePackage", None, None, Role.OPERATOR),

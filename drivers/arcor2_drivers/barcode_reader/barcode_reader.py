@@ -163,7 +163,7 @@ class BarcodeReader(LineDevice, Reader):
         return self.ask(command.encode("ascii") + lines.CR, found, command, timeout)
 
     # -------------------------------------------------------------------------------- actions
-    @action(deadline=LONGEST_SCAN + MARGIN, again="safe")
+    @action(deadline=LONGEST_SCAN + MARGIN, again="safe", identifies=True)
     def scan(self, timeout: float = 2.0, *, an: str | None = None) -> str:
         """Read the code in front of the reader; it is an error if there is none.
 

@@ -276,7 +276,7 @@ class DobotMagician(HoldsParts, SingleArm):
         assert 0.01 <= speed <= 1.0
         self._motion.to_joints(values(self.name, joints.joints), speed, self._control.stops.guard())
 
-    @action
+    @action(takes_from="pose")
     def pick(
         self, pose: Pose, approach: float = 0.05, speed: float = 0.5, slow_speed: float = 0.1, *, an: str | None = None
     ) -> None:
@@ -292,7 +292,7 @@ class DobotMagician(HoldsParts, SingleArm):
         assert 0.01 <= slow_speed <= 1.0
         self._pick_or_place("pick", pose, approach, speed, slow_speed, suck=True)
 
-    @action
+    @action(puts_to="pose")
     def place(
         self, pose: Pose, approach: float = 0.05, speed: float = 0.5, slow_speed: float = 0.1, *, an: str | None = None
     ) -> None:

@@ -7,6 +7,7 @@ from arcor2_hw.actions import action
 from arcor2_hw.data.device import Alarm, Health, LossReaction, Observation, Quality
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models
+from arcor2_hw.data.parts import PlaceKind
 from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, DeviceTimeout, NotFound, Refused
 from arcor2_hw.messages import Phrase, translatable
 from arcor2_hw.objects import CollisionObject, Machine, MachineCommand, MachineState, UnitMode
@@ -28,6 +29,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
 
     _ABSTRACT = False
     display_name = "Functional tester"
+    place_kind = PlaceKind.HOLDER
     states: ClassVar[frozenset[MachineState]] = STATES
     loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(LONGEST_WATCHDOG / 1000.0 + ABORTS_WITHIN)
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"test": "stop", "open_door": "stop", "close_door": "stop"}

@@ -25,7 +25,7 @@ class DigitalGripper(HoldsParts, DigitalIO):
     _ur: UrSettings
     _motion: Motion
 
-    @action
+    @action(takes_from="pose")
     def pick(
         self, pose: Pose, approach: float = 0.1, speed: float = 0.5, slow_speed: float = 0.1, *, an: str | None = None
     ) -> None:
@@ -54,7 +54,7 @@ class DigitalGripper(HoldsParts, DigitalIO):
             )
         self._check_part_held("on the way up")
 
-    @action
+    @action(puts_to="pose")
     def place(
         self, pose: Pose, approach: float = 0.1, speed: float = 0.5, slow_speed: float = 0.1, *, an: str | None = None
     ) -> None:
@@ -83,7 +83,7 @@ class DigitalGripper(HoldsParts, DigitalIO):
             raise Refused("{name} has no gripper: gripper_output is not set.", name=self.name)
         return self._ur.gripper_output
 
-    def _part_sensed(self) -> bool | None:
+    def part_present(self) -> bool | None:
         """Return whether the sensor detects a part; None without a sensor."""
         number = self._ur.part_sensor_input
         return self.get_digital_input(number) if number >= 0 else None
@@ -93,12 +93,12 @@ class DigitalGripper(HoldsParts, DigitalIO):
 
         def seen() -> bool:
             guard.check(f"The gripper of {self.name}")
-            return self._part_sensed() is held
+            return self.part_present() is held
 
-        return once_within(seen, self._ur.gripper_time, POLL) or self._part_sensed() is None
+        return once_within(seen, self._ur.gripper_time, POLL) or self.part_present() is None
 
     def _check_part_held(self, when: str) -> None:
-        if self._part_sensed() is False:
+        if self.part_present() is False:
             self.detach_part()
             raise DeviceFault("{name} lost the part {when}.", fault_code=PART_LOST, name=self.name, when=when)
 

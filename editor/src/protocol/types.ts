@@ -595,6 +595,24 @@ export interface CollisionModels {
   meshes: Mesh[];
 }
 
+/** Arguments of ConfirmParts: where a person has found parts. No parts: only that a program was interrupted. */
+export interface ConfirmPartsArgs {
+  scene_id: string;
+  parts: ConfirmedPart[];
+}
+
+/**
+ * The place of a part as a person has found it.
+ *
+ * number: of the part; 0: a part that is not in the books, which counts as fed. place: id of the place; empty: the
+ * part was taken out of the cell, which counts as rejected. serial: corrects the serial number.
+ */
+export interface ConfirmedPart {
+  number: number;
+  place: string;
+  serial?: string;
+}
+
 /** State of a connection. */
 export type Connection = "offline" | "connecting" | "online" | "lost" | "back" | "failed";
 
@@ -1680,8 +1698,65 @@ export interface ParameterMeta {
   found_by?: string;
 }
 
+/**
+ * A part in the cell.
+ *
+ * number: unique in the scene. serial: its code; empty before it is scanned. place: id of the place. moving_to: id of
+ * the place where it may also be, because an action has not completed. good: result of its test. confirmed: whether
+ * the place is known; if not, a person has to confirm it.
+ */
+export interface Part {
+  number: number;
+  place: string;
+  serial: string;
+  moving_to?: string;
+  good?: boolean;
+  confirmed: boolean;
+}
+
+/** The parts of a scene, its places, the counts, and the last run. */
+export interface PartBooks {
+  scene_id: string;
+  parts: Part[];
+  places: Place[];
+  counts: PartCounts;
+  run?: RunCheckpoint;
+}
+
+/** What was counted since the scene exists: fed = good + bad + rejected + in_cell. */
+export interface PartCounts {
+  fed: number;
+  good: number;
+  bad: number;
+  rejected: number;
+  in_cell: number;
+}
+
 /** Values of PivotEnum in UpdateObjectPoseUsingRobot. */
 export type Pivot = "top" | "middle" | "bottom";
+
+/**
+ * A place: id and name of the object, or of an action point at no object that is a place.
+ *
+ * capacity: how many parts fit; 0: any number. parts: serial numbers of the newest parts in a box. sensed: whether the
+ * sensor detects a part; omitted if there is no sensor, or if it was not read.
+ */
+export interface Place {
+  id: string;
+  name: string;
+  kind: PlaceKind;
+  capacity: number;
+  parts: string[];
+  sensed?: boolean;
+}
+
+/**
+ * Kinds of places.
+ *
+ * A part comes into the cell by a FEEDER. A HOLDER is a fixture, a nest, a gripper or a machine. A part leaves the
+ * cell in a box: GOOD, BAD or REJECTED, by which it is counted.
+ */
+export type PlaceKind = "feeder" | "holder" | "good" | "bad" | "rejected";
 
 /** Position and orientation of a frame in its parent frame. */
 export interface Pose {
@@ -2208,6 +2283,25 @@ export interface Run {
   values?: Record<string, string | Message>;
 }
 
+/**
+ * State of a run before or after an action.
+ *
+ * package_hash: SHA-256 of script and project. cycle: number of the present cycle, from 1. actions: those that have
+ * started and not ended; empty between two actions. last: the action that ended last. results: the newest results of
+ * each action by its id, in JSON. ended: whether the program has ended in an orderly way.
+ */
+export interface RunCheckpoint {
+  run: number;
+  package_id: string;
+  package_hash: string;
+  since: string;
+  cycle: number;
+  actions: RunningAction[];
+  last: string;
+  results: Record<string, string[]>;
+  ended: boolean;
+}
+
 /** How a run ended: completed, stopped by a user, by an error, or with the server or its host. */
 export type RunEnd = "running" | "finished" | "stopped" | "failed" | "lost";
 
@@ -2215,7 +2309,8 @@ export type RunEnd = "running" | "finished" | "stopped" | "failed" | "lost";
  * Arguments of RunPackage.
  *
  * shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
- * on_error: what the program does when an action fails and no error exit applies.
+ * on_error: what the program does when an action fails and no error exit applies. checkpoints: whether the state is
+ * stored before and after each action; default: true.
  */
 export interface RunPackageArgs {
   id: string;
@@ -2223,6 +2318,7 @@ export interface RunPackageArgs {
   breakpoints?: string[];
   shared_breakpoints?: boolean;
   on_error?: OnError;
+  checkpoints?: boolean;
 }
 
 /**
@@ -2269,6 +2365,19 @@ export interface RunTrace {
   devices: TracedDevice[];
   spans: Span[];
   omitted: number;
+}
+
+/**
+ * An action that has started and not ended.
+ *
+ * number: in the run. branch, frames: its position, as in ProgramPosition.
+ */
+export interface RunningAction {
+  number: number;
+  action_id: string;
+  action_name: string;
+  branch: string;
+  frames: Frame[];
 }
 
 /** A scene with its objects. */
@@ -2545,13 +2654,14 @@ export interface TaskStateData {
  * Arguments of TemporaryPackage.
  *
  * shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
- * on_error: what the program does when an action fails and no error exit applies.
+ * on_error: what the program does when an action fails and no error exit applies. checkpoints: as in RunPackage.
  */
 export interface TemporaryPackageArgs {
   start_paused?: boolean;
   breakpoints?: string[];
   shared_breakpoints?: boolean;
   on_error?: OnError;
+  checkpoints?: boolean;
 }
 
 /**
@@ -2863,6 +2973,7 @@ export interface Requests {
   CheckScript: { args: ScriptArgs; data: CheckScriptData };
   CloseProject: { args: CloseProjectArgs | undefined; data: undefined };
   CloseScene: { args: CloseSceneArgs | undefined; data: undefined };
+  ConfirmParts: { args: ConfirmPartsArgs; data: undefined };
   CopyActionPoint: { args: CopyActionPointArgs; data: undefined };
   CopyProject: { args: CopyProjectArgs; data: undefined };
   CopyScene: { args: CopySceneArgs; data: string };
@@ -2888,6 +2999,7 @@ export interface Requests {
   GetGrippers: { args: GetGrippersArgs; data: string[] };
   GetHeld: { args: undefined; data: GetHeldData };
   GetObjectTypes: { args: undefined; data: ObjectTypeMeta[] };
+  GetParts: { args: undefined; data: PartBooks[] };
   GetProgramPosition: { args: undefined; data: ProgramPosition };
   GetProject: { args: IdArgs; data: Project };
   GetRobotArms: { args: GetRobotArmsArgs; data: string[] };
@@ -3049,6 +3161,7 @@ export interface Events {
   PackageChanged: PackageSummary;
   PackageInfo: PackageInfoData;
   PackageState: PackageStateData;
+  PartsChanged: PartBooks;
   ProcessState: ProcessStateData;
   ProgramPosition: ProgramPosition;
   ProjectChanged: BareProject;
@@ -3131,6 +3244,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   CheckScript: 2,
   CloseProject: 2,
   CloseScene: 2,
+  ConfirmParts: 1,
   CopyActionPoint: 2,
   CopyProject: 2,
   CopyScene: 4,
@@ -3156,6 +3270,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   GetGrippers: 1,
   GetHeld: 1,
   GetObjectTypes: 1,
+  GetParts: 1,
   GetProgramPosition: 1,
   GetProject: 1,
   GetRobotArms: 1,
@@ -3296,6 +3411,7 @@ export const ADDITIONAL_EVENTS = [
   "ObjectObservations",
   "ObjectState",
   "ObjectValues",
+  "PartsChanged",
   "ProgramPosition",
   "ReachabilityChanged",
   "RobotHold",

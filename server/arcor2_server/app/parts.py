@@ -28,6 +28,7 @@ from arcor2_server.documents.saved_problems import SavedProblems
 from arcor2_server.dry_run.service import DryRuns
 from arcor2_server.execution.breakpoints import SharedBreakpoints
 from arcor2_server.execution.package_runs import PackageRuns
+from arcor2_server.execution.part_books import AllPartBooks
 from arcor2_server.execution.run_message import RunMessages
 from arcor2_server.execution.runs import Runs
 from arcor2_server.execution.service import Execution
@@ -182,8 +183,9 @@ class Server:
         breakpoints = self.breakpoints = SharedBreakpoints(hub, storage, session, shared)
         connect_edits(edit_notifications, previews, breakpoints)
         messages = RunMessages(settings, secrets, breakpoints, host_world)
+        books = AllPartBooks(hub, settings.checkpoints_dir)
         execution = self.execution = closed(
-            Execution(packages, program_host, online, settings, hub, types, runs, breakpoints, secrets, messages)
+            Execution(packages, program_host, online, settings, hub, types, runs, breakpoints, secrets, messages, books)
         )
         alarms = self.alarms = Alarms(
             hub,

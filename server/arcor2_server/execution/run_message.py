@@ -41,6 +41,8 @@ class RunMessages:
             self._settings.cell,
             assets=self._host_world.shape_files(),
             hold_on_error=how.on_error is OnError.HOLD,
+            records=str(self._settings.checkpoints_dir),
+            checkpoints=how.checkpoints,
         )
 
     async def complete(self, message: m.RunPackage, shared_of: str) -> m.RunPackage:

@@ -93,6 +93,7 @@ class How(Struct, frozen=True):
         shared_breakpoints: pause also at the shared breakpoints of the project.
         by: name of the user.
         on_error: what the program does when an action fails and no error exit applies.
+        checkpoints: store the state before and after each action.
     """
 
     start_paused: bool = False
@@ -100,6 +101,7 @@ class How(Struct, frozen=True):
     shared_breakpoints: bool = False
     by: str = ""
     on_error: OnError = OnError.END
+    checkpoints: bool = True
 
 
 class Runs:

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import msgspec
 import structlog
+from msgspec.structs import replace
 
 from arcor2_hw.data import events as e
 from arcor2_hw.data.base import UNSET
@@ -15,7 +16,7 @@ from arcor2_hw.data.events import Event, MainScreen, ProjectExceptionData
 from arcor2_hw.data.held import HoldDecidedData
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.position import ProgramStep
-from arcor2_hw.data.rpc import DecideHeldArgs
+from arcor2_hw.data.rpc import ConfirmPartsArgs, DecideHeldArgs
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, NotFound
 from arcor2_hw.messages import Message
@@ -26,6 +27,7 @@ from arcor2_server.events import EventHub, encode, make_event
 from arcor2_server.execution.breakpoints import SharedBreakpoints
 from arcor2_server.execution.holds import ProgramHold
 from arcor2_server.execution.packages import PackageLibrary
+from arcor2_server.execution.part_books import AllPartBooks
 from arcor2_server.execution.program_run import ProgramRun
 from arcor2_server.execution.run_message import RunMessages
 from arcor2_server.execution.runs import How, Runs
@@ -70,6 +72,7 @@ class Execution(PackageLibrary):
         breakpoints: SharedBreakpoints,
         secrets: SettingSecrets,
         messages: RunMessages,
+        parts: AllPartBooks,
     ) -> None:
         super().__init__(hub, packages)
         self.state = S.UNDEFINED
@@ -79,6 +82,8 @@ class Execution(PackageLibrary):
         """The present or last run."""
         self.hold = ProgramHold(hub, runs)
         """The hold of the present run."""
+        self.parts = parts
+        """The books of parts."""
         self._host = host
         self._online = online
         self._settings = settings
@@ -204,6 +209,7 @@ class Execution(PackageLibrary):
         requested_at = time.monotonic()
         directory = await asyncio.to_thread(self.packages.directory, package_id)
         project_id = await asyncio.to_thread(self.packages.project_id, package_id) if how.shared_breakpoints else ""
+        scene_id = await self.parts.require_confirmed(directory)
         self._require_idle()
         self._online.last_stop.require_none_since(requested_at)
         self.program = program = ProgramRun(self._runs, package_id, project_id)
@@ -213,6 +219,8 @@ class Execution(PackageLibrary):
         self._enter(S.STARTED)
         message = self._messages.prepare(package_id, directory, how)
         program.begin(how, temporary=temporary)
+        message = replace(message, run=program.number)
+        self.parts.begin_run(scene_id)
         self._background.spawn(self._begin(message), "program start")
         self._background.spawn(program.describe(self.packages), "description of the run")
 
@@ -305,6 +313,10 @@ class Execution(PackageLibrary):
         """Continue the held program as a user has decided."""
         await self.hold.decide(self._host.host, args, by)
 
+    async def confirm_parts(self, args: ConfirmPartsArgs, by: str) -> None:
+        """Record where a user has found parts."""
+        await self.parts.confirm(self._host.host, args.scene_id, args.parts, by)
+
     def device_of_hold(self, object_id: str) -> SceneObject:
         """Return a device of the held program, on which a user may act. Raise RequestRefused unless it is held."""
         if self.hold.present is None:
@@ -376,6 +388,8 @@ class Execution(PackageLibrary):
                     self._publish_position()
             case m.ProgramHeld():
                 self._held(message)
+            case m.PartsChanged():
+                self.parts.changed(message.books)
             case m.ProgramChanged():
                 self._program_changed(host, message)
             case _:
@@ -465,6 +479,7 @@ class Execution(PackageLibrary):
             self._killing.cancel()
             self._killing = None
         self._enter(S.STOPPED)
+        self._background.spawn(self.parts.publish(self.parts.end_run()), "books of parts after the run")
         if self._over is None:
             screen = e.ShowMainScreenData(MainScreen.PACKAGES_LIST, self.program.package_id)
             self._hub.broadcast(make_event("ShowMainScreen", screen))

@@ -15,6 +15,7 @@ import structlog
 from arcor2_hw.actions.json_values import encode
 from arcor2_hw.data.held import HoldChoice
 from arcor2_hw.data.operation import HoldKind
+from arcor2_hw.data.parts import ConfirmedPart
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
@@ -245,6 +246,16 @@ class CellHost:
             DeviceTimeout: the host did not answer in time.
         """
         await self._request(m.DecideHeld, number, choice, list(results), exit_id, limit=ANSWER_TIMEOUT)
+
+    async def confirm_parts(self, parts: Sequence[ConfirmedPart]) -> None:
+        """Record where a person has found parts.
+
+        Raises:
+            CellError: an action is running, or the parts contradict each other.
+            ConnectionLost: the host ended.
+            DeviceTimeout: the host did not answer in time.
+        """
+        await self._request(m.ConfirmParts, list(parts), limit=ANSWER_TIMEOUT)
 
     async def retry(self, object_id: str) -> None:
         """Create and connect a failed object again. Raise CellError or ConnectionLost if that is impossible."""

@@ -7,8 +7,10 @@ from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.events import ActionExecutionData, ChangeType
 from arcor2_hw.data.held import OnError
 from arcor2_hw.data.package import PackageSummary
+from arcor2_hw.data.parts import PartBooks
 from arcor2_hw.data.position import ProgramPosition
 from arcor2_hw.data.rpc import (
+    ConfirmPartsArgs,
     DecideHeldArgs,
     ExecuteActionArgs,
     GetHeldData,
@@ -37,7 +39,8 @@ from arcor2_server.rpc.registry import Context, rpc
 def _run_options(context: Context, args: RunPackageArgs | TemporaryPackageArgs) -> How:
     breakpoints = frozenset[str]() if isinstance(args.breakpoints, Unset) else args.breakpoints
     on_error = OnError.END if isinstance(args.on_error, Unset) else args.on_error
-    return How(args.start_paused, breakpoints, args.shared_breakpoints is True, context.client.name, on_error)
+    shared, checkpoints = args.shared_breakpoints is True, args.checkpoints is not False
+    return How(args.start_paused, breakpoints, shared, context.client.name, on_error, checkpoints)
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,6 +188,16 @@ class ExecutionRequests:
     async def decide_held(self, context: Context, args: DecideHeldArgs) -> None:
         """Continue the held program. HoldDecided publishes the decision."""
         await self._execution.decide(args, context.client.name)
+
+    @rpc("GetParts")
+    async def get_parts(self, context: Context, args: None) -> list[PartBooks]:
+        """Return the books of parts of all scenes."""
+        return await self._execution.parts.all()
+
+    @rpc("ConfirmParts")
+    async def confirm_parts(self, context: Context, args: ConfirmPartsArgs) -> None:
+        """Record where a person has found parts. PartsChanged publishes it."""
+        await self._execution.confirm_parts(args, context.client.name)
 
     @rpc("GetProgramPosition")
     async def get_program_position(self, context: Context, args: None) -> ProgramPosition:

@@ -27,6 +27,7 @@ from arcor2_server.compute.workers import Compute
 from arcor2_server.documents import Session
 from arcor2_server.execution.breakpoints import SharedBreakpoints
 from arcor2_server.execution.package_runs import PackageRuns
+from arcor2_server.execution.part_books import AllPartBooks
 from arcor2_server.execution.run_message import RunMessages
 from arcor2_server.execution.runs import Runs
 from arcor2_server.execution.service import Execution
@@ -189,7 +190,10 @@ async def running_server(data_dir: Path) -> AsyncIterator[Server]:
     breakpoints = SharedBreakpoints(hub, none, session, none)
     packages = Packages(settings.packages_dir, secrets.hide_in_package)
     messages = RunMessages(settings, secrets, breakpoints, world)
-    execution = Execution(packages, program_host, online, settings, hub, known, runs, breakpoints, secrets, messages)
+    books = AllPartBooks(hub, settings.checkpoints_dir)
+    execution = Execution(
+        packages, program_host, online, settings, hub, known, runs, breakpoints, secrets, messages, books
+    )
     presence = PresenceBoard(hub, users)
     takeover = LockTakeover(locks, users, session.name_of)
     kinematics = Kinematics(known, scene_host, compute, robots, models, scene_collisions)

@@ -1,0 +1,339 @@
+"""The record of a run: the books of parts, and checkpoints before and after each action."""
+
+import enum
+import hashlib
+import inspect
+import logging
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from msgspec.structs import replace
+
+from arcor2_hw.actions import metadata_of
+from arcor2_hw.actions.decorator import PartFlow, part_flow_of
+from arcor2_hw.data.base import UNSET, Unset, now
+from arcor2_hw.data.geometry import Orientation, Pose, Position
+from arcor2_hw.data.parts import ConfirmedPart, PartBooks, Place, PlaceKind, RunCheckpoint, RunningAction
+from arcor2_hw.data.project import START, Project
+from arcor2_hw.exceptions import (
+    Arcor2Error,
+    Conflict,
+    InvalidData,
+    PartUnconfirmed,
+    PlaceEmpty,
+    PlaceOccupied,
+    StorageError,
+)
+from arcor2_hw.objects.stock.part_places import PartBox, PartHolder
+from arcor2_hw.runtime.branches import Action, Branch
+from arcor2_hw.runtime.cell import Cell
+from arcor2_hw.runtime.checkpoints import CheckpointFile
+from arcor2_hw.runtime.device import Device
+from arcor2_hw.runtime.ledger import Ledger
+from arcor2_hw.runtime.values import results
+
+LONGEST_RESULT: Final = 10_000
+"""Length of results that are stored in checkpoints, characters. Longer ones are not stored."""
+_STORED: Final = (bool, int, float, str, enum.Enum, Pose, Position, Orientation)
+"""Types of results that are stored in checkpoints."""
+
+log = logging.getLogger(__name__)
+
+
+class Step(NamedTuple):
+    """A started action. part: number of the part that it moves. place: where it identifies or judges one."""
+
+    number: int
+    action_id: str
+    part: int | None = None
+    place: str = ""
+    identifies: bool = False
+    judges: bool = False
+
+
+class RunRecord:
+    """Keeps the books of parts and stores checkpoints. The threads of the script and the reader thread call it.
+
+    The books are kept in scenes with a PartFeeder, PartHolder or PartBox. In other scenes there are only checkpoints.
+
+    Args:
+        directory: the directory of the checkpoints.
+        run: number of the run.
+        package_id: the package.
+        changed: called with the books after each change of a part.
+        each_action: whether a checkpoint is stored before and after each action, or only of the start and the end.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        run: int,
+        package_id: str,
+        changed: Callable[[PartBooks], None],
+        *,
+        each_action: bool = True,
+    ) -> None:
+        self._directory, self._changed, self._each_action = directory, changed, each_action
+        self._run = RunCheckpoint(run, package_id, "", now())
+        self._lock = threading.Lock()
+        self._file: CheckpointFile | None = None
+        self._ledger = Ledger(PartBooks(""))
+        self._cell: Cell | None = None
+        self._keeps_books = False
+        self._points: dict[str, str] = {}
+        """The place of each action point by its id."""
+        self._own: dict[str, str] = {}
+        """The place of each action at an action point, by the id of the action."""
+        self._first = ""
+        self._running: dict[int, RunningAction] = {}
+        self._results: dict[str, list[str]] = {}
+        self._interrupted = False
+
+    def open(self, project: Project, cell: Cell, package: Path) -> None:
+        """Read the books of the scene, and store that the run has started. All devices are connected.
+
+        Raises:
+            StorageError: the checkpoint cannot be stored.
+            PartUnconfirmed: a person has to confirm the place of a part first.
+        """
+        self._cell = cell
+        self._file = CheckpointFile(self._directory, project.scene_id)
+        former = self._file.read() or PartBooks(project.scene_id)
+        if former.unconfirmed:
+            raise PartUnconfirmed("Confirm where the parts are before the program starts: {parts}.",
+                                  parts=", ".join(part.shown for part in former.unconfirmed))  # fmt: skip
+        self._ledger = Ledger(former)
+        self._keeps_books = any(isinstance(device.require(), PartHolder | PartBox) for device in cell)
+        self._first = next((item.end for item in project.logic if item.start == START), "")
+        self._run = replace(self._run, package_hash=package_hash(package))
+        if self._keeps_books:
+            self._ledger.set_places(self._find_places(project, cell))
+        self._store(always=True)
+        self._publish()
+
+    def _find_places(self, project: Project, cell: Cell) -> list[Place]:
+        """Return the places of the scene and of the project, and assign action points and actions to them."""
+        places: dict[str, Place] = {}
+        for device in cell:
+            instance = device.require()
+            if instance.place_kind is not None:
+                kind, capacity = PlaceKind(instance.place_kind), instance.place_capacity
+                places[device.id] = Place(device.id, device.name, kind, capacity)
+        points = {point.id: point for point in project.action_points}
+        for point in project.action_points:
+            parent, seen = point.parent, {point.id}
+            while not isinstance(parent, Unset) and parent in points and parent not in seen:
+                seen.add(parent)
+                parent = points[parent].parent
+            if not isinstance(parent, Unset) and parent in places:
+                self._points[point.id] = parent
+            else:
+                self._points[point.id] = point.id
+                places[point.id] = Place(point.id, point.name, PlaceKind.FEEDER, 0)
+            self._own |= {action.id: self._points[point.id] for action in point.actions}
+        for action in project.all_actions():
+            owner, _, method = action.type.partition("/")
+            if owner not in (device.id for device in cell):
+                continue
+            bound = getattr(cell[owner].require(), method, None)
+            flow, found = part_flow_of(bound), metadata_of(bound)
+            self._ledger.tests = self._ledger.tests or (found is not None and found.verdict is True)
+            if (flow.takes_from or flow.puts_to) and owner not in places:  # a robot or gripper
+                places[owner] = Place(owner, cell[owner].name, PlaceKind.HOLDER)
+        return list(places.values())
+
+    # -------------------------------------------------------------------------------- actions
+    def begin(
+        self, action: Action, name: str, branch: Branch, device: Device, bound: Any, arguments: Sequence[Any],
+        keywords: Mapping[str, Any],
+    ) -> Step:  # fmt: skip
+        """Record that an action is about to start. It is on disk when this returns.
+
+        Args:
+            action: the announced action.
+            name: its name.
+            branch: the branch of the program.
+            device: the device.
+            bound: its method.
+            arguments: positional arguments.
+            keywords: named arguments.
+
+        Raises:
+            PartError: the action does not agree with the books. Nothing is recorded.
+            InvalidData: the place of the part is unknown, because the pose is at no action point.
+            StorageError: the checkpoint cannot be stored.
+        """
+        action_id = action.id or ""
+        with self._lock:
+            step = Step(action.number, action_id)
+            if self._keeps_books:
+                step = self._begin_part(step, device, bound, arguments, keywords)
+            if action_id and action_id == self._first and action.attempt == 1:
+                self._run = replace(self._run, cycle=self._run.cycle + 1)
+            frames = [each.frame for each in (*branch.calls, action) if each.frame is not None]
+            self._running[action.number] = RunningAction(action.number, action_id, name, branch.id, frames)
+            self._store()
+        return step
+
+    def _begin_part(
+        self, step: Step, device: Device, bound: Any, arguments: Sequence[Any], keywords: Mapping[str, Any]
+    ) -> Step:
+        flow, found = part_flow_of(bound), metadata_of(bound)
+        judges = found is not None and found.verdict is True
+        if flow == PartFlow() and not judges:
+            return step
+        own = self._own.get(step.action_id, "")
+        if flow.takes_from or flow.puts_to:
+            there = self._place_of(bound, flow.takes_from or flow.puts_to, arguments, keywords) or own
+            if not there:
+                raise InvalidData(
+                    "{device}: the place of the part is unknown, because its pose is at no action point.",
+                    device=device.name,
+                )
+            source, target = (there, device.id) if flow.takes_from else (device.id, there)
+            self._compare(source, target)
+            part = self._ledger.move(source, target)
+            self._publish()
+            return step._replace(part=part)
+        if judges and self._ledger.has_part(device.id):
+            own = device.id
+        return step._replace(place=own, identifies=flow.identifies, judges=judges)
+
+    def _place_of(self, bound: Any, parameter: str, arguments: Sequence[Any], keywords: Mapping[str, Any]) -> str:
+        """Return the place that an argument names; empty if it is a pose at no action point."""
+        given = inspect.signature(bound).bind(*arguments, **keywords).arguments.get(parameter)
+        point = vars(given).get("action_point_id", "") if isinstance(given, Pose) else ""
+        return self._points.get(point, "")
+
+    def _compare(self, source: str, target: str) -> None:
+        """Compare what the books expect with what sensors detect. Raises PlaceEmpty, PlaceOccupied."""
+        if self._sensed(source) is False:
+            raise PlaceEmpty(
+                "The sensor detects no part at {place}. Check the place, then confirm where the parts are.",
+                place=self._ledger.name_of(source),
+            )
+        if not self._ledger.has_part(target) and self._sensed(target) is True:
+            raise PlaceOccupied(
+                "{place} is occupied: its sensor detects a part that is not in the books. Remove it.",
+                place=self._ledger.name_of(target),
+            )
+
+    def _sensed(self, place_id: str) -> bool | None:
+        """Return whether the sensor of a place detects a part; None without a sensor that can be read."""
+        if self._cell is None:
+            return None
+        for device in self._cell:
+            if device.id == place_id and device.instance is not None:
+                try:
+                    return device.instance.part_present()
+                except Arcor2Error:
+                    return None
+        return None
+
+    def end(self, step: Step, value: Any) -> None:
+        """Record that an action has succeeded, or counts as done. It is on disk when this returns.
+
+        Raises:
+            WrongPart: another part was identified than expected.
+        """
+        with self._lock:
+            if step.part is not None:
+                self._ledger.complete(step.part)
+            if step.place and step.identifies and isinstance(value, str):
+                self._ledger.identify(step.place, value)
+            if step.place and step.judges and isinstance(value, bool):
+                self._ledger.judge(step.place, value)
+            self._running.pop(step.number, None)
+            if step.action_id:
+                self._results[step.action_id] = _stored(value)
+                self._run = replace(self._run, last=step.action_id)
+            self._store_later()
+            if step.part is not None or step.place:
+                self._publish()
+
+    def fail(self, step: Step) -> None:
+        """Record that an action has failed or was stopped: the part may be at its source or its target."""
+        with self._lock:
+            if not self._interrupted:
+                self._running.pop(step.number, None)
+            if step.part is not None:
+                self._ledger.fail(step.part)
+            self._store_later()
+            if step.part is not None:
+                self._publish(sense=True)
+
+    def interrupt(self) -> None:
+        """Record that the program is stopped because the server has ended. The actions that ran remain recorded."""
+        self._interrupted = True
+
+    def close(self) -> None:
+        """Record that the program has ended."""
+        with self._lock:
+            if self._file is not None:
+                if not self._interrupted:
+                    self._run = replace(self._run, ended=True)
+                    self._running.clear()
+                self._store_later(always=True)
+                self._file.close()
+                self._file = None
+
+    # -------------------------------------------------------------------------------- people
+    def confirm(self, found: Sequence[ConfirmedPart]) -> None:
+        """Record where a person has found parts, while the program is held or paused.
+
+        Raises:
+            Conflict: an action is running, or the parts contradict each other.
+            NotFound: there is no such part or place.
+        """
+        with self._lock:
+            if self._running:
+                names = ", ".join(action.action_name for action in self._running.values())
+                raise Conflict("Parts cannot be confirmed while an action runs: {names}.", names=names)
+            self._ledger.confirm(found)
+            self._store(always=True)
+            self._publish(sense=True)
+
+    # -------------------------------------------------------------------------------- helpers
+    def _publish(self, *, sense: bool = False) -> None:
+        """Publish the books. sense: whether sensors are read, which may take some milliseconds."""
+        if not self._keeps_books:
+            return
+        books = self._ledger.books
+        if sense:
+            sensed = ((place, self._sensed(place.id)) for place in books.places)
+            books = replace(
+                books, places=[replace(place, sensed=UNSET if found is None else found) for place, found in sensed]
+            )
+        self._changed(books)
+
+    def _store(self, *, always: bool = False) -> None:
+        if self._file is not None and (always or self._each_action):
+            run = replace(self._run, actions=list(self._running.values()), results=self._results)
+            self._file.write(replace(self._ledger.books, run=run))
+
+    def _store_later(self, *, always: bool = False) -> None:
+        """Store a checkpoint. If the disk fails, the next action does not start, but this one does not fail."""
+        try:
+            self._store(always=always)
+        except StorageError as error:
+            log.error("%s", error)
+
+
+def package_hash(directory: Path) -> str:
+    """Return the SHA-256 of the script and the project of a package."""
+    digest = hashlib.sha256()
+    for name in ("script.py", "data/project.json", "data/scene.json"):
+        content = (directory / name).read_bytes()
+        digest.update(len(content).to_bytes(8, "little") + content)
+    return digest.hexdigest()
+
+
+def _stored(value: Any) -> list[str]:
+    """Return results as they are stored; none if they are long or of another type, such as an image."""
+    members = value if isinstance(value, tuple) else () if value is None else (value,)
+    if not all(isinstance(member, _STORED) for member in members):
+        return []
+    found = results(value)
+    return found if sum(map(len, found)) <= LONGEST_RESULT else []

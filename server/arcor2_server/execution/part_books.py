@@ -1,0 +1,151 @@
+"""The books of parts of all scenes: their publication, their state after an interruption, and corrections by people."""
+
+import asyncio
+from pathlib import Path
+from typing import Final
+
+import msgspec
+import structlog
+from msgspec import UNSET
+from msgspec.structs import replace
+
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.parts import ConfirmedPart, PartBooks
+from arcor2_hw.runtime.checkpoints import CheckpointFile, stored_scenes
+from arcor2_hw.runtime.ledger import Ledger
+from arcor2_server.errors import RequestRefused
+from arcor2_server.events import EventHub, make_event
+from arcor2_server.hosts.process import CellHost
+
+log = structlog.get_logger(__name__)
+
+PARTS: Final = "PartsChanged"
+"""The additional event with the books of a scene."""
+
+
+class _SceneId(msgspec.Struct):
+    id: str
+
+
+class AllPartBooks:
+    """The books of parts. During a run the cell host keeps those of its scene, otherwise they are read from disk.
+
+    Args:
+        hub: publishes them.
+        directory: the checkpoints of all scenes.
+    """
+
+    def __init__(self, hub: EventHub, directory: Path) -> None:
+        self._hub = hub
+        self.directory = directory
+        self._live: PartBooks | None = None
+        self._scene_id = ""
+        """The scene of the present run; empty if no program runs."""
+        self._using_files = asyncio.Lock()
+
+    # -------------------------------------------------------------------------------- runs
+    async def require_confirmed(self, package: Path) -> str:
+        """Return the scene of a package; empty if it cannot be read, which the cell host reports.
+
+        Raises:
+            RequestRefused: a person has to confirm where parts are.
+        """
+        try:
+            content = await asyncio.to_thread((package / "data" / "scene.json").read_bytes)
+            scene_id = msgspec.json.decode(content, type=_SceneId).id
+        except (OSError, msgspec.MsgspecError):
+            return ""
+        books = await self._stored(scene_id)
+        if books is not None and books.unconfirmed:
+            names = ", ".join(f"{part.shown} ({books.name_of(part.place)})" for part in books.unconfirmed)
+            raise RequestRefused(
+                "Confirm where these parts are before the program starts: {parts}. They may have been moved.",
+                parts=names,
+            )
+        return scene_id
+
+    def begin_run(self, scene_id: str) -> None:
+        """Handle the start of a run. The cell host keeps the books of its scene."""
+        self._scene_id, self._live = scene_id, None
+
+    def changed(self, books: PartBooks) -> None:
+        """Handle the books from the cell host."""
+        self._live = books
+        self._hub.broadcast(make_event(PARTS, books))
+
+    def end_run(self) -> str:
+        """Handle the end of the run, and return its scene."""
+        scene_id, self._scene_id, self._live = self._scene_id, "", None
+        return scene_id
+
+    async def publish(self, scene_id: str) -> None:
+        """Publish the stored books of a scene."""
+        books = await self._stored(scene_id) if scene_id else None
+        if books is not None and (books.places or not isinstance(books.run, Unset)):
+            self._hub.broadcast(make_event(PARTS, books))
+
+    # -------------------------------------------------------------------------------- people
+    async def all(self) -> list[PartBooks]:
+        """Return the books of all scenes; `run` only of a run that was interrupted."""
+        scenes = await asyncio.to_thread(stored_scenes, self.directory)
+        found = [self._live if scene == self._scene_id else await self._stored(scene) for scene in scenes]
+        return [books for books in found if books is not None and (books.places or not isinstance(books.run, Unset))]
+
+    async def confirm(self, host: CellHost | None, scene_id: str, parts: list[ConfirmedPart], by: str) -> None:
+        """Record where a person has found parts. Nothing moves.
+
+        Args:
+            host: runs the program; None if no program runs.
+            scene_id: the scene.
+            parts: the parts; none to confirm only that a program was interrupted.
+            by: name of the user.
+
+        Raises:
+            RequestRefused: there are no books of this scene, or an action is running.
+            NotFound: there is no such part or place.
+            Conflict: the parts contradict each other.
+        """
+        if scene_id == self._scene_id:
+            if host is None:
+                raise RequestRefused("The program is starting or ending. Try again.")
+            await host.confirm_parts(parts)
+        else:
+            await self._confirm_stored(scene_id, parts)
+        log.info("parts confirmed", scene=scene_id, by=by, parts=[(part.number, part.place) for part in parts])
+
+    async def _confirm_stored(self, scene_id: str, parts: list[ConfirmedPart]) -> None:
+        async with self._using_files:
+            books = await asyncio.to_thread(self._read, scene_id)
+            if books is None:
+                raise RequestRefused("There are no books of parts of the scene {scene}.", scene=scene_id)
+            ledger = Ledger(books)
+            ledger.confirm(parts)
+            corrected = ledger.books
+            if corrected.unconfirmed:  # the card still shows what was running
+                corrected = replace(corrected, run=books.run)
+            await asyncio.to_thread(self._write, corrected)
+        self._hub.broadcast(make_event(PARTS, corrected))
+
+    # -------------------------------------------------------------------------------- files
+    async def _stored(self, scene_id: str) -> PartBooks | None:
+        async with self._using_files:
+            return await asyncio.to_thread(self._read, scene_id)
+
+    def _read(self, scene_id: str) -> PartBooks | None:
+        """Read the books of a scene without a run. After an interrupted run, no place of a part is confirmed."""
+        books = CheckpointFile(self.directory, scene_id).read()
+        if books is None or isinstance(books.run, Unset):
+            return books
+        if books.run.ended:
+            return replace(books, run=UNSET)
+        ledger = Ledger(books)
+        if not all(part.confirmed is False for part in books.parts):
+            ledger.interrupt()
+        return replace(ledger.books, run=books.run)
+
+    def _write(self, books: PartBooks) -> None:
+        file = CheckpointFile(self.directory, books.scene_id)
+        try:
+            file.write(books)
+        finally:
+            file.close()

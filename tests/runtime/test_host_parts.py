@@ -1,0 +1,221 @@
+"""The cell host keeps the books of parts, and stores checkpoints before and after each action."""
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+from msgspec import UNSET
+
+from arcor2_hw.data.geometry import Orientation, Position
+from arcor2_hw.data.held import HeldData, HoldChoice
+from arcor2_hw.data.parts import ConfirmedPart, Part, PartBooks
+from arcor2_hw.data.project import START, Action, ActionPoint, Flow, LogicItem, NamedOrientation, Project
+from arcor2_hw.runtime import messages as m
+from arcor2_hw.runtime.checkpoints import CheckpointFile
+
+from .conftest import HostProcess, Package, scene_object
+
+ARM = """
+@dataclass
+class ArmSettings(Settings):
+    directory: str
+
+class Arm(Generic):
+    _ABSTRACT = False
+    def __init__(self, obj_id, name, settings: ArmSettings):
+        super().__init__(obj_id, name, settings)
+        self.directory = Path(settings.directory)
+
+    def part_present(self):
+        sensor = self.directory / "sensor"
+        return sensor.read_text() == "on" if sensor.exists() else None
+
+    def move(self, text):
+        with open(self.directory / "notes", "a") as file:
+            file.write(text + "\\n")
+        while (self.directory / "hang").exists():
+            time.sleep(0.01)
+        if (self.directory / "fault").exists():
+            raise DeviceFault("the part sticks")
+
+    @action(takes_from="pose")
+    def pick(self, pose: Pose, *, an: str | None = None) -> None:
+        self.move("pick")
+
+    @action(puts_to="pose")
+    def place(self, pose: Pose, *, an: str | None = None) -> None:
+        self.move("place")
+
+    @action(identifies=True)
+    def scan(self, code: str, *, an: str | None = None) -> str:
+        return code
+
+    @action(verdict=True)
+    def test(self, good: bool, *, an: str | None = None) -> bool:
+        return good
+"""
+
+
+def point(name: str, parent: str, *actions: str) -> ActionPoint:
+    methods = {"pick": "pick", "insert": "place", "take": "pick", "into_box": "place", "scan": "scan", "test": "test"}
+    made = [Action(each, f"obj_arm/{methods[each]}", f"act_{each}", flows=[Flow()]) for each in actions]
+    orientation = NamedOrientation("default", Orientation(), f"ori_{name}")
+    return ActionPoint(name, Position(), parent, id=f"acp_{name}", orientations=[orientation], actions=made)
+
+
+PROJECT = Project(
+    "project",
+    "scn_1",
+    id="pro_1",
+    action_points=[
+        point("stop", "obj_feeder", "scan", "pick"),
+        point("inside", "obj_nest", "insert", "test", "take"),
+        point("box", "obj_good", "into_box"),
+    ],
+    logic=[LogicItem(START, "act_scan", id="lit_1")],
+)
+BODY = """
+arm = res.objects["obj_arm"]
+stop, inside, box = (res.pose(f"ori_{name}") for name in ("stop", "inside", "box"))
+"""
+ONE = BODY + 'arm.scan("A-1", an="scan")\narm.pick(stop, an="pick")\narm.place(inside, an="insert")\n'
+
+
+def write_package(package: Path, directory: Path, body: str) -> Path:
+    """Write a package whose arm writes notes to the directory, and finds its faults there."""
+    objects = [
+        scene_object("arm", "Arm", directory=str(directory)),
+        scene_object("feeder", "PartFeeder", pose=True),
+        scene_object("nest", "PartHolder", pose=True),
+        scene_object("good", "PartBox", pose=True, counts_as="good"),
+    ]
+    return Package(package).write({"Arm": ARM}, objects, PROJECT, body)
+
+
+class Cell:
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory
+        self.records = directory / "records"
+        self.runs = 0
+        self.hosts: list[HostProcess] = []
+
+    def start(self, body: str, **options: object) -> HostProcess:
+        host = HostProcess()
+        self.hosts.append(host)
+        self.runs += 1
+        path = write_package(self.directory / f"pkg_{self.runs}", self.directory, body)
+        more = {"records": str(self.records), "run": self.runs, "hold_on_error": True} | options
+        host.send(m.RunPackage("pkg_1", str(path), streaming_period=0, **more))  # type: ignore[arg-type]
+        return host
+
+    def books(self) -> PartBooks:
+        found = CheckpointFile(self.records, "scn_1").read()
+        assert found is not None
+        return found
+
+    def notes(self) -> list[str]:
+        path = self.directory / "notes"
+        return path.read_text().split() if path.exists() else []
+
+
+@pytest.fixture
+def cell(tmp_path: Path):  # type: ignore[no-untyped-def]
+    made = Cell(tmp_path)
+    yield made
+    for host in made.hosts:
+        host.end()
+
+
+def held(host: HostProcess) -> HeldData:
+    found = host.expect(m.ProgramHeld).held
+    host.expect_state("paused")
+    return found
+
+
+def decide(host: HostProcess, number: int, choice: HoldChoice) -> None:
+    host._calls += 1
+    host.send(m.DecideHeld(host._calls, number, choice, []))
+    assert host.answer(host._calls) is None
+
+
+def confirm(host: HostProcess, *parts: ConfirmedPart) -> object:
+    host._calls += 1
+    host.send(m.ConfirmParts(host._calls, list(parts)))
+    return host.answer(host._calls)
+
+
+def test_a_nest_is_not_filled_twice_by_another_run(cell: Cell) -> None:
+    host = cell.start(ONE)
+    assert host.expect_state("stopped").finished
+    books = cell.books()
+    assert books.parts == [Part(1, "obj_nest", "A-1")]
+    assert books.run is not UNSET
+    assert books.run.ended
+    assert books.run.cycle == 1
+    assert books.run.results["act_scan"] == ['"A-1"']
+
+    host = cell.start(ONE.replace("A-1", "A-2"))
+    found = held(host)
+    assert (found.kind, found.action_name) == ("place_occupied", "insert")
+    assert "nest is occupied: part A-1 is there" in found.text
+    assert cell.notes() == ["pick", "place", "pick"]  # nothing has moved
+    assert confirm(host, ConfirmedPart(1, "obj_good")) is None
+    decide(host, found.number, HoldChoice.RETRY)
+    assert host.expect_state("stopped").finished
+    assert (cell.books().counts.fed, cell.books().counts.good) == (2, 1)
+    assert [part.serial for part in cell.books().parts] == ["A-2"]
+
+
+def test_a_failed_movement_is_repeated_or_done_by_hand(cell: Cell) -> None:
+    (cell.directory / "fault").touch()
+    host = cell.start(ONE + 'arm.test(True, an="test")\narm.pick(inside, an="take")\narm.place(box, an="into_box")')
+    found = held(host)
+    assert cell.books().parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm", confirmed=False)]
+    changed = [each.books for each in host.seen if isinstance(each, m.PartsChanged)]
+    assert changed[-1].parts == cell.books().parts
+    (cell.directory / "sensor").write_text("on")
+    decide(host, found.number, HoldChoice.SKIP)  # the part is in the gripper
+    found = held(host)
+    assert found.action_name == "insert"
+    (cell.directory / "sensor").write_text("off")
+    decide(host, found.number, HoldChoice.RETRY)
+    found = held(host)
+    assert (found.kind, found.text) == (
+        "place_empty",
+        "arm (Arm): The sensor detects no part at arm. Check the place, then confirm where the parts are.",
+    )
+    (cell.directory / "fault").unlink()
+    decide(host, found.number, HoldChoice.SKIP)
+    found = held(host)
+    assert found.action_name == "into_box"  # the sensor is off although the part was taken
+    (cell.directory / "sensor").unlink()
+    decide(host, found.number, HoldChoice.RETRY)
+    assert host.expect_state("stopped").finished
+    assert cell.books().counts.good == 1
+
+
+def test_after_kill_the_checkpoint_names_the_running_action(cell: Cell) -> None:
+    (cell.directory / "hang").touch()
+    host = cell.start(ONE)
+    host.expect(m.ProgramEvent, lambda event: event.name == "pick")
+    while not cell.notes():
+        pass
+    os.kill(host.process.pid, signal.SIGKILL)
+    host.gone()
+    books = cell.books()
+    assert books.run is not UNSET
+    assert not books.run.ended
+    assert [(action.action_name, action.branch) for action in books.run.actions] == [("pick", "main")]
+    assert books.run.last == "act_scan"
+    assert len(books.run.package_hash) == 64
+    assert books.parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm")]
+
+
+def test_checkpoints_of_actions_can_be_switched_off(cell: Cell) -> None:
+    host = cell.start(BODY + 'arm.scan("A-1", an="scan")\narm.pick(box, an="pick")', checkpoints=False)
+    found = held(host)  # parts are not taken from a box
+    assert cell.books().parts == []
+    decide(host, found.number, HoldChoice.END)
+    host.expect_state("stopped")
+    assert cell.books().parts == [Part(1, "obj_feeder", "A-1")]

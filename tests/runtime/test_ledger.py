@@ -1,0 +1,145 @@
+"""Books of parts, and their checkpoints on disk."""
+
+import itertools
+import random
+from pathlib import Path
+
+import pytest
+from msgspec import UNSET
+
+from arcor2_hw.data.parts import ConfirmedPart, PartBooks, Place, PlaceKind
+from arcor2_hw.exceptions import Conflict, NotFound, PartError, PartUnconfirmed, PlaceEmpty, PlaceOccupied, WrongPart
+from arcor2_hw.runtime.checkpoints import CheckpointFile, stored_scenes
+from arcor2_hw.runtime.ledger import Ledger
+
+PLACES = [
+    Place("stop", "stop", PlaceKind.FEEDER),
+    Place("robot", "robot", PlaceKind.HOLDER),
+    Place("nest", "nest", PlaceKind.HOLDER),
+    Place("good", "good box", PlaceKind.GOOD, 0),
+    Place("bad", "bad box", PlaceKind.BAD, 0),
+]
+
+
+@pytest.fixture
+def ledger() -> Ledger:
+    made = Ledger(PartBooks("scn_1"))
+    made.set_places(PLACES)
+    return made
+
+
+def carry(ledger: Ledger, *way: str) -> None:
+    for source, target in itertools.pairwise(way):
+        ledger.complete(ledger.move(source, target))
+
+
+def test_a_part_is_followed_from_the_feeder_to_the_box(ledger: Ledger) -> None:
+    ledger.identify("stop", "A-1")
+    carry(ledger, "stop", "robot", "nest")
+    (part,) = ledger.books.parts
+    assert (part.place, part.serial, part.moving_to, part.confirmed) == ("nest", "A-1", UNSET, True)
+    carry(ledger, "nest", "robot")
+    ledger.tests = True
+    with pytest.raises(WrongPart, match="A-1 does not belong in good box: it has not passed its test"):
+        carry(ledger, "robot", "good")
+    ledger.judge("robot", True)
+    with pytest.raises(WrongPart, match="A-1 does not belong in bad box: it has passed its test"):
+        carry(ledger, "robot", "bad")
+    carry(ledger, "robot", "good")
+    books = ledger.books
+    assert (books.counts.fed, books.counts.good, books.counts.in_cell) == (1, 1, 0)
+    assert next(place.parts for place in books.places if place.id == "good") == ["A-1"]
+
+
+def test_an_occupied_place_is_not_filled_twice(ledger: Ledger) -> None:
+    ledger.identify("stop", "A-1")
+    carry(ledger, "stop", "robot", "nest")
+    carry(ledger, "stop", "robot")
+    with pytest.raises(PlaceOccupied, match="nest is occupied: part A-1 is there"):
+        ledger.move("robot", "nest")
+    with pytest.raises(PlaceOccupied, match="robot is occupied: part #2 is there"):
+        ledger.move("stop", "robot")
+    assert ledger.books.counts.fed == 2  # a refused pick feeds nothing
+    ledger.confirm([ConfirmedPart(1, ""), ConfirmedPart(2, "")])
+    with pytest.raises(PlaceEmpty, match="no part at nest"):
+        ledger.move("nest", "robot")
+
+
+def test_after_a_failure_a_person_confirms_the_place(ledger: Ledger) -> None:
+    ledger.identify("stop", "A-1")
+    ledger.fail(ledger.move("stop", "robot"))
+    with pytest.raises(PartUnconfirmed, match="A-1 is at stop or at robot"):
+        ledger.move("robot", "nest")
+    ledger.fail(ledger.move("stop", "robot"))  # repeated by decision
+    with pytest.raises(NotFound, match="no place shelf"):
+        ledger.confirm([ConfirmedPart(1, "shelf")])
+    ledger.confirm([ConfirmedPart(1, "robot", "A-2")])
+    ledger.complete(1)  # has no effect: a person has found the part
+    carry(ledger, "robot", "nest")
+    with pytest.raises(PlaceOccupied):
+        ledger.confirm([ConfirmedPart(0, "nest")])
+    with pytest.raises(Conflict, match="A-2"):
+        ledger.confirm([ConfirmedPart(0, "robot", "A-2")])
+    assert ledger.books.counts.fed == 1
+    ledger.confirm([ConfirmedPart(0, "robot", "B-1"), ConfirmedPart(1, "")])
+    assert (ledger.books.counts.fed, ledger.books.counts.rejected, ledger.books.counts.in_cell) == (2, 1, 1)
+
+
+def test_a_code_that_is_expected_elsewhere_is_refused(ledger: Ledger) -> None:
+    ledger.identify("stop", "A-1")
+    ledger.identify("stop", "A-1")
+    with pytest.raises(WrongPart, match="A-2 was read at stop, where part A-1 is expected"):
+        ledger.identify("stop", "A-2")
+    carry(ledger, "stop", "robot", "nest")
+    with pytest.raises(WrongPart, match="A-1 was read at stop, but it is expected at nest"):
+        ledger.identify("stop", "A-1")
+
+
+def test_books_balance_after_random_operations(ledger: Ledger) -> None:
+    seed = random.SystemRandom().randrange(1_000_000)
+    chance = random.Random(seed)
+    ids = [place.id for place in PLACES]
+    for _ in range(3000):
+        parts = ledger.books.parts
+        try:
+            match chance.randrange(6):
+                case 0:
+                    ledger.fail(ledger.move(chance.choice(ids), chance.choice(ids)))
+                case 1:
+                    ledger.judge(chance.choice(ids), chance.random() < 0.5)
+                case 2 if parts:
+                    ledger.confirm([ConfirmedPart(chance.choice(parts).number, chance.choice([*ids, ""]))])
+                case 3:
+                    ledger.identify("stop", str(chance.randrange(1000)))
+                case 4:
+                    ledger.interrupt()
+                    ledger.confirm([ConfirmedPart(part.number, part.place) for part in parts])
+                case _:
+                    carry(ledger, chance.choice(ids), chance.choice(ids))
+        except PartError:
+            pass
+        books, counts = ledger.books, ledger.books.counts
+        assert counts.fed == counts.good + counts.bad + counts.rejected + len(books.parts), seed
+        held = [part.place for part in books.parts]
+        assert len(held) == len(set(held)), seed
+    assert ledger.books.counts.good, seed
+
+
+def test_a_power_cut_leaves_the_checkpoint_before(tmp_path: Path) -> None:
+    file = CheckpointFile(tmp_path, "scn/1")
+    assert file.read() is None
+    for number in range(4):
+        file.write(PartBooks(f"{number}"))
+    newest = max(tmp_path.iterdir(), key=lambda path: path.read_bytes()[0])
+    whole = newest.read_bytes()
+    for damaged in (whole[:-1], whole[:10], b"", whole[:-1] + bytes([whole[-1] ^ 1])):
+        newest.write_bytes(damaged)
+        found = CheckpointFile(tmp_path, "scn/1").read()
+        assert found is not None
+        assert found.scene_id == "2"
+    again = CheckpointFile(tmp_path, "scn/1")
+    again.write(PartBooks("5"))
+    found = CheckpointFile(tmp_path, "scn/1").read()
+    assert found is not None
+    assert found.scene_id == "5"
+    assert stored_scenes(tmp_path) == ["scn/1"]
