@@ -14,6 +14,7 @@ from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import Flow
 from benchmarks import server_process
 from benchmarks.metrics import Metric, Report, median
+from benchmarks.requests import fdatasync_time
 
 SLOW = '''"""A device that connects slowly."""
 
@@ -142,22 +143,30 @@ async def programs(report: Report, url: str, directory: Path, rounds: int = 5, c
         await client.call("SaveProject")
         nested = (await client.call("BuildProject", rpc.BuildProjectArgs(project_id, "nested"))).package_id
         await client.call("CloseProject")
-        await client.call("RunPackage", rpc.RunPackageArgs(nested))
+        await client.call("RunPackage", rpc.RunPackageArgs(nested, checkpoints=False))
         await ended(client)
         in_function = float(file.read_text()) / 2
-        first, periods = [], []
+        first, periods, stored, syncs = [], [], [], []
         for _ in range(rounds):
             await asyncio.sleep(2.0)
             begin = time.perf_counter()
-            await client.call("RunPackage", rpc.RunPackageArgs(package))
+            await client.call("RunPackage", rpc.RunPackageArgs(package, checkpoints=False))
             await client.next_event("ActionStateBefore")
             first.append(time.perf_counter() - begin)
             await ended(client)
             periods.append(float(file.read_text()))
+            await asyncio.sleep(2.0)
+            await client.run_package(package)
+            await ended(client)
+            stored.append(float(file.read_text()))
+            syncs.append(fdatasync_time(directory, 1000, 512))
     report.add(Metric("run_first_action_ms", median(first) * 1e3, rounds, f"worst {max(first) * 1e3:.0f} ms"))
     note = "including script, device executor, deadline and both events; a client follows them"
     note += f"; {in_function * 1e3:.3f} ms if every second action is a call of a function with the other one"
     report.add(Metric("action_overhead_ms", median(periods) * 1e3, rounds * calls, note))
+    added = median(stored) - median(periods)
+    note = f"added {added * 1e3:.3f} ms, fdatasync {median(syncs) * 1e3:.3f} ms"
+    report.add(Metric("checkpoint_ms", (added - 2.0 * median(syncs)) * 1e3, rounds * calls, note))
 
 
 async def ended(client: Client) -> None:

@@ -163,7 +163,7 @@ async def distinct(report: Report, url: str, rounds: int = 3) -> None:
         for _ in range(rounds):
             await asyncio.sleep(1.0)
             begin = time.perf_counter()
-            await client.call("RunPackage", rpc.RunPackageArgs(package))
+            await client.call("RunPackage", rpc.RunPackageArgs(package, checkpoints=False))
             await client.next_event("ActionStateBefore")
             first.append(time.perf_counter() - begin)
             await ended(client)

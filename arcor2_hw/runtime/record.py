@@ -86,7 +86,11 @@ class RunRecord:
         """The place of each action point by its id."""
         self._own: dict[str, str] = {}
         """The place of each action at an action point, by the id of the action."""
+        self._only_feeder = ""
+        """The place of actions of functions, which are at no action point: the feeder, if there is only one."""
         self._first = ""
+        self._named: set[str] = set()
+        """The actions whose results have names, so that other actions can use them."""
         self._running: dict[int, RunningAction] = {}
         self._results: dict[str, list[str]] = {}
         self._interrupted = False
@@ -107,6 +111,7 @@ class RunRecord:
         self._ledger = Ledger(former)
         self._keeps_books = any(isinstance(device.require(), PartHolder | PartBox) for device in cell)
         self._first = next((item.end for item in project.logic if item.start == START), "")
+        self._named = {action.id for action in project.all_actions() if action.outputs()}
         self._run = replace(self._run, package_hash=package_hash(package))
         if self._keeps_books:
             self._ledger.set_places(self._find_places(project, cell))
@@ -121,6 +126,8 @@ class RunRecord:
             if instance.place_kind is not None:
                 kind, capacity = PlaceKind(instance.place_kind), instance.place_capacity
                 places[device.id] = Place(device.id, device.name, kind, capacity)
+        feeders = [key for key, place in places.items() if place.kind is PlaceKind.FEEDER]
+        self._only_feeder = feeders[0] if len(feeders) == 1 else ""
         points = {point.id: point for point in project.action_points}
         for point in project.action_points:
             parent, seen = point.parent, {point.id}
@@ -199,6 +206,8 @@ class RunRecord:
             return step._replace(part=part)
         if judges and self._ledger.has_part(device.id):
             own = device.id
+        elif flow.identifies:
+            own = own or self._only_feeder
         return step._replace(place=own, identifies=flow.identifies, judges=judges)
 
     def _place_of(self, bound: Any, parameter: str, arguments: Sequence[Any], keywords: Mapping[str, Any]) -> str:
@@ -247,7 +256,8 @@ class RunRecord:
                 self._ledger.judge(step.place, value)
             self._running.pop(step.number, None)
             if step.action_id:
-                self._results[step.action_id] = _stored(value)
+                if step.action_id in self._named:
+                    self._results[step.action_id] = _stored(value)
                 self._run = replace(self._run, last=step.action_id)
             self._store_later()
             if step.part is not None or step.place:

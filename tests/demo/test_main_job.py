@@ -1,4 +1,4 @@
-"""Tests of the demo's main program: four readings agree, each fault is reported, and the cell restarts."""
+"""Tests of the demo's main program: five readings agree, each fault is reported, and the cell restarts."""
 
 import asyncio
 import io
@@ -19,6 +19,8 @@ from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.package import PackageStateEnum
+from arcor2_hw.data.parts import PartCounts, PlaceKind
+from arcor2_server.demo.workplace import confirm_emptied
 from tests.demo.running import Run, demo
 from tests.e2e.harness import until
 
@@ -45,6 +47,8 @@ class Cell:
     async def renew(self, boards: int = 1) -> None:
         """Prepare a new start like an operator: remove everything and insert new boards."""
         await self.run.command_fake("world", "renew", boards=boards, seed=GOOD)
+        async with Client(self.url, "operator") as client:
+            await confirm_emptied(client)
 
     async def program(
         self, client: Client, at: dict[str, Callable[[], Awaitable[Any]]] | None = None, package_id: str = ""
@@ -111,7 +115,7 @@ async def cell(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Cell]:
         assert run.at() is None
 
 
-async def test_four_readings_agree(cell: Cell) -> None:
+async def test_five_readings_agree(cell: Cell) -> None:
     run, at = cell.run, cell.run.at()
     assert at is not None, run.output
     assert f"seed {SEED}" in run.output
@@ -135,6 +139,13 @@ async def test_four_readings_agree(cell: Cell) -> None:
     reported = {(result["serial"], result["passed"]) for result in erp["results"]}
     assert reported == {(board["code"], board["good"]) for board in world["boards"]}
     assert len(erp["results"]) == boards
+
+    async with Client(cell.url, "tests") as client:
+        (books,) = await client.get_parts()
+    assert books.counts == PartCounts(boards, passed, failed)
+    boxes = {place.kind: set(place.parts) for place in books.places if place.kind.is_box}
+    assert boxes[PlaceKind.GOOD] == {board["code"] for board in world["boards"] if board["good"]}
+    assert boxes[PlaceKind.BAD] == {board["code"] for board in world["boards"] if not board["good"]}
 
 
 async def test_the_belt_brings_the_next_board_while_the_tester_works(cell: Cell) -> None:

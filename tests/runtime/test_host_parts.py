@@ -59,7 +59,8 @@ class Arm(Generic):
 
 def point(name: str, parent: str, *actions: str) -> ActionPoint:
     methods = {"pick": "pick", "insert": "place", "take": "pick", "into_box": "place", "scan": "scan", "test": "test"}
-    made = [Action(each, f"obj_arm/{methods[each]}", f"act_{each}", flows=[Flow()]) for each in actions]
+    flows = {name: [Flow(outputs=["code"] if name == "scan" else [])] for name in methods}
+    made = [Action(each, f"obj_arm/{methods[each]}", f"act_{each}", flows=flows[each]) for each in actions]
     orientation = NamedOrientation("default", Orientation(), f"ori_{name}")
     return ActionPoint(name, Position(), parent, id=f"acp_{name}", orientations=[orientation], actions=made)
 

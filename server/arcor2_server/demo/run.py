@@ -20,7 +20,7 @@ from arcor2_server.demo.display import Display
 from arcor2_server.demo.fakes import Fake, Ready, fakes, wires, world_arguments
 from arcor2_server.demo.outcome import Outcome, board_errors, report_errors
 from arcor2_server.demo.processes import Child, python_module
-from arcor2_server.demo.workplace import Creation, Scalar, layout_file, load, markers_file
+from arcor2_server.demo.workplace import Creation, Scalar, confirm_emptied, layout_file, load, markers_file
 from arcor2_server.files import replace_file
 
 ONLINE_TIMEOUT: Final = 30.0
@@ -189,6 +189,7 @@ class Demo:
         self._display.note("building the package")
         built = await client.call("BuildProject", rpc.BuildProjectArgs(project.id, project.name))
         await client.close_project()
+        await confirm_emptied(client)  # the simulated world is new
         started = time.monotonic()
         await client.subscribe_events({"ProgramPosition"})  # also actions of functions are announced then
         await client.run_package(built.package_id)

@@ -17,6 +17,7 @@ from arcor2_hw.data.editor import ViewScope
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box, Model3dType, ObjectAction, ObjectModel
 from arcor2_hw.data.parameter import Parameter
+from arcor2_hw.data.parts import ConfirmedPart
 from arcor2_hw.data.project import (
     ERROR_FLOW,
     ERROR_PARTS,
@@ -386,6 +387,14 @@ class Creation:
             kind, ids = references[value[0]]
             return ActionParameter(name, kind, _json(ids[value[1:]]))
         return ActionParameter(name, meta.type, _json(value))
+
+
+async def confirm_emptied(client: Client) -> None:
+    """Confirm that all parts were taken out of the cell, so that the next program starts without parts."""
+    for books in await client.get_parts():
+        removed = [ConfirmedPart(part.number, "") for part in books.parts]
+        if removed or not isinstance(books.run, Unset):
+            await client.confirm_parts(scene_id=books.scene_id, parts=removed)
 
 
 @dataclass(slots=True)
