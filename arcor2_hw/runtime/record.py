@@ -26,7 +26,6 @@ from arcor2_hw.exceptions import (
     PlaceOccupied,
     StorageError,
 )
-from arcor2_hw.objects.stock.part_places import PartBox, PartHolder
 from arcor2_hw.runtime.branches import Action, Branch
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.checkpoints import CheckpointFile
@@ -56,7 +55,7 @@ class Step(NamedTuple):
 class RunRecord:
     """Keeps the books of parts and stores checkpoints. The threads of the script and the reader thread call it.
 
-    The books are kept in scenes with a PartFeeder, PartHolder or PartBox. In other scenes there are only checkpoints.
+    The books are kept in scenes with a feeder or a box. In other scenes there are only checkpoints.
 
     Args:
         directory: the directory of the checkpoints.
@@ -109,7 +108,8 @@ class RunRecord:
             raise PartUnconfirmed("Confirm where the parts are before the program starts: {parts}.",
                                   parts=", ".join(part.shown for part in former.unconfirmed))  # fmt: skip
         self._ledger = Ledger(former)
-        self._keeps_books = any(isinstance(device.require(), PartHolder | PartBox) for device in cell)
+        kinds = {device.require().place_kind for device in cell}
+        self._keeps_books = not kinds <= {None, PlaceKind.HOLDER}
         self._first = next((item.end for item in project.logic if item.start == START), "")
         self._named = {action.id for action in project.all_actions() if action.outputs()}
         self._run = replace(self._run, package_hash=package_hash(package))

@@ -10,6 +10,7 @@ import {
   ADDITIONAL_EVENTS,
   type AlarmRecord,
   type ObjectObservationsData,
+  type PartBooks,
   ROLES,
   type ServerEvent,
 } from "../protocol/types";
@@ -40,6 +41,8 @@ declare module "../store/runtime" {
     takeObservations?: ((data: ObjectObservationsData) => void) | undefined;
     /** Receive changed alarms, which bypass the store, while they are shown. */
     takeAlarm?: Set<(record: AlarmRecord) => void>;
+    /** Receives changed books of parts, which bypass the store, while they are shown. */
+    takeParts?: ((books: PartBooks) => void) | undefined;
   }
 }
 
@@ -106,6 +109,7 @@ export class Session {
     else if (event.event === "RobotEef") telemetry.takeEef(event.data);
     else if (event.event === "ObjectObservations") now().runtime.takeObservations?.(event.data);
     else if (event.event === "AlarmChanged") for (const take of now().runtime.takeAlarm ?? []) take(event.data);
+    else if (event.event === "PartsChanged") now().runtime.takeParts?.(event.data);
     else {
       // Frequent events would push everything else out of the diary.
       if (event.event !== "MovePreview" && event.event !== "UserPresence")

@@ -59,7 +59,7 @@ class AllPartBooks:
         if books is not None and books.unconfirmed:
             names = ", ".join(f"{part.shown} ({books.name_of(part.place)})" for part in books.unconfirmed)
             raise RequestRefused(
-                "Confirm where these parts are before the program starts: {parts}. They may have been moved.",
+                "Confirm on the operator's screen where these parts are before the program starts: {parts}.",
                 parts=names,
             )
         return scene_id

@@ -12,8 +12,12 @@ import { nameOf, withNames } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { Confirm } from "../kit/lazyControls";
+import PartsCard from "../parts/PartsCard";
 import { ValueField } from "../program/ValueField";
 import "./held.css";
+
+/** Errors that say that the cell and the books of parts do not agree. */
+const PART_ERRORS: readonly string[] = ["place_occupied", "place_empty", "wrong_part", "part_unconfirmed"];
 
 export default function HeldCard({ held }: { held: HeldData }) {
   const state = useEditor((each) => each);
@@ -38,6 +42,7 @@ export default function HeldCard({ held }: { held: HeldData }) {
         </details>
       )}
       <Remedies held={held} />
+      {PART_ERRORS.includes(held.kind) && <PartsCard all />}
       <p>
         {t`Fix the cause first. The program starts nothing until you decide.`}{" "}
         {t`What is switched on stays on, such as a belt.`}

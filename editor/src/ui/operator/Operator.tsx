@@ -36,6 +36,7 @@ import { Production } from "./Production";
 import "../run/run.css";
 import "./operator.css";
 
+const PartsCard = lazyComponent(() => import("../parts/PartsCard"));
 const AlarmList = lazyComponent(() => import("../alarms/AlarmList"));
 
 const TONES: Record<Result["tone"], string> = { good: "done", bad: "broken", warn: "interrupted", "": "idle" };
@@ -128,6 +129,11 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
       )}
       <main data-runs={runs} data-held={program.held !== null} hidden={listing}>
         <Held />
+        {!program.held && (
+          <Suspense fallback={null}>
+            <PartsCard />
+          </Suspense>
+        )}
         {!runs && <Alarms alarms={alarms} />}
         {!program.held && (
           <section className="operator-state" aria-label={t`State`} role="status">

@@ -1,0 +1,162 @@
+/** Where the parts in the cell are: what was running, expected next to sensed, and one question for each part. */
+
+import { t } from "@lingui/core/macro";
+import { useEffect, useState } from "react";
+import { ask } from "../../commands/requests";
+import type { Part, PartBooks, Place } from "../../protocol/types";
+import { call, serves } from "../../session/connection";
+import { whyUnavailable } from "../../store/permissions";
+import { now, useEditor } from "../../store/store";
+import { Icon } from "../kit/icons";
+import { Button } from "../kit/kit";
+import "../held/held.css";
+import "./parts.css";
+
+/** Return books with changed ones. */
+export function withBooks(known: readonly PartBooks[], changed: PartBooks): PartBooks[] {
+  return [...known.filter((each) => each.scene_id !== changed.scene_id), changed];
+}
+
+/** Return the parts about which the card asks: those that are not confirmed, or all of them. */
+export const askedParts = (books: PartBooks, all: boolean): Part[] =>
+  books.parts.filter((part) => all || !part.confirmed);
+
+/** Return the places where a part may be, the likely ones first. */
+export function answersFor(part: Part, books: PartBooks): Place[] {
+  const rank = (place: Place) => (place.id === part.place ? 0 : place.id === part.moving_to ? 1 : 2);
+  const taken = new Set(
+    books.parts.filter((each) => each.number !== part.number && each.confirmed).map((e) => e.place),
+  );
+  return books.places.filter((place) => place.capacity === 0 || !taken.has(place.id)).sort((a, b) => rank(a) - rank(b));
+}
+
+function useBooks(): [PartBooks[], (books: PartBooks[]) => void] {
+  const ready = useEditor((state) => state.connection.status === "ready");
+  const phase = useEditor((state) => state.program.state);
+  const [books, setBooks] = useState<PartBooks[]>([]);
+  useEffect(() => {
+    if (!ready || !serves("GetParts")) return;
+    let current = true;
+    const { runtime } = now();
+    const take = (changed: PartBooks) => setBooks((known) => withBooks(known, changed));
+    runtime.takeParts = take;
+    call("GetParts").then(
+      (answer) => current && setBooks(answer),
+      () => {}, // offline: loaded again after the reconnect
+    );
+    return () => {
+      current = false;
+      if (runtime.takeParts === take) runtime.takeParts = undefined;
+    };
+  }, [ready, phase]);
+  return [books, setBooks];
+}
+
+/** Show the first scene with a question. With `all`, all parts can be corrected, because the program is held. */
+export default function PartsCard({ all = false }: { all?: boolean }) {
+  const [books] = useBooks();
+  const open = books.find((each) => askedParts(each, all).length > 0 || each.run !== undefined);
+  return open ? <Books books={open} all={all} /> : null;
+}
+
+function Books({ books, all }: { books: PartBooks; all: boolean }) {
+  const [chosen, setChosen] = useState<number>();
+  const why = useEditor((state) => whyUnavailable(state, "ConfirmParts"));
+  const parts = askedParts(books, all);
+  const part = parts.find((each) => each.number === chosen) ?? (all ? undefined : parts[0]);
+  const packages = useEditor((state) => state.lists.packages) ?? [];
+  const confirm = (found: { number: number; place: string }[]) =>
+    ask("ConfirmParts", { scene_id: books.scene_id, parts: found }).then(() => setChosen(undefined));
+  const { run } = books;
+  const program = packages.find((each) => each.id === run?.package_id)?.package_meta.name ?? t`The program`;
+  const running = run?.actions.map((each) => each.action_name).join(", ");
+  return (
+    <section className="held" aria-label={t`Parts in the cell`}>
+      {run && (
+        <div role="alert">
+          <h2>
+            <Icon name="warn" /> {t`The program was interrupted`}
+          </h2>
+          <p className="held-what">
+            {running ? t`${program} was at ${running}.` : t`${program} was between two actions.`}
+          </p>
+          <p>{t`Nothing moves by itself. Confirm where the parts are, then press Start.`}</p>
+        </div>
+      )}
+      {(!run || parts.length > 0) && <Places books={books} />}
+      {all && !part && (
+        <div className="held-choices">
+          {parts.map((each) => (
+            <Button key={each.number} why={why} onPress={() => setChosen(each.number)}>
+              {t`Correct ${shown(each)}`}
+            </Button>
+          ))}
+        </div>
+      )}
+      {part && (
+        <>
+          <h2>{t`Where is part ${shown(part)}?`}</h2>
+          <div className="held-choices">
+            {answersFor(part, books).map((place, index) => (
+              <Button
+                key={place.id}
+                look={index === 0 ? "primary" : ""}
+                why={why}
+                onPress={() => void confirm([{ number: part.number, place: place.id }])}
+              >
+                {place.name}
+              </Button>
+            ))}
+            <Button why={why} onPress={() => void confirm([{ number: part.number, place: "" }])}>
+              {t`I have taken it out of the cell`}
+            </Button>
+            {all && <Button onPress={() => setChosen(undefined)}>{t`Back`}</Button>}
+          </div>
+        </>
+      )}
+      {run && parts.length === 0 && (
+        <div className="held-choices">
+          <Button look="primary" why={why} onPress={() => void confirm([])}>
+            {t`There are no parts in the cell`}
+          </Button>
+        </div>
+      )}
+    </section>
+  );
+}
+
+const shown = (part: Part): string => part.serial || `#${part.number}`;
+
+/** The places that contain a part or may contain it, or whose sensors detect one: expected next to sensed. */
+function Places({ books }: { books: PartBooks }) {
+  const rows = books.places
+    .map((place) => {
+      const sure = books.parts.filter((part) => part.place === place.id).map(shown);
+      const maybe = books.parts
+        .filter((part) => part.moving_to === place.id)
+        .map((part) => t`${shown(part)} (or here)`);
+      return { place, expected: [...sure, ...maybe].join(", ") };
+    })
+    .filter(({ place, expected }) => expected || place.sensed);
+  const sensed = (place: Place) => (place.sensed === undefined ? "–" : place.sensed ? t`a part` : t`no part`);
+  return (
+    <table className="parts-table">
+      <thead>
+        <tr>
+          <th>{t`Place`}</th>
+          <th>{t`Expected`}</th>
+          <th>{t`Sensed`}</th>
+        </tr>
+      </thead>
+      <tbody>
+        {rows.map(({ place, expected }) => (
+          <tr key={place.id}>
+            <td data-name>{place.name}</td>
+            <td data-name>{expected || t`no part`}</td>
+            <td>{sensed(place)}</td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}
