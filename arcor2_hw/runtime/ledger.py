@@ -57,6 +57,10 @@ class Ledger:
             if place.kind.is_box:
                 self._serials.setdefault(key, deque(maxlen=SERIALS))
 
+    def add_place(self, place: Place) -> None:
+        """Add a place unless it exists."""
+        self._places.setdefault(place.id, place)
+
     # -------------------------------------------------------------------------------- actions
     def move(self, source: str, target: str) -> int:
         """Start to move a part from one place to another, and return its number.

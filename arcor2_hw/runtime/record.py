@@ -83,6 +83,8 @@ class RunRecord:
         self._keeps_books = False
         self._points: dict[str, str] = {}
         """The place of each action point by its id."""
+        self._free: dict[str, Place] = {}
+        """Places that are action points at no object, by their ids; they count when a part is first moved there."""
         self._own: dict[str, str] = {}
         """The place of each action at an action point, by the id of the action."""
         self._only_feeder = ""
@@ -138,7 +140,7 @@ class RunRecord:
                 self._points[point.id] = parent
             else:
                 self._points[point.id] = point.id
-                places[point.id] = Place(point.id, point.name, PlaceKind.FEEDER, 0)
+                self._free[point.id] = Place(point.id, point.name, PlaceKind.FEEDER, 0)
             self._own |= {action.id: self._points[point.id] for action in point.actions}
         for action in project.all_actions():
             owner, _, method = action.type.partition("/")
@@ -199,6 +201,8 @@ class RunRecord:
                     "{device}: the place of the part is unknown, because its pose is at no action point.",
                     device=device.name,
                 )
+            if there in self._free:
+                self._ledger.add_place(self._free[there])
             source, target = (there, device.id) if flow.takes_from else (device.id, there)
             self._compare(source, target)
             part = self._ledger.move(source, target)
@@ -208,6 +212,8 @@ class RunRecord:
             own = device.id
         elif flow.identifies:
             own = own or self._only_feeder
+        if own in self._free:
+            own = ""
         return step._replace(place=own, identifies=flow.identifies, judges=judges)
 
     def _place_of(self, bound: Any, parameter: str, arguments: Sequence[Any], keywords: Mapping[str, Any]) -> str:

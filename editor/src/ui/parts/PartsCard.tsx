@@ -71,7 +71,7 @@ function Books({ books, all }: { books: PartBooks; all: boolean }) {
   const program = packages.find((each) => each.id === run?.package_id)?.package_meta.name ?? t`The program`;
   const running = run?.actions.map((each) => each.action_name).join(", ");
   return (
-    <section className="held" aria-label={t`Parts in the cell`}>
+    <section className="held" data-parts aria-label={t`Parts in the cell`}>
       {run && (
         <div role="alert">
           <h2>
@@ -97,10 +97,10 @@ function Books({ books, all }: { books: PartBooks; all: boolean }) {
         <>
           <h2>{t`Where is part ${shown(part)}?`}</h2>
           <div className="held-choices">
-            {answersFor(part, books).map((place, index) => (
+            {answersFor(part, books).map((place) => (
               <Button
                 key={place.id}
-                look={index === 0 ? "primary" : ""}
+                look={[part.place, part.moving_to].includes(place.id) ? "primary" : ""}
                 why={why}
                 onPress={() => void confirm([{ number: part.number, place: place.id }])}
               >
