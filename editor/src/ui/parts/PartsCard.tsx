@@ -138,14 +138,15 @@ function Places({ books }: { books: PartBooks }) {
       return { place, expected: [...sure, ...maybe].join(", ") };
     })
     .filter(({ place, expected }) => expected || place.sensed);
+  const anySensor = rows.some(({ place }) => place.sensed !== undefined);
   const sensed = (place: Place) => (place.sensed === undefined ? "–" : place.sensed ? t`a part` : t`no part`);
   return (
     <table className="parts-table">
       <thead>
         <tr>
-          <th>{t`Place`}</th>
+          <th>{t`Where`}</th>
           <th>{t`Expected`}</th>
-          <th>{t`Sensed`}</th>
+          {anySensor && <th>{t`Sensed`}</th>}
         </tr>
       </thead>
       <tbody>
@@ -153,7 +154,7 @@ function Places({ books }: { books: PartBooks }) {
           <tr key={place.id}>
             <td data-name>{place.name}</td>
             <td data-name>{expected || t`no part`}</td>
-            <td>{sensed(place)}</td>
+            {anySensor && <td>{sensed(place)}</td>}
           </tr>
         ))}
       </tbody>
