@@ -128,7 +128,7 @@ class Server:
         dependents = self.dependents = Dependents(storage, types, session)
         self.saved_problems = closed(SavedProblems(storage, types, settings.problems_file))
         edit_notifications = self.edit_notifications = closed(EditNotifications(hub, session))
-        locks = self.locks = Locks(session, is_stored(types, storage), settings.lock_retries, settings.lock_retry_wait)
+        locks = self.locks = Locks(session, stored_name(types, storage), settings.lock_retries, settings.lock_retry_wait)
         users = self.users = closed(Users(hub, locks, settings))
         lock_takeover = self.lock_takeover = LockTakeover(locks, users, session.name_of)
         tasks = self.tasks = closed(Tasks(hub))
@@ -245,13 +245,13 @@ async def running_server(settings: ServerSettings) -> AsyncIterator[Server]:
         yield server
 
 
-def is_stored(types: ObjectTypes, storage: Storage) -> Callable[[str], Awaitable[bool]]:
-    """Return a function that returns whether an id names an object type, or a saved scene or project."""
+def stored_name(types: ObjectTypes, storage: Storage) -> Callable[[str], Awaitable[str | None]]:
+    """Return a function that returns the name of an object type, or of a saved scene or project; None if unknown."""
 
-    async def check(item: str) -> bool:
-        return types.known(item) or await storage.identify(item) is not None
+    async def find(item: str) -> str | None:
+        return item if types.known(item) else await storage.name_of(item)
 
-    return check
+    return find
 
 
 def connect_alarms(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Final, Protocol
 
 from arcor2_hw.exceptions import NotFound
+from arcor2_hw.messages import Message, translatable
 from arcor2_server.errors import RequestRefused
 
 SCENE: Final = "SCENE"
@@ -18,6 +19,19 @@ SERVER: Final = "SERVER"
 
 OWN_ROOTS: Final = frozenset({SCENE, PROJECT, ACTION, ADDING_OBJECT, "START", "END"})
 """Ids of which each is the root of its own tree."""
+
+
+_NAMES: Final = translatable(
+    {
+        SCENE: "The scene",
+        PROJECT: "The project",
+        ACTION: "The execution of actions",
+        ADDING_OBJECT: "The list of object types",
+        "START": "The start of the program",
+        "END": "The end of the program",
+    }
+)
+"""Names of the ids that are no items, for refusals."""
 
 
 class Locked(RequestRefused):
@@ -34,6 +48,9 @@ class LockTree(Protocol):
 
     def tree_of(self, root: str) -> Iterable[str]:
         """Return the ids below a root; empty if it is not a root."""
+
+    def name_of(self, item: str) -> str:
+        """Return the name of an item; empty if it has none."""
 
 
 @dataclass(slots=True)
@@ -64,6 +81,8 @@ class LockTable:
         self._reads: dict[str, list[str]] = {}
         self._since: dict[tuple[str, str], str] = {}
         """The time at which a client locked an id, by user and id."""
+        self._stored_names: dict[str, str] = {}
+        """Names of saved scenes and projects for which a lock was requested, by id."""
         self._changed: asyncio.Event = asyncio.Event()
 
     # ------------------------------------------------------------------------------------------------ queries
@@ -80,11 +99,11 @@ class LockTable:
         """Raise Locked unless the user holds the write lock of an id (`held(x)`); with `tree`, of its tree."""
         if not self.holds(user, item, tree=tree):
             text = (
-                "{user} does not hold the write lock of the tree of {item!r}."
+                "{user} does not hold the write lock of the tree of {item}."
                 if tree
-                else "{user} does not hold the write lock of {item!r}."
+                else "{user} does not hold the write lock of {item}."
             )
-            raise Locked(text, user=user, item=item)
+            raise Locked(text, user=user, item=self._name(item))
 
     def holds_read(self, user: str, item: str) -> bool:
         """Return whether the user holds a read lock of an id."""
@@ -217,6 +236,12 @@ class LockTable:
         self._notify()
 
     # ------------------------------------------------------------------------------------------------ internals
+    def _name(self, item: str) -> str | Message:
+        """Return the name of an item for a refusal; its id if it has no name."""
+        if item in _NAMES:
+            return Message.of(_NAMES[item])
+        return self._tree.name_of(item) or self._stored_names.get(item, item)
+
     def _locked_root(self, item: str) -> _Root | None:
         """Return the locks of the tree that an id belongs to, None if there are none."""
         if (root_id := self._root_ids.get(item)) is None:
@@ -239,17 +264,17 @@ class LockTable:
         if root is None:
             return
         if root.tree or item in root.writers or root.readers.get(item):
-            raise Locked("{item!r} is locked by {blockers}.", item=item, blockers=self._blockers(root, item))
+            raise Locked("{item} is locked by {blockers}.", item=self._name(item), blockers=self._blockers(root, item))
         if tree and not root.free:
             raise Locked(
-                "An item in the tree of {item!r} is locked by {blockers}.",
-                item=item,
+                "An item in the tree of {item} is locked by {blockers}.",
+                item=self._name(item),
                 blockers=self._blockers(root, ""),
             )
 
     def _refuse_read(self, root: _Root | None, item: str) -> None:
         if root is not None and (root.tree or item in root.writers):
-            raise Locked("{item!r} is locked by {blockers}.", item=item, blockers=self._blockers(root, item))
+            raise Locked("{item} is locked by {blockers}.", item=self._name(item), blockers=self._blockers(root, item))
 
     @staticmethod
     def _blockers(root: _Root, item: str) -> str:

@@ -34,16 +34,16 @@ class Locks(LockTable):
 
     Args:
         tree: The open document.
-        is_stored: Returns whether an id belongs to an object type, or to a saved scene or project.
+        stored_name: Returns the name of an object type, or of a saved scene or project, by id; None if it is unknown.
         retries: Number of further attempts to acquire a busy lock.
         retry_wait: Time between two attempts, s.
     """
 
     def __init__(
-        self, tree: LockTree, is_stored: Callable[[str], Awaitable[bool]], retries: int = 13, retry_wait: float = 0.15
+        self, tree: LockTree, stored_name: Callable[[str], Awaitable[str | None]], retries: int = 13, retry_wait: float = 0.15
     ) -> None:
         super().__init__(tree)
-        self._is_stored = is_stored
+        self._stored_name = stored_name
         self._wait_limit = retries * retry_wait
         self._exclusive: asyncio.Task[Any] | None = None
 
@@ -70,7 +70,7 @@ class Locks(LockTable):
         """Unlock an item for a client; return the ids to announce. Raise Locked if the user does not hold this lock."""
         await self._wait_for_exclusive()
         if not self._is_writer(user, item):
-            raise Locked("{user} does not hold a write lock of {item!r}.", user=user, item=item)
+            raise Locked("{user} does not hold a write lock of {item}.", user=user, item=self._name(item))
         return sorted(self._remove_write(user, item))
 
     async def read_lock(self, user: str, item: str) -> None:
@@ -83,7 +83,7 @@ class Locks(LockTable):
         """Release a read lock of a client. Raise Locked if the user does not hold it."""
         await self._wait_for_exclusive()
         if item not in self._reads.get(user, ()):
-            raise Locked("{user} does not hold a read lock of {item!r}.", user=user, item=item)
+            raise Locked("{user} does not hold a read lock of {item}.", user=user, item=self._name(item))
         self._forget_read(user, item)
         self._remove_read(user, item)
 
@@ -91,17 +91,17 @@ class Locks(LockTable):
         """Extend a lock to its tree, or reduce it to the item. Return the ids to announce as locked or unlocked."""
         await self._wait_for_exclusive()
         if not self._is_writer(user, item):
-            raise Locked("{user} does not hold a write lock of {item!r}.", user=user, item=item)
+            raise Locked("{user} does not hold a write lock of {item}.", user=user, item=self._name(item))
         root_id = self._root_ids[item]
         root = self._roots[root_id]
         if root.tree is tree:
-            raise Locked("The lock of {item!r} is of that type already.", item=item)
+            raise Locked("The lock of {item} is of that type already.", item=self._name(item))
         whole = {root_id, *self._tree.tree_of(root_id)} - {item}
         announced = self._announced.setdefault(user, {})
         self._since.setdefault((user, item), now())
         if tree:
             if len(root.writers) > 1:
-                raise Locked("Other locks are held in the tree of {item!r}.", item=item)
+                raise Locked("Other locks are held in the tree of {item}.", item=self._name(item))
             root.tree = True
             announced[item] = whole | {item}
         else:
@@ -184,9 +184,10 @@ class Locks(LockTable):
         try:
             return self._tree.root_of(item)
         except NotFound:
-            if await self._is_stored(item):
-                return item
-            raise
+            if (name := await self._stored_name(item)) is None:
+                raise
+            self._stored_names[item] = name
+            return item
 
     def _refuse_announced(self) -> None:
         if found := self.announced():

@@ -91,10 +91,15 @@ def prepare(
     actions = [action for one in (flow, *flows.values()) for action in one.actions]
     graph = Graph(steps)
     following = {step.action_id: [action_of(graph, edge) for edge in step.edges] for step in steps}
+    names = {action.id: action.name for action in actions}
     branches = {} if isinstance(args.branches, Unset) else args.branches
     for action_id, wanted in branches.items():
         if wanted not in following.get(action_id, ()):
-            raise InvalidData("The program has no branch from {action} to {next}.", action=action_id, next=wanted)
+            raise InvalidData(
+                "The program has no branch from {action} to {next}.",
+                action=names.get(action_id, action_id),
+                next=names.get(wanted, wanted),
+            )
     traces = earlier.traces
     usual = experience.branches(traces[0], following) if traces else {}
     moves, assumptions = _moves(actions, index, devices)

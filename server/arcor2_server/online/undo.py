@@ -59,8 +59,8 @@ class Undo:
             for item in moved_ids(self._session.document, changes):
                 if others := self._locks.holders_of(item) - {user}:
                     raise Locked(
-                        "{item!r} would move too, but is locked by {others}.",
-                        item=item,
+                        "{item} would move too, but is locked by {others}.",
+                        item=self._session.name_of(item) or item,
                         others=", ".join(sorted(others)),
                     )
             yield

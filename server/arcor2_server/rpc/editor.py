@@ -99,7 +99,7 @@ class SharedStateRequests:
         if item.kind is Kind.JOINTS and not (isinstance(args.position, Unset) and isinstance(args.orientation, Unset)):
             raise RequestRefused("Joints have neither a position nor an orientation.")
         if item.kind is not Kind.JOINTS and not isinstance(args.joints, Unset):
-            raise RequestRefused("{id!r} has no joints.", id=args.id)
+            raise RequestRefused("{name} has no joints.", name=item.value.name)
         locked = args.id if self._locks.holds(user, args.id) else item.parent or args.id
         self._locks.require_held(user, locked)
         self._previews.show(context.client, user, args, locked)

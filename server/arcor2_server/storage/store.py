@@ -249,6 +249,18 @@ class Storage(Database):
         """Return whether a scene or a project has that name."""
         return await self.scene_named(name) is not None or await self.project_named(name) is not None
 
+    async def name_of(self, key: str) -> str | None:
+        """Return the name of a saved scene or project; the id of an object type; None if the id is unknown."""
+        async with self.reading() as session:
+            for column, name in (
+                (SceneRow.id, SceneRow.name),
+                (ProjectRow.id, ProjectRow.name),
+                (ObjectTypeRow.id, ObjectTypeRow.id),
+            ):
+                if (found := await session.scalar(select(name).where(column == key))) is not None:
+                    return found
+        return None
+
     async def identify(self, key: str) -> DocumentId | None:
         """Return the kind of a stored id, None if it is unknown."""
         async with self.reading() as session:

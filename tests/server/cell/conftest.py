@@ -170,10 +170,10 @@ async def running_server(data_dir: Path) -> AsyncIterator[Server]:
     session = Session(settings, none, known, damage, secrets)
     await session.open()
 
-    async def is_stored(item: str) -> bool:
-        return False
+    async def stored_name(item: str) -> str | None:
+        return None
 
-    locks = Locks(session, is_stored, 2, 0.05)
+    locks = Locks(session, stored_name, 2, 0.05)
     users = Users(hub, locks, settings)
     compute, tasks, hosts = Compute(settings.compute_idle), Tasks(hub), CellHosts(settings.device_files_dirs)
     scene_host, program_host = HostSession(hub, hosts, "scene"), HostSession(hub, hosts, "program", to_all_clients=True)

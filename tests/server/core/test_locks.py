@@ -24,19 +24,22 @@ class Tree:
     def tree_of(self, root: str) -> list[str]:
         return [item for item in self.parents if item != root and self.root_of(item) == root]
 
+    def name_of(self, id: str) -> str:  # noqa: A002
+        return f"name of {id}" if id in self.parents else ""
+
 
 @pytest.fixture
 def tree() -> Tree:
     return Tree()
 
 
-async def is_stored(item: str) -> bool:
-    return item == "scn_stored"
+async def stored_name(item: str) -> str | None:
+    return "stored" if item == "scn_stored" else None
 
 
 @pytest.fixture
 def locks(tree: Tree) -> Locks:
-    return Locks(tree, is_stored, retries=3, retry_wait=0.05)
+    return Locks(tree, stored_name, retries=3, retry_wait=0.05)
 
 
 WHOLE = {"box", "ap1", "ap2", "ori", "act"}
@@ -196,7 +199,7 @@ async def test_a_client_cannot_get_a_lock_that_its_request_holds(locks: Locks) -
 
 
 async def test_exclusive_is_refused_at_once_while_a_client_holds_a_lock(tree: Tree) -> None:
-    locks = Locks(tree, is_stored, retries=1, retry_wait=3600.0)
+    locks = Locks(tree, stored_name, retries=1, retry_wait=3600.0)
     await locks.write_lock("ann", "box")
     with pytest.raises(Locked):
         async with asyncio.timeout(30), locks.exclusive():
@@ -362,30 +365,36 @@ async def test_the_table_lists_locks_and_holders(locks: Locks) -> None:
         locks.locked_at("ann", "ap2")
 
 
-async def test_a_refusal_names_the_holders(locks: Locks) -> None:
+async def test_a_refusal_names_the_item_and_the_holders(locks: Locks) -> None:
     await locks.read_lock("eve", "ap1")
     await locks.read_lock("bob", "ap1")
-    with pytest.raises(Locked, match=r"'ap1' is locked by bob, eve"):
+    with pytest.raises(Locked, match=r"name of ap1 is locked by bob, eve"):
         await locks.write_lock("ann", "ap1")
-    with pytest.raises(Locked, match=r"in the tree of 'ap2' is locked by bob, eve"):
+    with pytest.raises(Locked, match=r"in the tree of name of ap2 is locked by bob, eve"):
         await locks.write_lock("ann", "ap2", tree=True)
     await locks.write_lock("ann", "act")
-    with pytest.raises(Locked, match=r"'act' is locked by ann"):
+    with pytest.raises(Locked, match=r"name of act is locked by ann"):
         await locks.read_lock("bob", "act")
-    with pytest.raises(Locked, match=r"in the tree of 'ap2' is locked by ann"):
+    with pytest.raises(Locked, match=r"in the tree of name of ap2 is locked by ann"):
         await locks.write_lock("bob", "ap2", tree=True)
     await locks.write_lock("ann", "free", tree=True)
-    with pytest.raises(Locked, match=r"'ori2' is locked by ann"):
+    with pytest.raises(Locked, match=r"name of ori2 is locked by ann"):
         await locks.read_lock("bob", "ori2")
-    with pytest.raises(Locked, match=r"'robot' is locked by ann"):
+    with pytest.raises(Locked, match=r"name of robot is locked by ann"):
         async with locks.auto("ann", "robot"), locks.auto("bob", "robot"):
             pass
     with pytest.raises(Locked, match=r"bob does not hold the write lock"):
         locks.require_held("bob", "act")
-    with pytest.raises(Locked, match=r"tree of 'act'"):
+    with pytest.raises(Locked, match=r"tree of name of act"):
         locks.require_held("ann", "act", tree=True)
     locks.require_held("ann", "act")
     locks.require_held("ann", "ori2", tree=True)
+    await locks.write_lock("ann", "scn_stored")
+    with pytest.raises(Locked, match=r"^stored is locked by ann"):
+        await locks.write_lock("bob", "scn_stored")
+    await locks.write_lock("ann", "PROJECT")
+    with pytest.raises(Locked, match=r"^The project is locked by ann"):
+        await locks.write_lock("bob", "PROJECT")
 
 
 async def test_removing_a_locked_item_frees_the_rest_of_its_tree(locks: Locks, tree: Tree) -> None:
@@ -516,7 +525,7 @@ async def test_a_tree_lock_that_a_request_holds_is_announced_when_its_client_ask
 async def test_without_a_document_only_fixed_and_stored_ids_can_be_locked() -> None:
     empty = Tree()
     empty.parents.clear()
-    locks = Locks(empty, is_stored, retries=1, retry_wait=0.01)
+    locks = Locks(empty, stored_name, retries=1, retry_wait=0.01)
     with pytest.raises(NotFound, match="box unknown"):
         await locks.write_lock("ann", "box")
     assert await locks.write_lock("ann", "SCENE", tree=True) == ["SCENE"]

@@ -30,7 +30,7 @@ from arcor2_hw.exceptions import NotFound
 from arcor2_server.access.admission import Access
 from arcor2_server.app import Server
 from arcor2_server.app.application import endpoints
-from arcor2_server.app.parts import connect_edits, is_stored
+from arcor2_server.app.parts import connect_edits, stored_name
 from arcor2_server.audit.trail import AuditTrail
 from arcor2_server.build.script_editing import ScriptEditing
 from arcor2_server.collaboration.lock_takeover import LockTakeover
@@ -329,7 +329,7 @@ async def open_server(directory: Path, **settings: Any) -> AsyncIterator[Session
     session = Session(chosen, storage, known, damage, secrets)
     shared = SharedData(storage)
 
-    locks = Locks(session, is_stored(known, storage), chosen.lock_retries, chosen.lock_retry_wait)
+    locks = Locks(session, stored_name(known, storage), chosen.lock_retries, chosen.lock_retry_wait)
     users = Users(hub, locks, chosen)
     try:
         await session.open()
