@@ -109,7 +109,9 @@ function Flow() {
   const width = useStore((state) => Math.floor(state.width / COARSE) * COARSE);
   const height = useStore((state) => Math.floor(state.height / COARSE) * COARSE);
   const wrapped = useMemo(() => inColumns(latest, { width, height }), [latest, width, height]);
-  const graph = usePressed(host, wrapped);
+  const box = (id: string): Pick<Box, "id" | "kind" | "run" | "branches"> =>
+    graph.boxes.find((each) => each.id === id) ?? { id, kind: "action", run: [], branches: [] };
+  const graph = usePressed(host, wrapped, (id) => choose(box(id)));
 
   const nodes = graph.boxes.map(
     (box): FlowNodeType => ({
@@ -169,9 +171,6 @@ function Flow() {
   const step = doc?.logic[selected];
   const runs = running.findLast((id) => doc !== null && id in doc.actions) ?? executing;
   const { moved, whole } = useViewport(graph.boxes, runs, step ? placeOf(step.start) : selected);
-
-  const box = (id: string): Pick<Box, "id" | "kind" | "run" | "branches"> =>
-    graph.boxes.find((each) => each.id === id) ?? { id, kind: "action", run: [], branches: [] };
 
   return (
     <div className="flow" role="region" aria-label={t`Program graph`} ref={host}>
