@@ -52,7 +52,9 @@ export function pick(
       const score = each.distance * (small(id) ? 0.85 : 1) * (1 + penalty);
       const known = found.get(id);
       if (known && known.score <= score) continue;
-      const normal = each.face ? each.face.normal.clone().transformDirection(each.object.matrixWorld) : null;
+      // Points, pucks and arrows are drawn as instances: they mark places and have no surface to place anything on.
+      const face = each.instanceId === undefined ? each.face : null;
+      const normal = face ? face.normal.clone().transformDirection(each.object.matrixWorld) : null;
       found.set(id, { id, point: each.point.clone(), normal, distance: each.distance, score });
     }
   };

@@ -128,7 +128,9 @@ class Server:
         dependents = self.dependents = Dependents(storage, types, session)
         self.saved_problems = closed(SavedProblems(storage, types, settings.problems_file))
         edit_notifications = self.edit_notifications = closed(EditNotifications(hub, session))
-        locks = self.locks = Locks(session, stored_name(types, storage), settings.lock_retries, settings.lock_retry_wait)
+        locks = self.locks = Locks(
+            session, stored_name(types, storage), settings.lock_retries, settings.lock_retry_wait
+        )
         users = self.users = closed(Users(hub, locks, settings))
         lock_takeover = self.lock_takeover = LockTakeover(locks, users, session.name_of)
         tasks = self.tasks = closed(Tasks(hub))

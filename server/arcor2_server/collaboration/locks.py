@@ -40,7 +40,11 @@ class Locks(LockTable):
     """
 
     def __init__(
-        self, tree: LockTree, stored_name: Callable[[str], Awaitable[str | None]], retries: int = 13, retry_wait: float = 0.15
+        self,
+        tree: LockTree,
+        stored_name: Callable[[str], Awaitable[str | None]],
+        retries: int = 13,
+        retry_wait: float = 0.15,
     ) -> None:
         super().__init__(tree)
         self._stored_name = stored_name
