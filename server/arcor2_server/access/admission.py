@@ -14,7 +14,7 @@ from arcor2_hw.data.audit import AuditOutcome
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error
-from arcor2_hw.messages import Message
+from arcor2_hw.messages import Message, translatable
 from arcor2_server.access.connection_limits import CONNECTION
 from arcor2_server.access.route_options import AS_ROLE, OPEN, PERSON, ROLE
 from arcor2_server.access.tokens import FILE, Token, TokenFile
@@ -182,7 +182,7 @@ def role_needed(connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRou
         connection.state[PERSON] = admission.token.name
     if role is None:
         raise NotAuthorizedException(
-            "A token is needed: Authorization: Bearer ...", headers={"WWW-Authenticate": "Bearer"}
+            translatable("A token is needed: Authorization: Bearer ..."), headers={"WWW-Authenticate": "Bearer"}
         )
     connection.state[AS_ROLE] = role
     needed = handler.opt.get(ROLE, Role.PROGRAMMER)

@@ -11,6 +11,7 @@ from litestar.connection import ASGIConnection
 from litestar.exceptions import PermissionDeniedException
 from litestar.handlers import BaseRouteHandler, WebsocketRouteHandler
 
+from arcor2_hw.messages import Message, translatable
 from arcor2_server.settings import ServerSettings
 
 HOSTS: Final = Path("/etc/hosts")
@@ -103,11 +104,13 @@ def own_pages_only(connection: ASGIConnection[Any, Any, Any, Any], handler: Base
     names: HostNames = connection.app.state.host_names
     origin, host = connection.headers.get("origin"), connection.headers.get("host")
     if not may_connect(origin, host, names):
-        raise PermissionDeniedException("Pages of other origins may not use this server.")
+        raise PermissionDeniedException(translatable("Pages of other origins may not use this server."))
     if host is None or isinstance(handler, WebsocketRouteHandler):
         return
     if (name := host_of(host)) not in names:
-        raise PermissionDeniedException(
-            f"This server is not reached as {name or host!r}: use its address, "
-            "or add the name to ARCOR2_HW_ALLOWED_HOSTS."
+        message = Message.of(
+            "This server is not reached as {name}: use its address, or add the name to {setting}.",
+            name=name or host,
+            setting="ARCOR2_HW_ALLOWED_HOSTS",
         )
+        raise PermissionDeniedException(message.text, extra=message.translation())

@@ -40,7 +40,7 @@ def no_such_route(request: Request[Any, Any, Any], error: MethodNotAllowedExcept
     """Answer 404 instead of 405 if only the websocket has the path, since there is no HTTP route."""
     allowed = {name.lower(): value for name, value in (error.headers or {}).items()}.get("allow")
     if allowed in (None, "websocket"):
-        return http_refusal(request, NotFoundException("This route does not exist."))
+        return http_refusal(request, NotFoundException())
     return http_refusal(request, error)
 
 

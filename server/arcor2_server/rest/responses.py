@@ -4,7 +4,7 @@ from typing import Any, Final
 
 import msgspec
 from litestar import MediaType, Request, Response
-from litestar.exceptions import HTTPException
+from litestar.exceptions import HTTPException, ValidationException
 
 from arcor2_hw.data.base import TranslatableData
 from arcor2_hw.exceptions import (
@@ -16,10 +16,20 @@ from arcor2_hw.exceptions import (
     NotFound,
     StorageError,
 )
+from arcor2_hw.messages import Message, translatable
 from arcor2_server.storage.assets import TooLarge
 
 SERVICE: Final = "service"
 """Option of a route: the name of its service."""
+_PHRASES: Final = translatable(
+    {
+        "Not Found": "This address does not exist.",
+        "Method Not Allowed": "This address does not support the method of the request.",
+        "Request Entity Too Large": "The request is too large.",
+        "Internal Server Error": "The server failed to answer. Its log has the details.",
+    }
+)
+"""Messages of errors that Litestar raises with the phrase of their status only."""
 _encode = msgspec.json.Encoder().encode
 
 
@@ -86,11 +96,26 @@ def http_refusal(request: Request[Any, Any, Any], error: HTTPException) -> Respo
     if "route_handler" in request.scope:
         service = request.route_handler.opt.get(SERVICE, service)
     name = {404: "NotFound", 400: "Argument", 413: "Argument", 405: "Argument"}.get(error.status_code, "General")
+    text, detail = error.detail, ""
     translation = error.extra if isinstance(error.extra, dict) else {}  # only our own errors have one
-    refused = _json_response(WebApiError(service, error.detail, name, "", **translation), error.status_code)
+    if (message := _of_litestar(error)) is not None:
+        text, detail, translation = message.text, error.detail, message.translation()
+    refused = _json_response(WebApiError(service, text, name, detail, **translation), error.status_code)
     for header, value in (error.headers or {}).items():
         refused.headers[header] = value
     return refused
+
+
+def _of_litestar(error: HTTPException) -> Message | None:
+    """Return the message for an error that Litestar raised itself, None for our own errors."""
+    if isinstance(error, ValidationException):
+        faults = error.extra if isinstance(error.extra, list) else []
+        names = [fault["key"] for fault in faults if isinstance(fault, dict) and fault.get("key")]
+        if not names:
+            return Message.of("The request has an invalid or missing parameter.")
+        return Message.of("Invalid or missing in the request: {names}.", names=", ".join(names))
+    found = _PHRASES.get(error.detail)
+    return None if found is None else Message.of(found)
 
 
 def _printable(text: str) -> str:

@@ -13,6 +13,7 @@ from litestar.handlers import HTTPRouteHandler
 
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.role import Role
+from arcor2_hw.messages import translatable
 from arcor2_server.access.route_options import OPEN, ROLE
 from arcor2_server.web.encodings import accepted_encodings
 
@@ -102,7 +103,7 @@ def editor_routes(directory: Path = FILES) -> list[HTTPRouteHandler]:
         """Return a file in an accepted encoding; 304 if the browser has it, 404 if it does not exist."""
         name = str(request.path_params["path"]).lstrip("/")
         if name not in names or name == "index.html":
-            raise NotFoundException("The editor has no such file.")
+            raise NotFoundException(translatable("The editor has no such file."))
         if (file := files.get(name)) is None:
             file = files[name] = await asyncio.to_thread(read_file, directory / name)
         # The build names these files after their content, so they never change.

@@ -1,7 +1,11 @@
 """REST statuses of refusals by compute workers."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import msgspec
 import pytest
+from litestar.exceptions import HTTPException, MethodNotAllowedException, NotFoundException, ValidationException
 
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.compute import messages as m
@@ -9,7 +13,7 @@ from arcor2_hw.compute.task import ComputeBusy, ComputeStopped, ComputeTimeout, 
 from arcor2_hw.compute.worker import failed
 from arcor2_hw.exceptions import Arcor2Error, KinematicsError
 from arcor2_server.compute.process import error_of
-from arcor2_server.rest.responses import refusal
+from arcor2_server.rest.responses import http_refusal, refusal
 
 
 @pytest.mark.parametrize(
@@ -53,3 +57,27 @@ def test_the_answer_contains_what_is_needed_to_translate_it() -> None:
 def test_key_and_values_cross_the_process_border() -> None:
     error = KinematicsError("{x:.1f} m is too far.", x=3)
     assert error_of(failed(error)).message == error.message
+
+
+@pytest.mark.parametrize(
+    ("error", "message", "values", "description"),
+    [
+        (NotFoundException(), "This address does not exist.", None, "Not Found"),
+        (MethodNotAllowedException(), "This address does not support the method of the request.", None, None),
+        (
+            ValidationException("Validation failed for GET /x", extra=[{"message": "Expected `int`", "key": "limit"}]),
+            "Invalid or missing in the request: limit.",
+            {"names": "limit"},
+            "Validation failed for GET /x",
+        ),
+        (NotFoundException("The editor has no such file."), "The editor has no such file.", None, ""),
+    ],
+)
+def test_errors_of_the_framework_can_be_translated(
+    error: HTTPException, message: str, values: dict[str, str] | None, description: str | None
+) -> None:
+    request: Any = SimpleNamespace(scope={})
+    body = msgspec.json.decode(http_refusal(request, error).content)
+    assert (body["message"], body.get("values")) == (message, values)
+    if description is not None:
+        assert body["description"] == description
