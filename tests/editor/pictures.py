@@ -10,8 +10,10 @@ import tempfile
 from pathlib import Path
 from typing import Final
 
-from playwright.async_api import Browser
+from playwright.async_api import Browser, expect
 
+from arcor2_hw.client import Client
+from arcor2_hw.data import rpc
 from tests.demo.running import Run, demo
 from tests.e2e.harness import until
 from tests.editor import texts
@@ -19,21 +21,25 @@ from tests.editor.screen import Screen, running_browser, screen_of
 
 SEED: Final = 3
 
+SLOW: Final = 240_000
+"""Timeout of each step, ms: without a graphics card, a frame in high quality takes up to seconds."""
+
 
 async def _come_in(screen: Screen) -> None:
+    screen.page.set_default_timeout(SLOW)
     await screen.page.goto(f"{screen.url}/?q=high")
     await screen.page.get_by_label(texts.YOUR_NAME).fill("Ada")
     await screen.press(texts.JOIN)
     shows = "() => document.querySelector('.home') ? 'home' : window.__engine?.ids().length > 20 && 'workplace'"
-    if await screen.until(shows) == "home":
+    if await (await screen.page.wait_for_function(shows)).json_value() == "home":
         await screen.page.get_by_role("radio", name=texts.PROJECTS).click()
         await screen.page.get_by_role("button", name=re.compile("^Open ")).first.click()
-        await screen.until("() => window.__engine?.ids().length > 20")
+        await screen.page.wait_for_function("() => window.__engine?.ids().length > 20")
 
 
 async def _rest(screen: Screen) -> None:
     """Wait until everything is loaded and drawn."""
-    await screen.until(
+    await screen.page.wait_for_function(
         """() => {
             const now = performance.now(), last = window.lastDrawn;
             const frames = window.__engine?.frames ?? 0;
@@ -54,9 +60,18 @@ async def _tablet(browser: Browser, run: Run, to: Path) -> None:
             (to / f"editor-{name}.png").write_bytes(await page.screenshot())
 
         await _come_in(screen)
+        # The view becomes the thumbnail of the project when it is saved.
+        await _rest(screen)
+        async with Client(at["url"].replace("http", "ws", 1), "Carl", reconnect=False) as client:
+            project = (await client.call("ListProjects"))[0].id
+            description = rpc.UpdateProjectDescriptionArgs(project, "Test boards, and sort them.")
+            await client.call("UpdateProjectDescription", description)
+        await page.get_by_text(texts.NOT_SAVED).wait_for()
+        await screen.press(texts.SAVE)
+        await page.get_by_text(texts.NOT_SAVED).wait_for(state="detached")
         await screen.press(texts.GO_ONLINE)
-        await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=60_000)
-        await screen.until("() => __engine.ids().some((id) => __engine.item(id).endEffectors?.length)")
+        await page.get_by_role("button", name=texts.STOP_MOTION).wait_for()
+        await screen.page.wait_for_function("() => __engine.ids().some((id) => __engine.item(id).endEffectors?.length)")
         await take("workplace")
         tools = page.get_by_role("navigation")
         await tools.get_by_role("button", name=texts.ROBOT, exact=True).click()
@@ -66,6 +81,16 @@ async def _tablet(browser: Browser, run: Run, to: Path) -> None:
         await tools.get_by_role("button", name=texts.PROGRAM, exact=True).click()
         await page.get_by_role("region", name=texts.GRAPH).wait_for()
         await take("program")
+
+
+async def _operator(browser: Browser, run: Run, to: Path) -> None:
+    """Take the operator's screen while the program runs, with the first board in its box."""
+    async with screen_of(browser, run.at()["url"], drawn=True) as screen:  # type: ignore[index]
+        screen.page.set_default_timeout(SLOW)
+        await screen.join("Olga", "/?q=low#/operator")
+        await expect(screen.page.get_by_role("region", name="This run")).to_contain_text("Good1", timeout=SLOW)
+        await screen.page.get_by_role("button", name=texts.STOP, exact=True).wait_for()
+        (to / "editor-operator.png").write_bytes(await screen.page.screenshot())
 
 
 async def _lists(browser: Browser, run: Run, to: Path) -> None:
@@ -87,7 +112,7 @@ async def _phone(browser: Browser, run: Run, to: Path) -> None:
     assert at is not None
     async with screen_of(browser, at["url"], "phone", dark=True, touch=True, drawn=True) as screen:
         await screen.join("Ben")
-        await screen.until("() => window.__engine?.ids().length > 20")
+        await screen.page.wait_for_function("() => window.__engine?.ids().length > 20")
         tools = screen.page.get_by_role("navigation")
         await tools.get_by_role("button", name=texts.POINTS, exact=True).click()
         await _rest(screen)
@@ -98,8 +123,10 @@ async def main(to: Path) -> None:
     """Start the demo, wait until its program has run, and take the pictures."""
     to.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="arcor2-hw-pictures-") as name:
-        async with demo(Path(name), "--boards", "1", "--seed", str(SEED)) as run, running_browser() as browser:
-            await until(lambda: "The server runs at" in run.output, "the demo to serve", 240)
+        async with demo(Path(name), "--boards", "3", "--seed", str(SEED)) as run, running_browser() as browser:
+            await until(lambda: run.at() is not None, "the demo to start", 240)
+            await _operator(browser, run, to)
+            await until(lambda: "The server runs at" in run.output, "the demo to serve", 600)
             await _tablet(browser, run, to)
             await _phone(browser, run, to)
             await _lists(browser, run, to)
