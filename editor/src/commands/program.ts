@@ -48,29 +48,38 @@ export async function addAction(
 ): Promise<string | undefined> {
   try {
     const step = newStep();
-    const objectId = await serviceObject(object, step);
-    const called = now().doc?.functions[objectId];
-    const base = called?.name ?? meta.name;
-    const inFunction = (now().doc?.path.length ?? 0) > 0; // its actions need no point
-    const at = where ?? (inFunction ? { pointId: "" } : await anyPlace(objectId, slot, step));
-    const pointId = "pointId" in at ? at.pointId : await newPoint(`${base}_point`, at.position, step);
-    const parameters = await startingParameters(objectId, meta, pointId, at, step);
-    const { doc } = now();
-    if (!doc) return undefined;
-    const name = freeName(base, actionNames(doc));
-    const outputs = called ? resultNames(doc, called) : newOutputs(doc, base, meta.returns.length);
-    const flows = [{ type: "default" as const, outputs }];
-    const action_point_id = scopeOf(doc) || pointId;
-    const action = { action_point_id, name, type: `${objectId}/${meta.name}`, parameters, flows };
-    await call("AddAction", action, step);
-    const added = await awaited((state) => Object.values(state.doc?.actions ?? {}).find((each) => each.name === name));
-    if (slot) await insert(added.id, slot, step);
-    select({ kind: "action", id: added.id });
-    return added.id;
+    const id = await addLoose(await serviceObject(object, step), meta, where, slot, step);
+    if (slot) await insert(id, slot, step);
+    select({ kind: "action", id });
+    return id;
   } catch (error) {
     notify("error", sentence(error));
     return undefined;
   }
+}
+
+/** Add an action of a device or function, with what it needs, but without connections. Return its id. */
+export async function addLoose(
+  objectId: string,
+  meta: ObjectAction,
+  where: Where | null,
+  slot: Slot | null,
+  step: CallOptions,
+): Promise<string> {
+  const called = now().doc?.functions[objectId];
+  const base = called?.name ?? meta.name;
+  const inFunction = (now().doc?.path.length ?? 0) > 0; // its actions need no point
+  const at = where ?? (inFunction ? { pointId: "" } : await anyPlace(objectId, slot, step));
+  const pointId = "pointId" in at ? at.pointId : await newPoint(`${base}_point`, at.position, step);
+  const parameters = await startingParameters(objectId, meta, pointId, at, step);
+  const { doc } = now();
+  if (!doc) throw new Error(t`Open a project first. A scene has no program.`);
+  const name = freeName(base, actionNames(doc));
+  const outputs = called ? resultNames(doc, called) : newOutputs(doc, base, meta.returns.length);
+  const flows = [{ type: "default" as const, outputs }];
+  const action_point_id = scopeOf(doc) || pointId;
+  await call("AddAction", { action_point_id, name, type: `${objectId}/${meta.name}`, parameters, flows }, step);
+  return (await awaited((state) => Object.values(state.doc?.actions ?? {}).find((each) => each.name === name))).id;
 }
 
 /** Return the id of an object; for the name of a type, that of its first object, which is added if there is none. */
@@ -99,7 +108,7 @@ async function anyPlace(objectId: string, slot: Slot | null, step: CallOptions):
 }
 
 /** Connect a new action in a slot: what was there follows it. */
-async function insert(id: string, slot: Slot, step: CallOptions): Promise<void> {
+export async function insert(id: string, slot: Slot, step: CallOptions): Promise<void> {
   const { doc } = now();
   if (!doc) return;
   const { redirect, branch, to } = insertion(doc, slot);

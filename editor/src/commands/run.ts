@@ -48,8 +48,12 @@ export const runPackage = (id: string, paused = false) =>
   );
 export const pause = () => ask("PausePackage");
 export const resume = () => ask("ResumePackage");
-/** Run until the next action: `into` a called function, `out` of the present one, or `over` a call. */
-export const step = (mode: ProgramStep = "over") => ask("StepAction", { mode });
+/**
+ * Run until the next action: `into` a called function, `out` of the present one, or `over` a call. `branch`: the branch
+ * that continues; by default the one that waits longest.
+ */
+export const step = (mode: ProgramStep = "over", branch?: string) =>
+  ask("StepAction", { mode, ...(branch !== undefined && { branch }) });
 /** Stop at once, without confirmation; the program can be started again. */
 export const stop = () => ask("StopPackage");
 

@@ -15,6 +15,8 @@ import {
   START,
 } from "./logic";
 
+import { parallelOf, runnerOf } from "./parallel";
+
 const IN_SPACE: ReadonlySet<string> = new Set(["pose", "position", "joints", "relative_pose"]);
 
 /** Return whether an action needs a point in space. */
@@ -54,13 +56,15 @@ function regular(doc: OpenDocument, types: State["types"], after: string): Slot[
 
 /** Return all slots of a program. */
 export const slotsOf = (doc: OpenDocument, types: State["types"]): Slot[] =>
-  [START, ...Object.keys(doc.actions)].flatMap((after) => slotsAfter(doc, types, after));
+  [START, ...Object.keys(doc.actions).filter((id) => !parallelOf(doc).has(id))].flatMap((after) =>
+    slotsAfter(doc, types, after),
+  );
 
 /** Return where the next action goes: after the selected one, else at the end of the program. */
 export function slotFor(doc: OpenDocument, types: State["types"], selected: string): Slot {
   const exit = doc.logic[selected];
   if (isErrorExit(exit)) return { after: placeOf(exit.start), exit: exit.id };
-  const after = selected in doc.actions || selected === START ? selected : lastOf(doc);
+  const after = selected in doc.actions || selected === START ? runnerOf(doc, selected) : lastOf(doc);
   return slotsAfter(doc, types, after)[0] ?? { after };
 }
 

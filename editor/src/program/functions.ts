@@ -8,11 +8,14 @@ import { decoded } from "./decoded";
 import { ordered } from "./listing";
 import { after, before, calledBy, END, outgoing, PASSED_ON, placeOf, START } from "./logic";
 import { freeName } from "./naming";
-import { branchNames, isParallel } from "./parallel";
+import { callsIn, isParallel } from "./parallel";
 
 /** Return the device and the point of an action as text, the function that it calls, or the calls that it runs. */
 export function detailOf(doc: OpenDocument, action: Of<Action>): string {
-  if (isParallel(action)) return branchNames(doc, action);
+  if (isParallel(action))
+    return t`in parallel: ${callsIn(doc, action)
+      .map((each) => each.name)
+      .join(", ")}`;
   const called = calledBy(doc, action);
   if (called) return t`function ${called.name}`;
   const object = doc.objects[action.type.split("/")[0] ?? ""]?.name ?? "?";

@@ -7,7 +7,7 @@ import { program } from "./testing";
 
 const shown = (row: Row): string => {
   const indent = "  ".repeat(row.depth);
-  if (row.kind === "action") return `${indent}${row.id}`;
+  if (row.kind === "action" || row.kind === "lane") return `${indent}${row.id}`;
   if (row.kind === "unreached") return "unreached";
   return `${indent}${row.kind === "branch" ? "?" : ">"} ${row.item.start}-${row.item.end}`;
 };

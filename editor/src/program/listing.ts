@@ -2,15 +2,16 @@
 
 import type { LogicItem } from "../protocol/types";
 import type { OpenDocument } from "../store/state";
-import { parallelOf } from "./parallel";
+import { callsIn, parallelOf } from "./parallel";
 import { END, incoming, isConditional, isErrorExit, nextSteps, outgoing, placeOf, START } from "./steps";
 
 /**
- * A row: an action; the head of a branch; or where a branch continues, if that is not the next row of a lower depth.
- * `unreached` heads the actions that never run.
+ * A row: an action; a call that the parallel action above runs at the same time as others; the head of a branch; or
+ * where a branch continues, if that is not the next row of a lower depth. `unreached` heads the actions that never run.
  */
 export type Row =
   | { kind: "action"; id: string; depth: number }
+  | { kind: "lane"; id: string; depth: number }
   | { kind: "branch"; item: LogicItem; depth: number }
   | { kind: "goto"; item: LogicItem; depth: number }
   | { kind: "unreached"; depth: 0 };
@@ -32,6 +33,10 @@ export function listingOf(doc: OpenDocument): Row[] {
     );
 
   const rows: Row[] = [];
+  const list = (id: string, depth: number) => {
+    rows.push({ kind: "action", id, depth });
+    for (const call of callsIn(doc, doc.actions[id] ?? {})) rows.push({ kind: "lane", id: call.id, depth: depth + 1 });
+  };
   /** What is still to be listed, the next one last: a row, or an action with what follows after its block. */
   const waiting: (Row | { kind: "block"; id: string; depth: number; next: string | null })[] = [];
   const later: typeof waiting = [];
@@ -83,7 +88,7 @@ export function listingOf(doc: OpenDocument): Row[] {
       rows.push(one);
       continue;
     }
-    if (one.id !== START) rows.push({ kind: "action", id: one.id, depth: one.depth });
+    if (one.id !== START) list(one.id, one.depth);
     expand(one.id, one.depth, one.next);
     while (later.length > 0) waiting.push(later.pop() as (typeof later)[number]);
   }
@@ -91,7 +96,7 @@ export function listingOf(doc: OpenDocument): Row[] {
   const rest = Object.keys(doc.actions).filter((id) => !known.has(id));
   if (rest.length > 0) {
     if (rows.length > 0) rows.push({ kind: "unreached", depth: 0 });
-    for (const id of rest) rows.push({ kind: "action", id, depth: 0 });
+    for (const id of rest) list(id, 0);
   }
   return rows;
 }

@@ -2,7 +2,7 @@
 
 import type { Action } from "../protocol/types";
 import { perObject } from "../store/memo";
-import type { OpenDocument } from "../store/state";
+import type { Of, OpenDocument } from "../store/state";
 
 const PARALLEL = "functions/parallel";
 
@@ -19,6 +19,6 @@ export const parallelOf = perObject(
 /** Return the action in the logic that runs an action: its parallel action, or the action itself. */
 export const runnerOf = (doc: OpenDocument, id: string): string => parallelOf(doc).get(id) ?? id;
 
-/** Return the names of the calls that a parallel action runs, as text. */
-export const branchNames = (doc: OpenDocument, { branches = [] }: Pick<Action, "branches">): string =>
-  branches.map((branch) => doc.actions[branch]?.name ?? "?").join(", ");
+/** Return the calls that a parallel action runs; none for other actions. */
+export const callsIn = (doc: OpenDocument, { branches = [] }: Pick<Action, "branches">): Of<Action>[] =>
+  branches.flatMap((id) => doc.actions[id] ?? []);

@@ -2,7 +2,7 @@
 
 import { anyAction } from "../store/scope";
 import type { State } from "../store/state";
-import { calledBy } from "./logic";
+import { calledBy } from "./operands";
 
 /** Return the ids of the calls around a running action and of the action itself, outermost first. */
 export function stackOf({ doc, program }: State, id: string): string[] {

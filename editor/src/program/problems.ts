@@ -8,6 +8,7 @@ import { isComplete } from "./comparisons";
 import { decoded } from "./decoded";
 import { errorAt, hasFailed, linkToError, partNames } from "./errorExits";
 import { onAllPaths, resultOf } from "./functions";
+import { whyNotAtOnce } from "./lanes";
 import {
   after,
   calledBy,
@@ -29,7 +30,7 @@ import {
   variableNamed,
   whenOf,
 } from "./logic";
-import { isParallel, parallelOf, runnerOf } from "./parallel";
+import { callsIn, isParallel, parallelOf, runnerOf } from "./parallel";
 import { reachOfAction } from "./reach";
 
 export interface Problem {
@@ -165,7 +166,11 @@ function ofAction(
   warn: Tell,
 ): void {
   const [objectId = ""] = action.type.split("/");
-  if (isParallel(action)) return;
+  if (isParallel(action)) {
+    const why = whyNotAtOnce(doc, callsIn(doc, action));
+    if (why) error(action.id, t`${action.name}: ${why}`);
+    return;
+  }
   const object = doc.objects[objectId] ?? calledBy(doc, action);
   if (!object) return error(action.id, t`${action.name}: its device is no longer in the scene.`);
   if ("type" in object && !(object.type in types.actions)) return;

@@ -4,7 +4,8 @@ import { t } from "@lingui/core/macro";
 import type { Item, LinkItem, RobotItem } from "../engine/items";
 import { decimal } from "../formats";
 import { errorWords } from "../program/errorKinds";
-import { calledBy, whenOf, whenWords } from "../program/logic";
+import { calledBy, whenOf, whenWords } from "../program/operands";
+import { parallelOf } from "../program/parallel";
 import { reachOfAction, worse } from "../program/reach";
 import { type BranchKind, branchKind, hasComparisons, placeKey } from "../program/steps";
 import { takenExit } from "../program/taken";
@@ -158,9 +159,11 @@ export class ItemMaker {
     const dim = isDim(state);
     const levels = new Map<string, number>();
     const counts = new Map<string, number>();
-    for (const { pointId } of Object.values(doc.actions)) counts.set(pointId, (counts.get(pointId) ?? 0) + 1);
+    const lanes = parallelOf(doc);
+    const shown = Object.values(doc.actions).filter(({ id }) => !lanes.has(id)); // the puck of parallel work shows them
+    for (const { pointId } of shown) counts.set(pointId, (counts.get(pointId) ?? 0) + 1);
     const colours = [...Object.keys(doc.objects), ...Object.keys(doc.functions)];
-    for (const action of Object.values(doc.actions)) {
+    for (const action of shown) {
       const level = levels.get(action.pointId) ?? 0;
       levels.set(action.pointId, level + 1);
       const count = counts.get(action.pointId) ?? 1;
@@ -183,7 +186,7 @@ export class ItemMaker {
           count,
           open,
           dim: pale,
-          role: called ? "call" : "action",
+          role: called || action.branches ? "call" : "action",
           running,
           breakpoint,
           colour,

@@ -3,7 +3,11 @@
 import { t } from "@lingui/core/macro";
 import { Handle, type Node, type NodeProps, Position } from "@xyflow/react";
 import { notEditable, startConnecting } from "../../commands/program";
-import { notify, now } from "../../store/store";
+import { detailOf } from "../../program/functions";
+import { lanesOf } from "../../program/lanes";
+import type { Action } from "../../protocol/types";
+import type { Of } from "../../store/state";
+import { notify, now, select, setUi, useEditor } from "../../store/store";
 import { deviceIcon } from "../kit/deviceIcons";
 import { Drawing, Icon } from "../kit/icons";
 import { ReachBadge } from "../points/Reach";
@@ -32,7 +36,7 @@ export function FlowNode({ data, selected }: NodeProps<FlowNodeType>) {
   const { box, running, paused, breakpoint, fault, target, from, picked } = data;
   return (
     <div
-      className={`flow-node ${box.kind} ${box.called ? "call" : ""}`}
+      className={`flow-node ${box.kind} ${box.called ? "call" : box.lanes ? "parallel" : ""}`}
       data-running={running}
       data-target={target}
       data-from={from}
@@ -43,8 +47,8 @@ export function FlowNode({ data, selected }: NodeProps<FlowNodeType>) {
       )}
       <div className="flow-name">
         {box.kind === "fold" && <Icon name="list" size={18} />}
-        {box.called ? (
-          <Icon name="function" size={18} />
+        {box.called || box.lanes ? (
+          <Icon name={box.lanes ? "parallel" : "function"} size={18} />
         ) : (
           box.kind === "action" && <Drawing path={deviceIcon(box)} size={18} />
         )}
@@ -59,6 +63,13 @@ export function FlowNode({ data, selected }: NodeProps<FlowNodeType>) {
           </span>
         )}
       </div>
+      {box.lanes && (
+        <ul className="flow-lanes">
+          {box.lanes.map((call) => (
+            <Lane key={call.id} call={call} />
+          ))}
+        </ul>
+      )}
       {box.detail && <div className="quiet small flow-detail">{box.detail}</div>}
       {box.values && <div className="small flow-values">{box.values}</div>}
       <div className="flow-branches">
@@ -83,6 +94,39 @@ export function FlowNode({ data, selected }: NodeProps<FlowNodeType>) {
         </>
       )}
     </div>
+  );
+}
+
+/** A call that parallel work runs: what it does now. A tap selects it. */
+function Lane({ call }: { call: Of<Action> }) {
+  const running = useEditor((state) => state.program.running.includes(call.id));
+  const waits = useEditor((state) => state.program.state === "paused");
+  const doing = useEditor((state) => lanesOf(state).find((each) => each.id === call.id)?.doing ?? "");
+  const detail = useEditor((state) => (state.doc ? detailOf(state.doc, call) : ""));
+  const selected = useEditor((state) => state.ui.selection?.id === call.id);
+  const breakpoint = useEditor((state) => call.id in state.breakpoints);
+  return (
+    <li>
+      <button
+        type="button"
+        className="flow-lane"
+        data-running={running}
+        data-selected={selected}
+        onClick={(event) => {
+          if (now().ui.picked || now().ui.connecting) return;
+          event.stopPropagation();
+          select({ kind: "action", id: call.id });
+          setUi({ tool: "" });
+        }}
+      >
+        <span className="flow-name">
+          {breakpoint && <span className="breakpoint-dot" data-on="true" role="img" aria-label={t`pauses here`} />}
+          <span className="flow-title">{call.name}</span>
+          {running && <span className="tag good">{waits ? t`next` : t`runs`}</span>}
+        </span>
+        <span className="quiet small flow-detail">{running && doing ? doing : detail}</span>
+      </button>
+    </li>
   );
 }
 

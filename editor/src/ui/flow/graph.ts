@@ -16,15 +16,20 @@ import {
   resultsOf,
   START,
 } from "../../program/logic";
-import { parallelOf } from "../../program/parallel";
+import { callsIn, isParallel, parallelOf } from "../../program/parallel";
 import { valuesOf } from "../../program/step";
-import type { OpenDocument, State } from "../../store/state";
+import type { Action } from "../../protocol/types";
+import type { Of, OpenDocument, State } from "../../store/state";
 
 const NODE = { width: 250, height: 66 };
+/** Height of a node with a name only. */
+const BARE = 46;
 /** Additional height for a line of parameters. */
 const LINE = 21;
 /** Additional height for the free branches. */
 const BRANCHES = 22;
+/** Additional height for a call that parallel work runs. */
+export const LANE = 46;
 const BORDER = { width: 132, height: 68 };
 
 /** A free branch of an action: the next step, one for a value of its result, or an error exit. */
@@ -47,6 +52,8 @@ export interface Box {
   /** Icon that the type of its device declares. */
   icon?: string | undefined;
   branches: Branch[];
+  /** The calls that it runs at once. */
+  lanes?: Of<Action>[] | undefined;
   /** Folded actions in their order. */
   run: string[];
   x: number;
@@ -101,16 +108,18 @@ export function graphOf(
       .filter((action) => !into.has(action.id) && !branches.has(action.id))
       .map((action) => {
         const values = valuesOf(doc, types, action);
+        const lanes = isParallel(action) ? callsIn(doc, action) : undefined;
         return {
           id: action.id,
           kind: "action" as const,
           name: action.name,
-          detail: detailOf(doc, action),
+          detail: lanes ? "" : detailOf(doc, action),
+          lanes,
           called: calledBy(doc, action)?.id,
           values,
           icon: types.byName[doc.objects[action.type.split("/")[0] ?? ""]?.type ?? ""]?.icon,
           run: [],
-          ...sized(branchesOf(doc, types, action.id), values !== ""),
+          ...sized(branchesOf(doc, types, action.id), values !== "", lanes?.length),
         };
       }),
     ...folded.map((run) => ({
@@ -134,8 +143,9 @@ export const lastIn = (box: Pick<Box, "id" | "kind" | "run">): string =>
 export const firstIn = (box: Pick<Box, "id" | "kind" | "run">): string =>
   box.kind === "fold" ? (box.run[0] ?? box.id) : box.id;
 
-function sized(branches: Branch[], values = false): Pick<Box, "branches" | "width" | "height"> {
-  const height = NODE.height + (branches.length > 0 ? BRANCHES : 0) + (values ? LINE : 0);
+function sized(branches: Branch[], values = false, lanes = 0): Pick<Box, "branches" | "width" | "height"> {
+  const free = branches.length > 0 ? BRANCHES : 0;
+  const height = (lanes > 0 ? BARE : NODE.height) + free + (values ? LINE : 0) + lanes * LANE;
   return { branches, width: NODE.width, height };
 }
 

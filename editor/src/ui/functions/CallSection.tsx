@@ -5,7 +5,8 @@ import { dissolve, openFunction } from "../../commands/functions";
 import { notEditable } from "../../commands/program";
 import { callsOf } from "../../program/functions";
 import { calledBy } from "../../program/logic";
-import { useEditor } from "../../store/store";
+import { parallelOf } from "../../program/parallel";
+import { select, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import type { Section } from "../workplace/section";
 import { FunctionMenu } from "./FunctionMenu";
@@ -16,6 +17,7 @@ const CallSection: Section["Body"] = ({ selection: { id } }) => {
   const called = doc && calledBy(doc, doc.actions[id]);
   if (!doc || !called) return null;
   const calls = callsOf(doc, called.id).length;
+  const owner = doc.actions[parallelOf(doc).get(id) ?? ""];
   const actions = plural(Object.keys(called.actions).length, { one: "# action", other: "# actions" });
   return (
     <>
@@ -27,13 +29,20 @@ const CallSection: Section["Body"] = ({ selection: { id } }) => {
           {plural(calls, { one: "# call", other: "# calls" })}
         </span>
       </p>
+      {owner && (
+        <Button look="plain" icon="parallel" onPress={() => select({ kind: "action", id: owner.id })}>
+          {t`Branch of ${owner.name}`}
+        </Button>
+      )}
       <div className="row">
         <Button icon="function" onPress={() => openFunction(called.id)}>
           {t`Open function`}
         </Button>
-        <Button look="plain" why={why} onPress={() => void dissolve(id)}>
-          {t`Replace by its actions`}
-        </Button>
+        {!owner && (
+          <Button look="plain" why={why} onPress={() => void dissolve(id)}>
+            {t`Replace by its actions`}
+          </Button>
+        )}
         <FunctionMenu id={called.id} />
       </div>
     </>

@@ -11,6 +11,7 @@ import {
   readFunction,
 } from "../../commands/functions";
 import { notEditable } from "../../commands/program";
+import type { Slot } from "../../program/chain";
 import { functionNames } from "../../program/functions";
 import { notify, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
@@ -18,17 +19,20 @@ import { lazyComponent } from "../kit/lazy";
 import "./functions.css";
 import { AskName } from "../kit/lazyControls";
 
+const ParallelDialog = lazyComponent(() => import("./ParallelDialog"));
 const ImportDialog = lazyComponent(() => import("./ImportDialog"));
 
 export function OpenButton({ id, name }: { id: string; name: string }) {
   return <Button look="plain" icon="function" aria-label={t`Open ${name}`} onPress={() => openFunction(id)} />;
 }
 
-export function NewFunction() {
+/** `slot`: where parallel work is added. */
+export function NewFunction({ slot }: { slot: Slot | null }) {
   const doc = useEditor((state) => state.doc);
   const why = useEditor((state) => notEditable(state, "AddFunction"));
   const input = useRef<HTMLInputElement>(null);
   const [naming, setNaming] = useState(false);
+  const [choosing, setChoosing] = useState(false);
   const [file, setFile] = useState<FunctionFile | null>(null);
   const take = async (chosen: File | undefined) => {
     if (!chosen) return;
@@ -46,6 +50,11 @@ export function NewFunction() {
       <Button icon="plus" why={why} onPress={() => setNaming(true)}>
         {t`New function`}
       </Button>
+      {Object.keys(doc?.functions ?? {}).length > 1 && (
+        <Button icon="parallel" why={why} onPress={() => setChoosing(true)}>
+          {t`Run in parallel`}
+        </Button>
+      )}
       <Button look="plain" why={why} onPress={() => input.current?.click()}>
         {t`Import a function`}
       </Button>
@@ -70,6 +79,11 @@ export function NewFunction() {
           onYes={(name) => void addFunction(name)}
           onClose={() => setNaming(false)}
         />
+      )}
+      {choosing && (
+        <Suspense fallback={null}>
+          <ParallelDialog slot={slot} onClose={() => setChoosing(false)} />
+        </Suspense>
       )}
       {file && (
         <Suspense fallback={null}>

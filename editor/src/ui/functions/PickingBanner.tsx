@@ -1,9 +1,12 @@
-/** The actions that are being selected for a function, and why they cannot become one. */
+/** The actions that are being selected, and why they cannot become a function or run at once. */
 
 import { plural, t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { cancelPicking, makeFunction, whyNoFunction } from "../../commands/functions";
+import { makeParallel, parallelName, whyNotParallel } from "../../commands/parallel";
 import { functionNames, suggestedName } from "../../program/functions";
+import { actionNames } from "../../program/naming";
+import { calledBy } from "../../program/operands";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { AskName } from "../kit/lazyControls";
@@ -13,12 +16,14 @@ export default function PickingBanner() {
   const picked = useEditor((state) => state.ui.picked);
   const doc = useEditor((state) => state.doc);
   const [why, setWhy] = useState("");
-  const [asking, setAsking] = useState(false);
+  const [notAtOnce, setNotAtOnce] = useState("");
+  const [asking, setAsking] = useState<"" | "function" | "parallel">("");
   const ids = picked?.filter((id) => doc && id in doc.actions) ?? [];
   const key = ids.join();
   useEffect(() => {
     let ended = false;
     void whyNoFunction(ids).then((found) => ended || setWhy(found));
+    void whyNotParallel(ids).then((found) => ended || setNotAtOnce(found));
     return () => {
       ended = true;
     };
@@ -29,6 +34,8 @@ export default function PickingBanner() {
     return () => window.removeEventListener("keydown", onKey);
   }, [asking]);
   if (!picked || !doc) return null;
+  const calls = ids.length > 1 && ids.every((id) => calledBy(doc, doc.actions[id]));
+  const shown = calls ? notAtOnce : why;
   return (
     <div className="banner picking" role="group" aria-label={t`Make a function`}>
       <p role="status">
@@ -37,13 +44,28 @@ export default function PickingBanner() {
         ) : (
           <strong>{plural(ids.length, { one: "# action selected", other: "# actions selected" })}</strong>
         )}
-        {ids.length > 0 && why && <span className="small"> {why}</span>}
+        {ids.length > 0 && shown && <span className="small"> {shown}</span>}
       </p>
-      <Button look="primary" icon="function" why={why} onPress={() => setAsking(true)}>
+      {calls && (
+        <Button look="primary" icon="parallel" why={notAtOnce} onPress={() => setAsking("parallel")}>
+          {t`Run in parallel`}
+        </Button>
+      )}
+      <Button look={calls ? "" : "primary"} icon="function" why={why} onPress={() => setAsking("function")}>
         {t`Make a function`}
       </Button>
       <Button look="plain" onPress={cancelPicking}>{t`Cancel`}</Button>
-      {asking && (
+      {asking === "parallel" && (
+        <AskName
+          title={t`Run in parallel`}
+          initial={parallelName()}
+          yes={t`Run in parallel`}
+          taken={actionNames(doc)}
+          onYes={(name) => void makeParallel(name, ids)}
+          onClose={() => setAsking("")}
+        />
+      )}
+      {asking === "function" && (
         <AskName
           title={t`Make a function`}
           label={t`Name of the function`}
@@ -51,7 +73,7 @@ export default function PickingBanner() {
           yes={t`Make a function`}
           taken={functionNames(doc)}
           onYes={(name) => void makeFunction(name, ids)}
-          onClose={() => setAsking(false)}
+          onClose={() => setAsking("")}
         />
       )}
     </div>

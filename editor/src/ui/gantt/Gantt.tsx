@@ -6,7 +6,7 @@ import { decimal, duration, fixed } from "../../formats";
 import type { RunTrace, Span, TraceSummary } from "../../protocol/types";
 import { Button } from "../kit/kit";
 import { ShowAction } from "../run/Result";
-import { type Bar, bars, nearest, ticks } from "./layout";
+import { type Bar, bars, byDevice, byLane, lanesIn, nearest, type RowOf, ticks } from "./layout";
 import "./gantt.css";
 
 /** Height of a bar, pixels. */
@@ -45,10 +45,12 @@ export function Gantt({ name, trace, summary, span: visible }: GanttProps) {
   const from = (view.left - view.width / 2) / scale;
   const to = (view.left + 1.5 * view.width) / scale;
   const rows = useMemo(() => bars(trace.spans, from, to, scale), [trace, from, to, scale]);
+  const lanes = useMemo(() => [...lanesIn(trace.spans)], [trace]);
+  const laneRows = useMemo(() => bars(trace.spans, from, to, scale, byLane), [trace, from, to, scale]);
   const shares = new Map(summary.devices.map((each) => [each.id, each.share]));
-  const tap = (device: string) => (event: MouseEvent<SVGSVGElement>) => {
+  const tap = (row: string, rowOf: RowOf) => (event: MouseEvent<SVGSVGElement>) => {
     const x = event.clientX - event.currentTarget.getBoundingClientRect().left;
-    setChosen(nearest(trace.spans, device, x / scale, FINGER / scale));
+    setChosen(nearest(trace.spans, row, x / scale, FINGER / scale, rowOf));
   };
   const zoomBy = (factor: number) => {
     const { current } = box;
@@ -91,9 +93,25 @@ export function Gantt({ name, trace, summary, span: visible }: GanttProps) {
                 height={HEIGHT}
                 role="img"
                 aria-label={busyWords(device.name, device.busy)}
-                onClick={tap(device.id)}
+                onClick={tap(device.id, byDevice)}
               >
                 {(rows.get(device.id) ?? []).map((bar) => (
+                  <Rect
+                    key={bar.span?.number ?? `at ${bar.x}`}
+                    bar={bar}
+                    chosen={bar.span !== undefined && bar.span === chosen}
+                  />
+                ))}
+              </svg>
+            </div>
+          ))}
+          {lanes.map(([id, call]) => (
+            <div key={id} className="gantt-row">
+              <span className="gantt-device small">
+                {call} <span className="quiet">{t`branch`}</span>
+              </span>
+              <svg width={whole} height={HEIGHT} role="img" aria-label={t`Branch ${call}`} onClick={tap(id, byLane)}>
+                {(laneRows.get(id) ?? []).map((bar) => (
                   <Rect
                     key={bar.span?.number ?? `at ${bar.x}`}
                     bar={bar}

@@ -13,14 +13,32 @@ export interface Bar {
   span?: Span;
 }
 
-/** Return the bars of each device between two times, s. `scale` is in pixels per s; x is relative to the time 0. */
-export function bars(spans: readonly Span[], from: number, to: number, scale: number): Map<string, Bar[]> {
+/** Return the row of an action: its device, or the branch of parallel work that executes it; empty for none. */
+export type RowOf = (span: Span) => string;
+
+export const byDevice: RowOf = ({ device }) => device;
+/** The calls of the branches themselves are not shown, only their actions. */
+export const byLane: RowOf = ({ device, lane }) => (device === "" ? "" : (lane ?? ""));
+
+/** Return the branches of parallel work in a trace, with the names of their calls, in the order of their start. */
+export const lanesIn = (spans: readonly Span[]): Map<string, string> =>
+  new Map(spans.filter(({ action_id, lane }) => action_id === lane).map(({ action_id, name }) => [action_id, name]));
+
+/** Return the bars of each row between two times, s. `scale` is in pixels per s; x is relative to the time 0. */
+export function bars(
+  spans: readonly Span[],
+  from: number,
+  to: number,
+  scale: number,
+  rowOf: RowOf = byDevice,
+): Map<string, Bar[]> {
   const found = new Map<string, Bar[]>();
   for (const span of spans) {
     const end = span.start + span.duration;
     if (end < from || span.start > to) continue;
-    const row = found.get(span.device) ?? [];
-    found.set(span.device, row);
+    const key = rowOf(span);
+    const row = found.get(key) ?? [];
+    found.set(key, row);
     const x = span.start * scale;
     const width = Math.max(PIXEL, span.duration * scale);
     const failed = span.error !== undefined;
@@ -43,12 +61,18 @@ export function ticks(from: number, to: number, scale: number, space: number): n
   return Array.from({ length: Math.max(0, Math.floor(to / step + 1e-9) - first + 1) }, (_, n) => (first + n) * step);
 }
 
-/** Return the action of a device nearest to a time, at most `within` s away. */
-export function nearest(spans: readonly Span[], device: string, time: number, within: number): Span | undefined {
+/** Return the action of a row nearest to a time, at most `within` s away. */
+export function nearest(
+  spans: readonly Span[],
+  row: string,
+  time: number,
+  within: number,
+  rowOf: RowOf = byDevice,
+): Span | undefined {
   let best: Span | undefined;
   let least = within;
   for (const span of spans) {
-    if (span.device !== device) continue;
+    if (rowOf(span) !== row) continue;
     const away = Math.max(span.start - time, time - span.start - span.duration, 0);
     if (away > least || (best && away === least)) continue;
     best = span;

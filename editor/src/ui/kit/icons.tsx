@@ -32,6 +32,7 @@ export const PATHS = {
   point: "M12 9a3 3 0 1 0 0 6 3 3 0 0 0 0-6zM12 2v4M12 18v4M2 12h4M18 12h4",
   action: "M4 14c0-2 3.6-3.5 8-3.500s8 1.5 8 3.5-3.6 3.5-8 3.500S4 16 4 14z",
   eye: "M2 12s4-7 10-7 10 7 10 7-4 7-10 7-10-7-10-7zM12 9a3 3 0 1 0 0 6 3 3 0 0 0 0-6z",
+  parallel: "M12 3v4M6 17V7h12v10zM12 17v4M12 10v4",
   function: "M8 4H4v16h4M16 4h4v16h-4M8 12h7M12 9l3 3-3 3",
   lock: "M6 11h12v9H6zM8.5 11V8a3.5 3.5 0 0 1 7 0v3",
 } as const;

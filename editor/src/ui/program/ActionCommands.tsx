@@ -9,6 +9,7 @@ import { duplicateAction, notEditable, removeAction, renameAction } from "../../
 import { breakAt, cancel, execute, notRunnable, runTo } from "../../commands/run";
 import { ago } from "../../formats";
 import { calledBy, metaOf } from "../../program/logic";
+import { isParallel, parallelOf } from "../../program/parallel";
 import { whyUnavailable } from "../../store/permissions";
 import { select, setUi, useEditor } from "../../store/store";
 import { Field } from "../kit/Field";
@@ -25,10 +26,14 @@ const ActionCommands: Section["Body"] = ({ selection: { id } }) => {
   if (!doc || !action) return null;
   const meta = metaOf(types, doc, action);
   const why = notEditable(state, "RemoveAction");
+  const owner = doc.actions[parallelOf(doc).get(id) ?? ""];
+  const fixed =
+    why || (owner ? t`${action.name} is a branch of ${owner.name}. Select ${owner.name} to change it.` : "");
+  const single = why || (isParallel(action) ? t`Parallel work cannot be duplicated.` : "");
   const running = live.executing === id;
   const notNow =
     notEditable(state, "ExecuteAction") ||
-    (calledBy(doc, action) ? t`Run the project to run a function.` : "") ||
+    (calledBy(doc, action) || isParallel(action) ? t`Run the project to run a function.` : "") ||
     (live.state !== "started"
       ? t`Go online first. The action runs on the devices.`
       : live.executing
@@ -99,15 +104,15 @@ const ActionCommands: Section["Body"] = ({ selection: { id } }) => {
           <Button look="plain" why={why} onPress={() => setRenaming(true)}>
             {t`Rename`}
           </Button>
-          {doc.project?.has_logic && (
+          {doc.project?.has_logic && !owner && (
             <Button look="plain" why={notEditable(state, "MakeFunction")} onPress={pick}>
               {t`Make a function`}
             </Button>
           )}
-          <Button look="plain" why={why} onPress={() => void duplicateAction(action)}>
+          <Button look="plain" why={single} onPress={() => void duplicateAction(action)}>
             {t`Duplicate`}
           </Button>
-          <Button look="plain" why={why} onPress={() => void removeAction(id)}>
+          <Button look="plain" why={fixed} onPress={() => void removeAction(id)}>
             {t`Remove`}
           </Button>
         </div>

@@ -170,10 +170,10 @@ export function AddAction() {
             {of[0]?.category && <span className="tag">{words(of[0].category)}</span>}
           </h3>
           <ul>{of.map((offer) => row(offer))}</ul>
-          {of[0]?.called && <NewFunction />}
+          {of[0]?.called && <NewFunction slot={chosen} />}
         </section>
       ))}
-      {doc?.project?.has_logic && !found.some((each) => each.called) && <NewFunction />}
+      {doc?.project?.has_logic && !found.some((each) => each.called) && <NewFunction slot={chosen} />}
       {found.length === 0 && (
         <p className="quiet">{offers.length ? t`No action matches.` : t`No device in this scene has actions.`}</p>
       )}

@@ -11,9 +11,11 @@ import { notEditable } from "../../commands/program";
 import { breakAt } from "../../commands/run";
 import { storeViewState } from "../../commands/viewstate";
 import { detailOf } from "../../program/functions";
+import { lanesOf } from "../../program/lanes";
 import { listingOf, type Row } from "../../program/listing";
 import { branchKind, calledBy, conditionWords } from "../../program/logic";
 import { movableRuns } from "../../program/moving";
+import { isParallel } from "../../program/parallel";
 import type { Problem } from "../../program/problems";
 import { valuesOf } from "../../program/step";
 import { END, placeOf } from "../../program/steps";
@@ -31,7 +33,7 @@ import { type Drag, MoveHandle } from "./MoveHandle";
 import { at, useRows } from "./useRows";
 
 /** Heights of rows, and indentation of a level up to the deepest one shown, in pixels at the usual text size. */
-const HEIGHT: Readonly<Record<Row["kind"], number>> = { action: 62, branch: 48, goto: 48, unreached: 40 };
+const HEIGHT: Readonly<Record<Row["kind"], number>> = { action: 62, lane: 62, branch: 48, goto: 48, unreached: 40 };
 const INDENT = 16;
 const DEEPEST = 7;
 
@@ -97,7 +99,8 @@ export function Steps({ problems }: { problems: Problem[] }) {
               key={id + row.kind}
               aria-setsize={rows.length}
               aria-posinset={index + 1}
-              data-action={row.kind === "action" ? id : undefined}
+              data-action={row.kind === "action" || row.kind === "lane" ? id : undefined}
+              data-lane={row.kind === "lane" || undefined}
               data-depth={row.depth}
               data-running={program.running.includes(id) || live.executing === id}
               data-selected={ui.selection?.id === id || ui.picked?.includes(id)}
@@ -109,7 +112,7 @@ export function Steps({ problems }: { problems: Problem[] }) {
                 left: Math.min(row.depth, DEEPEST) * INDENT,
               }}
             >
-              {row.kind === "action" ? (
+              {row.kind === "action" || row.kind === "lane" ? (
                 <ActionRow
                   state={state}
                   id={id}
@@ -131,7 +134,7 @@ export function Steps({ problems }: { problems: Problem[] }) {
   );
 }
 
-const idOf = (row: Row): string => (row.kind === "action" ? row.id : row.kind === "unreached" ? "" : row.item.id);
+const idOf = (row: Row): string => ("id" in row ? row.id : row.kind === "unreached" ? "" : row.item.id);
 
 interface ActionRowProps {
   state: State;
@@ -150,6 +153,7 @@ function ActionRow({ state, id, problem, run, drag, onDrag }: ActionRowProps) {
   const called = calledBy(doc, action);
   const cannot = whyUnavailable(state, "SetBreakpoints");
   const running = program.running.includes(id) || live.executing === id;
+  const inside = running && lanesOf(state).find((each) => each.id === id)?.doing;
   return (
     <>
       <ToggleButton
@@ -168,6 +172,7 @@ function ActionRow({ state, id, problem, run, drag, onDrag }: ActionRowProps) {
       >
         <span className="step-head">
           {called && <Icon name="function" size={16} />}
+          {isParallel(action) && <Icon name="parallel" size={16} />}
           <span className="step-name">{action.name}</span>
           <ReachBadge id={id} />
           {running && <span className="tag good">{program.state === "paused" ? t`waiting` : t`running`}</span>}
@@ -178,7 +183,9 @@ function ActionRow({ state, id, problem, run, drag, onDrag }: ActionRowProps) {
           </span>
         ) : (
           <span className="quiet small step-more">
-            {[detailOf(doc, action), called && valuesOf(doc, types, action)].filter(Boolean).join(" · ")}
+            {[inside ? t`at ${inside}` : detailOf(doc, action), called && valuesOf(doc, types, action)]
+              .filter(Boolean)
+              .join(" · ")}
           </span>
         )}
       </AriaButton>

@@ -1,12 +1,15 @@
 /** Sections of the panel about actions, connections, START and END; their bodies are loaded when they are needed. */
 
 import { msg } from "@lingui/core/macro";
-import { calledBy, metaOf } from "../../program/logic";
+import { calledBy, metaOf } from "../../program/operands";
+import { parallelOf } from "../../program/parallel";
 import { END, isErrorExit, START } from "../../program/steps";
 import { lazyComponent } from "../kit/lazy";
 import type { Section } from "../workplace/section";
 
 const isAction: Section["applies"] = ({ kind }) => kind === "action";
+/** Parallel work has neither parameters nor results. */
+const takes: Section["applies"] = ({ kind, id }, { doc }) => kind === "action" && !doc?.actions[id]?.branches;
 
 export const programSections: readonly Section[] = [
   {
@@ -15,6 +18,12 @@ export const programSections: readonly Section[] = [
     applies: ({ kind, id }, { doc }) =>
       kind === "action" && doc !== null && calledBy(doc, doc.actions[id]) !== undefined,
     Body: lazyComponent(() => import("../functions/CallSection")),
+  },
+  {
+    id: "parallel",
+    title: msg`Branches`,
+    applies: ({ kind, id }, { doc }) => kind === "action" && doc?.actions[id]?.branches !== undefined,
+    Body: lazyComponent(() => import("../functions/Branches")),
   },
   {
     id: "taken",
@@ -32,14 +41,15 @@ export const programSections: readonly Section[] = [
   {
     id: "parameters",
     title: msg`Parameters`,
-    applies: isAction,
+    applies: takes,
     Body: lazyComponent(() => import("./ActionParameters")),
   },
   {
     id: "next",
     title: msg`Next step`,
     applies: ({ kind, id }, state) =>
-      state.doc?.project?.has_logic === true && (kind === "action" || (kind === "terminal" && id === "START")),
+      state.doc?.project?.has_logic === true &&
+      (kind === "action" ? !parallelOf(state.doc).has(id) : kind === "terminal" && id === "START"),
     Body: lazyComponent(() => import("./Next")),
   },
   {
@@ -52,7 +62,7 @@ export const programSections: readonly Section[] = [
     },
     Body: lazyComponent(() => import("./Retry")),
   },
-  { id: "results", title: msg`Results`, applies: isAction, Body: lazyComponent(() => import("./Results")) },
+  { id: "results", title: msg`Results`, applies: takes, Body: lazyComponent(() => import("./Results")) },
   {
     id: "step",
     title: msg`Condition`,

@@ -13,6 +13,7 @@ import { select, useEditor } from "../../store/store";
 import { selectionOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
+import { Lanes } from "./Lanes";
 
 const HeldCard = lazyComponent(() => import("../held/HeldCard"));
 
@@ -49,6 +50,7 @@ export default function RunBar() {
           </Button>
         )}
         <RunButtons />
+        <Lanes />
       </div>
       <Held />
     </>

@@ -4,6 +4,7 @@ import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { Button as AriaButton } from "react-aria-components";
 import { clock, duration } from "../../formats";
+import { laneIn } from "../../program/lanes";
 import { metaOf } from "../../program/logic";
 import { words } from "../../program/naming";
 import type { ActionHold, HoldChoice, TraceEntry } from "../../protocol/types";
@@ -19,38 +20,43 @@ const SHOWN = 30;
 export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {
   const trace = useEditor((state) => state.program.trace);
   const paused = useEditor((state) => state.program.state === "paused");
+  const doc = useEditor((state) => state.doc);
   const [all, setAll] = useState(false);
   const [open, setOpen] = useState(0);
   if (trace.length === 0) return null;
   const newest = [...trace].sort((a, b) => b.number - a.number);
+  const numbered = new Map(trace.map((each) => [each.number, each]));
   const shown = all ? newest : newest.slice(0, SHOWN);
   return (
     <section className="run-part" aria-label={t`Trace`}>
       <h3>{t`Trace`}</h3>
       <ol className="trace" reversed>
-        {shown.map((entry) => (
-          <li key={entry.number} data-failed={entry.error !== undefined} data-running={entry.duration === undefined}>
-            <AriaButton
-              className="trace-row"
-              aria-expanded={open === entry.number}
-              onPress={() => setOpen(open === entry.number ? 0 : entry.number)}
-            >
-              <span className="trace-name" data-inside={entry.call !== undefined}>
-                {entry.name || t`an action`}
-              </span>
-              <span className="quiet small">
-                {entry.error !== undefined
-                  ? t`failed`
-                  : entry.duration === undefined
-                    ? paused
-                      ? t`waiting`
-                      : t`running`
-                    : duration(entry.duration)}
-              </span>
-            </AriaButton>
-            {open === entry.number && <Detail entry={entry} onChoose={onChoose} />}
-          </li>
-        ))}
+        {shown
+          .map((entry) => ({ entry, lane: doc ? laneIn(doc, numbered, entry) : "" }))
+          .map(({ entry, lane }) => (
+            <li key={entry.number} data-failed={entry.error !== undefined} data-running={entry.duration === undefined}>
+              <AriaButton
+                className="trace-row"
+                aria-expanded={open === entry.number}
+                onPress={() => setOpen(open === entry.number ? 0 : entry.number)}
+              >
+                <span className="trace-name" data-inside={entry.call !== undefined}>
+                  {entry.name || t`an action`}
+                  {lane && lane !== entry.name && <span className="tag">{lane}</span>}
+                </span>
+                <span className="quiet small">
+                  {entry.error !== undefined
+                    ? t`failed`
+                    : entry.duration === undefined
+                      ? paused
+                        ? t`waiting`
+                        : t`running`
+                      : duration(entry.duration)}
+                </span>
+              </AriaButton>
+              {open === entry.number && <Detail entry={entry} onChoose={onChoose} />}
+            </li>
+          ))}
       </ol>
       {!all && trace.length > SHOWN && <Button onPress={() => setAll(true)}>{t`Show all ${trace.length}`}</Button>}
     </section>

@@ -3,8 +3,8 @@
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { Suspense } from "react";
-import { calledBy } from "../../../program/logic";
 import { words } from "../../../program/naming";
+import { calledBy } from "../../../program/operands";
 import { theEngine } from "../../../session/engine";
 import { heldBy } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
@@ -30,7 +30,13 @@ const Body: Section["Body"] = ({ selection: { kind, id } }) => {
   return (
     <>
       <p>
-        {called ? t`Calls ${by}` : action ? `${by}: ${words(method)}` : typeName || kindName(kind)}
+        {called
+          ? t`Calls ${by}`
+          : action?.branches
+            ? t`Parallel work`
+            : action
+              ? `${by}: ${words(method)}`
+              : typeName || kindName(kind)}
         {state && (
           <span className={`tag ${limited ? "warn" : (TONE[state.state] ?? "")}`}>{stateName(state.state)}</span>
         )}
