@@ -7,11 +7,28 @@ from typing import Any
 import pytest
 from msgspec import UNSET
 
+from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import RunEnd
 from arcor2_hw.data.geometry import Position
-from arcor2_hw.data.project import Action, ActionPoint, Flow, Project
+from arcor2_hw.data.object_type import ObjectAction
+from arcor2_hw.data.project import (
+    END,
+    PARALLEL,
+    START,
+    Action,
+    ActionPoint,
+    Flow,
+    LogicItem,
+    Project,
+    ProjectFunction,
+)
+from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.build import points
+from arcor2_server.build.frame import TypeFacts
+from arcor2_server.build.script import from_logic
 from arcor2_server.errors import RequestRefused
+from tests.e2e.harness import until
 from tests.runtime.conftest import Package, scene_object
 
 from .conftest import Recorder, Server, serving
@@ -149,3 +166,91 @@ async def test_stop_during_a_hold_and_without_the_option(server: Server) -> None
     await server.ask("RunPackage", {"id": "pkg_1"})
     await server.client.event("ProjectException")
     assert not any(event["event"] == "Held" for event in server.client.got)
+
+
+STATION = """
+_pressed = threading.Event()
+
+class Station(Generic):
+    _ABSTRACT = False
+    full = True
+    @action
+    def fill(self, *, an: str | None = None) -> None:
+        _pressed.wait(60)
+        if Station.full:
+            raise Refused("{name} is full", name=self.name)
+    @action
+    def press(self, *, an: str | None = None) -> None:
+        _pressed.set()
+    @action
+    def report(self, *, an: str | None = None) -> None: ...
+    def acknowledge(self, code: str) -> None:
+        Station.full = False
+"""
+
+
+def parallel_package(server: Server) -> None:
+    """Write a package whose program fills a box and presses at once, and reports when both have ended."""
+
+    def function(name: str, device: str) -> ProjectFunction:
+        logic = [LogicItem(START, f"act_{name}", id=f"lit_{name}"), LogicItem(f"act_{name}", END, id=f"lit_{name}_end")]
+        return ProjectFunction(
+            f"do_{name}", [Action(name, f"obj_{device}/{name}", f"act_{name}")], logic, id=f"pfu_{name}"
+        )
+
+    actions = [
+        Action("both", PARALLEL, "act_both", branches=["act_filling", "act_pressing"]),
+        Action("filling", "pfu_fill/call", "act_filling"),
+        Action("pressing", "pfu_press/call", "act_pressing"),
+        Action("report", "obj_press/report", "act_report"),
+    ]
+    project = Project(
+        "project",
+        "scn_1",
+        id="pro_1",
+        action_points=[ActionPoint("p", Position(), id="acp_1", actions=actions)],
+        functions=[function("fill", "box"), function("press", "press")],
+        logic=[
+            LogicItem(START, "act_both", id="lit_1"),
+            LogicItem("act_both", "act_report", id="lit_2"),
+            LogicItem("act_report", END, id="lit_3"),
+        ],
+    )
+    objects = [scene_object("box", "Station"), scene_object("press", "Station")]
+    facts = TypeFacts(
+        "object_types.station", "Station", {name: ObjectAction(name) for name in ("fill", "press", "report")}
+    )
+    script = from_logic(Scene("scene", objects=objects, id="scn_1"), project, {"Station": facts})
+    directory = server.services.settings.packages_dir / "pkg_1"
+    Package(directory).write({"Station": STATION}, objects, project, "", script=script)
+    (directory / "action_points.py").write_text(points.source(project))
+
+
+@serving()
+async def test_a_failed_branch_is_retried_while_the_other_one_waits_at_the_join(server: Server) -> None:
+    subscribe(server, "Held", "ProgramPosition")
+    parallel_package(server)
+    await server.ask("RunPackage", {"id": "pkg_1", "on_error": "hold"})
+    data = await held(server)
+    assert (data["action_id"], data["device"], data["choices"]) == ("act_fill", "obj_box", ["retry", "skip", "end"])
+
+    async def pressed() -> bool:
+        return [branch.id for branch in (await server.ask("GetProgramPosition")).branches] == ["main", "act_filling"]
+
+    await until(pressed, "only the failed branch has not ended")
+    entries = (await server.ask("GetExecutionTrace", {})).entries
+    ended = {entry.name: not isinstance(entry.duration, Unset) for entry in entries}
+    assert ended == {"both": False, "filling": False, "pressing": True, "fill": True, "press": True}
+
+    await server.ask("AcknowledgeStop", {"object_id": "obj_box", "code": "full"})
+    await server.ask("DecideHeld", {"number": data["number"], "choice": "retry", "confirmed": True})
+    await server.client.event("ActionStateAfter", lambda event: event["action_id"] == "act_report")
+    await server.ask("StopPackage")
+    await server.client.state("stopped", "PackageState")
+    spans = {span.number: span for span in (await server.services.runs.run_trace(1)).spans}
+    failed = spans[data["number"]]
+    assert (failed.lane, failed.hold.choice, failed.hold.by) == ("act_filling", "retry", "alice")  # type: ignore[union-attr]
+    again = next(span for span in spans.values() if span.attempt == 2)
+    report = next(span for span in spans.values() if span.action_id == "act_report")
+    assert (again.action_id, again.lane, again.error) == ("act_fill", "act_filling", UNSET)
+    assert again.start + again.duration <= report.start
