@@ -7,7 +7,7 @@ import { detailOf } from "../../program/functions";
 import { lanesOf } from "../../program/lanes";
 import type { Action } from "../../protocol/types";
 import type { Of } from "../../store/state";
-import { notify, now, select, setUi, useEditor } from "../../store/store";
+import { notify, now, useEditor } from "../../store/store";
 import { deviceIcon } from "../kit/deviceIcons";
 import { Drawing, Icon } from "../kit/icons";
 import { ReachBadge } from "../points/Reach";
@@ -97,7 +97,7 @@ export function FlowNode({ data, selected }: NodeProps<FlowNodeType>) {
   );
 }
 
-/** A call that parallel work runs: what it does now. A tap selects it. */
+/** A call that parallel work runs: what it does now. The graph selects it at a tap. */
 function Lane({ call }: { call: Of<Action> }) {
   const running = useEditor((state) => state.program.running.includes(call.id));
   const waits = useEditor((state) => state.program.state === "paused");
@@ -106,26 +106,13 @@ function Lane({ call }: { call: Of<Action> }) {
   const selected = useEditor((state) => state.ui.selection?.id === call.id);
   const breakpoint = useEditor((state) => call.id in state.breakpoints);
   return (
-    <li>
-      <button
-        type="button"
-        className="flow-lane"
-        data-running={running}
-        data-selected={selected}
-        onClick={(event) => {
-          if (now().ui.picked || now().ui.connecting) return;
-          event.stopPropagation();
-          select({ kind: "action", id: call.id });
-          setUi({ tool: "" });
-        }}
-      >
-        <span className="flow-name">
-          {breakpoint && <span className="breakpoint-dot" data-on="true" role="img" aria-label={t`pauses here`} />}
-          <span className="flow-title">{call.name}</span>
-          {running && <span className="tag good">{waits ? t`next` : t`runs`}</span>}
-        </span>
-        <span className="quiet small flow-detail">{running && doing ? doing : detail}</span>
-      </button>
+    <li className="flow-lane" data-call={call.id} data-running={running} data-selected={selected}>
+      <span className="flow-name">
+        {breakpoint && <span className="breakpoint-dot" data-on="true" role="img" aria-label={t`pauses here`} />}
+        <span className="flow-title">{call.name}</span>
+        {running && <span className="tag good">{waits ? t`next` : t`runs`}</span>}
+      </span>
+      <span className="quiet small flow-detail">{running && doing ? doing : detail}</span>
     </li>
   );
 }

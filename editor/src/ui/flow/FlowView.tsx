@@ -203,7 +203,12 @@ function Flow() {
           const branch = box(source).branches.find((each) => each.id === sourceHandle);
           void connect(lastIn(box(source)), firstIn(box(target)), branch && conditionOf(branch));
         }}
-        onNodeClick={(_, { id }) => choose(box(id))}
+        onNodeClick={({ target }, { id }) => {
+          const call = (target as Element).closest<HTMLElement>("[data-call]")?.dataset.call;
+          if (call === undefined || now().ui.connecting || now().ui.picked) return choose(box(id));
+          select({ kind: "action", id: call });
+          setUi({ tool: "" });
+        }}
         onEdgeClick={(_, { id }) => choose({ id, kind: "action", run: [] })}
         onPaneClick={() => (now().ui.connecting ? setUi({ connecting: null }) : select(null))}
         onNodesChange={(changes) => {
