@@ -192,16 +192,21 @@ class Match(enum.StrEnum):
 
 
 class LogicComparison(Data, frozen=True):
-    """A comparison of a value with a constant.
+    """A comparison of a value with a constant, or with another value.
 
     `what` is `<action id>/default/<output index>`, or the id of a project parameter. `value`, and `upper` of a range,
-    are JSON in a string.
+    are JSON in a string. `other` is another value in the form of `what`; `value` is empty then.
     """
 
     what: str
     operator: Operator
-    value: str
+    value: str = ""
     upper: str | Unset = UNSET
+    other: str | Unset = UNSET
+
+    def compared(self) -> list[str]:
+        """Return what is compared: `what`, and `other` if there is one."""
+        return [self.what] if isinstance(self.other, Unset) else [self.what, self.other]
 
 
 class LogicWhen(Data, frozen=True):
@@ -247,7 +252,7 @@ class LogicItem(Data, frozen=True):
         """Return the ids of the actions and project parameters whose values the condition compares."""
         links = [] if isinstance(self.condition, Unset) else [self.condition.what]
         if not isinstance(self.when, Unset):
-            links += [one.what for one in self.when.comparisons]
+            links += [what for one in self.when.comparisons for what in one.compared()]
         return {link.partition("/")[0] for link in links}
 
     @property

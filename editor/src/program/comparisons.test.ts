@@ -1,8 +1,27 @@
 import { describe, expect, test } from "vitest";
 import type { LogicComparison, LogicWhen, Match, Operator } from "../protocol/types";
-import { fieldsOf, isComplete, newComparison, OPERATORS, operandsOf, withOperator } from "./comparisons";
+import {
+  fieldsOf,
+  isComplete,
+  newComparison,
+  OPERATORS,
+  operandsOf,
+  operatorsOf,
+  othersOf,
+  withOperator,
+  withOther,
+} from "./comparisons";
 import { listingOf } from "./listing";
-import { branchKind, conditionWords, freeStep, operandAt, whenOf, whenWords } from "./logic";
+import {
+  branchKind,
+  comparisonWords,
+  conditionWords,
+  freeStep,
+  type Operand,
+  operandAt,
+  whenOf,
+  whenWords,
+} from "./logic";
 import { movableRuns } from "./moving";
 import { problemsOf, usersOf } from "./problems";
 import { runsOf } from "./runs";
@@ -152,4 +171,25 @@ test("after an error exit, results of its action cannot be compared", () => {
   expect(problemsOf(doc, TYPES).map((each) => each.text)).toEqual([
     "a: no next step if none of the conditions is met.",
   ]);
+});
+
+test("a value can be compared with another one", () => {
+  const { doc, s2 } = comparing(all());
+  const [flag, count, limit] = operandsOf(doc, TYPES, "b") as [Operand, Operand, Operand];
+  expect(othersOf(count, [flag, count, limit])).toEqual([limit]);
+  expect(othersOf(flag, [flag, count, limit])).toEqual([]);
+  const pair = withOther(compared(N, ">=", "3"), count, limit);
+  expect(pair).toEqual({ what: N, operator: ">=", value: "", other: "par" });
+  expect(withOther(compared(N, "[)", "3", "7"), count, limit).operator).toBe("==");
+  expect(operatorsOf(count, { ...limit, type: "double" })).toEqual(["<", "<=", ">", ">="]);
+  expect(operatorsOf(flag, flag)).toEqual(["==", "!="]);
+  expect(withOperator(pair, "<")).toEqual({ ...pair, operator: "<" });
+  expect(withOther(pair, count, undefined)).toEqual(compared(N, ">=", "0"));
+  expect(fieldsOf(doc, TYPES, all({ ...pair, operator: "==" }))).toEqual({ when: all({ ...pair, operator: "==" }) });
+  expect(comparisonWords(doc, TYPES, pair)).toBe("a_result ≥ so_many");
+  expect(isComplete(doc, TYPES, [all(pair)])).toBeUndefined();
+  s2.when = all(pair);
+  expect(usersOf(doc, TYPES, { parameter: "par" })).toEqual([s2.id]);
+  s2.when = all({ ...pair, other: "gone" });
+  expect(problemsOf(doc, TYPES).map((each) => each.id)).toContain(s2.id);
 });

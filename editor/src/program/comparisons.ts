@@ -32,7 +32,8 @@ export function fieldsOf(
   const [one] = when.comparisons;
   const none: LogicWhen = { match: "all", comparisons: [] };
   if (!one) return { when: none };
-  const simple = when.comparisons.length === 1 && one.operator === "==" && one.what.includes("/");
+  const constant = one.operator === "==" && one.other === undefined;
+  const simple = when.comparisons.length === 1 && constant && one.what.includes("/");
   if (simple && BRANCHABLE.has(operandAt(doc, types, one.what)?.type ?? ""))
     return { condition: { what: one.what, value: one.value }, when: none };
   return { when };
@@ -50,6 +51,29 @@ export function operandsOf(doc: OpenDocument, types: State["types"], id: string)
   return [...results, ...variables].filter((each) => each.type in OPERATORS);
 }
 
+const NUMBERS: ReadonlySet<string> = new Set(["integer", "double"]);
+
+/** Return the values that can be compared with a value. */
+export const othersOf = (one: Operand, operands: readonly Operand[]): Operand[] =>
+  operands.filter(
+    ({ what, type }) => what !== one.what && (type === one.type || (NUMBERS.has(type) && NUMBERS.has(one.type))),
+  );
+
+/** Return the operators for a value, or for two. */
+export function operatorsOf(one: Operand, other?: Operand): Operator[] {
+  if (!other) return OPERATORS[one.type] ?? [];
+  if (one.type === "double" || other.type === "double") return ORDER;
+  return one.type === "integer" ? [...EQUALITY, ...ORDER] : EQUALITY;
+}
+
+/** Return a comparison with another value, or with a constant if there is none. */
+export function withOther(one: LogicComparison, operand: Operand, other: Operand | undefined): LogicComparison {
+  const { what } = one;
+  const operators = operatorsOf(operand, other);
+  const operator = operators.includes(one.operator) ? one.operator : (operators[0] ?? "==");
+  return other ? { what, operator, value: "", other: other.what } : { ...newComparison(operand, []), operator };
+}
+
 /** Return a comparison of a value to start with, which is not among the others. */
 export function newComparison({ what, type }: Operand, others: LogicComparison[]): LogicComparison {
   const operators = OPERATORS[type] ?? EQUALITY;
@@ -57,7 +81,9 @@ export function newComparison({ what, type }: Operand, others: LogicComparison[]
   for (const value of values)
     for (const operator of operators) {
       if (isRange(operator)) continue;
-      const taken = others.some((each) => each.what === what && each.operator === operator && each.value === value);
+      const taken = others.some(
+        (each) => each.what === what && each.operator === operator && each.value === value && each.other === undefined,
+      );
       if (!taken) return { what, operator, value };
     }
   return { what, operator: operators[0] ?? "==", value: values[0] ?? "0" };
@@ -65,7 +91,8 @@ export function newComparison({ what, type }: Operand, others: LogicComparison[]
 
 /** Return a comparison with another operator. A new range starts at the value and has the width 1. */
 export function withOperator(one: LogicComparison, operator: Operator): LogicComparison {
-  const { what, value } = one;
+  const { what, value, other } = one;
+  if (other !== undefined) return { ...one, operator };
   if (!isRange(operator)) return { what, operator, value };
   return { what, operator, value, upper: one.upper ?? JSON.stringify(Number(decoded(value)) + 1) };
 }
@@ -129,12 +156,13 @@ function samples(type: string, constants: Value[]): Value[] {
 }
 
 /**
- * Return whether one of several conditions is true for all values. Undefined if it is unknown: a value is missing, or
- * there are too many.
+ * Return whether one of several conditions is true for all values. Undefined if it is unknown: a value is missing,
+ * there are too many, or two values are compared with each other, which only the server proves.
  */
 export function isComplete(doc: OpenDocument, types: State["types"], conditions: LogicWhen[]): boolean | undefined {
   const constants = new Map<string, Value[]>();
   for (const one of conditions.flatMap((each) => each.comparisons)) {
+    if (one.other !== undefined) return undefined;
     const limits = [decoded(one.value), decoded(one.upper)].filter((each) => each !== undefined) as Value[];
     constants.set(one.what, [...(constants.get(one.what) ?? []), ...limits]);
   }

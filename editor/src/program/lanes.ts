@@ -52,8 +52,10 @@ export function whyNotAtOnce(doc: OpenDocument, calls: readonly Call[]): string 
     for (const [id, name] of devices) {
       const other = users.get(id);
       const device = doc.objects[id]?.name ?? "?";
-      if (other)
-        return t`${other.call.name} and ${call.name} both use ${device}: ${other.name} and ${name}. One device cannot work for two branches.`;
+      if (other) {
+        const [one, two, first] = [other.call.name, call.name, other.name];
+        return t`${one} and ${two} both use ${device}: ${first} and ${name}. A device can work for one branch only.`;
+      }
       users.set(id, { call, name });
     }
   }

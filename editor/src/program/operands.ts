@@ -151,7 +151,11 @@ function valueWords(json: string | undefined): string {
 /** Return a comparison as text: "3 ≤ n < 7", "passed = yes". */
 export function comparisonWords(doc: OpenDocument, types: State["types"], one: LogicComparison): string {
   const name = operandAt(doc, types, one.what)?.name ?? t`result`;
-  if (!isRange(one.operator)) return `${name} ${SIGNS[one.operator] ?? one.operator} ${valueWords(one.value)}`;
+  if (!isRange(one.operator)) {
+    const other =
+      one.other === undefined ? valueWords(one.value) : (operandAt(doc, types, one.other)?.name ?? t`result`);
+    return `${name} ${SIGNS[one.operator] ?? one.operator} ${other}`;
+  }
   const [below, above] = [one.operator[0] === "[" ? "≤" : "<", one.operator[1] === "]" ? "≤" : "<"];
   return `${valueWords(one.value)} ${below} ${name} ${above} ${valueWords(one.upper)}`;
 }

@@ -26,8 +26,11 @@ export function stackOf({ doc, program }: State, id: string): string[] {
 
 /** Return the innermost running actions: not the calls around them. */
 export function innermost(state: State): string[] {
-  const within = new Set(state.program.running.flatMap((id) => stackOf(state, id).slice(0, -1)));
-  return state.program.running.filter((id) => !within.has(id));
+  const { doc, program } = state;
+  const within = new Set(program.running.flatMap((id) => stackOf(state, id).slice(0, -1)));
+  // Parallel work is around its branches.
+  const around = (id: string) => doc && anyAction(doc, id)?.branches?.some((each) => program.running.includes(each));
+  return program.running.filter((id) => !within.has(id) && !around(id));
 }
 
 /** Return an action with the calls around it: "handle_board › pick". */

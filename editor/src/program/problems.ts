@@ -137,7 +137,9 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
     }
   }
   for (const item of Object.values(doc.logic)) {
-    const missing = whenOf(item).comparisons.some(({ what }) => !operandAt(doc, types, what));
+    const missing = whenOf(item).comparisons.some(({ what, other = what }) =>
+      [what, other].some((each) => !operandAt(doc, types, each)),
+    );
     if (missing && typesKnown(doc, types)) {
       error(
         item.id,
@@ -262,7 +264,8 @@ export function usersOf(
     if (uses || stores) users.push(action.id);
   }
   for (const item of Object.values(doc.logic)) {
-    if ("parameter" in of && whenOf(item).comparisons.some(({ what }) => what === of.parameter)) users.push(item.id);
+    if ("parameter" in of && whenOf(item).comparisons.some((one) => [one.what, one.other].includes(of.parameter)))
+      users.push(item.id);
   }
   return users;
 }

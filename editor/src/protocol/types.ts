@@ -1256,16 +1256,17 @@ export interface LockHolder {
 export type LockType = "TREE" | "OBJECT";
 
 /**
- * A comparison of a value with a constant.
+ * A comparison of a value with a constant, or with another value.
  *
  * `what` is `<action id>/default/<output index>`, or the id of a project parameter. `value`, and `upper` of a range,
- * are JSON in a string.
+ * are JSON in a string. `other` is another value in the form of `what`; `value` is empty then.
  */
 export interface LogicComparison {
   what: string;
   operator: Operator;
   value: string;
   upper?: string;
+  other?: string;
 }
 
 /**

@@ -27,7 +27,7 @@ from arcor2_server.build.frame import ERROR, NEXT_ACTION, REFERENCES, ActionCall
 from arcor2_server.build.layout import arrange
 from arcor2_server.build.naming import Names
 from arcor2_server.documents.checks.actions import check_retry
-from arcor2_server.documents.comparisons import Comparisons, Reference, cases_of, comparison_problem
+from arcor2_server.documents.comparisons import Comparisons, Reference, cases_of, comparison_problem, pair_problem
 from arcor2_server.documents.logic_graph import (
     BRANCHABLE,
     END_NODE,
@@ -260,7 +260,7 @@ class Cycle:
     def _test(self, node: int, condition: Test | None, *, negated: bool = False) -> ast.expr:
         assert condition is not None, "only the last of several edges has no condition"
         if isinstance(condition, Comparisons):
-            variables = [self._compared(node, one.what)[0] for one in condition.comparisons]
+            variables = [[self._compared(node, what)[0] for what in one.compared()] for one in condition.comparisons]
             return expressions.compares(variables, condition, negated=negated)
         source, number = condition.action, self.nodes.actions[node]
         if not self.nodes.has_results(self.natural, source, node):
@@ -307,11 +307,14 @@ class Cycle:
         conditions = [as_comparisons(edge.condition) for edge in edges if edge.condition is not None]
         for condition in conditions:
             for one in condition.comparisons:
-                variable, kind = self._compared(node, one.what)
-                problem = comparison_problem(variable, kind, one.operator, one.value, one.upper)
+                compared = {what: self._compared(node, what) for what in one.compared()}
+                if one.other is None:
+                    problem = comparison_problem(*compared[one.what], one.operator, one.value, one.upper)
+                else:
+                    problem = pair_problem(*compared[one.what], one.operator, *compared[one.other])
                 if problem is not None:
                     raise InvalidProject("action {name!r}: {reason}", name=user.name, reason=problem)
-                kinds[one.what] = kind
+                kinds |= {what: kind for what, (_, kind) in compared.items()}
         cases = cases_of(conditions, kinds)
         if cases.unused:
             raise never_taken(user, edges[cases.unused[0]], [self.flow.actions[one] for one in self.nodes.actions])

@@ -56,7 +56,10 @@ _AST: Final[dict[Operator, type[ast.cmpop]]] = {
 }
 
 
-def _comparison(variable: str, one: Comparison) -> ast.expr:
+def _comparison(variables: Sequence[str], one: Comparison) -> ast.expr:
+    variable, *others = variables
+    if others:
+        return ast.Compare(name(variable), [_AST[one.operator]()], [name(others[0])])
     if isinstance(one.value, bool):
         return name(variable) if one.value else ast.UnaryOp(ast.Not(), name(variable))
     if one.operator in RANGES:
@@ -72,8 +75,8 @@ def _number(value: Value | None) -> ast.expr:
     return ast.Constant(value)
 
 
-def compares(variables: Sequence[str], condition: Comparisons, *, negated: bool = False) -> ast.expr:
-    """Return a condition such as `3 <= n < 7 and passed`; `variables` are the variables of its comparisons."""
+def compares(variables: Sequence[Sequence[str]], condition: Comparisons, *, negated: bool = False) -> ast.expr:
+    """Return a condition such as `3 <= n < 7 and passed`; `variables` are those of each comparison."""
     if negated and (other := inverse(condition)) is not None:
         return compares(variables, other)
     tests = [_comparison(*pair) for pair in zip(variables, condition.comparisons, strict=True)]

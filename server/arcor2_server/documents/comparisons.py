@@ -53,12 +53,17 @@ class Reference(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """A comparison with a constant. In a range, `value` is the lower limit."""
+    """A comparison with a constant, or with another value `other`. In a range, `value` is the lower limit."""
 
     what: Reference
     operator: Operator
     value: Value
     upper: int | float | None = None
+    other: Reference | None = None
+
+    def compared(self) -> tuple[Reference, ...]:
+        """Return what is compared: `what`, and `other` if there is one."""
+        return (self.what,) if self.other is None else (self.what, self.other)
 
 
 class Comparisons(NamedTuple):
@@ -68,17 +73,22 @@ class Comparisons(NamedTuple):
     match: Match = Match.ALL
 
 
-def of_result(when: LogicComparison) -> bool:
-    """Return whether a comparison is about the result of an action, not about a project parameter."""
-    return "/" in when.what
+def is_result(what: str) -> bool:
+    """Return whether a compared value is the result of an action, not a project parameter."""
+    return "/" in what
 
 
 def decoded(one: LogicComparison) -> tuple[Value, int | float | None]:
-    """Return the value and the upper limit of a comparison.
+    """Return the value and the upper limit of a comparison; an empty text for one with another value.
 
     Raises:
-        InvalidData: one of them is not JSON of a boolean, number or string, or there is no limit where one is needed.
+        InvalidData: one of them is not JSON of a boolean, number or string, there is no limit where one is needed, or
+            there is one next to another value.
     """
+    if not isinstance(one.other, Unset):
+        if one.value or not isinstance(one.upper, Unset) or one.operator in RANGES:
+            raise InvalidData("A comparison with another value has no constants.")
+        return "", None
     try:
         value = msgspec.json.decode(one.value, type=bool | int | float | str)
         upper = None if isinstance(one.upper, Unset) else msgspec.json.decode(one.upper, type=int | float)
@@ -115,6 +125,29 @@ def comparison_problem(name: str, kind: str, operator: Operator, value: Value, u
     return None
 
 
+def pair_problem(name: str, kind: str, operator: Operator, other_name: str, other_kind: str) -> Message | None:
+    """Return the problem of a comparison of two values with their names and types, None if it is valid."""
+    for one, type_ in ((name, kind), (other_name, other_kind)):
+        if type_ not in OPERATORS:
+            return Message.of("{name} is {type}, which a condition cannot use", name=one, type=type_ or "nothing")
+    if kind != other_kind and not {kind, other_kind} <= {"integer", "double"}:
+        return Message.of(
+            "{name} is {type} and cannot be compared with {other}, which is {other_type}",
+            name=name,
+            type=kind,
+            other=other_name,
+            other_type=other_kind,
+        )
+    if "double" in (kind, other_kind) and operator in _EQUALITY:
+        measured = name if kind == "double" else other_name
+        return Message.of("{name} is a measured number, which is rarely equal to another one", name=measured)
+    if operator not in (*OPERATORS[kind], *_EQUALITY) or operator in RANGES:
+        return Message.of(
+            "{name} is {type}, which cannot be compared by {operator}", name=name, type=kind, operator=operator
+        )
+    return None
+
+
 def inverse(condition: Comparisons) -> Comparisons | None:
     """Return the opposite of a single comparison for equality, None for other conditions."""
     [one, *more] = condition.comparisons
@@ -126,7 +159,7 @@ def inverse(condition: Comparisons) -> Comparisons | None:
     return Comparisons((one._replace(operator=opposite),))
 
 
-def check_when(when: LogicWhen, kind_of: Callable[[LogicComparison], tuple[str, str]]) -> None:
+def check_when(when: LogicWhen, kind_of: Callable[[str], tuple[str, str]]) -> None:
     """Check the comparisons of a logic item.
 
     Args:
@@ -139,9 +172,15 @@ def check_when(when: LogicWhen, kind_of: Callable[[LogicComparison], tuple[str, 
     seen: set[object] = set()
     for one in when.comparisons:
         value, upper = decoded(one)
-        if (problem := comparison_problem(*kind_of(one), one.operator, value, upper)) is not None:
+        if isinstance(one.other, Unset):
+            problem = comparison_problem(*kind_of(one.what), one.operator, value, upper)
+        elif one.other == one.what:
+            raise InvalidData("A comparison compares a value with itself.")
+        else:
+            problem = pair_problem(*kind_of(one.what), one.operator, *kind_of(one.other))
+        if problem is not None:
             raise InvalidData("{problem}.", problem=problem)
-        key = (one.what, one.operator, type(value), value, upper)
+        key = (one.what, one.operator, type(value), value, upper, one.other)
         if key in seen:
             raise InvalidData("A comparison is given twice.")
         seen.add(key)
@@ -158,9 +197,10 @@ def condition_key(item: LogicItem) -> object:
             try:
                 value, upper = decoded(one)
             except InvalidData:
-                parts.append((one.what, one.operator, one.value, one.upper))
+                parts.append((one.what, one.operator, one.value, one.upper, one.other))
                 continue
-            parts.append((one.what, one.operator, isinstance(value, bool), value, upper))
+            other = None if isinstance(one.other, Unset) else one.other
+            parts.append((one.what, one.operator, isinstance(value, bool), value, upper, other))
         return tuple(parts), item.when.match if len(parts) > 1 else Match.ALL
     if isinstance(item.condition, Unset):
         return None
@@ -168,7 +208,7 @@ def condition_key(item: LogicItem) -> object:
         value = msgspec.json.decode(item.condition.value, type=bool | int | float | str)
     except msgspec.DecodeError:
         return item.condition.what, item.condition.value
-    return ((item.condition.what, Operator.EQUAL, isinstance(value, bool), value, None),), Match.ALL
+    return ((item.condition.what, Operator.EQUAL, isinstance(value, bool), value, None, None),), Match.ALL
 
 
 def text_of(when: LogicWhen, name: Callable[[str], str]) -> str:
@@ -179,7 +219,7 @@ def text_of(when: LogicWhen, name: Callable[[str], str]) -> str:
         if one.operator in RANGES:
             above, below = RANGES[one.operator]
             return f"{one.value} {above} {called} {below} {one.upper}"
-        return f"{called} {one.operator} {one.value}"
+        return f"{called} {one.operator} {one.value if isinstance(one.other, Unset) else name(one.other)}"
 
     return (" and " if when.match is Match.ALL else " or ").join(map(text, when.comparisons))
 
@@ -199,8 +239,9 @@ def what_of(text: str) -> tuple[str, int] | str:
 
 
 # ------------------------------------------------------------------------------------------------ completeness
-def _holds(one: Comparison, value: Value) -> bool:
-    limit = one.value
+def _holds(one: Comparison, values: Mapping[Reference, Value]) -> bool:
+    value = values[one.what]
+    limit = one.value if one.other is None else values[one.other]
     match one.operator:
         case Operator.EQUAL:
             return value == limit
@@ -226,24 +267,40 @@ def _holds(one: Comparison, value: Value) -> bool:
 
 def holds(condition: Comparisons, values: Mapping[Reference, Value]) -> bool:
     """Return whether a condition is true for some values."""
-    tested = (_holds(one, values[one.what]) for one in condition.comparisons)
+    tested = (_holds(one, values) for one in condition.comparisons)
     return all(tested) if condition.match is Match.ALL else any(tested)
 
 
-def _samples(kind: str, constants: Sequence[Value]) -> list[Value]:
-    """Return values of a type that stand for all values, which differ only in comparisons with the constants."""
+def _samples(kind: str, constants: Sequence[Value], kinds: Sequence[str]) -> list[Value]:
+    """Return values of a type that stand for all values, which differ only in comparisons.
+
+    Args:
+        kind: the type.
+        constants: the constants with which the values are compared.
+        kinds: the types of the values that are compared with each other, this one included. Between two constants
+            there are as many samples as values, so that these have any order.
+    """
     if kind == "boolean":
         return [True, False]
+    count = len(kinds)
     texts = [one for one in constants if isinstance(one, str)]
     if kind in ("string", "string_enum"):
-        other = next(text for number in itertools.count() if (text := "other" + "_" * number) not in texts)
-        return [*dict.fromkeys(texts), other]
-    numbers = sorted({one for one in constants if isinstance(one, int | float)})
-    if kind == "double":
-        between = [low + (high - low) / 2 for low, high in itertools.pairwise(numbers)]
-        outside = [numbers[0] - max(1.0, abs(numbers[0])), numbers[-1] + max(1.0, abs(numbers[-1]))]
-        return [*numbers, *between, *outside]
-    return list(dict.fromkeys(near for one in numbers for near in (one, one - 1, one + 1)))
+        others = (text for number in itertools.count() if (text := "other" + "_" * number) not in texts)
+        return [*dict.fromkeys(texts), *itertools.islice(others, count)]
+    numbers = [one for one in constants if isinstance(one, int | float)] or [0]
+    shifts = sorted(range(-count, count + 1), key=abs)
+    near = dict.fromkeys(
+        value + shift for one in numbers for value in {math.floor(one), math.ceil(one)} for shift in shifts
+    )
+    if kind != "double":
+        return list(near)
+    fixed = sorted({*numbers, *(near if "integer" in kinds else ())})
+    between = [
+        low + (high - low) * n / (count + 1) for low, high in itertools.pairwise(fixed) for n in range(1, count + 1)
+    ]
+    below = [fixed[0] - n * max(1.0, abs(fixed[0])) for n in range(1, count + 1)]
+    above = [fixed[-1] + n * max(1.0, abs(fixed[-1])) for n in range(1, count + 1)]
+    return [*fixed, *between, *below, *above]
 
 
 class Cases(NamedTuple):
@@ -260,16 +317,33 @@ class Cases(NamedTuple):
     known: bool
 
 
+def _groups(conditions: Sequence[Comparisons]) -> list[list[Reference]]:
+    """Return the values that are compared with each other, directly or through others."""
+    groups: dict[Reference, list[Reference]] = {}
+    for one in (one for condition in conditions for one in condition.comparisons):
+        joined: dict[Reference, None] = {}
+        for what in one.compared():
+            joined |= dict.fromkeys(groups.get(what, [what]))
+        group = list(joined)
+        groups |= dict.fromkeys(group, group)
+    return [group for what, group in groups.items() if group[0] == what]
+
+
 def _all_values(kinds: Mapping[Reference, str], conditions: Sequence[Comparisons]) -> Iterator[dict[Reference, Value]]:
     constants: dict[Reference, list[Value]] = {}
     for condition in conditions:
         for one in condition.comparisons:
-            constants.setdefault(one.what, []).extend(limit for limit in (one.value, one.upper) if limit is not None)
-    samples = [_samples(kinds[what], values) for what, values in constants.items()]
-    if math.prod(map(len, samples)) > MAX_CASES:
+            if one.other is None:
+                limits = [limit for limit in (one.value, one.upper) if limit is not None]
+                constants.setdefault(one.what, []).extend(limits)
+    samples: dict[Reference, list[Value]] = {}
+    for group in _groups(conditions):
+        common = [value for what in group for value in constants.get(what, ())]
+        samples |= {what: _samples(kinds[what], common, [kinds[one] for one in group]) for what in group}
+    if math.prod(map(len, samples.values())) > MAX_CASES:
         return
-    for values in itertools.product(*samples):
-        yield dict(zip(constants, values, strict=True))
+    for values in itertools.product(*samples.values()):
+        yield dict(zip(samples, values, strict=True))
 
 
 def cases_of(conditions: Sequence[Comparisons], kinds: Mapping[Reference, str]) -> Cases:

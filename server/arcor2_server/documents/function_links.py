@@ -95,7 +95,10 @@ def with_condition(item: LogicItem, changed: Callable[[tuple[str, str, int]], st
     if not isinstance(item.condition, Unset):
         item = replace(item, condition=ProjectLogicIf(link(item.condition.what), item.condition.value))
     if not isinstance(item.when, Unset):
-        comparisons = [replace(one, what=link(one.what)) for one in item.when.comparisons]
+        comparisons = [
+            replace(one, what=link(one.what), other=one.other if isinstance(one.other, Unset) else link(one.other))
+            for one in item.when.comparisons
+        ]
         item = replace(item, when=replace(item.when, comparisons=comparisons))
     return item
 
@@ -104,7 +107,7 @@ def tested_by(item: LogicItem) -> list[tuple[str, str, int]]:
     """Return the results that the condition of a logic item tests, without malformed links."""
     links = [] if isinstance(item.condition, Unset) else [item.condition.what]
     if not isinstance(item.when, Unset):
-        links += [one.what for one in item.when.comparisons]
+        links += [what for one in item.when.comparisons for what in one.compared()]
     found: list[tuple[str, str, int]] = []
     for link in links:
         with contextlib.suppress(ValueError):

@@ -6,10 +6,10 @@ import msgspec
 
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectAction
-from arcor2_hw.data.project import END, START, Action, LogicComparison, LogicItem, ProjectLogicIf, parse_link
+from arcor2_hw.data.project import END, START, Action, LogicItem, ProjectLogicIf, parse_link
 from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.messages import Message, translatable
-from arcor2_server.documents.comparisons import check_when, condition_key, of_result
+from arcor2_server.documents.comparisons import check_when, condition_key, is_result
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.item_indexes import action_of
 from arcor2_server.documents.logic_graph import BRANCHABLE, error_kinds_problem
@@ -216,14 +216,14 @@ def _result(
 
 
 def _compared(
-    document: Document, meta_of: Callable[[Action], ObjectAction], comparison: LogicComparison, function: str
+    document: Document, meta_of: Callable[[Action], ObjectAction], what: str, function: str
 ) -> tuple[str, str]:
     """Return the name and the type of a compared value."""
-    if not of_result(comparison):
-        parameter = document.parameter(comparison.what)
+    if not is_result(what):
+        parameter = document.parameter(what)
         return parameter.name, parameter.type
     try:
-        link = parse_link(comparison.what)
+        link = parse_link(what)
     except ValueError as error:
         raise InvalidData("The condition is malformed: {reason}.", reason=error) from None
     return _result(document, meta_of, link, function)

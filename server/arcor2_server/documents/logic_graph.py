@@ -120,22 +120,25 @@ def _missing(name: str, what: str) -> InvalidProject:
 def _comparisons(when: LogicWhen, name: str, known: Mapping[str, int], parameters: Collection[str]) -> Comparisons:
     found: list[Comparison] = []
     for one in when.comparisons:
+        references: list[Reference] = []
         try:
-            what = what_of(one.what)
             value, upper = decoded(one)
+            places = [what_of(text) for text in one.compared()]
         except (ValueError, InvalidData) as error:
             raise InvalidProject(
                 "action {name!r}: a condition cannot be read: {reason}", name=name, reason=error
             ) from None
-        if isinstance(what, str):
-            reference = Reference(END_NODE, 0, what)
-            missing = what not in parameters
-        else:
-            reference = Reference(known.get(what[0], END_NODE), what[1])
-            missing = what[0] not in known
-        if missing:
-            raise _missing(name, one.what)
-        found.append(Comparison(reference, one.operator, value, upper))
+        for text, place in zip(one.compared(), places, strict=True):
+            if isinstance(place, str):
+                references.append(Reference(END_NODE, 0, place))
+                missing = place not in parameters
+            else:
+                references.append(Reference(known.get(place[0], END_NODE), place[1]))
+                missing = place[0] not in known
+            if missing:
+                raise _missing(name, text)
+        what, *others = references
+        found.append(Comparison(what, one.operator, value, upper, *others))
     return Comparisons(tuple(found), when.match if len(found) > 1 else Match.ALL)
 
 
@@ -162,7 +165,8 @@ def _check_named(test: Test | None, source: Action, actions: Sequence[Action]) -
     """Raise InvalidProject if a condition refers to a result without a name."""
     if test is None:
         return
-    places = [test] if isinstance(test, Condition) else [one.what for one in test.comparisons if not one.what.parameter]
+    references = [] if isinstance(test, Condition) else [what for one in test.comparisons for what in one.compared()]
+    places = [test] if isinstance(test, Condition) else [what for what in references if not what.parameter]
     for place in places:
         tested = actions[place.action]
         if place.output >= len(tested.outputs()):

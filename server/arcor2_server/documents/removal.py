@@ -100,7 +100,7 @@ def _used_results(user: Action | LogicItem | ProjectFunction, action_id: str) ->
         return {index for source, _, index in (parse_link(one.link) for one in user.returns) if source == action_id}
     compared = [] if isinstance(user.condition, Unset) else [user.condition.what]
     if not isinstance(user.when, Unset):
-        compared += [one.what for one in user.when.comparisons]
+        compared += [what for one in user.when.comparisons for what in one.compared()]
     found = [parse_link(what) for what in compared if "/" in what]
     return {index for source, _, index in found if source == action_id}
 

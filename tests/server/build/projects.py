@@ -52,6 +52,7 @@ from arcor2_server.documents.comparisons import (
     Reference,
     cases_of,
     decoded,
+    pair_problem,
 )
 from arcor2_server.documents.consistency import Inconsistent, check_consistent
 from arcor2_server.documents.document import Document
@@ -234,8 +235,8 @@ def _compared(what: str, results: dict[tuple[str, str], tuple[Any, ...]], variab
     return results[source, flow][output]
 
 
-def _met(one: LogicComparison, value: Any) -> bool:
-    limit = json.loads(one.value)
+def _met(one: LogicComparison, value: Any, *others: Any) -> bool:
+    limit = others[0] if others else json.loads(one.value)
     if isinstance(one.upper, str):
         upper = json.loads(one.upper)
         above = limit <= value if one.operator[0] == "[" else limit < value
@@ -294,8 +295,8 @@ def walk(project: Project, oracle: Oracle, count: int) -> list[tuple[str, tuple[
                     if results[source, "default"][output] != json.loads(item.condition.value):
                         continue
                 if isinstance(item.when, LogicWhen) and item is not ways[-1]:
-                    values = [_compared(one.what, results, variables) for one in item.when.comparisons]
-                    met = [_met(one, value) for one, value in zip(item.when.comparisons, values, strict=True)]
+                    comparisons = item.when.comparisons
+                    met = [_met(o, *(_compared(w, results, variables) for w in o.compared())) for o in comparisons]
                     if not (all(met) if item.when.match == "all" else any(met)):
                         continue
                 at = item.end
@@ -476,8 +477,15 @@ LIMITS: dict[str, tuple[Any, ...]] = {
 METHODS = {"count": "integer", "measure": "double", "read": "string", "ask": "boolean"}
 
 
-def _comparison(rng: random.Random, what: str, kind: str) -> LogicComparison:
+def _comparison(rng: random.Random, what: str, kinds: dict[str, str]) -> LogicComparison:
+    kind = kinds[what]
     limits = LIMITS[kind]
+    operators = [one for one in Operator if one not in RANGES]
+    pairs = [(o, other) for o in operators for other in kinds if other != what]
+    pairs = [(o, other) for o, other in pairs if pair_problem(what, kind, o, other, kinds[other]) is None]
+    if pairs and rng.random() < 0.25:
+        operator, other = rng.choice(pairs)
+        return LogicComparison(what, operator, other=other)
     if kind in ("integer", "double") and rng.random() < 0.3:
         lower, upper = sorted(rng.sample(limits, 2))
         closed = Operator.CLOSED if upper - lower <= 1 else rng.choice(list(RANGES))
@@ -486,13 +494,15 @@ def _comparison(rng: random.Random, what: str, kind: str) -> LogicComparison:
     return LogicComparison(what, operator, json.dumps(rng.choice(limits)))
 
 
+def _numbered(one: LogicComparison, numbers: dict[str, Reference]) -> Comparison:
+    what, *others = (numbers[each] for each in one.compared())
+    return Comparison(what, one.operator, *decoded(one), *others)
+
+
 def _proven(whens: list[LogicWhen], kinds: dict[str, str], *, otherwise: bool) -> bool:
     """Return whether Build accepts these conditions, tested in order."""
     numbers = {what: Reference(number, 0) for number, what in enumerate(kinds)}
-    tests = [
-        Comparisons(tuple(Comparison(numbers[o.what], o.operator, *decoded(o)) for o in when.comparisons), when.match)
-        for when in whens
-    ]
+    tests = [Comparisons(tuple(_numbered(one, numbers) for one in when.comparisons), when.match) for when in whens]
     if any(len(set(test.comparisons)) != len(test.comparisons) for test in tests):
         return False
     cases = cases_of(tests, {numbers[what]: kind for what, kind in kinds.items()})
@@ -521,7 +531,7 @@ def with_comparisons(draft: Draft, rng: random.Random) -> Draft:
             otherwise = rng.random() < 0.6
             whens = [
                 LogicWhen(
-                    [_comparison(rng, what, kinds[what]) for what in rng.choices(list(kinds), k=count)],
+                    [_comparison(rng, what, kinds) for what in rng.choices(list(kinds), k=count)],
                     rng.choice(list(Match)) if count > 1 else Match.ALL,
                 )
                 for _ in numbers[otherwise:]
@@ -549,7 +559,8 @@ def with_variables(draft: Draft, rng: random.Random) -> Draft:
     used = {source for source, _ in draft.links.values()}
     used |= {condition[0] for _, _, condition in draft.ways if condition is not None}
     for when in draft.whens.values():
-        used |= {parse_link(one.what)[0].removeprefix("id_") for one in when.comparisons if "/" in one.what}
+        compared = {what for one in when.comparisons for what in one.compared() if "/" in what}
+        used |= {parse_link(what)[0].removeprefix("id_") for what in compared}
     kinds = {one.type: one for one in PARAMETERS}
     for name, results in draft.actions.items():
         if len(results) == 1 and name not in used and rng.random() < 0.6:

@@ -463,6 +463,26 @@ def test_comparisons_read_well() -> None:
     same_runs(draft, _oracle(1), 60)
 
 
+def pair(what: str, operator: str, other: str) -> LogicComparison:
+    return LogicComparison(what, Operator(operator), other=other)
+
+
+def test_two_values_are_compared() -> None:
+    draft = comparing([pair(N, ">=", LIMIT)], [pair(X, "<", N), compared(P, "==", True)], None)
+    assert loop(draft.script()).splitlines()[3:7] == [
+        "if n >= limit:",
+        '    thing.do(an="b0")',
+        "elif x < n and passed:",
+        '    thing.do(an="b1")',
+    ]
+    same_runs(draft, _oracle(4), 60)
+    comparing([pair(N, "<", LIMIT)], [pair(LIMIT, "<=", N)]).script()
+    # Two values can lie in any order between and outside of constants.
+    high = [compared(N, ">", 5), compared(LIMIT, ">", 5)]
+    for operator in ("<", "==", ">"):
+        comparing([*high, pair(N, operator, LIMIT)], None).script()
+
+
 def test_many_comparisons_are_written_one_per_line() -> None:
     ranges = [compared(N, "[]", first, first + 3) for first in range(100000, 100100, 10)]
     lines = loop(comparing(ranges, None, match=Match.ANY).script()).splitlines()
@@ -499,6 +519,12 @@ def test_complete_comparisons_need_no_default_branch() -> None:
         (comparing([compared(X, "==", 0.5)], None), "x is a measured number"),
         (comparing([compared(P, "<", True)], None), "passed is boolean, which cannot be compared by <"),
         (comparing([compared(N, "[]", 3)], None), "A range has two limits"),
+        (comparing([pair(N, "<", LIMIT)], [pair(N, ">", LIMIT)]), "no action follows it when n = 0, limit = 0"),
+        (comparing([pair(X, "<", LIMIT)], [pair(X, ">=", LIMIT)], None), "the connection to 'b2' is never taken"),
+        (comparing([pair(N, "<", P)], None), "n is integer and cannot be compared with passed, which is boolean"),
+        (comparing([pair(X, "==", LIMIT)], None), "x is a measured number"),
+        (comparing([pair(N, "[]", LIMIT)], None), "A comparison with another value has no constants"),
+        (comparing([pair(N, "<", "pco_none")], None), "a condition refers to 'pco_none', which does not exist"),
         (comparing([compared(N, "<", [3])], None), "A comparison has an invalid value: [3]."),
         (comparing([compared("id_b0/default/0", "<", 3)], None), "refers to a result that 'b0' does not name"),
         (comparing([compared("pco_none", "<", 3)], None), "a condition refers to 'pco_none', which does not exist"),

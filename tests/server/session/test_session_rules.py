@@ -150,9 +150,14 @@ def when(
     return LogicItem(start, end, id=key or f"{start}>{end}", when=LogicWhen(tests))
 
 
+def paired(what: str, operator: str, other: str) -> LogicItem:
+    return LogicItem("a", "d", id="a>d", when=LogicWhen([LogicComparison(what, Operator(operator), other=other)]))
+
+
 def test_comparisons_are_checked_by_the_types_of_their_values() -> None:
     document = branching("a", "b", "c", "d", "e")
-    document.apply([document.add(Kind.PARAMETER, "pco", ProjectParameter("limit", "string", '"x"', id="pco"))])
+    for name, key in (("limit", "pco"), ("other", "pco2")):
+        document.apply([document.add(Kind.PARAMETER, key, ProjectParameter(name, "string", '"x"', id=key))])
     add(document, step("START", "a"))
     add(document, when("a", "b", ("a/default/2", "[)", "3", "7"), ("pco", "==", '"x"'), ("a/default/1", "<", "5")))
     add(document, step("a", "c"))
@@ -166,6 +171,10 @@ def test_comparisons_are_checked_by_the_types_of_their_values() -> None:
         (when("a", "d", (number, "[]", "4", "3")), "range of a_i from 4 to 3 is empty"),
         (when("a", "d", (number, "<", "3"), (number, "<", "3")), "given twice"),
         (when("a", "d", (number, "<", "null")), "invalid value: null"),
+        (paired(number, "<", "pco"), "integer and cannot be compared with limit, which is string"),
+        (paired(number, "<", number), "compares a value with itself"),
+        (paired(number, "<", "gone"), "gone"),
+        (paired("pco", "<", "pco2"), "limit is string, which cannot be compared by <"),
         (when("a", "d", ("gone", "<", "3")), "gone"),
         (when("a", "d", ("a/default/4", "<", "3")), "result number 4"),
         (when("START", "a", (number, "<", "3"), key="START>a"), "START cannot have a condition"),

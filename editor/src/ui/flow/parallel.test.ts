@@ -71,7 +71,7 @@ describe("parallel work", () => {
   });
 
   it("must not use a device in two branches", () => {
-    const why = "one and two both use device: count_one and count_two. One device cannot work for two branches.";
+    const why = "one and two both use device: count_one and count_two. A device can work for one branch only.";
     expect(problemsOf(doc, TYPES).map(({ id, text }) => [id, text])).toEqual([["both", `both: ${why}`]]);
     const [first, second] = callsIn(doc, { branches: ["one", "two"] });
     expect(whyNotAtOnce(doc, [first as never])).toBe("");

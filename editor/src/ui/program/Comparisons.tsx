@@ -2,7 +2,14 @@
 
 import { t } from "@lingui/core/macro";
 import { useId } from "react";
-import { newComparison, OPERATORS, operatorWords, withOperator } from "../../program/comparisons";
+import {
+  newComparison,
+  operatorsOf,
+  operatorWords,
+  othersOf,
+  withOperator,
+  withOther,
+} from "../../program/comparisons";
 import { isRange, type Operand, operandAt } from "../../program/logic";
 import type { LogicComparison, LogicWhen, Match, Operator } from "../../protocol/types";
 import type { OpenDocument, State } from "../../store/state";
@@ -98,14 +105,18 @@ interface RowProps {
 
 function Row({ number, one, operand, operands, from, nameOf, none, why, onSet, onChoose, onRemove }: RowProps) {
   const id = useId();
-  const operators = OPERATORS[operand?.type ?? ""] ?? [];
-  const title = number === 0 ? t`Condition` : t`Comparison ${number + 1}`;
+  const other = one?.other === undefined ? undefined : operands.find((each) => each.what === one.other);
+  const operators = operand ? operatorsOf(operand, other) : [];
+  const others = operand ? othersOf(operand, operands) : [];
+  const heading = number === 0 ? t`Condition` : t`Comparison ${number + 1}`;
   const type = operand?.type === "integer_enum" ? "integer" : (operand?.type ?? "string");
+  const title = ({ actionId, name }: Operand) =>
+    actionId === from ? name : actionId ? t`${name} of ${nameOf(actionId)}` : t`${name} (variable)`;
   return (
-    <fieldset className="comparison" aria-label={title}>
+    <fieldset className="comparison" aria-label={heading}>
       <div className="field">
         <div className="value-head">
-          <label htmlFor={id}>{title}</label>
+          <label htmlFor={id}>{heading}</label>
           {onRemove && (
             <Button
               look="plain"
@@ -131,11 +142,7 @@ function Row({ number, one, operand, operands, from, nameOf, none, why, onSet, o
           )}
           {operands.map((each) => (
             <option key={each.what} value={each.what}>
-              {each.actionId === from
-                ? each.name
-                : each.actionId
-                  ? t`${each.name} of ${nameOf(each.actionId)}`
-                  : t`${each.name} (variable)`}
+              {title(each)}
             </option>
           ))}
         </select>
@@ -159,14 +166,45 @@ function Row({ number, one, operand, operands, from, nameOf, none, why, onSet, o
               </select>
             </div>
           )}
-          <ValueField
-            label={isRange(one.operator) ? t`From` : t`Value of ${operand.name}`}
-            name={operand.name}
-            type={type}
-            json={one.value}
-            why={why}
-            onSet={(value) => onSet({ ...one, value })}
-          />
+          {(others.length > 0 || one.other !== undefined) && (
+            <div className="field">
+              <label htmlFor={`${id}-other`}>{t`Compared with`}</label>
+              <select
+                id={`${id}-other`}
+                value={one.other ?? ""}
+                disabled={why !== ""}
+                onChange={({ target }) =>
+                  void onSet(
+                    withOther(
+                      one,
+                      operand,
+                      others.find((each) => each.what === target.value),
+                    ),
+                  )
+                }
+              >
+                <option value="">{t`a fixed value`}</option>
+                {one.other !== undefined && !others.some((each) => each.what === one.other) && (
+                  <option value={one.other}>{t`a result that no longer exists`}</option>
+                )}
+                {others.map((each) => (
+                  <option key={each.what} value={each.what}>
+                    {title(each)}
+                  </option>
+                ))}
+              </select>
+            </div>
+          )}
+          {one.other === undefined && (
+            <ValueField
+              label={isRange(one.operator) ? t`From` : t`Value of ${operand.name}`}
+              name={operand.name}
+              type={type}
+              json={one.value}
+              why={why}
+              onSet={(value) => onSet({ ...one, value })}
+            />
+          )}
           {isRange(one.operator) && (
             <ValueField
               label={t`To`}

@@ -2,16 +2,15 @@
 
 import { t } from "@lingui/core/macro";
 import { step } from "../../commands/run";
-import { type Lane, lanesOf } from "../../program/lanes";
+import type { Lane } from "../../program/lanes";
 import { whyUnavailable } from "../../store/permissions";
 import { select, useEditor } from "../../store/store";
 import { selectionOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
 import "./lanes.css";
 
-export function Lanes() {
+export function Lanes({ lanes }: { lanes: readonly Lane[] }) {
   const state = useEditor((each) => each);
-  const lanes = lanesOf(state);
   const why = whyUnavailable(state, "StepAction");
   const paused = state.program.state === "paused";
   if (lanes.length === 0) return null;

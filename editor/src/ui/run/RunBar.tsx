@@ -4,6 +4,7 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { Suspense } from "react";
 import * as commands from "../../commands/run";
+import { lanesOf } from "../../program/lanes";
 import { calledBy } from "../../program/logic";
 import { doingWords, innermost, stackOf } from "../../program/position";
 import { whyUnavailable } from "../../store/permissions";
@@ -37,12 +38,15 @@ export default function RunBar() {
   const { state: phase } = state.program;
   const doing = doingWords(state);
   const [inner] = innermost(state);
+  const lanes = lanesOf(state);
   return (
     <>
       <div className="runbar" role="group" aria-label={t`The program`}>
         <span className="runbar-state" role="status">
           <strong>{phaseName(state.program)}</strong>
-          {doing && <span className="small quiet"> {phase === "paused" ? t`before ${doing}` : doing}</span>}
+          {doing && lanes.length === 0 && (
+            <span className="small quiet"> {phase === "paused" ? t`before ${doing}` : doing}</span>
+          )}
         </span>
         {inner !== undefined && state.doc && !(inner in state.doc.actions) && selectionOf(state, inner) && (
           <Button icon="function" onPress={() => select(selectionOf(state, inner))}>
@@ -50,7 +54,7 @@ export default function RunBar() {
           </Button>
         )}
         <RunButtons />
-        <Lanes />
+        <Lanes lanes={lanes} />
       </div>
       <Held />
     </>

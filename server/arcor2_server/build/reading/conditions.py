@@ -14,6 +14,7 @@ from arcor2_server.documents.comparisons import (
     Reference,
     Value,
     comparison_problem,
+    pair_problem,
 )
 from arcor2_server.documents.logic_graph import BRANCHABLE, END_NODE, Condition, Test
 
@@ -63,7 +64,12 @@ class ConditionReader:
                 return Comparisons(found, Match.ALL if isinstance(connective, ast.And) else Match.ANY), False
         one = self._comparison(test)
         kind = self._scope.kind(one.what)
-        if one.what.parameter or one.operator not in (Operator.EQUAL, Operator.DIFFERENT) or kind not in BRANCHABLE:
+        if (
+            one.other is not None
+            or one.what.parameter
+            or one.operator not in (Operator.EQUAL, Operator.DIFFERENT)
+            or kind not in BRANCHABLE
+        ):
             return Comparisons((one,)), False
         if one.operator is Operator.DIFFERENT and more:
             return Comparisons((one,)), False
@@ -74,6 +80,8 @@ class ConditionReader:
         """Read one comparison, such as `passed`, `not passed`, `n > 3` or `3 <= n < 7`."""
         value: Value
         upper: Value | None = None
+        if (pair := self._pair(test)) is not None:
+            return pair
         match test:
             case ast.Name(variable):
                 operator, value = Operator.EQUAL, True
@@ -97,12 +105,7 @@ class ConditionReader:
                     " `or`, but this is {test}",
                     test=excerpt(test),
                 )
-        if variable in self._scope.results:
-            what = Reference(*self._scope.results[variable])
-        elif variable in self._scope.values.parameters and self._scope.parameter(variable) is None:
-            what = Reference(END_NODE, 0, self._scope.values.parameters[variable][0])
-        else:
-            raise NotUnderstood(test.lineno, "{variable} is not a result of an action above", variable=variable)
+        what = self._reference(variable, test)
         if isinstance(value, bool) and operator is Operator.DIFFERENT:
             operator, value = Operator.EQUAL, not value
         if isinstance(upper, bool | str):
@@ -110,3 +113,26 @@ class ConditionReader:
         if (problem := comparison_problem(variable, self._scope.kind(what), operator, value, upper)) is not None:
             raise NotUnderstood(test.lineno, "{problem}", problem=problem)
         return Comparison(what, operator, value, upper)
+
+    def _pair(self, test: ast.expr) -> Comparison | None:
+        """Read a comparison of two values, such as `count >= limit`; None if it is another one."""
+        match test:
+            case ast.Compare(ast.Name(variable), [symbol], [ast.Name(other)]) if type(symbol) in _OPERATORS:
+                operator = _OPERATORS[type(symbol)]
+            case _:
+                return None
+        what, compared = self._reference(variable, test), self._reference(other, test)
+        if what == compared:
+            raise NotUnderstood(test.lineno, "{test} compares a value with itself", test=excerpt(test))
+        kinds = self._scope.kind(what), self._scope.kind(compared)
+        if (problem := pair_problem(variable, kinds[0], operator, other, kinds[1])) is not None:
+            raise NotUnderstood(test.lineno, "{problem}", problem=problem)
+        return Comparison(what, operator, "", None, compared)
+
+    def _reference(self, variable: str, test: ast.expr) -> Reference:
+        """Return the result or project parameter of a variable in a condition."""
+        if variable in self._scope.results:
+            return Reference(*self._scope.results[variable])
+        if variable in self._scope.values.parameters and self._scope.parameter(variable) is None:
+            return Reference(END_NODE, 0, self._scope.values.parameters[variable][0])
+        raise NotUnderstood(test.lineno, "{variable} is not a result of an action above", variable=variable)

@@ -27,7 +27,7 @@ from arcor2_server.build.reading.paths import START_NODE, LogicPath, LoopReader
 from arcor2_server.build.reading.scope import Call
 from arcor2_server.build.reading.values import Values, json_of
 from arcor2_server.documents import logic_graph
-from arcor2_server.documents.comparisons import Comparisons, cases_of, condition_key, inverse
+from arcor2_server.documents.comparisons import Comparisons, Reference, cases_of, condition_key, inverse
 from arcor2_server.documents.logic_graph import (
     END_NODE,
     Condition,
@@ -312,14 +312,18 @@ class Part:
             return LogicItem("", end, self._logic_if(test))
         comparisons = [
             LogicComparison(
-                one.what.parameter or f"{self.ids[one.what.action]}/default/{one.what.output}",
+                self._link(one.what),
                 one.operator,
-                json_of(one.value),
+                json_of(one.value) if one.other is None else "",
                 UNSET if one.upper is None else json_of(one.upper),
+                UNSET if one.other is None else self._link(one.other),
             )
             for one in test.comparisons
         ]
         return LogicItem("", end, when=LogicWhen(comparisons, test.match))
+
+    def _link(self, what: Reference) -> str:
+        return what.parameter or f"{self.ids[what.action]}/default/{what.output}"
 
     def _logic_if(self, condition: Condition) -> ProjectLogicIf:
         return ProjectLogicIf(f"{self.ids[condition.action]}/default/{condition.output}", json_of(condition.value))

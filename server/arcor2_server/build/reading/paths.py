@@ -235,10 +235,10 @@ class LoopReader:
                 raise NotUnderstood(test.lineno, "a condition needs the result of an action before it")
             if path.kinds:
                 raise NotUnderstood(test.lineno, "an action is required between an error and a condition")
-            for one in as_comparisons(condition).comparisons:
-                if not one.what.parameter:
-                    output = self.scope.calls[one.what.action].outputs[one.what.output]
-                    self.scope.uses.append(Use(path.source, one.what.action, test.lineno, output, in_condition=True))
+            for what in (what for one in as_comparisons(condition).comparisons for what in one.compared()):
+                if not what.parameter:
+                    output = self.scope.calls[what.action].outputs[what.output]
+                    self.scope.uses.append(Use(path.source, what.action, test.lineno, output, in_condition=True))
             if path.taken is not None:
                 if path.taken != condition and not _same_result(path.taken, condition):
                     raise NotUnderstood(test.lineno, "an action is required between two conditions")

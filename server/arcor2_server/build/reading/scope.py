@@ -105,4 +105,5 @@ class Scope:
 
     def kinds(self, conditions: Iterable[Comparisons]) -> dict[Reference, str]:
         """Return the types of the values that conditions compare."""
-        return {one.what: self.kind(one.what) for condition in conditions for one in condition.comparisons}
+        compared = {what for condition in conditions for one in condition.comparisons for what in one.compared()}
+        return {what: self.kind(what) for what in compared}
