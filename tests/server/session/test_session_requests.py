@@ -80,7 +80,10 @@ async def test_comparisons_survive_a_client_that_does_not_know_them(work: Work, 
     await alice.ask("AddProjectParameter", name="other", type="integer", value="4")
     other = next(one for one in work.session.project.parameters if one.name == "other")
     ranged = {"what": limit.id, "operator": "[)", "value": "3", "upper": "7"}
-    when = {"match": "any", "comparisons": [ranged, {"what": other.id, "operator": ">", "value": "", "other": limit.id}]}
+    when = {
+        "match": "any",
+        "comparisons": [ranged, {"what": other.id, "operator": ">", "value": "", "other": limit.id}],
+    }
     alice.take()
     await alice.ask("AddLogicItem", start=one, end=two, when=when)
     [_, changed, *_] = alice.take()
