@@ -81,15 +81,6 @@ async def _tablet(browser: Browser, run: Run, to: Path) -> None:
         await tools.get_by_role("button", name=texts.PROGRAM, exact=True).click()
         await page.get_by_role("region", name=texts.GRAPH).wait_for()
         await take("program")
-        await _parallel(screen)
-        await take("parallel")
-
-
-async def _parallel(screen: Screen) -> None:
-    """Show the parallel work of the program, with its branches in the panel."""
-    await screen.page.get_by_role("radio", name="Flow", exact=True).click()
-    await screen.page.locator(".flow-node.parallel .flow-title").first.click()
-    await screen.page.get_by_role("region", name="Branches").wait_for()
 
 
 async def _operator(browser: Browser, run: Run, to: Path) -> None:

@@ -1,4 +1,7 @@
-/** Keep the graph unchanged while it is pressed; a new layout is shown after the release. A tap counts for the pressed node. */
+/**
+ * Keep the graph unchanged while it is pressed; a new layout is shown after the release. A tap counts for the pressed
+ * node.
+ */
 
 import { type RefObject, useEffect, useRef, useState } from "react";
 
