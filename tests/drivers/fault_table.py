@@ -237,8 +237,9 @@ FAULTS: dict[type[Bench], list[Fault]] = {
         Fault("violation", {}, "device-25"),
         Fault("fault", {}, "device-26"),
         Fault("remote_control", {"on": False}, "device-3", _take_control, _release_control),
-        # Without an answer, the driver cannot always distinguish another program from a computer that is too slow.
-        Fault("foreign_program", {}, "device-5 device-4", _turn(UR5eBench)),
+        # Without an answer, the driver cannot always distinguish another program from a computer that is too slow. If
+        # the other program moves the arm while the motion is planned, the motion is not sent.
+        Fault("foreign_program", {}, "device-5 device-4 device-7", _turn(UR5eBench)),
         Fault("power", {"on": False}, "device-3", _turn(UR5eBench)),
         Fault("fieldbus", {}, "device-3", _take_control, _release_control),
     ],

@@ -132,5 +132,5 @@ async def test_an_uploaded_type_names_the_installed_type_that_it_replaces(cell: 
     async with screen_of(browser, cell.url) as screen:
         await screen.join("Eva")
         await open_add_panel(screen, "conveyor")
-        kind = screen.page.get_by_role("complementary").get_by_role("button", name="Conveyor")
+        kind = screen.page.get_by_role("complementary").get_by_role("button", name=re.compile("^Conveyor"))
         await expect(kind).to_contain_text("replaces the installed type Conveyor (arcor2-hw ")

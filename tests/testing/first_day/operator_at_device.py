@@ -15,7 +15,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
-PROMPT = re.compile(r"\n([^\n]*?(?:\?|Enter\.)) (?:\[y/N\] )?$")
+PROMPT = re.compile(r"\n([^\n]*?(?:\?|Enter\.)) (?:\[y/N\] )?(?:$|The connection to )")
+"""A question, possibly with a message about the connection behind it."""
 SHOWN_WITHIN = 90.0  # s, on a busy machine
 ENDS_WITHIN = 60.0  # s
 
