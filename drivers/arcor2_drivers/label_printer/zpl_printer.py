@@ -116,9 +116,12 @@ class ZplPrinter(LineDevice, Printer):
             before = self._ask_counter()
             self._check_not_stopped(go_on, "nothing was sent")
             self._unconfirmed = before
-            self.set_alarm(UNCONFIRMED, True)
-            self.line.send(data)
-            job = self._confirm(before, go_on)
+            try:
+                self.line.send(data)
+                job = self._confirm(before, go_on)
+            except BaseException:
+                self.set_alarm(UNCONFIRMED, True)
+                raise
             self._settle()
             self.observing.settled()
             return job
