@@ -283,6 +283,7 @@ class OnlineScene:
             except TimeoutError:
                 problem = Message.of("The devices could not be closed in time.")
                 host.kill()
+            self.host.host = None  # its end is expected from now on
             await host.wait_or_kill()
         self._gone_offline(problem)
 

@@ -22,6 +22,7 @@ from arcor2_hw.data.project import (
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import ConnectionLost
+from arcor2_hw.messages import Message
 from arcor2_server.errors import RequestRefused
 from arcor2_server.hosts.process import CellError
 from tests.runtime.conftest import scene_object
@@ -168,6 +169,8 @@ async def test_a_setting_cannot_name_a_file_outside_the_device_files(server: Ser
 @serving(with_arm)
 async def test_a_scene_starts_and_stops(arm: Server) -> None:
     cell, client = arm.services.online, arm.client
+    unexpected: list[Message] = []
+    cell.host.on_death.append(unexpected.append)
     with pytest.raises(RequestRefused):
         await arm.ask("StopScene")
     await arm.ask("StartScene")
@@ -182,6 +185,7 @@ async def test_a_scene_starts_and_stops(arm: Server) -> None:
     await arm.ask("StopScene")
     await client.state("stopped")
     assert not cell.online
+    assert unexpected == []
     await arm.start()
 
 
@@ -224,6 +228,8 @@ async def test_a_failed_start_gives_the_reason_and_can_be_repeated(server: Serve
 async def test_a_crash_takes_the_scene_offline(arm: Server) -> None:
     await arm.start()
     cell = arm.services.online
+    unexpected: list[Message] = []
+    cell.host.on_death.append(unexpected.append)
     assert cell.host.host is not None
     call = asyncio.create_task(cell.call(OBJ, "pick", {"where": Pose(), "offset": 9.0}))
     await asyncio.sleep(0.05)
@@ -232,6 +238,7 @@ async def test_a_crash_takes_the_scene_offline(arm: Server) -> None:
     assert "SIGKILL" in stopped["message"]
     with pytest.raises(ConnectionLost):
         await call
+    assert [reason.text for reason in unexpected] == ["the cell host was killed by SIGKILL"]
     await arm.start()
 
 
