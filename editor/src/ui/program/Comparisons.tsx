@@ -1,7 +1,8 @@
 /** The condition of a connection: one row for each comparison, and whether all or any of them have to be true. */
 
 import { t } from "@lingui/core/macro";
-import { useId } from "react";
+import { useId, useState } from "react";
+import { Changes } from "../../program/changes";
 import {
   newComparison,
   operatorsOf,
@@ -33,7 +34,16 @@ interface ComparisonsProps {
 export function Comparisons({ doc, types, when, operands, from, none, why, onSet }: ComparisonsProps) {
   const { comparisons, match } = when;
   const all = useId();
-  const put = (rows: LogicComparison[]) => onSet({ match: rows.length > 1 ? match : "all", comparisons: rows });
+  const [changes] = useState(() => new Changes<LogicWhen>());
+  const put = (change: (rows: LogicComparison[]) => LogicComparison[]) =>
+    changes.apply(
+      when,
+      (last) => {
+        const rows = change(last.comparisons);
+        return { match: rows.length > 1 ? last.match : "all", comparisons: rows };
+      },
+      onSet,
+    );
   const first = operands[0];
   const unused = operands.find((each) => !comparisons.some(({ what }) => what === each.what)) ?? first;
   return (
@@ -49,15 +59,17 @@ export function Comparisons({ doc, types, when, operands, from, none, why, onSet
           nameOf={(id) => doc.actions[id]?.name ?? ""}
           none={comparisons.length > 1 ? "" : none}
           why={why}
-          onSet={(changed) =>
-            put(changed ? [...comparisons.slice(0, index), changed, ...comparisons.slice(index + 1)] : [])
+          onSet={(change) => put((rows) => rows.map((each, place) => (place === index ? change(each) : each)))}
+          onChoose={(operand) =>
+            put((rows) => {
+              const others = rows.filter((_, place) => place !== index);
+              return [...rows.slice(0, index), newComparison(operand, others), ...rows.slice(index + 1)];
+            })
           }
-          onChoose={(operand) => {
-            const others = comparisons.filter((_, place) => place !== index);
-            const chosen = newComparison(operand, others);
-            return put([...comparisons.slice(0, index), chosen, ...comparisons.slice(index + 1)]);
-          }}
-          onRemove={comparisons.length > 1 ? () => put(comparisons.filter((_, place) => place !== index)) : undefined}
+          onClear={() => put(() => [])}
+          onRemove={
+            comparisons.length > 1 ? () => put((rows) => rows.filter((_, place) => place !== index)) : undefined
+          }
         />
       ))}
       {comparisons.length > 1 && (
@@ -67,7 +79,9 @@ export function Comparisons({ doc, types, when, operands, from, none, why, onSet
             id={all}
             value={match}
             disabled={why !== ""}
-            onChange={(event) => void onSet({ comparisons, match: event.target.value as Match })}
+            onChange={({ target }) =>
+              void changes.apply(when, (last) => ({ ...last, match: target.value as Match }), onSet)
+            }
           >
             <option value="all">{t`all comparisons are true`}</option>
             <option value="any">{t`at least one is true`}</option>
@@ -79,7 +93,7 @@ export function Comparisons({ doc, types, when, operands, from, none, why, onSet
           look="plain"
           icon="plus"
           why={why}
-          onPress={() => void put([...comparisons, newComparison(unused, comparisons)])}
+          onPress={() => void put((rows) => [...rows, newComparison(unused, rows)])}
         >
           {t`Add a comparison`}
         </Button>
@@ -98,12 +112,26 @@ interface RowProps {
   nameOf: (actionId: string) => string;
   none: string;
   why: string;
-  onSet: (one: LogicComparison | undefined) => Promise<string>;
+  onSet: (change: (one: LogicComparison) => LogicComparison) => Promise<string>;
   onChoose: (operand: Operand) => Promise<string>;
+  onClear: () => Promise<string>;
   onRemove: (() => Promise<string>) | undefined;
 }
 
-function Row({ number, one, operand, operands, from, nameOf, none, why, onSet, onChoose, onRemove }: RowProps) {
+function Row({
+  number,
+  one,
+  operand,
+  operands,
+  from,
+  nameOf,
+  none,
+  why,
+  onSet,
+  onChoose,
+  onClear,
+  onRemove,
+}: RowProps) {
   const id = useId();
   const other = one?.other === undefined ? undefined : operands.find((each) => each.what === one.other);
   const operators = operand ? operatorsOf(operand, other) : [];
@@ -133,7 +161,7 @@ function Row({ number, one, operand, operands, from, nameOf, none, why, onSet, o
           disabled={why !== ""}
           onChange={(event) => {
             const chosen = operands.find((each) => each.what === event.target.value);
-            void (chosen ? onChoose(chosen) : onSet(undefined));
+            void (chosen ? onChoose(chosen) : onClear());
           }}
         >
           {none && <option value="">{none}</option>}
@@ -156,7 +184,7 @@ function Row({ number, one, operand, operands, from, nameOf, none, why, onSet, o
                 id={`${id}-operator`}
                 value={one.operator}
                 disabled={why !== ""}
-                onChange={(event) => void onSet(withOperator(one, event.target.value as Operator))}
+                onChange={(event) => void onSet((last) => withOperator(last, event.target.value as Operator))}
               >
                 {operators.map((each) => (
                   <option key={each} value={each}>
@@ -174,9 +202,9 @@ function Row({ number, one, operand, operands, from, nameOf, none, why, onSet, o
                 value={one.other ?? ""}
                 disabled={why !== ""}
                 onChange={({ target }) =>
-                  void onSet(
+                  void onSet((last) =>
                     withOther(
-                      one,
+                      last,
                       operand,
                       others.find((each) => each.what === target.value),
                     ),
@@ -202,7 +230,7 @@ function Row({ number, one, operand, operands, from, nameOf, none, why, onSet, o
               type={type}
               json={one.value}
               why={why}
-              onSet={(value) => onSet({ ...one, value })}
+              onSet={(value) => onSet((last) => ({ ...last, value }))}
             />
           )}
           {isRange(one.operator) && (
@@ -212,7 +240,7 @@ function Row({ number, one, operand, operands, from, nameOf, none, why, onSet, o
               type={type}
               json={one.upper}
               why={why}
-              onSet={(upper) => onSet({ ...one, upper })}
+              onSet={(upper) => onSet((last) => ({ ...last, upper }))}
             />
           )}
         </div>
