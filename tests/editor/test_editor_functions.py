@@ -185,7 +185,7 @@ async def test_a_run_of_actions_becomes_a_function_that_is_called_again(work: Wo
     await tap("open")
     await work.tap_button("Run to here", panel)
     bar = page.get_by_role("group", name=texts.PROGRAM_STATE)
-    await bar.get_by_text("before check_board › open").wait_for(timeout=BEGUN)
+    await expect(bar).to_contain_text("before check_board › open", timeout=BEGUN)
     await work.next_event("PackageState", lambda event: event.data.state is PackageStateEnum.PAUSED)
     await expect(graph.locator(node("open"))).to_contain_text("next")
     await bar.get_by_role("button", name="Step out").wait_for()
