@@ -31,7 +31,7 @@ _NAMES: Final = translatable(
         "END": "The end of the program",
     }
 )
-"""Names of the ids that are no items, for refusals."""
+"""Names of ids that do not belong to an item, for refusals."""
 
 
 class Locked(RequestRefused):

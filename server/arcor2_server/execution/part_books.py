@@ -59,7 +59,8 @@ class AllPartBooks:
         if books is not None and books.unconfirmed:
             names = ", ".join(f"{part.shown} ({books.name_of(part.place)})" for part in books.unconfirmed)
             raise RequestRefused(
-                "Confirm on the operator's screen where these parts are before the program starts: {parts}.",
+                "Confirm where these parts are before the program starts: {parts}. "
+                "The operator's screen and the panel Run ask for it.",
                 parts=names,
             )
         return scene_id

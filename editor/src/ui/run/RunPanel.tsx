@@ -11,6 +11,7 @@ import { select, setUi, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { Button } from "../kit/kit";
 import { AskName } from "../kit/lazyControls";
+import PartsCard from "../parts/PartsCard";
 import { DryRun } from "./DryRun";
 import { History } from "./History";
 import { LastResult } from "./Result";
@@ -35,6 +36,7 @@ export default function RunPanel() {
   const broken = Object.keys(breakpoints).filter((id) => nameOf(state, id));
   return (
     <>
+      {!runs && <PartsCard />}
       {!runs && !busy && doc?.project && <LastResult projectId={doc.project.id} />}
       {(runs || busy) && (
         <p className="run-state" role="status">
