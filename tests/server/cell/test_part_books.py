@@ -45,7 +45,7 @@ async def test_after_an_interruption_a_person_confirms_where_parts_are(tmp_path:
         (books,) = await server.ask("GetParts")
         assert books.run.package_id == "pkg_1"
         assert [part.confirmed for part in books.parts] == [False]
-        with pytest.raises(RequestRefused, match=r"Confirm on .* where these parts are .*: A-1 \(feeder\)"):
+        with pytest.raises(RequestRefused, match=r"Confirm where these parts are .*: A-1 \(feeder\)"):
             await server.ask("RunPackage", {"id": "pkg_1"})
         await server.ask("ConfirmParts", CONFIRMED)
         published = await server.client.event("PartsChanged")
