@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import tempfile
 import tty
 from collections.abc import Callable
 from pathlib import Path
@@ -51,23 +52,28 @@ class PtyLine:
 
     Args:
         received: Called with bytes from the host.
-        link: Symbolic link to the terminal, whose own path changes with each `plug`.
+        link: Symbolic link to the terminal. Without it, the line makes one in a temporary directory.
+
+    A host never gets the path of the terminal itself. This path changes with each `plug`, and the system soon gives it
+    to somebody else's terminal, which a host that reconnects would then open and lock.
     """
 
     def __init__(self, received: Callable[[bytes], None], link: Path | None = None) -> None:
         self._received = received
+        if link is None:
+            self._folder = tempfile.TemporaryDirectory(prefix="arcor2-fake-")
+            link = Path(self._folder.name) / "tty"
         self._link = link
         self._ends: tuple[int, int] | None = (
             None  # ours and the host's; the latter stays open, so that hosts can open and close the terminal
         )
-        self._path = ""
         self._faults = Faults()
         self._loop = asyncio.get_running_loop()
 
     @property
     def port(self) -> str:
-        """Return the link, or without one the path of the terminal."""
-        return self._path if self._link is None else str(self._link)
+        """Return the link, which stays the same when the line is unplugged and plugged in."""
+        return str(self._link)
 
     @property
     def plugged(self) -> bool:
@@ -98,20 +104,18 @@ class PtyLine:
             self._received(data)
 
     async def plug(self) -> None:
-        """Create a terminal, and the link to it. Raise `OSError` if the link cannot be created."""
+        """Create a terminal and the link to it. Raise `OSError` if the link cannot be created."""
         if self._ends is not None:
             return
         ours, hosts = os.openpty()
         self._ends = ours, hosts
         tty.setraw(hosts)
         os.set_blocking(ours, False)
-        self._path = os.ttyname(hosts)
-        if self._link is not None:
-            try:
-                _point(self._link, self._path)
-            except OSError:
-                self._close_ends()
-                raise
+        try:
+            _point(self._link, os.ttyname(hosts))
+        except OSError:
+            self._close_ends()
+            raise
         self._loop.add_reader(ours, self._readable)
 
     async def unplug(self) -> None:
@@ -119,8 +123,7 @@ class PtyLine:
         if self._ends is not None:
             self._loop.remove_reader(self._ends[0])
             self._close_ends()
-            if self._link is not None:
-                self._link.unlink(missing_ok=True)
+            self._link.unlink(missing_ok=True)
 
     def _close_ends(self) -> None:
         assert self._ends is not None

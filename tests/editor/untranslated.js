@@ -2,7 +2,7 @@
   // Visible texts and texts for screen readers that are in plain letters, so that they did not come from a catalogue.
   // Exempt are: names and values that users typed or that models and devices define, units, keys, times, code, products.
   const UNITS = "mm|cm|m|km|s|ms|min|h|Hz|kg|g|N|Nm|V|A|mA|Pa|kPa|deg|rad|px|kB|MB|GB|MiB|fps|bit|bar|Ω|X|Y|Z|x|y|z|RX|RY|RZ|Rx|Ry|Rz|J\\d|[a-zA-Z]";
-  const OTHER = "/dev/pts/\\d+|ARCOR2-HW|English|Čeština|Deutsch|Python|URDF|TCP|JSON|Modbus|Ctrl|Esc|Shift|Alt|Enter|Tab|true|false";
+  const OTHER = "/tmp/arcor2-fake-\\w+/tty|ARCOR2-HW|English|Čeština|Deutsch|Python|URDF|TCP|JSON|Modbus|Ctrl|Esc|Shift|Alt|Enter|Tab|true|false";
   const TIMES = "gerade eben|jetzt|vor \\d+ \\S+|gestern|Jan\\.?|Feb\\.?|März|Apr\\.?|Mai|Juni|Juli|Aug\\.?|Sept\\.?|Okt\\.?|Nov\\.?|Dez\\.?|Uhr";
   const ARIA = "Schließen|Reduzieren|Erweitern"; // texts of react-aria, which has its own catalogues
   const exempt = new RegExp(`(?<![\\p{L}\\d_])(${UNITS}|${OTHER}|${TIMES}|${ARIA})(?![\\p{L}_])`, "gu");

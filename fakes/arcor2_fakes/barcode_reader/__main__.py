@@ -55,7 +55,7 @@ async def main(
 
     Args:
         tcp: HOST:PORT to serve instead of a pty; port 0 takes a free one.
-        link: symbolic link to the pty, whose path changes when it is unplugged and plugged in.
+        link: Symbolic link to the pty; without it, one in a temporary directory.
         crlf: end answers with CR LF instead of CR.
         stx: frame answers with STX and ETX.
         timeout: time limit of a reading, s.

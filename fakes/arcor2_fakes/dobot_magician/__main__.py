@@ -73,7 +73,7 @@ async def main(
     """Start the fake; it prints one line `ready {json}` with its port and exits on SIGTERM.
 
     Args:
-        link: Symbolic link to the pty, whose path changes when it is unplugged and plugged.
+        link: Symbolic link to the pty; without it, one in a temporary directory.
         pace: Speed of the simulation; 1 is real time.
     """
     arm = Arm(pace)

@@ -69,7 +69,7 @@ async def main(
 
     Args:
         tcp: HOST:PORT to serve instead of a pty (9100 on real printers); port 0 takes a free one.
-        link: symbolic link to the pty, whose path changes when it is unplugged and plugged in.
+        link: Symbolic link to the pty; without it, one in a temporary directory.
         duration: printing time of a label, s.
         labels: number of labels on the roll.
         mute: do not answer while out of media or with the head open; otherwise report it in the flags of ~HS.

@@ -82,7 +82,7 @@ def main(
         host: address to serve Modbus TCP on.
         port: port to serve Modbus TCP on; 0 takes a free one.
         serial: serve Modbus RTU on a pty instead.
-        link: symbolic link to keep on the pty, whose own path changes when it is unplugged and plugged.
+        link: Symbolic link to the pty; without it, one in a temporary directory.
         control: HOST:PORT of the control channel; port 0 takes a free one.
     """
 

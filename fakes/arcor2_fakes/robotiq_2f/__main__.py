@@ -32,7 +32,7 @@ async def main(
 
     Args:
         ascii_port: HOST:PORT of the URCap's ASCII port; port 0 takes a free one.
-        link: Symbolic link to the pty of Modbus RTU, whose path changes when it is unplugged and plugged.
+        link: Symbolic link to the pty of Modbus RTU; without it, one in a temporary directory.
         stroke: Width between the open fingers, m.
         latency: Time between a request and its effect, s.
         time_scale: Speed of the simulation; 1 is real time.

@@ -66,7 +66,7 @@ async def main(
 
     Args:
         tcp: HOST:PORT to serve instead of a pty; port 0 takes a free one.
-        link: symbolic link to the pty, whose path changes when it is unplugged and plugged in.
+        link: Symbolic link to the pty; without it, one in a temporary directory.
         capacity: largest load, kg.
         settling: time until the value is stable after a change of the load, s.
         stability_timeout: time limit of S, T and Z for a stable value, s.

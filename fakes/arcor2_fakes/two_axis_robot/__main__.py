@@ -84,7 +84,7 @@ async def main(
     """Start the fake; it prints one line `ready {json}` with its port and exits on SIGTERM.
 
     Args:
-        link: Symbolic link to the pty, whose path changes when it is unplugged and plugged.
+        link: Symbolic link to the pty; without it, one in a temporary directory.
         ids: Ids of the servos on the bus.
         time_scale: Speed of the servos; 1 is real time. Their watchdogs always run in real time.
     """

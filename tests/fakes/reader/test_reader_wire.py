@@ -177,8 +177,10 @@ def test_an_unreadable_code_is_refused(reader: Any) -> None:
         reader.control.do("health", value="TIRED")
 
 
-def test_a_cable_can_be_pulled(start_fake: Callable[..., Any], tmp_path: Path) -> None:
-    reader = start_fake("barcode_reader", "--link", str(tmp_path / "reader"))
+@pytest.mark.parametrize("link_given", [True, False])
+def test_a_cable_can_be_pulled(start_fake: Callable[..., Any], tmp_path: Path, link_given: bool) -> None:
+    """A host gets a link, never the path of the terminal, which may soon belong to another device's line."""
+    reader = start_fake("barcode_reader", *(["--link", str(tmp_path / "reader")] if link_given else []))
     link = Path(reader.ready["port"])
     host = Host(str(link))
     assert link.is_symlink()
@@ -195,6 +197,7 @@ def test_a_cable_can_be_pulled(start_fake: Callable[..., Any], tmp_path: Path) -
     again.close()
     assert reader.terminate() == 0
     assert not link.is_symlink()
+    assert link_given or not link.parent.exists()
 
 
 def test_tcp_can_be_unplugged(start_fake: Callable[..., Any]) -> None:
