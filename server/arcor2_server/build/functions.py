@@ -4,15 +4,15 @@ import ast
 from collections.abc import Collection, Iterable, Iterator
 from typing import Final
 
-from arcor2_hw.data.object_type import ParameterMeta
-from arcor2_hw.data.project import CALL, ActionParameter, ActionParameterType, Project, ProjectFunction, parse_link
-from arcor2_hw.exceptions import InvalidData, InvalidProject
+from arcor2_hw.data.project import CALL, ActionParameterType, Project, ProjectFunction, parse_link
+from arcor2_hw.exceptions import InvalidProject
 from arcor2_server.build import expressions
+from arcor2_server.build.calls import Calls, Scope
 from arcor2_server.build.cycle import Block, Cycle
 from arcor2_server.build.frame import Frame
+from arcor2_server.build.naming import Names
 from arcor2_server.build.parallel_work import check_parallel_work
 from arcor2_server.documents import logic_graph
-from arcor2_server.documents.checks.actions import text_of
 from arcor2_server.documents.item_indexes import reference
 from arcor2_server.documents.logic_graph import END_NODE, Flow
 
@@ -36,41 +36,22 @@ _DECORATOR: Final = expressions.dotted("res", ("function",))
 class FunctionCycle(Cycle):
     """The body of a function."""
 
-    stores = False
-
     def __init__(self, frame: Frame, flow: Flow, function: ProjectFunction) -> None:
         self.function = function
-        self.parameters: dict[str, str] = {}
-        """The variables of the parameters by name."""
-        super().__init__(frame, flow)
+        super().__init__(Calls(frame, flow, _scope(frame, flow, function)))
         self._returned = [self._result_variable(result.link, result.type) for result in function.returns]
-
-    def _claim_parameters(self) -> None:
-        self.names.claim(NAME)
-        # A parameter may have the name of a project parameter, whose value the calls often pass.
-        used = {
-            reference(parameter.type, parameter.value)
-            for action in self.flow.actions
-            for parameter in action.parameters
-            if parameter.type == ActionParameterType.PROJECT_PARAMETER
-        }
-        used |= {target for item in self.function.logic for target in item.used()}
-        hidden = {variable for key, variable in self.frame.parameters.items() if key not in used}
-        for each in self.function.parameters:
-            claim = self.names.shadow if each.name in hidden else self.names.claim
-            self.parameters[each.name] = claim(each.name)
 
     def _result_variable(self, link: str, kind: str) -> str:
         """Return the variable of a result of the function. Raise InvalidProject unless it is set on all paths."""
-        name = self.function.name
+        name, calls = self.function.name, self.calls
         try:
             action_id, _, output = parse_link(link)
         except ValueError as error:
             raise InvalidProject("function {name!r}: {reason}", name=name, reason=error) from None
-        source = self.numbers.get(action_id)
-        if source is None or output >= len(self.results[source]):
+        source = calls.numbers.get(action_id)
+        if source is None or output >= len(calls.results[source]):
             raise InvalidProject("function {name!r}: its result {link} does not exist", name=name, link=link)
-        action, returns = self.flow.actions[source], self.calls[source].meta.returns
+        action, returns = calls.flow.actions[source], calls.returns(source)
         if returns[output] != kind:
             raise InvalidProject(
                 "function {name!r}: its result {link} is {type}, not {other}",
@@ -79,28 +60,15 @@ class FunctionCycle(Cycle):
                 type=returns[output],
                 other=kind,
             )
-        for node, edges in enumerate(self.nodes.edges):
+        for node, edges in enumerate(calls.nodes.edges):
             ends = any(edge.target == END_NODE for edge in edges)
-            if ends and not self.nodes.has_results(self.natural, source, node):
+            if ends and not calls.nodes.has_results(calls.natural, source, node):
                 raise InvalidProject(
                     "function {name!r} returns a result of {action!r}, which does not run on all paths to its end",
                     name=name,
                     action=action.name,
                 )
-        return self.results[source][output]
-
-    def _parameter(self, parameter: ActionParameter, meta: ParameterMeta) -> ast.expr:
-        name = text_of(parameter)
-        source = next((each for each in self.function.parameters if each.name == name), None)
-        if source is None or source.type != meta.type:
-            raise InvalidData(
-                "parameter {name} must be {type}; {source} is not such a parameter of the function {function}",
-                name=parameter.name,
-                type=meta.type,
-                source=name,
-                function=self.function.name,
-            )
-        return expressions.name(self.parameters[name])
+        return calls.results[source][output]
 
     def _leaving(self) -> ast.stmt:
         returned: list[ast.expr] = [expressions.name(variable) for variable in self._returned]
@@ -118,18 +86,18 @@ class FunctionCycle(Cycle):
         if self._returned:
             body.append(self._leaving())
         parameters = [
-            ast.arg(self.parameters[each.name], self._hint(each.name, each.type)) for each in self.function.parameters
+            ast.arg(variable, self._hint(name, kind)) for name, (variable, kind) in self.calls.scope.parameters.items()
         ]
         arguments = ast.arguments([], parameters, None, [ast.arg(NAME, expressions.name("str"))], [None], None, [])
-        name = self.frame.functions[self.function.id]
+        name = self.calls.frame.functions[self.function.id]
         return ast.FunctionDef(name, arguments, body, [_DECORATOR], self._returns(), lineno=0)
 
     def _hint(self, name: str, kind: str) -> ast.expr:
         """Return the type hint of a parameter."""
-        enumeration = self.frame.facts_of(self.function).enumerations.get((CALL, name))
+        enumeration = self.calls.frame.facts_of(self.function).enumerations.get((CALL, name))
         if enumeration is not None:
             first, *inner = enumeration.name.split(".")
-            return expressions.dotted(self.frame.imported(enumeration.module, first), tuple(inner))
+            return expressions.dotted(self.calls.frame.imported(enumeration.module, first), tuple(inner))
         if kind not in HINTS:
             raise InvalidProject(
                 "function {name!r}: {type} cannot be the type of the parameter {parameter}",
@@ -141,7 +109,7 @@ class FunctionCycle(Cycle):
 
     def _class(self, kind: str) -> ast.expr:
         module, name = HINTS.get(kind, ("builtins", "object"))
-        return expressions.name(name if module == "builtins" else self.frame.imported(module, name))
+        return expressions.name(name if module == "builtins" else self.calls.frame.imported(module, name))
 
     def _returns(self) -> ast.expr:
         match [self._class(result.type) for result in self.function.returns]:
@@ -151,6 +119,26 @@ class FunctionCycle(Cycle):
                 return hint
             case hints:
                 return ast.Subscript(expressions.name("tuple"), ast.Tuple(hints, ast.Load()), ast.Load())
+
+
+def _scope(frame: Frame, flow: Flow, function: ProjectFunction) -> Scope:
+    """Choose the variables of a function's parameters, which precede those of results."""
+    names = Names(outer=frame.names)
+    names.claim(NAME)
+    # A parameter may have the name of a project parameter, whose value the calls often pass.
+    used = {
+        reference(parameter.type, parameter.value)
+        for action in flow.actions
+        for parameter in action.parameters
+        if parameter.type == ActionParameterType.PROJECT_PARAMETER
+    }
+    used |= {target for item in function.logic for target in item.used()}
+    hidden = {variable for key, variable in frame.parameters.items() if key not in used}
+    parameters: dict[str, tuple[str, str]] = {}
+    for each in function.parameters:
+        claim = names.shadow if each.name in hidden else names.claim
+        parameters[each.name] = claim(each.name), each.type
+    return Scope(names, function.name, parameters)
 
 
 def called_functions(project: Project, program: Flow) -> list[tuple[ProjectFunction, Flow]]:
@@ -219,4 +207,5 @@ def cycles_of(frame: Frame, project: Project) -> tuple[Cycle, list[FunctionCycle
     program = logic_graph.read(project, frame.parameters)
     functions = called_functions(project, program)
     check_parallel_work(program, functions, frame.index)
-    return Cycle(frame, program), [FunctionCycle(frame, flow, function) for function, flow in functions]
+    cycle = Cycle(Calls(frame, program, Scope(Names(outer=frame.names))))
+    return cycle, [FunctionCycle(frame, flow, function) for function, flow in functions]

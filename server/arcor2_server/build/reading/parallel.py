@@ -3,7 +3,7 @@
 import ast
 
 from arcor2_hw.data.project import CALL
-from arcor2_server.build.cycle import NO_RESULT
+from arcor2_server.build.calls import NO_RESULT
 from arcor2_server.build.frame import PARALLEL_CALL
 from arcor2_server.build.reading.calls import CallReader
 from arcor2_server.build.reading.errors import NotUnderstood, excerpt

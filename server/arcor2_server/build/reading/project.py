@@ -230,11 +230,14 @@ def _variables(frame: Frame, project: Project) -> Variables:
     except InvalidProject:
         return found
     for cycle in (program, *functions):
-        for number, action in enumerate(cycle.flow.actions):
-            found.results[action.id] = cycle.results[number]
-            found.errors[action.id] = cycle.errors[number]
+        calls = cycle.calls
+        for number, action in enumerate(calls.flow.actions):
+            found.results[action.id] = calls.results[number]
+            found.errors[action.id] = calls.errors[number]
     for function in functions:
-        found.parameters[function.function.id] = function.parameters
+        found.parameters[function.function.id] = {
+            name: variable for name, (variable, _) in function.calls.scope.parameters.items()
+        }
     return found
 
 
