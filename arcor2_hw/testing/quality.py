@@ -1,6 +1,7 @@
 """quality.yaml: the claims of a driver, next to its source."""
 
 import enum
+import functools
 import re
 from pathlib import Path
 from typing import Final, Literal
@@ -131,7 +132,7 @@ def read(path: Path) -> Quality:
         InvalidData: It is invalid; the message names folder, key and error.
     """
     try:
-        return msgspec.yaml.decode(path.read_bytes(), type=Quality)
+        return _decode(path.read_bytes())
     except FileNotFoundError:
         raise NotFound("{name}/{file} does not exist", file=FILE, name=path.parent.name) from None
     except OSError as error:
@@ -140,3 +141,9 @@ def read(path: Path) -> Quality:
         ) from None
     except msgspec.DecodeError as error:  # also raised for a wrong value
         raise InvalidData("{name}/{file}: {reason}", name=path.parent.name, file=FILE, reason=error) from None
+
+
+@functools.lru_cache(maxsize=4)
+def _decode(text: bytes) -> Quality:
+    """Decode a quality.yaml, once for the many cases that read the same one."""
+    return msgspec.yaml.decode(text, type=Quality)

@@ -36,7 +36,7 @@ def test_there_is_a_broken_driver_for_each_case() -> None:
 
 
 def test_each_broken_driver_fails_only_its_case(tmp_path: Path) -> None:
-    options = ("-pxdist", "-n8", "--dist=load", "--phases=1", "-rfE", "--tb=short")
+    options = ("-pxdist", "-n4", "--dist=load", "--phases=1", "-rfE", "--tb=short")
     output = run(tmp_path, "test_toy.py::TestBroken", *options, selected="not test_level", cases=BROKEN)
     found: dict[str, set[str]] = {}
     for case, bench in re.findall(r"^(?:FAILED|ERROR) test_toy.py::TestBroken::test_(\w+)\[(\w+)\]", output, re.M):
