@@ -15,7 +15,7 @@ from tests.fakes.conftest import FakeProcess
 class Host:
     """A minimal host, written from the device page."""
 
-    def __init__(self, port: str, timeout: float = 2.0) -> None:
+    def __init__(self, port: str, timeout: float = 30.0) -> None:
         self.serial = serial.serial_for_url(port, baudrate=9600, timeout=timeout)
 
     def send(self, command: str) -> None:
@@ -88,7 +88,9 @@ def test_the_code_in_front_is_read(any_reader: Any) -> None:
     host.close()
 
 
-def test_a_board_that_appears_during_reading_is_read(reader: Any, host: Host) -> None:
+def test_a_board_that_appears_during_reading_is_read(start_fake: Callable[..., Any]) -> None:
+    reader = start_fake("barcode_reader", "--timeout", "60")
+    host = Host(reader.ready["port"])
     host.send("LON")
     reader.control.wait_until(lambda truth: truth["reading"])
     reader.control.do("present", code="LATE-1")
@@ -98,6 +100,7 @@ def test_a_board_that_appears_during_reading_is_read(reader: Any, host: Host) ->
     reader.control.do("present", code=None)
     reader.control.do("present", code="NEXT-2")
     assert host.receive() == b"NEXT-2\r"
+    host.close()
 
 
 def test_no_read_is_reported_after_the_readers_timeout(start_fake: Callable[..., Any]) -> None:
