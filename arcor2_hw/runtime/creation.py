@@ -78,14 +78,14 @@ def shown_name(cls: type[Generic]) -> str:
     return cls.__dict__.get("display_name") or cls.__name__
 
 
-def write_sources(types: Iterable[TypeCode]) -> str | None:
+def write_sources(types: Iterable[TypeCode]) -> None:
     """Write uploaded sources as package `object_types` into a private directory and add that to the import path.
 
-    Return the directory, or None if no type is uploaded.
+    The directory stays, for tracebacks of types that are loaded. The server removes it after the end of the host.
     """
     uploaded = [code for code in types if not code.entry_point and code.source]
     if not uploaded:
-        return None
+        return
     prepare_for_sources()
     root = tempfile.mkdtemp(prefix="arcor2-hw-types-")
     package = Path(root) / "object_types"
@@ -105,7 +105,6 @@ def write_sources(types: Iterable[TypeCode]) -> str | None:
         del sys.modules[known]
     sys.path.insert(0, root)
     importlib.invalidate_caches()
-    return root
 
 
 def load_type(code: TypeCode) -> type[Generic]:

@@ -10,7 +10,6 @@ import contextlib
 import faulthandler
 import logging
 import os
-import shutil
 import signal
 import socket
 import sys
@@ -91,7 +90,6 @@ class Host:
         self._stop_requested = threading.Event()
         self._scene: m.OpenScene | None = None
         self._connecting = threading.Lock()
-        self._types: list[str] = []
         self._wake, wake_up = socket.socketpair()
         wake_up.setblocking(False)
         signal.set_wakeup_fd(wake_up.detach(), warn_on_full_buffer=False)
@@ -122,8 +120,6 @@ class Host:
                 case _:
                     self._close_scene()
                     break
-        for directory in self._types:
-            shutil.rmtree(directory, ignore_errors=True)
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError, ValueError):
                 stream.flush()
@@ -137,7 +133,7 @@ class Host:
         self._cell.assets = message.assets
         failed = self._skip_object if message.keep_going else None
         try:
-            self._write_sources(message.types)
+            write_sources(message.types)
             self._cell.open(scene_recipes(message, failed), failed)
         except SceneFault as caught:
             fault = caught
@@ -211,7 +207,7 @@ class Host:
         known = {code.name for code in scene.types}
         types = [*scene.types, *(code for code in opening.types if code.name not in known)]
         if any(code.source for code in types[len(scene.types) :]):
-            self._write_sources(types)
+            write_sources(types)
         added = {one.id for one in objects}
         self._scene = replace(
             scene,
@@ -221,11 +217,6 @@ class Host:
             overrides=[*scene.overrides, *(each for each in opening.overrides if each.id in added)],
             secrets=scene.secrets | opening.secrets,
         )
-
-    def _write_sources(self, types: Sequence[m.TypeCode]) -> None:
-        """Write uploaded sources for import. Files of types that are loaded already stay for their tracebacks."""
-        if (directory := write_sources(types)) is not None:
-            self._types.append(directory)
 
     def _close_scene(self) -> None:
         active = (

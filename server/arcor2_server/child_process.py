@@ -6,6 +6,7 @@ import os
 import signal
 import socket
 import sys
+import tempfile
 from collections.abc import AsyncIterator, Mapping, Sequence
 from typing import Final
 
@@ -21,10 +22,11 @@ class ChildProcess:
 
     Args:
         process: the process; its standard output and error are one pipe.
+        folder: the directory for its temporary files. It is removed after the end of the process, even a killed one.
     """
 
-    def __init__(self, process: asyncio.subprocess.Process) -> None:
-        self._process = process
+    def __init__(self, process: asyncio.subprocess.Process, folder: "tempfile.TemporaryDirectory[str]") -> None:
+        self._process, self._folder = process, folder
 
     @classmethod
     async def start(
@@ -40,6 +42,7 @@ class ChildProcess:
         Raises:
             OSError: the process cannot be started.
         """
+        folder = tempfile.TemporaryDirectory(prefix="arcor2-hw-process-", ignore_cleanup_errors=True)
         try:
             process = await asyncio.create_subprocess_exec(
                 sys.executable, *command, "--fd", str(connection.fileno()),
@@ -48,12 +51,15 @@ class ChildProcess:
                 stdout=asyncio.subprocess.PIPE,
                 stderr=asyncio.subprocess.STDOUT,
                 # The processes use their own threads; a thread pool of OpenBLAS would only cost memory.
-                env={"OPENBLAS_NUM_THREADS": "1", **environment},
+                env={"OPENBLAS_NUM_THREADS": "1", **environment, "TMPDIR": folder.name},
                 start_new_session=True,  # Ctrl-C reaches only the server, which stops its processes in order
             )  # fmt: skip
+        except BaseException:
+            folder.cleanup()
+            raise
         finally:
             connection.close()
-        return cls(process)
+        return cls(process, folder)
 
     @property
     def pid(self) -> int:
@@ -73,7 +79,9 @@ class ChildProcess:
 
     async def wait(self) -> int:
         """Wait for the end of the process and return its exit status."""
-        return await self._process.wait()
+        status = await self._process.wait()
+        self._folder.cleanup()
+        return status
 
     async def wait_or_kill(self, within: float) -> int:
         """Wait for the end of the process, kill it after `within` seconds, and return its exit status.
@@ -82,13 +90,13 @@ class ChildProcess:
         """
         try:
             async with asyncio.timeout(within):
-                return await self._process.wait()
+                return await self.wait()
         except TimeoutError:
             self.kill()
-            return await self._process.wait()
+            return await self.wait()
         except BaseException:
             self.kill()
-            await self._process.wait()
+            await self.wait()
             raise
 
     async def output(self, longest: int = LONGEST_LINE) -> AsyncIterator[str]:

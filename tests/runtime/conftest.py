@@ -5,6 +5,7 @@ import select
 import socket
 import subprocess
 import sys
+import tempfile
 import textwrap
 import time
 from collections.abc import Callable, Iterator
@@ -30,9 +31,11 @@ class HostProcess:
     def __init__(self) -> None:
         ours, theirs = socket.socketpair()
         self.socket = ours
+        self._folder = tempfile.TemporaryDirectory()  # as the server does
         self.process = subprocess.Popen(
             [sys.executable, "-P", "-m", "arcor2_hw.runtime.host", "--fd", str(theirs.fileno())],
             pass_fds=[theirs.fileno()],
+            env=os.environ | {"TMPDIR": self._folder.name},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -125,6 +128,7 @@ class HostProcess:
         self.socket.close()
         assert self.process.stdout is not None
         self.process.stdout.close()
+        self._folder.cleanup()
 
 
 @pytest.fixture
