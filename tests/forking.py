@@ -115,6 +115,30 @@ class Forker:
         return ours
 
 
+class AwaitedProcess:
+    """A started program, with the part of `asyncio.subprocess.Process` that tests use."""
+
+    def __init__(self, process: "Forked | subprocess.Popen[bytes]", stdout: asyncio.StreamReader) -> None:
+        self.pid = process.pid
+        self.stdout = stdout
+        self.send_signal, self.kill = process.send_signal, process.kill
+        self._process = process
+
+    @property
+    def returncode(self) -> int | None:
+        return self._process.poll()
+
+    async def wait(self) -> int:
+        return await ended(self._process)
+
+
+async def awaited(process: "Forked | subprocess.Popen[bytes]") -> AwaitedProcess:
+    """Return a program whose output and end the running event loop waits for."""
+    reader = asyncio.StreamReader()
+    await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), process.stdout)
+    return AwaitedProcess(process, reader)
+
+
 async def ended(process: "Forked | subprocess.Popen[bytes]") -> int:
     """Wait for the end of a process without blocking the event loop; return its exit status."""
     with contextlib.suppress(ProcessLookupError):

@@ -4,10 +4,11 @@ import asyncio
 import contextlib
 import os
 import signal
+import subprocess
 import time
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 from urllib.parse import urlsplit
 
 import msgspec
@@ -20,9 +21,12 @@ from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.testing.own_time import own_time
 from arcor2_server.demo.fakes import free_loopback_address
-from arcor2_server.demo.processes import Child, python_module
+from arcor2_server.demo.processes import Child
 from arcor2_server.demo.workplace import Creation, Scalar, Workplace, load
+from tests.fakes.conftest import start_forked_fake
+from tests.forking import Forked, awaited
 from tests.leaks import outliving_the_test
+from tests.server.core.serving import fork_server, keep_analysis
 
 WORKPLACE = Path(__file__).parent / "workplace" / "three_devices.toml"
 
@@ -41,6 +45,17 @@ async def until(ask: Callable[[], Any], what: str, timeout: float = 30.0) -> Any
         await asyncio.sleep(0.02)
 
 
+class ForkedChild(Child):
+    """A child that is forked from a process which has already imported its program."""
+
+    def __init__(self, name: str, log: Path, fork: Callable[[IO[bytes]], Forked | subprocess.Popen[bytes]]) -> None:
+        super().__init__(name, [], log)
+        self._fork = fork
+
+    async def _launch(self, log: IO[bytes]) -> Any:
+        return await awaited(self._fork(log))
+
+
 class Cell:
     """All processes. `command_fake` sends commands to a fake, `client` connects to the server."""
 
@@ -56,29 +71,30 @@ class Cell:
         self.robot_host = free_loopback_address()
 
     # ------------------------------------------------------------------------------------------------ processes
-    async def _start(self, name: str, command: list[str]) -> str:
-        child = Child(name, command, self.logs / f"{name}-{len(self.children)}.log")
+    async def _start(self, name: str, fork: Callable[[IO[bytes]], Forked | subprocess.Popen[bytes]]) -> str:
+        child = ForkedChild(name, self.logs / f"{name}-{len(self.children)}.log", fork)
         self.children[name] = child
         return await child.start()
 
     async def start_fake(self, name: str, module: str, *arguments: str) -> None:
-        self.at[name] = msgspec.json.decode(
-            await self._start(name, python_module(module, *arguments, "--control", "127.0.0.1:0"))
-        )
+        """Start a module of `arcor2_fakes`."""
+        control = ("--control", "127.0.0.1:0")
+        ready = await self._start(name, lambda log: start_forked_fake(module, [*arguments, *control], log))
+        self.at[name] = msgspec.json.decode(ready)
 
     async def start_robot(self) -> None:
-        await self.start_fake("robot", "arcor2_fakes.ur", "--host", self.robot_host)
+        await self.start_fake("robot", "ur", "--host", self.robot_host)
 
     async def start_devices(self) -> None:
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self.start_robot())
-            tasks.create_task(self.start_fake("tester", "arcor2_fakes.functional_tester"))
-            tasks.create_task(self.start_fake("reader", "arcor2_fakes.barcode_reader"))
+            tasks.create_task(self.start_fake("tester", "functional_tester"))
+            tasks.create_task(self.start_fake("reader", "barcode_reader"))
 
     async def start_world(self, boards: int, seed: int) -> None:
         await self.start_fake(
             "world",
-            "arcor2_fakes.cell",
+            "cell",
             *("--layout", str(WORKPLACE.with_suffix(".json"))),
             *("--robot", self.at["robot"]["control"]),
             *("--tester", self.at["tester"]["control"]),
@@ -87,10 +103,10 @@ class Cell:
         )
 
     async def start_server(self, port: int = 0) -> None:
-        self.url = await self._start(
-            "server",
-            python_module("arcor2_server.cli.main", "serve", "--port", str(port), "--data-dir", str(self.data_dir)),
-        )
+        fresh = not self.data_dir.exists()
+        self.url = await self._start("server", lambda log: fork_server(self.data_dir, "--port", str(port), stderr=log))
+        if fresh:
+            keep_analysis(self.data_dir)
 
     async def restart_server(self) -> None:
         """Restart the killed server on the same port and data directory."""

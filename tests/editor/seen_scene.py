@@ -21,7 +21,7 @@ NAMES = {SCENE, "eye", "arm"}
 async def camera_of(cell: Cell, *, width: int = 1280, height: int = 720) -> AsyncIterator[None]:
     """Run a simulated camera in the workplace."""
     size = ("--width", f"{width}", "--height", f"{height}")
-    await cell.start_fake("camera", "arcor2_fakes.oak_d", *size, "--fps", "5")
+    await cell.start_fake("camera", "oak_d", *size, "--fps", "5")
     yield
     await cell.children.pop("camera").stop()
 

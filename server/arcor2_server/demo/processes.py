@@ -5,7 +5,7 @@ import contextlib
 import signal
 import sys
 from pathlib import Path
-from typing import Any, Final
+from typing import IO, Any, Final
 
 import msgspec
 
@@ -41,14 +41,7 @@ class Child:
     async def start(self) -> str:
         """Start it and return the rest of its ready line. Raise ChildFailed with the last line of its log."""
         with self._log.open("wb") as log:
-            # In a new session: Ctrl-C in the terminal reaches only the demo, which stops the children in order.
-            self._process = await asyncio.create_subprocess_exec(
-                *self._command,
-                stdin=asyncio.subprocess.DEVNULL,
-                stdout=asyncio.subprocess.PIPE,
-                stderr=log,
-                start_new_session=True,
-            )
+            self._process = await self._launch(log)
         assert self._process.stdout is not None
         try:
             async with asyncio.timeout(READY_TIMEOUT):
@@ -71,6 +64,16 @@ class Child:
         await self._process.wait()
         raise ChildFailed(
             "{name} did not start: {last_words}", name=self.name, last_words=self._last_words() or "it printed no error"
+        )
+
+    async def _launch(self, log: IO[bytes]) -> asyncio.subprocess.Process:
+        # In a new session: Ctrl-C in the terminal reaches only the demo, which stops the children in order.
+        return await asyncio.create_subprocess_exec(
+            *self._command,
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=log,
+            start_new_session=True,
         )
 
     async def start_json(self) -> dict[str, Any]:

@@ -8,9 +8,9 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from websockets.asyncio.client import ClientConnection, connect
 
@@ -28,8 +28,30 @@ _IMPORTS = (
     *("arcor2_server.cli.serve", "arcor2_server.app", "arcor2_server.web.http_server"),
     "sqlalchemy.dialects.sqlite.aiosqlite",
 )
+_ANALYSIS = "analysis.msgpack"
 _analyses: list[bytes] = []
 """The stored analysis of the installed object types, once a server has made it."""
+
+
+def fork_server(
+    data_dir: Path, *arguments: str, stderr: IO[bytes], environment: Mapping[str, str] | None = None
+) -> Forked | subprocess.Popen[bytes]:
+    """Start `arcor2-hw serve` on a data directory, forked from a process that has imported it.
+
+    The analysis of the installed object types takes a third of a start. A new data directory gets that of an earlier
+    server, if `keep_analysis` was called with it. The server checks that it is valid.
+    """
+    if _analyses and not data_dir.exists():
+        data_dir.mkdir(0o700, parents=True)
+        (data_dir / _ANALYSIS).write_bytes(_analyses[0])
+    serve = ("serve", "--data-dir", str(data_dir), *arguments)
+    return _forker.start(_MAIN, serve, _IMPORTS, stderr, environment)
+
+
+def keep_analysis(data_dir: Path) -> None:
+    """Keep the analysis of a server that is ready, for the servers that `fork_server` starts."""
+    if not _analyses:
+        _analyses.append((data_dir / _ANALYSIS).read_bytes())
 
 
 class ServerProcess:
@@ -52,17 +74,14 @@ class ServerProcess:
         return self._process
 
     async def start(self) -> None:
-        stored = self.data_dir / "analysis.msgpack"
         fresh = self.forked and not self.data_dir.exists()
-        if fresh and _analyses:  # the analysis takes a third of a start; the server checks that it is valid
-            self.data_dir.mkdir(0o700, parents=True)
-            stored.write_bytes(_analyses[0])
-        serve = ("serve", "--port", "0", "--data-dir", str(self.data_dir), *self._arguments)
         with self.log.open("wb") as log:
             if self.forked:
-                self._process = _forker.start(_MAIN, serve, _IMPORTS, log, self._environment)
+                self._process = fork_server(
+                    self.data_dir, "--port", "0", *self._arguments, stderr=log, environment=self._environment
+                )
             else:
-                command = [*COMMAND, *serve]
+                command = [*COMMAND, "serve", "--port", "0", "--data-dir", str(self.data_dir), *self._arguments]
                 self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, env=self._environment)
         try:
             self.url = await self._ready()
@@ -70,8 +89,8 @@ class ServerProcess:
             self._process.kill()
             await self.ended()
             raise
-        if fresh and not _analyses:
-            _analyses.append(stored.read_bytes())
+        if fresh:
+            keep_analysis(self.data_dir)
 
     async def _ready(self) -> str:
         assert self.process.stdout is not None
