@@ -85,8 +85,10 @@ def alarm_faults(file: SourceFile) -> list[str]:
         for name in ("cause", "remedy")
         if not getattr(kind, name)
     ]
+    if not declared or not (folder / translations.FOLDER).is_dir():
+        return wrong  # without reading all sources of the library for its texts, which takes seconds
     shared = extraction.texts(templates.LIBRARY)
-    for language in alarms.LANGUAGES if declared and (folder / translations.FOLDER).is_dir() else ():
+    for language in alarms.LANGUAGES:
         path = translations.file_of(folder, language)
         known = translations.read(path) if path.exists() else {}
         wrong += [
