@@ -11,7 +11,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 from arcor2_hw.data.base import Data
 from arcor2_hw.messages import key_of
-from arcor2_hw.parsing import parse
+from arcor2_hw.parsing import parse, paused_garbage_collection
 
 LIBRARY: Final = Path(__file__).resolve().parents[1]
 """Folder of `arcor2_hw`, whose errors drivers raise and derive from."""
@@ -75,7 +75,7 @@ def templates(files: Iterable[Path]) -> list[Template]:
     Raises:
         SyntaxError: A file is not valid Python.
     """
-    scans = {path: _Scan.of(parse(path.read_bytes(), str(path))) for path in files}
+    scans = _scanned(files)
     errors = dict(_errors_of_library())
     errors |= _errors((scan for path, scan in scans.items() if LIBRARY not in path.parents), errors)
     return [found for path, scan in scans.items() for found in _templates(scan, errors, str(path))]
@@ -90,7 +90,7 @@ def hard_coded(files: Iterable[Path]) -> list[str]:
     Raises:
         SyntaxError: A file is not valid Python.
     """
-    scans = {path: _Scan.of(parse(path.read_bytes(), str(path))) for path in files}
+    scans = _scanned(files)
     errors = dict(_errors_of_library())
     errors |= _errors((scan for path, scan in scans.items() if LIBRARY not in path.parents), errors)
     return [
@@ -218,9 +218,14 @@ class _Scan(NamedTuple):
             yield "".join(found)
 
 
+def _scanned(files: Iterable[Path]) -> dict[Path, _Scan]:
+    with paused_garbage_collection():
+        return {path: _Scan.of(parse(path.read_bytes(), str(path))) for path in files}
+
+
 @lru_cache(maxsize=1)
 def _errors_of_library() -> _Errors:
-    return _errors((_Scan.of(parse(path.read_bytes(), str(path))) for path in sources(LIBRARY)), {_ROOT: ()})
+    return _errors(_scanned(sources(LIBRARY)).values(), {_ROOT: ()})
 
 
 def _errors(scans: Iterable[_Scan], known: _Errors) -> dict[str, tuple[str, ...] | None]:
