@@ -26,12 +26,12 @@ from arcor2_hw.exceptions import (
 )
 from arcor2_hw.objects.mapped_device import MappedDevice
 from arcor2_hw.testing.fake_bench import modbus_address
+from arcor2_server.cli.main import app
 from tests.fakes.conftest import FakeProcess
 from tests.server.cli.generated import run_tests
 
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "docs" / "examples"
-NEW = [sys.executable, "-m", "arcor2_server.cli.main", "device", "new"]
 Screwdriver = Any
 """The generated class, which mypy cannot know."""
 
@@ -40,9 +40,7 @@ def generate(folder: Path, name: str, text: str = "") -> Path:
     """Write the driver of a map, and return its folder."""
     file = folder / f"{name}.yaml"
     file.write_text(text or (EXAMPLES / f"{name}.yaml").read_text())
-    command = [*NEW, name, "--from-map", str(file), "--directory", str(folder)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    assert app(["device", "new", name, "--from-map", str(file), "--directory", str(folder)]) == 0
     return folder / name
 
 

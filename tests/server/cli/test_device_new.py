@@ -9,6 +9,7 @@ import pytest
 
 from arcor2_hw.data.cell import read_cell
 from arcor2_server.cli.device_new import WIRES, Bus, refusal, texts
+from arcor2_server.cli.main import app
 from arcor2_server.cli.starter_kinds import KINDS, Base
 from tests.server.cli.generated import run_tests
 
@@ -20,13 +21,8 @@ ALL = [(base, bus) for base in KINDS for bus in WIRES]
 
 
 def generate(directory: Path, base: Base, bus: Bus, name: str = "dough-mixer") -> Path:
-    done = subprocess.run(
-        [*COMMAND, "device", "new", name, "--base", base, "--bus", bus, "--directory", str(directory)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    words = ["device", "new", name, "--base", base, "--bus", bus, "--directory", str(directory)]
+    assert app(words) == 0
     return directory / name
 
 
