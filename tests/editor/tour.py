@@ -263,7 +263,8 @@ class Tour:
     async def failed(self) -> AsyncIterator[str]:
         """Visit the screens after a run that failed, from the operator's screen."""
         page, words = self.screen.page, self.words
-        dismiss = page.locator(".operator").get_by_role("button", name=words("Dismiss"), exact=True)
+        # Not by its name, which notices on this screen share in some languages.
+        dismiss = page.locator(".operator-dismiss")
         await dismiss.wait_for()
         yield "operator, failed run"
         await dismiss.click()
