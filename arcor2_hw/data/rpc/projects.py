@@ -85,7 +85,7 @@ class RemoveProjectParameterArgs(Data, frozen=True):
 
 
 class RemoveActionArgs(Data, frozen=True):
-    """Arguments of RemoveAction. With `with_steps` the action is also removed from the logic, in the same edit."""
+    """Arguments of RemoveAction. With `with_steps`, its connections and parallel calls are removed in the same edit."""
 
     id: str
     with_steps: bool = False

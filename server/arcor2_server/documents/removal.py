@@ -1,5 +1,7 @@
 """Rules for removing action points and actions, and the logic without a removed action."""
 
+from collections.abc import Collection
+
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset
@@ -54,6 +56,23 @@ def require_point_unused(document: Document, point: BareActionPoint) -> None:
                     name=user.name,
                     point_name=point.name,
                 )
+
+
+def require_unused(document: Document, action: Action, without: Collection[str] = ()) -> None:
+    """Raise RequestRefused if something other than the items `without` uses an action."""
+    for user in document.users_of(action.id):
+        if user.id in without:
+            continue
+        if isinstance(user, Action) and action.id in (user.branches or ()):
+            raise RequestRefused(
+                "{user} runs {name} in parallel. Remove {user} first.", user=user.name, name=action.name
+            )
+        using = title_of(user)
+        raise RequestRefused(
+            "A result of {name} is used by {user}. Change that first.",
+            name=action.name,
+            user=using[0].lower() + using[1:],
+        )
 
 
 def title_of(user: Action | LogicItem | ProjectFunction) -> str:

@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.base import UNSET, Unset, new_id
 from arcor2_hw.data.events import ChangeType
-from arcor2_hw.data.project import Action, BareAction, LogicItem, Retry
+from arcor2_hw.data.project import Action, BareAction, Retry
 from arcor2_hw.data.rpc import AddActionArgs, RemoveActionArgs, RenameActionArgs, UpdateActionArgs
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.collaboration.locks import Locks
@@ -23,7 +23,7 @@ from arcor2_server.documents.checks.actions import (
     complete_parameters,
 )
 from arcor2_server.documents.checks.branches import check_branches
-from arcor2_server.documents.removal import bypass, neighbours, require_results_unused, title_of
+from arcor2_server.documents.removal import bypass, neighbours, require_results_unused, require_unused
 from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.rpc.change_events import emit_functions
@@ -114,37 +114,31 @@ class ActionRequests:
 
     @rpc("RemoveAction")
     async def remove_action(self, context: Context, args: RemoveActionArgs) -> None:
-        """Remove an action, with `with_steps` also its logic items. Refuse while something else uses it."""
+        """Remove an action. Refuse while something else uses it.
+
+        With `with_steps`, its logic items and the calls that it runs in parallel are removed, too.
+        """
         document = self._session.require_project_open()
-        document.action(args.id)
+        calls = (document.action(args.id).branches or ()) if args.with_steps else ()
         places = neighbours(document, args.id) if args.with_steps else ()
-        async with self._locks.auto_skip_held(context.user, args.id, *places):
+        async with self._locks.auto_skip_held(context.user, args.id, *places, *calls):
             action = document.action(args.id)
+            branches = [document.action(key) for key in (action.branches or ()) if args.with_steps]
             if not args.with_steps and (document.outgoing(action.id) or document.incoming(action.id)):
                 raise RequestRefused("{name} is part of the logic: remove its steps first.", name=action.name)
             logic_changes = bypass(document, self._types, action) if args.with_steps else []
             removed = {change.id for change in logic_changes if change.after is None}
-            for user in document.users_of(action.id):
-                if isinstance(user, LogicItem) and user.id in removed:
-                    continue
-                if isinstance(user, Action) and action.id in (user.branches or ()):
-                    raise RequestRefused(
-                        "{user} runs {name} in parallel. Remove {user} first.", user=user.name, name=action.name
-                    )
-                using = title_of(user)
-                raise RequestRefused(
-                    "A result of {name} is used by {user}. Change that first.",
-                    name=action.name,
-                    user=using[0].lower() + using[1:],
-                )
+            for each in (action, *branches):
+                require_unused(document, each, {*removed, action.id, *(one.id for one in branches)})
             # The action comes first, since the history names an edit by its first change.
-            removal = document.remove(Kind.ACTION, action.id)
-            if await self._editing.commit(context, [removal, *logic_changes]):
-                if emit_functions(context, self._session, [removal, *logic_changes]):
+            changes = [document.remove(Kind.ACTION, each.id) for each in (action, *branches)] + logic_changes
+            if await self._editing.commit(context, changes):
+                if emit_functions(context, self._session, changes):
                     for change in logic_changes:
                         if change.after is None:
                             context.emit("LogicItemChanged", change.before, ChangeType.REMOVE)
                         else:
                             context.emit("LogicItemChanged", change.after, ChangeType.UPDATE)
-                    context.emit("ActionChanged", BareAction(action.name, action.type, action.id), ChangeType.REMOVE)
-                self._editing.drop_locks(context, action.id)
+                    for each in (action, *branches):
+                        context.emit("ActionChanged", BareAction(each.name, each.type, each.id), ChangeType.REMOVE)
+                self._editing.drop_locks(context, action.id, *calls)

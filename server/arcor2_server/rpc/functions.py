@@ -44,6 +44,7 @@ from arcor2_server.documents.function_signature import (
 )
 from arcor2_server.documents.functions import make_function
 from arcor2_server.documents.parallel_work import dissolve_parallel, make_parallel
+from arcor2_server.documents.removal import require_unused
 from arcor2_server.errors import RequestRefused
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.undo import Undo
@@ -115,9 +116,11 @@ class FunctionRequests:
 
     @rpc("UpdateParallel")
     async def update_parallel(self, context: Context, args: UpdateParallelArgs) -> None:
-        """Change the calls that a parallel action runs at once."""
+        """Change the calls that a parallel action runs at once. Refuse to leave out one whose results are used."""
         document = self._session.require_project_open()
         action = document.action(args.action_id)
+        for left_out in set(action.branches or ()).difference(args.branches):
+            require_unused(document, document.action(left_out), {action.id})
         await self._edit(
             context, [document.update(Kind.ACTION, action.id, replace(action, branches=list(args.branches)))]
         )

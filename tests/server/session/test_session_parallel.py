@@ -11,7 +11,7 @@ from arcor2_server.documents.document import UNTIMED
 from arcor2_server.documents.extensions import keep_extensions
 from tests.server.session.session_server import Person, Refused
 from tests.server.session.test_session_scripts import STORED, connect
-from tests.server.session.work import Work
+from tests.server.session.work import NOTHING_KEPT, Work
 
 
 @pytest.fixture
@@ -82,6 +82,36 @@ async def test_calls_run_in_parallel_and_return(alice: Person, work: Work) -> No
     for _ in range(2):
         await alice.ask("Undo")
     assert project_of(work) == before
+
+
+async def test_a_branch_whose_result_is_used_stays(alice: Person, work: Work) -> None:
+    call = work.action("do_pause")
+    await alice.ask(
+        "AddAction", action_point_id=work.point("here"), name="third", type=call.type, parameters=[], flows=NOTHING_KEPT
+    )
+    await made(work)
+    parallel, drawn = work.action("both"), work.action("do_draw")
+    [draw] = [each for each in project_of(work).functions if each.name == "do_draw"]
+    await alice.ask("AddFunctionResult", function_id=draw.id, link=f"{draw.actions[0].id}/default/0")
+    everything = [*(parallel.branches or ()), work.action("third").id]
+    await alice.ask("UpdateParallel", action_id=parallel.id, branches=everything)
+    leaving = next(item for item in project_of(work).logic if item.start == parallel.id)
+    when = {"comparisons": [{"what": f"{drawn.id}/default/0", "operator": "==", "value": "true"}], "match": "all"}
+    step = {"logic_item_id": leaving.id, "start": leaving.start, "end": leaving.end}
+    await alice.ask("UpdateLogicItem", **step, when=when)
+    before = project_of(work)
+    with pytest.raises(Refused, match=r"A result of do_draw is used by a condition of the logic\."):
+        await alice.ask("UpdateParallel", action_id=parallel.id, branches=everything[1:])
+    assert project_of(work) == before
+
+    # The connection with the condition is removed together with the parallel action and its calls.
+    await alice.ask("RemoveAction", id=parallel.id, with_steps=True)
+    assert {action.name for action in project_of(work).all_actions()} == {"draw", "pause", "again"}
+    await alice.ask("Undo")
+    assert project_of(work) == before
+    await alice.ask("UpdateLogicItem", **step, when={"comparisons": [], "match": "all"})
+    await alice.ask("UpdateParallel", action_id=parallel.id, branches=everything[1:])
+    assert work.action("both").branches == everything[1:]
 
 
 async def test_a_function_contains_parallel_work(alice: Person, work: Work) -> None:
