@@ -2,7 +2,6 @@ import { describe, expect, test } from "vitest";
 import type { LogicComparison, LogicWhen, Match, Operator } from "../protocol/types";
 import {
   fieldsOf,
-  isComplete,
   newComparison,
   OPERATORS,
   operandsOf,
@@ -11,6 +10,7 @@ import {
   withOperator,
   withOther,
 } from "./comparisons";
+import { branchProblems, casesOf } from "./completeness";
 import { listingOf } from "./listing";
 import {
   branchKind,
@@ -97,7 +97,10 @@ describe("words", () => {
 
 test("comparisons are complete if one of them is true for all values", () => {
   const { doc } = comparing(all());
-  const complete = (...conditions: LogicWhen[]) => isComplete(doc, TYPES, conditions);
+  const complete = (...conditions: LogicWhen[]) => {
+    const cases = casesOf(doc, TYPES, conditions);
+    return cases?.known ? cases.gap === undefined : undefined;
+  };
   expect(complete(all(compared(N, "<=", "3")), all(compared(N, ">=", "4")))).toBe(true);
   expect(complete(all(compared(N, "<", "3")), all(compared(N, ">", "3")))).toBe(false);
   expect(complete(all(compared(N, "<", "3"), compared(P, "==", "true")), all(compared(N, ">=", "3")))).toBe(false);
@@ -108,7 +111,7 @@ test("comparisons are complete if one of them is true for all values", () => {
 test("problems name incomplete comparisons and missing values", () => {
   const incomplete = comparing(all(compared(N, "<", "3")), all(compared(N, ">", "3"))).doc;
   expect(problemsOf(incomplete, TYPES).map((each) => each.text)).toEqual([
-    "b: no next step if none of the conditions is met.",
+    "b: no next step if a_result = 3. Add a step without a condition.",
   ]);
   expect(problemsOf(comparing(all(compared(N, "<", "3"))).doc, TYPES)).toEqual([]);
   const missing = comparing(all(compared("gone", "<", "3"))).doc;
@@ -131,6 +134,46 @@ test("a result that is stored in a variable is used as the variable", () => {
   doc.actions.a = { ...action, flows: [{ type: "default", outputs: ["so_many"] }] };
   expect(operandsOf(doc, TYPES, "b").map((each) => each.name)).toEqual(["b_result", "so_many"]);
   expect(usersOf(doc, TYPES, { parameter: "par" })).toEqual(["a"]);
+});
+
+test("what Build refuses about comparisons of two values is known while editing", () => {
+  const pair = (operator: Operator, other = "par"): LogicComparison => ({ what: N, operator, value: "", other });
+  const texts = (first: LogicWhen, second?: LogicWhen) =>
+    branchProblems(comparing(first, second).doc, TYPES, "b").map(({ id, text }) => `${id}: ${text}`);
+  expect(texts(all(pair(">=")), all(pair("<")))).toEqual([]);
+  expect(texts(all(pair(">=")))).toEqual([]);
+  expect(texts(all(pair(">")), all(pair("<")))).toEqual([
+    "b: b: no next step if a_result = 0, so_many = 0. Add a step without a condition.",
+  ]);
+  expect(texts(all(pair(">="), compared(N, ">", "10")), all(pair("<")))).toHaveLength(1);
+  // Three conditions of two values, of which one is contained in the others.
+  expect(texts(all(pair(">=")), all(pair("==")))).toEqual([
+    "s3: b: the step to d is never taken, because other conditions are met first.",
+    "b: b: no next step if a_result = 0, so_many = 1. Add a step without a condition.",
+  ]);
+  expect(texts({ match: "any", comparisons: [pair(">="), pair("<")] })).toEqual([
+    "s3: b: the step to d is never taken, because other conditions are met first.",
+  ]);
+  const many = Array.from({ length: 10 }, (_, n) => `${100 * n}`).map((value) => compared("par", "!=", value));
+  expect(texts(all(pair(">="), ...many), all(pair("<")))).toEqual([
+    "b: b: too many values to check. Add a step without a condition.",
+  ]);
+});
+
+test("a condition cannot use the result of an action that runs on some paths only", () => {
+  const doc = program({ a: "ask", b: "count", c: "act", d: "act" }, [
+    ["START", "a"],
+    ["a", "b", "true"],
+    ["a", "c", "false"],
+    ["b", "c"],
+    ["c", "d"],
+    ["c", "END"],
+    ["d", "END"],
+  ]);
+  if (doc.logic.s4) doc.logic.s4.when = all(compared("b/default/0", "<", "3"));
+  expect(problemsOf(doc, TYPES).map((each) => `${each.id}: ${each.text}`)).toEqual([
+    "s4: c: a step depends on a result of b, which does not run before it on all paths.",
+  ]);
 });
 
 test("a connection with comparisons is a branch in the list, and ends a sequence", () => {
@@ -169,7 +212,7 @@ test("after an error exit, results of its action cannot be compared", () => {
   expect([conditionWords(doc, TYPES, s1), conditionWords(doc, TYPES, s2)]).toEqual(["a_result < 3", "on error"]);
   expect(freeStep(doc, TYPES, "a")).toEqual({});
   expect(problemsOf(doc, TYPES).map((each) => each.text)).toEqual([
-    "a: no next step if none of the conditions is met.",
+    "a: no next step if a_result = 3. Add a step without a condition.",
   ]);
 });
 
@@ -187,7 +230,6 @@ test("a value can be compared with another one", () => {
   expect(withOther(pair, count, undefined)).toEqual(compared(N, ">=", "0"));
   expect(fieldsOf(doc, TYPES, all({ ...pair, operator: "==" }))).toEqual({ when: all({ ...pair, operator: "==" }) });
   expect(comparisonWords(doc, TYPES, pair)).toBe("a_result ≥ so_many");
-  expect(isComplete(doc, TYPES, [all(pair)])).toBeUndefined();
   s2.when = all(pair);
   expect(usersOf(doc, TYPES, { parameter: "par" })).toEqual([s2.id]);
   s2.when = all({ ...pair, other: "gone" });

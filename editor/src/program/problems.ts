@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import type { Action } from "../protocol/types";
 import { inScope, scopeOf } from "../store/scope";
 import type { Of, OpenDocument, State } from "../store/state";
-import { isComplete } from "./comparisons";
+import { branchProblems, canLackResults } from "./completeness";
 import { decoded } from "./decoded";
 import { errorAt, hasFailed, linkToError, partNames } from "./errorExits";
 import { onAllPaths, resultOf } from "./functions";
@@ -16,7 +16,6 @@ import {
   END,
   hasComparisons,
   incoming,
-  isConditional,
   linkTo,
   metaOf,
   nextSteps,
@@ -113,8 +112,7 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
       continue;
     }
     if (steps.some(hasComparisons)) {
-      if (steps.every(isConditional) && isComplete(doc, types, steps.map(whenOf)) === false)
-        error(action.id, t`${name}: no next step if none of the conditions is met.`);
+      for (const { id, text } of branchProblems(doc, types, action.id)) error(id, text);
       continue;
     }
     const conditions = steps.flatMap((step) => (step.condition ? [step.condition] : []));
@@ -137,15 +135,21 @@ function ofLogic(doc: OpenDocument, types: State["types"], error: Tell, warn: Te
     }
   }
   for (const item of Object.values(doc.logic)) {
-    const missing = whenOf(item).comparisons.some(({ what, other = what }) =>
-      [what, other].some((each) => !operandAt(doc, types, each)),
-    );
-    if (missing && typesKnown(doc, types)) {
+    const start = placeOf(item.start);
+    const name = doc.actions[start]?.name ?? "";
+    const compared = whenOf(item).comparisons.flatMap(({ what, other = what }) => [what, other]);
+    if (compared.some((each) => !operandAt(doc, types, each))) {
+      if (typesKnown(doc, types)) error(item.id, t`${name}: a step depends on a result that no longer exists.`);
+      continue;
+    }
+    const early = compared
+      .map((each) => resultAt(doc, types, each)?.action)
+      .find((each) => each && runnerOf(doc, each.id) !== start && canLackResults(doc, each.id, start));
+    if (early)
       error(
         item.id,
-        t`${doc.actions[placeOf(item.start)]?.name ?? ""}: a step depends on a result that no longer exists.`,
+        t`${name}: a step depends on a result of ${early.name}, which does not run before it on all paths.`,
       );
-    }
   }
   if (
     !Object.values(doc.logic).some((item) => placeOf(item.end) === END) &&
@@ -203,7 +207,13 @@ function ofAction(
       if (problem !== undefined) continue;
       const result = resultAt(doc, types, link);
       if (!result) error(action.id, t`${action.name}: the result used for ${wanted.name} no longer exists.`);
-      else if (doc.project?.has_logic && !after(doc, runnerOf(doc, result.action.id)).has(runnerOf(doc, action.id))) {
+      else if (doc.project?.has_logic && canLackResults(doc, result.action.id, action.id)) {
+        const { name } = result.action;
+        error(
+          action.id,
+          t`${action.name}: ${wanted.name} uses a result of ${name}, which does not run before it on all paths.`,
+        );
+      } else if (doc.project?.has_logic && !after(doc, runnerOf(doc, result.action.id)).has(runnerOf(doc, action.id))) {
         warn(
           action.id,
           t`${action.name}: ${wanted.name} uses a result of ${result.action.name}, which does not run before it.`,

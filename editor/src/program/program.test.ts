@@ -141,7 +141,7 @@ describe("problems", () => {
       ],
       { a: { type: "link", value: '"b/default/0"' } },
     );
-    expect(texts(later)).toEqual(["warn a: a: by uses a result of b, which does not run before it."]);
+    expect(texts(later)).toEqual(["error a: a: by uses a result of b, which does not run before it on all paths."]);
     expect(usersOf(later, TYPES, { action: "b" })).toEqual(["a"]);
     expect(usersOf(gone, TYPES, { parameter: "away" })).toEqual(["a"]);
   });

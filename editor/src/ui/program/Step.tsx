@@ -4,6 +4,7 @@ import { t } from "@lingui/core/macro";
 import { useState } from "react";
 import { notEditable, removeStep, setCondition, startConnecting } from "../../commands/program";
 import { operandsOf } from "../../program/comparisons";
+import { branchProblems } from "../../program/completeness";
 import { nextSteps, placeOf, START, whenOf } from "../../program/logic";
 import type { LogicWhen } from "../../protocol/types";
 import { now, select, useEditor } from "../../store/store";
@@ -24,6 +25,7 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
   const why = notEditable(state, "UpdateLogicItem");
   const operands = from === START ? [] : operandsOf(doc, types, from);
   const alone = nextSteps(doc, from).length === 1;
+  const faults = branchProblems(doc, types, from).filter((each) => each.id === id || each.id === from);
   const set = async (when: LogicWhen) => {
     const refused = await setCondition(id, when);
     setProblem(refused);
@@ -62,6 +64,16 @@ const Step: Section["Body"] = ({ selection: { id } }) => {
         <p className="error" role="alert">
           {problem}
         </p>
+      )}
+      {faults.map((each) => (
+        <p key={each.id} className="error small" role="status">
+          {each.text}
+        </p>
+      ))}
+      {faults.some((each) => each.id === from) && (
+        <Button icon="plus" why={why} onPress={() => startConnecting(from)}>
+          {t`Add a step for all other values`}
+        </Button>
       )}
       <div className="row">
         <Button why={why} onPress={() => startConnecting(from, undefined, id)}>
