@@ -108,7 +108,7 @@ async def test_a_run_of_actions_becomes_a_function_that_is_called_again(work: Wo
     await expect(panel.get_by_role("region", name="Results of the function")).to_contain_text("passed of test")
 
     # Call it again with another value.
-    await crumbs.get_by_role("button", name="Back").click()
+    await crumbs.get_by_role("button", name="Program").tap()
     await call.wait_for()
     await tap("check_board")
     await expect(panel.get_by_label("program", exact=True)).to_have_value("1")
@@ -123,6 +123,21 @@ async def test_a_run_of_actions_becomes_a_function_that_is_called_again(work: Wo
     await expect(again).to_contain_text("program 2")
     calls = [each for each in (await work.saved()).all_actions() if each.name.startswith("check_board")]
     assert sorted(each.parameters[0].value for each in calls) == ["1", "2"]
+
+    # The 3D view shows the value at the puck, where it can be changed.
+    await work.mode("3D")
+    values = page.get_by_role("group", name="Values of check_board_2")
+    await values.get_by_role("button", name="program 2").tap()
+    await values.get_by_label("program", exact=True).fill("3")
+    await values.get_by_label("program", exact=True).press("Enter")
+    await expect(panel.get_by_label("program", exact=True)).to_have_value("3")
+    await screen.picture("function values")
+    assert await screen.faults() == []
+    await values.get_by_label("program", exact=True).fill("2")
+    await values.get_by_label("program", exact=True).press("Enter")
+    await values.get_by_role("button", name="Close the values").tap()
+    await expect(values).to_contain_text("program 2")
+    await work.mode("Flow")
 
     # Another user renames it.
     function_id = (await work.saved()).functions[0].id

@@ -12,6 +12,7 @@ from arcor2_hw.data.package import PackageStateEnum
 from tests.e2e.harness import Cell, until
 from tests.editor import texts
 from tests.editor.programming import Work, at_work
+from tests.editor.screen import VIEWPORTS
 from tests.editor.test_editor_functions import BEGUN, _without_scan
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -92,6 +93,15 @@ async def test_calls_run_at_once_and_are_followed_branch_by_branch(work: Work) -
     await expect(both.locator(".flow-lane")).to_have_count(2)
     assert timer.id in {each.id for each in (await work.saved()).functions}
     assert [each.name for each in (await work.saved()).all_actions() if each.name == "wait"] == []
+
+    # On a phone, nothing covers the buttons of the graph below the 3D view.
+    await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
+    await work.mode("Split")
+    await screen.settle()
+    await screen.picture("parallel phone")
+    assert await screen.faults() == []
+    await work.mode("Flow")
+    await page.set_viewport_size(VIEWPORTS["tablet"])  # type: ignore[arg-type]
 
     # The list shows the branches below the parallel action.
     await work.tool(texts.PROGRAM)

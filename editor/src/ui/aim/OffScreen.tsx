@@ -9,7 +9,7 @@ import { nameOf } from "../../viewmodel/names";
 import { atEdge, type Rect } from "./edge";
 
 /** Controls at the edge of the view. */
-const OTHERS = ".view-controls, .centre-top > *, .stop, .aim-bar, .fly-pad, .insets";
+const OTHERS = ".view-controls, .centre-top > *, .stop, .aim-bar, .fly-pad, .insets, .puck-values";
 
 export function OffScreen({ engine }: { engine: Engine }) {
   const id = useEditor((state) => state.ui.selection?.id ?? "");
@@ -65,9 +65,10 @@ export function OffScreen({ engine }: { engine: Engine }) {
   );
 }
 
-/** Areas of controls that nothing else must cover, pixels in the view. */
-export function taken(view: DOMRect): Rect[] {
+/** Areas of controls that nothing else must cover, pixels in the view; without those of a control itself. */
+export function taken(view: DOMRect, own?: Element): Rect[] {
   return [...document.querySelectorAll(OTHERS)]
+    .filter((each) => each !== own)
     .map((each) => each.getBoundingClientRect())
     .filter((box) => box.width > 0)
     .map((box) => ({

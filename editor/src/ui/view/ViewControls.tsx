@@ -7,6 +7,7 @@ import { followItemRequests } from "../../commands/handover";
 import { storeGeneralState, storeViewState } from "../../commands/viewstate";
 import type { ViewMode, ViewName, Viewpoint } from "../../engine/camera";
 import type { Engine } from "../../engine/engine";
+import { calledBy } from "../../program/operands";
 import { aimsAlways } from "../../session/aiming";
 import { now, useEditor } from "../../store/store";
 import { Aim } from "../aim/Aim";
@@ -24,6 +25,8 @@ import "./view.css";
 
 const StartAr = lazyComponent(() => import("../ar/StartAr"));
 const ArView = lazyComponent(() => import("../ar/ArView"));
+
+const PuckValues = lazyComponent(() => import("../program/PuckValues"));
 
 /** Half edge, pixels. */
 const HALF = 30;
@@ -56,6 +59,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
   const always = useEditor(aimsAlways);
   const listed = useEditor((state) => state.ui.crosshair.listed);
   const ar = useEditor((state) => state.ui.ar !== null);
+  const called = useEditor(({ doc, ui }) => doc !== null && calledBy(doc, doc.actions[ui.selection?.id ?? ""]) != null);
   const [starting, setStarting] = useState(false);
   useCrosshairKey();
   useEffect(followItemRequests, []);
@@ -114,6 +118,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
         </div>
       )}
       <Suspense fallback={null}>
+        {called && <PuckValues engine={engine} />}
         {starting && <StartAr onClose={() => setStarting(false)} />}
         {ar && <ArView engine={engine} />}
       </Suspense>

@@ -51,7 +51,7 @@ function Sections() {
   const { selection } = state.ui;
   if (!selection) return null;
   return SECTIONS.filter((each) => each.applies(selection, state)).map(({ id, title, Body }) => (
-    <section key={id} className="section" aria-label={i18n._(title)}>
+    <section key={id} className="section" data-section={id} aria-label={i18n._(title)}>
       <h3>{i18n._(title)}</h3>
       <Body selection={selection} />
     </section>
