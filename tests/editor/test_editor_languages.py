@@ -20,6 +20,7 @@ from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
 from arcor2_hw.data.events import ProcessStateEnum, SceneStateEnum
 from arcor2_hw.data.package import PackageStateEnum
+from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from arcor2_server.demo.workplace import load
@@ -28,7 +29,7 @@ from tests.editor import texts
 from tests.editor.pseudo import LOCALE, PseudoWords, names_in, untranslated, use_pseudo_locale
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
 from tests.editor.seen_scene import NAMES, camera_of, configure_markers, new_scene
-from tests.editor.tour import Tour
+from tests.editor.tour import JOINING, Tour
 from tests.editor.words import Words
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -46,6 +47,8 @@ LANGUAGES = {"pseudo": ("ipad", "phone"), "cs": ("phone",), "de": ("ipad",)}
 DARK = "cs"
 LONGER = "label-content-name-mismatch"
 """A rule that the pseudo-locale breaks: a short text is not lengthened, but as a part of a longer label."""
+ADDRESSES = {*JOINING["addresses"], JOINING["addresses"][0].replace("https", "http")}
+FUNCTIONS = {"open_lid", "fetch", "grip", "count", "prepare"}
 PEOPLE = {"colleague", "helper", "CO", "HE", *(f"Visitor {each}" for each in LANGUAGES), "VP", "VC", "VD"}
 
 
@@ -121,7 +124,7 @@ class Visitor:
         self.pseudo = language == "pseudo"
         words = PseudoWords() if self.pseudo else Words(language)
         self.tour = Tour(screen, f"Visitor {language}", words, *documents, robot_host)
-        self.names = names_in(*documents) | NAMES | PEOPLE | DEFINED_BY_DEVICES
+        self.names = names_in(*documents) | NAMES | PEOPLE | FUNCTIONS | ADDRESSES | DEFINED_BY_DEVICES
         self._sizes = list(LANGUAGES[language])
 
     async def faults(self, screens: AsyncIterator[str], *, axe: bool) -> list[str]:
@@ -226,8 +229,30 @@ async def test_project(visitors: list[Visitor], client: Client, documents: tuple
     await client.open_project(documents[1].id)
     try:
         await visit(visitors, lambda each: each.tour.project_editor())
+        await client.call("StartDryRun", rpc.StartDryRunArgs())
+        await visit(visitors, lambda each: each.tour.dry_run())
         async with online(client):
             await visit(visitors, lambda each: each.tour.online())
+    finally:
+        await client.close_project(force=True)
+
+
+async def test_functions(visitors: list[Visitor], client: Client, documents: tuple[Scene, Project]) -> None:
+    project = documents[1]
+    actions = {action.name: action.id for action in project.all_actions()}
+    await client.open_project(project.id)
+    try:
+        made = {
+            name: await client.call("MakeFunction", rpc.MakeFunctionArgs(name, [actions[used]]))
+            for name, used in (("open_lid", "open"), ("fetch", "pick"), ("grip", "close"))
+        }
+        count = rpc.AddFunctionParameterArgs(
+            made["grip"].function_id, "count", "integer", Parameter("count", "integer", "1")
+        )
+        await client.call("AddFunctionParameter", count)
+        at_once = [made[name].action_id for name in ("open_lid", "fetch")]
+        await client.call("MakeParallel", rpc.MakeParallelArgs("prepare", at_once))
+        await visit(visitors, lambda each: each.tour.functions("grip", "prepare"))
     finally:
         await client.close_project(force=True)
 
@@ -256,5 +281,6 @@ async def test_calibration(visitors: list[Visitor], client: Client, module_cell:
                 await calibrate(client, ids["eye"], client.calibrate_camera(ids["eye"]))
                 await calibrate(client, ids["arm"], client.calibrate_robot(ids["arm"], camera_id=ids["eye"]))
                 await visit(visitors, lambda each: each.tour.calibrated())
+            await visit(visitors, lambda each: each.tour.augmented())
         finally:
             await client.close_scene(force=True)

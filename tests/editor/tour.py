@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import AsyncIterator
+from typing import Any, Final
 
 from playwright.async_api import Locator, expect
 
@@ -12,6 +13,22 @@ from tests.editor.screen import USERS, Screen
 from tests.editor.words import Words
 
 GUIDED_STEPS = 10
+JOINING: Final[Any] = {
+    "addresses": ["https://workplace.local:6789", "https://192.0.2.20:6789"],
+    "fingerprint": ":".join(["A0"] * 32),
+    "authority": ":".join(["B1"] * 32),
+}
+GREY_CAMERA = """() => {
+    const canvas = Object.assign(document.createElement("canvas"), { width: 640, height: 480 });
+    const context = canvas.getContext("2d");
+    let step = 0;
+    setInterval(() => {  // only changes are sent
+        context.fillStyle = step++ % 2 ? "#808080" : "#828282";
+        context.fillRect(0, 0, canvas.width, canvas.height);
+    }, 100);
+    navigator.mediaDevices.getUserMedia = async () => canvas.captureStream(10);
+}"""
+"""Replace the camera of the device."""
 
 
 class Tour:
@@ -89,7 +106,9 @@ class Tour:
         await page.get_by_role("dialog").get_by_role("listitem").first.wait_for()
         async for shown in self._dialog("audit trail"):
             yield shown
-        for key, name in (("?", "about"), ("/", "search")):
+        # As on a server that others can join.
+        await page.route("**/api/joining", lambda route: route.fulfill(json=JOINING))
+        for key, name in (("?", "about, with the addresses to join"), ("/", "search")):
             await page.keyboard.press(key)
             async for shown in self._dialog(name):
                 yield shown
@@ -196,6 +215,59 @@ class Tour:
         await page.get_by_role("menuitem", name=words("Save view…")).click()
         async for shown in self._dialog("save view"):
             yield shown
+
+    async def functions(self, call: str, parallel: str) -> AsyncIterator[str]:
+        """Visit functions and parallel work of the open project, with the names of a call and of parallel work."""
+        page, words = self.screen.page, self.words
+        await self._choice("3D").click()
+        await self._tool(texts.PROGRAM)
+        await self._panel.get_by_role("radio").filter(has_text=words(texts.ADD, "tab")).click()
+        await self._panel.get_by_role("region", name=words("Functions")).wait_for()
+        yield "list of functions"
+        await self._panel.get_by_role("button", name=words("Run in parallel"), exact=True).click()
+        async for shown in self._dialog("new parallel work"):
+            yield shown
+        await self._panel.get_by_role("radio").filter(has_text=words("Actions")).click()
+        await self._button(texts.SELECT_SEVERAL).click()
+        await page.locator(".picking").wait_for()
+        yield "selection for a function"
+        await self._button(texts.CANCEL).click()
+        await self._select(parallel)
+        yield "parallel work"
+        await self._select(call)
+        yield "call of a function"
+        await self._panel.get_by_role("button", name=words("Open function")).click()
+        await page.locator(".scope-bar").wait_for()
+        await self._choice("Flow").click()
+        await page.locator(".flow-node.start").click()
+        await self._panel.get_by_role("region", name=words("Parameters of the function")).wait_for()
+        yield "parameters of a function"
+        await page.locator(".scope-bar").get_by_role("button", name=words("Back"), exact=True).click()
+        await self._choice("Split").click()
+        await page.locator(".flow-node.parallel").wait_for()
+        yield "parallel work in the graph"
+        await self._choice("3D").click()
+
+    async def dry_run(self) -> AsyncIterator[str]:
+        """Visit the result of a dry run of the open project, which another user has started, and its assumptions."""
+        words = self.words
+        await self._tool(texts.RUN)
+        await self._panel.get_by_text(words("Assumptions"), exact=True).wait_for()
+        await self._open_details()
+        yield "dry run"
+
+    async def augmented(self) -> AsyncIterator[str]:
+        """Visit AR with a camera that shows nothing."""
+        page, words = self.screen.page, self.words
+        await page.evaluate(GREY_CAMERA)
+        await self._button("AR").click()
+        await self._button("Start AR").wait_for()
+        yield "before AR"
+        await self._button("Start AR").click()
+        await page.get_by_role("group", name=words("Quality of AR")).wait_for()
+        yield "AR"
+        await self._button("Leave AR").click()
+        await page.locator(".ar-controls").wait_for(state="detached")
 
     async def online(self) -> AsyncIterator[str]:
         """Visit the panels of the robot and the devices of the open project, which is online."""
