@@ -21,6 +21,7 @@ import { cannotLead } from "../../program/logic";
 import { problemsHere, problemsOf } from "../../program/problems";
 import { placeOf } from "../../program/steps";
 import { takenExit } from "../../program/taken";
+import { scopeOf } from "../../store/scope";
 import { notify, now, select, setUi, useEditor } from "../../store/store";
 import { selectionOf } from "../../viewmodel/names";
 import { Icon } from "../kit/icons";
@@ -170,7 +171,12 @@ function Flow() {
 
   const step = doc?.logic[selected];
   const runs = running.findLast((id) => doc !== null && id in doc.actions) ?? executing;
-  const { moved, whole } = useViewport(graph.boxes, runs, step ? placeOf(step.start) : selected);
+  const { moved, whole } = useViewport(
+    graph.boxes,
+    runs,
+    step ? placeOf(step.start) : selected,
+    doc ? scopeOf(doc) : "",
+  );
 
   return (
     <div className="flow" role="region" aria-label={t`Program graph`} ref={host}>
@@ -185,7 +191,7 @@ function Flow() {
         deleteKeyCode={["Delete", "Backspace"]}
         minZoom={SMALLEST}
         maxZoom={2}
-        onMoveStart={(event) => event && moved()}
+        onMove={(event) => event && moved()}
         ariaLabelConfig={{
           "controls.ariaLabel": t`View`,
           "controls.fitView.ariaLabel": t`Show everything`,

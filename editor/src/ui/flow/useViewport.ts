@@ -17,8 +17,8 @@ export interface Moves {
   whole: () => void;
 }
 
-/** Show the start of the graph, and follow the running action. */
-export function useViewport(boxes: readonly Box[], running: string, selected: string): Moves {
+/** Show the start of the graph, and follow the running action. `scope`: the open function, whose graph is another one. */
+export function useViewport(boxes: readonly Box[], running: string, selected: string, scope: string): Moves {
   const { getViewport, setViewport } = useReactFlow();
   const width = useStore((state) => state.width);
   const height = useStore((state) => state.height);
@@ -37,14 +37,25 @@ export function useViewport(boxes: readonly Box[], running: string, selected: st
   const box = boxes.find((each) => each.id === shown || each.run.includes(shown));
   const some = box !== undefined;
   const number = boxes.length;
+  const last = useRef({ scope, width });
   useEffect(() => {
-    if (!ready || number === 0 || shows.current === "other") return;
+    if (!ready || number === 0) return;
+    const before = last.current;
+    last.current = { scope, width };
+    if (before.scope !== scope) shows.current = "nothing";
+    else if (shows.current === "other") {
+      // The middle stays in the middle when a panel or the 3D view takes a part of the width.
+      const now = getViewport();
+      if (before.width > 0 && before.width !== width)
+        void setViewport({ ...now, x: now.x + (width - before.width) / 2 });
+      return;
+    }
     if (shows.current === "whole") return void setViewport(wholeView(latest.current, { width, height }));
     if (some && shows.current === "start") return;
     shows.current = "start";
     const start = latest.current.find((each) => each.id === START);
     void setViewport(firstView(latest.current, start, { width, height }));
-  }, [ready, width, height, number, some, setViewport]);
+  }, [ready, width, height, number, some, scope, getViewport, setViewport]);
 
   const { id, x, y } = box ?? {};
   useEffect(() => {
