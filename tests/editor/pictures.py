@@ -81,6 +81,35 @@ async def _tablet(browser: Browser, run: Run, to: Path) -> None:
         await tools.get_by_role("button", name=texts.PROGRAM, exact=True).click()
         await page.get_by_role("region", name=texts.GRAPH).wait_for()
         await take("program")
+        await _open_function(screen, "handle", "handle_board")
+        graph = page.get_by_role("region", name=texts.GRAPH)
+        await page.get_by_role("radio", name="Flow", exact=True).click()
+        await graph.get_by_role("button", name=texts.WHOLE_PROGRAM).click()
+        await _rest(screen)
+        await graph.get_by_role("button", name=texts.SELECT_SEVERAL).click()
+        for name in ("into_nest", "out_of_nest"):
+            await graph.locator(f'.react-flow__node[aria-label^="{name},"]').click()
+        await page.get_by_text("6 actions selected").wait_for()
+        await take("function")
+        await page.get_by_role("group", name="Make a function").get_by_role("button", name=texts.CANCEL).click()
+        await graph.locator('.react-flow__node[aria-label^="test_and_fetch"] .flow-title').first.click()
+        await page.get_by_role("complementary").get_by_role("region", name="Branches").wait_for()
+        await take("parallel")
+        await page.get_by_role("navigation", name="Open function").get_by_role("button", name="Back").click()
+
+
+async def _open_function(screen: Screen, call: str, name: str) -> None:
+    """Open a function from the panel of a call of it, which the search finds."""
+    page = screen.page
+    await page.keyboard.press("/")
+    search = page.get_by_role("dialog", name="Find a command or an object")
+    await search.get_by_role("option").first.wait_for()
+    await page.keyboard.type(f"{call} act")
+    await search.get_by_role("option").filter(has=page.get_by_text(call, exact=True)).first.click()
+    panel = page.get_by_role("complementary")
+    await panel.get_by_role("heading", name=call, exact=True).wait_for()
+    await panel.get_by_role("button", name="Open function").click()
+    await page.get_by_role("navigation", name="Open function").get_by_text(name, exact=True).wait_for()
 
 
 async def _operator(browser: Browser, run: Run, to: Path) -> None:

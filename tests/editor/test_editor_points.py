@@ -305,6 +305,11 @@ async def test_robot_is_previewed_and_moved_to_a_taught_orientation(place: Place
     turned = Orientation.from_rotation_vector(0.0, 0.0, 0.4) * now
     point = await place.add_point("taught", Position(**tool["position"]), turned)
     down = point.orientations[0].id
+    # An action shows the pose of its parameter.
+    await place.select("pick")
+    for shown in ("Boolean(window.__engine.item(id).ghost)", "!window.__engine.item(id).ghost"):
+        await place.button("Show pose in the 3D view").click()
+        await screen.until(f"id => {shown}", place.robot)
     await place.select("taught")
     await page.get_by_role("button", name=re.compile("^down")).first.click()
     before = (await screen.item(place.robot))["joints"]
@@ -388,6 +393,16 @@ async def test_copies_in_a_row_and_locked_points(place: Place) -> None:
         return sum(each.name.startswith("feeder_copy") for each in (await place.saved()).action_points) == 2
 
     await until(both, "the second, which is made after the first")
+    await place.select("feeder")
+    await page.get_by_text("Copies in a row").click()
+    await place.button("Mirror Y").click()
+
+    async def mirrored() -> bool:
+        copies = [each for each in (await place.saved()).action_points if each.name.startswith("feeder_copy")]
+        sides = [(each.position.x, each.position.y) for each in copies]
+        return (source.position.x, -source.position.y) in sides
+
+    await until(mirrored, "the mirrored copy")
     # A point locked by another user cannot be changed; the button names the user.
 
     async def locked() -> bool:

@@ -103,6 +103,14 @@ export function copyPoint(id: string, count: number, step: Position): Promise<st
   });
 }
 
+/** Copy a point and its children to the other side of the origin of the parent, along an axis. Orientations stay. */
+export function mirrorPoint(id: string, axis: keyof Position): Promise<string> {
+  return refusal(async () => {
+    const from = now().doc?.points[id]?.position;
+    if (from) await call("CopyActionPoint", { id, position: { ...from, [axis]: -from[axis] } }, newStep());
+  });
+}
+
 export const removePoint = (id: string) => refusal(() => call("RemoveActionPoint", { id }));
 export const renamePoint = (id: string, new_name: string) =>
   refusal(() => held(id, () => call("RenameActionPoint", { action_point_id: id, new_name })));

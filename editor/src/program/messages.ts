@@ -13,9 +13,12 @@ export function shownMessage({ doc, program }: Pick<State, "doc" | "program">): 
   return text === undefined ? "" : String(JSON.parse(text));
 }
 
-/** The address that the server adds at the end of a message, and IP addresses in a sentence, with their preposition. */
+/**
+ * The address that the server adds at the end of a message, and IP addresses and serial ports in a sentence, with their
+ * preposition.
+ */
 const LABEL = /(?<=\S) \[([^[\]]+)\]$/;
-const HOST = / (?:\(|\p{Ll}{2,5} )?((?:\d{1,3}\.){3}\d{1,3}(?::\d+)?)\)?/gu;
+const HOST = / (?:\(|\p{Ll}{2,5} )?((?:socket:\/\/)?(?:\d{1,3}\.){3}\d{1,3}(?::\d+)?|\/dev\/[\w/-]+)\)?/gu;
 
 /** Split a message of a device into the text for operators, and the addresses in it, which are for technicians. */
 export function splitAddress(message: string): { text: string; address: string } {

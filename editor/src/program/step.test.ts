@@ -35,6 +35,17 @@ describe("the running step", () => {
     expect([step?.started, step?.usual]).toEqual([undefined, undefined]);
   });
 
+  it("shows the value that a running action has received instead of the name of a result", () => {
+    const values = (...trace: TraceEntry[]) => {
+      const state = running(trace);
+      const { a } = state.doc?.actions ?? {};
+      if (a) a.parameters = [{ name: "by", type: "link", value: '"b/default/0"' }];
+      return stepsOf(state)[0]?.values;
+    };
+    expect(values(call(1, { parameters: ["0.02"] }))).toBe("by 20\u00a0mm");
+    expect([values(), values(call(1, { parameters: ["0.02"], duration: 2 }))]).toEqual(["", ""]);
+  });
+
   it("compares its duration with earlier ones that succeeded", () => {
     const [step] = stepsOf(
       running([

@@ -6,7 +6,7 @@ import { anyAction } from "../store/scope";
 import type { Of, OpenDocument, State } from "../store/state";
 import { decoded } from "./decoded";
 import { errorAt } from "./errorExits";
-import { calledBy, metaOf } from "./logic";
+import { calledBy, metaOf, PASSED_ON } from "./logic";
 import { words } from "./naming";
 import { innermost, pathWords } from "./position";
 import { type Extra, extraOf, shownUnit, textOf } from "./values";
@@ -47,7 +47,7 @@ export function stepsOf(state: State): Step[] {
         name: pathWords(state, id),
         device: doc.objects[action.type.split("/")[0] ?? ""]?.name ?? calledBy(doc, action)?.name ?? "",
         does: firstSentence(metaOf(types, doc, action)?.description),
-        values: valuesOf(doc, types, action),
+        values: valuesOf(doc, types, action, isOpen(calls.at(-1)) ? calls.at(-1)?.parameters : []),
         started: startOf(calls),
         usual: meanDuration(calls),
       },
@@ -62,8 +62,12 @@ export function isLate({ started, usual }: Step, time: number): boolean {
 
 function startOf(calls: readonly TraceEntry[]): number | undefined {
   const last = calls.at(-1);
-  return last && last.duration === undefined && last.error === undefined ? Date.parse(last.started) : undefined;
+  return isOpen(last) ? Date.parse(last.started) : undefined;
 }
+
+/** Return whether a call has not ended. */
+const isOpen = (call: TraceEntry | undefined): call is TraceEntry =>
+  call !== undefined && call.duration === undefined && call.error === undefined;
 
 function meanDuration(calls: readonly TraceEntry[]): number | undefined {
   const durations = calls.flatMap(({ duration, error }) =>
@@ -77,18 +81,29 @@ function firstSentence(description = ""): string {
   return (/^[^.;\n]+/.exec(description.trim())?.[0] ?? "").trim();
 }
 
-/** Return the first values that the name and the point of an action do not already tell, with their units. */
-export function valuesOf(doc: OpenDocument, types: State["types"], action: Of<Action>): string {
-  const meta = metaOf(types, doc, action);
+/**
+ * Return the first values that the name and the point of an action do not already tell, with their units.
+ *
+ * `sent`: the values that the running action has received, in the order of its parameters; then results and variables
+ * are shown by their values, not by their names, and left out while these are unknown.
+ */
+export function valuesOf(
+  doc: OpenDocument,
+  types: State["types"],
+  action: Of<Action>,
+  sent?: readonly string[],
+): string {
+  const parameters = metaOf(types, doc, action)?.parameters ?? [];
   return action.parameters
     .flatMap((parameter) => {
-      const value = shortValue(
-        doc,
-        action,
-        parameter,
-        extraOf(meta?.parameters.find((each) => each.name === parameter.name)),
-      );
-      return value ? [`${words(parameter.name)} ${value}`] : [];
+      const index = parameters.findIndex((each) => each.name === parameter.name);
+      const wanted = parameters[index];
+      const value = sent?.[index];
+      const varies = ["link", PASSED_ON].includes(parameter.type);
+      if (sent && varies && (value === undefined || !wanted)) return [];
+      const shown = varies && value !== undefined && wanted ? { name: "", type: wanted.type, value } : parameter;
+      const text = shortValue(doc, action, shown, extraOf(wanted));
+      return text ? [`${words(parameter.name)} ${text}`] : [];
     })
     .slice(0, SHOWN)
     .join(" · ");

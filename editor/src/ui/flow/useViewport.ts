@@ -17,7 +17,9 @@ export interface Moves {
   whole: () => void;
 }
 
-/** Show the start of the graph, and follow the running action. `scope`: the open function, whose graph is another one. */
+/**
+ * Show the start of the graph, and follow the running action. `scope` is the open function, which has its own graph.
+ */
 export function useViewport(boxes: readonly Box[], running: string, selected: string, scope: string): Moves {
   const { getViewport, setViewport } = useReactFlow();
   const width = useStore((state) => state.width);

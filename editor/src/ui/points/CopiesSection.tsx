@@ -1,8 +1,8 @@
-/** Copy a point with its children: once, or in a row. */
+/** Copy a point with its children: once, in a row, or mirrored. */
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";
-import { copyPoint } from "../../commands/points";
+import { copyPoint, mirrorPoint } from "../../commands/points";
 import type { Position } from "../../protocol/types";
 import { Amount } from "../kit/fields";
 import { Button } from "../kit/kit";
@@ -42,6 +42,14 @@ const CopiesSection: Section["Body"] = ({ selection: { id } }) => {
       <Button why={why} isDisabled={busy} onPress={() => void ask(copyPoint(id, count, step))}>
         {count === 1 ? t`Make a copy` : t`Make ${count} copies`}
       </Button>
+      <div className="row" role="group" aria-label={t`Mirrored copy`}>
+        <span className="quiet small">{t`Mirrored copy, in the frame of the parent:`}</span>
+        {(["x", "y", "z"] as const).map((axis) => (
+          <Button key={axis} why={why} isDisabled={busy} onPress={() => void ask(mirrorPoint(id, axis))}>
+            {t`Mirror ${axis.toUpperCase()}`}
+          </Button>
+        ))}
+      </div>
       <RefusedText>{refused}</RefusedText>
     </details>
   );

@@ -20,6 +20,7 @@ import { now, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { ReachOfAction } from "../points/Reach";
 import type { Section } from "../workplace/section";
+import { ShowValue } from "./ShowValue";
 import { type Choice, ValueField } from "./ValueField";
 import "./program.css";
 
@@ -209,6 +210,8 @@ interface LiteralProps {
 
 function Literal({ state, actionId, wanted, json, field, onSet }: LiteralProps) {
   const dynamic = useDynamic(state, actionId, wanted);
+  const robotId = state.doc?.actions[actionId]?.type.split("/")[0] ?? "";
+  const robot = state.doc?.objects[robotId]?.type ?? "";
   const choices = dynamic.choices ?? placesFor(state, actionId, wanted.type);
   const hint = [field.hint, dynamic.note, choices && !dynamic.choices && typeName(wanted.type)]
     .filter(Boolean)
@@ -222,7 +225,11 @@ function Literal({ state, actionId, wanted, json, field, onSet }: LiteralProps) 
       extra={extraOf(wanted)}
       choices={choices}
       onSet={onSet}
-    />
+    >
+      {robot in state.types.robots && ["pose", "joints"].includes(wanted.type) && (
+        <ShowValue robotId={robotId} label={field.label} value={String(decoded(json))} />
+      )}
+    </ValueField>
   );
 }
 

@@ -78,4 +78,9 @@ export const TONE: Record<string, string> = {
   connecting: "warn",
 };
 
-export const about: Section = { id: "about", title: msg({ message: "About", context: "item" }), applies: () => true, Body };
+export const about: Section = {
+  id: "about",
+  title: msg({ message: "About", context: "item" }),
+  applies: () => true,
+  Body,
+};
