@@ -217,6 +217,15 @@ async def test_camera_and_robot_are_calibrated_from_pictures(
         assert abs(float(moved[1]) - off(before, CAMERA)[0]) < 3.0
         await screen.press("Check lens with markers")
         await panel.get_by_role("status").get_by_text("focal length").wait_for()
+        # The corners that the server finds are drawn over the picture.
+        await screen.press("Find markers")
+        found = await panel.get_by_text(re.compile(r"^\d markers found")).inner_text()
+        inside = (
+            "all => all.every(({ points }) => [...points].every(({ x, y }) => x > 0 && x < 1280 && y > 0 && y < 720))"
+        )
+        outlines = panel.locator(".camera-markers polygon")
+        await expect(outlines).to_have_count(int(found[0]))
+        assert await outlines.evaluate_all(inside)
         assert await screen.faults() == []
         await screen.picture("calibrated camera")
         # Undo the calibration, and repeat it.

@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { type ServerMessage, translate } from "../i18n/serverMessages";
-import type { Pivot, Pose, Position } from "../protocol/types";
+import type { MarkerCorners, Pivot, Pose, Position } from "../protocol/types";
 import { call } from "../session/connection";
 import { rest } from "../session/rest";
 import { now, setUi, store } from "../store/store";
@@ -135,6 +135,17 @@ async function storingOldPose(id: string, begin: () => Promise<unknown>): Promis
 /** Take a picture. Reject with the reason if refused. */
 export async function takePicture(id: string): Promise<Blob> {
   return (await rest(`/api/cameras/${encodeURIComponent(id)}/picture`)).blob();
+}
+
+/** Return the markers that the server finds in a picture of a camera, with their corners in pixels. */
+export async function markersIn(id: string, picture: Blob): Promise<MarkerCorners[]> {
+  const bytes = new Uint8Array(await picture.arrayBuffer());
+  // The protocol sends a picture as a text with one character per byte.
+  const image = new TextDecoder("x-user-defined")
+    .decode(bytes)
+    .replace(/[\uf780-\uf7ff]/g, (each) => String.fromCharCode(each.charCodeAt(0) - 0xf700));
+  const camera_parameters = await held(id, () => call("CameraColorParameters", { id }));
+  return call("MarkersCorners", { camera_parameters, image });
 }
 
 // -------------------------------------------------------------------------------- history and touched points

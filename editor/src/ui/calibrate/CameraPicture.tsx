@@ -1,10 +1,13 @@
 /** The picture of a camera: one, or live. It tells its rate, its age if it is old, and what went wrong. */
 
-import { t } from "@lingui/core/macro";
+import { plural, t } from "@lingui/core/macro";
 import { useEffect, useRef, useState } from "react";
-import { takePicture } from "../../commands/calibrate";
+import { markersIn, takePicture } from "../../commands/calibrate";
 import { sentence } from "../../commands/requests";
 import { decimal } from "../../formats";
+import type { MarkerCorners } from "../../protocol/types";
+import { whyUnavailable } from "../../store/permissions";
+import { useEditor } from "../../store/store";
 import { OnOff } from "../kit/fields";
 import { Button } from "../kit/kit";
 import { RefusedText } from "../points/Refusal";
@@ -20,6 +23,8 @@ export function CameraPicture({ id, why }: { id: string; why: string }) {
   const image = useRef<HTMLImageElement>(null);
   const [live, setLive] = useState(false);
   const [feed, setFeed] = useState<Feed>(NOTHING);
+  const [markers, setMarkers] = useState<MarkerCorners[] | null>(null);
+  const cannotFind = useEditor((state) => whyUnavailable(state, "MarkersCorners"));
   const follows = live && !why;
   useTicking(feed.taken === undefined ? 0 : 1);
   useEffect(() => {
@@ -36,11 +41,14 @@ export function CameraPicture({ id, why }: { id: string; why: string }) {
     if (before) URL.revokeObjectURL(before);
     await current.decode();
   };
-  const once = async () => {
+  const once = async (find = false) => {
     const taken = Date.now();
+    setMarkers(null);
     try {
-      await draw(await takePicture(id));
+      const picture = await takePicture(id);
+      await draw(picture);
       setFeed({ taken, failure: "" });
+      if (find) setMarkers(await markersIn(id, picture));
     } catch (error) {
       setFeed((known) => ({ ...known, failure: reasonOf(error) }));
     }
@@ -70,6 +78,7 @@ export function CameraPicture({ id, why }: { id: string; why: string }) {
     <>
       <figure className="camera-live" data-stale={stale}>
         <img ref={image} className="camera-picture" alt={t`Camera picture`} hidden={feed.taken === undefined} />
+        {markers && !follows && image.current && <Corners markers={markers} picture={image.current} />}
         {stale && <figcaption className="tag warn">{t`${decimal(age)} s old`}</figcaption>}
         {follows && !stale && feed.rate !== undefined && (
           <figcaption className="tag">{t`${decimal(feed.rate, 1)} pictures per second`}</figcaption>
@@ -79,6 +88,9 @@ export function CameraPicture({ id, why }: { id: string; why: string }) {
         <Button why={why} isDisabled={follows} onPress={() => void once()}>
           {t`Take a picture`}
         </Button>
+        <Button why={why || cannotFind} isDisabled={follows} onPress={() => void once(true)}>
+          {t`Find markers`}
+        </Button>
         <OnOff
           isSelected={follows}
           onChange={(on) => (why ? setFeed((known) => ({ ...known, failure: why })) : setLive(on))}
@@ -86,7 +98,29 @@ export function CameraPicture({ id, why }: { id: string; why: string }) {
           {t`Live picture`}
         </OnOff>
       </div>
+      {markers && !follows && (
+        <p className="quiet small" role="status">
+          {plural(markers.length, { one: "# marker found", other: "# markers found" })}
+        </p>
+      )}
       <RefusedText>{feed.failure}</RefusedText>
     </>
+  );
+}
+
+/** The outlines and numbers of markers over the picture in which they were found. */
+function Corners({ markers, picture }: { markers: readonly MarkerCorners[]; picture: HTMLImageElement }) {
+  const { naturalWidth: width, naturalHeight: height } = picture;
+  return (
+    <svg className="camera-markers" viewBox={`0 0 ${width} ${height}`} aria-hidden="true">
+      {markers.map(({ marker_id, corners }) => (
+        <g key={marker_id}>
+          <polygon points={corners.map(({ x, y }) => `${x},${y}`).join(" ")} strokeWidth={width / 160} />
+          <text x={corners[0]?.x} y={corners[0]?.y} dy={-width / 80} fontSize={width / 20} strokeWidth={width / 200}>
+            {marker_id}
+          </text>
+        </g>
+      ))}
+    </svg>
   );
 }
