@@ -4,6 +4,7 @@ Run `python -m arcor2_hw.client.generating` after you add or change a request or
 """
 
 import enum
+import json
 import textwrap
 import types
 import typing
@@ -62,6 +63,8 @@ class _Names:
         origin, given = typing.get_origin(kind), typing.get_args(kind)
         if origin in (typing.Union, types.UnionType):
             return " | ".join(self.of(one) for one in given)
+        if origin is typing.Literal:
+            return f"{self.use('typing', 'Literal')}[{', '.join(json.dumps(one) for one in given)}]"
         if origin is not None:
             if origin.__module__ != "builtins":
                 self.use(origin.__module__, origin.__name__)

@@ -58,6 +58,7 @@ from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHo
 from arcor2_hw.data.package import PackageSummary
 from arcor2_hw.data.parameter import IdValue, Parameter
 from arcor2_hw.data.parts import ConfirmedPart, PartBooks
+from arcor2_hw.data.persons import LogOnChangedData, Person
 from arcor2_hw.data.position import ProgramPosition, ProgramStep
 from arcor2_hw.data.project import (
     ActionParameter,
@@ -94,6 +95,7 @@ from arcor2_hw.data.rpc.history import HistoryData, RestoreRevisionData, UndoDat
 from arcor2_hw.data.rpc.locks import LockHolder, LockType, TakeOverLocksData
 from arcor2_hw.data.rpc.object_types import DeleteObjectTypesData, ObjectAimingAddPointData
 from arcor2_hw.data.rpc.operation import JogFrame, JogRobotData, StopAllData
+from arcor2_hw.data.rpc.persons import ListPersonsData, LogOnData
 from arcor2_hw.data.rpc.projects import ListProjectsData
 from arcor2_hw.data.rpc.robots import RobotEventKind, StepAxis, StepMode, StepWhat
 from arcor2_hw.data.rpc.scenes import CheckConnectionData, FoundDevice, ListScenesData, Pivot
@@ -247,6 +249,17 @@ class Requests(ABC):
     ) -> None:
         """AddOverride. Needs the role advanced user."""
 
+    async def add_person(
+        self,
+        *,
+        name: str,
+        role: Literal["operator", "standard_user", "advanced_user", "technician", "programmer"],
+        pin: str = "",
+        card: str = "",
+        timeout: float | None = None,
+    ) -> Person:
+        """AddPerson: name, role, and PIN, card or both. Needs the role programmer."""
+
     async def add_project_parameter(
         self,
         *,
@@ -319,6 +332,22 @@ class Requests(ABC):
     async def cancel_dry_run(self, *, timeout: float | None = None) -> None:
         """CancelDryRun. Needs the role standard user."""
 
+    async def change_person(
+        self,
+        id: str,
+        *,
+        name: str | Unset = UNSET,
+        role: Literal["operator", "standard_user", "advanced_user", "technician", "programmer"] | Unset = UNSET,
+        pin: str | Unset = UNSET,
+        card: str | Unset = UNSET,
+        unlock: bool = False,
+        timeout: float | None = None,
+    ) -> Person:
+        """ChangePerson: what changes. An empty `pin` or `card` is removed; `unlock` ends all lock-outs.
+
+        Needs the role programmer.
+        """
+
     async def check_calibration(
         self,
         id: str,
@@ -368,6 +397,9 @@ class Requests(ABC):
 
     async def copy_scene(self, *, source_id: str, target_name: str, timeout: float | None = None) -> str:
         """CopyScene. Needs the role technician."""
+
+    async def create_administrator(self, *, name: str, pin: str, timeout: float | None = None) -> Person:
+        """CreateAdministrator: name and PIN of the first person. Needs the role operator."""
 
     async def decide_held(
         self,
@@ -598,6 +630,9 @@ class Requests(ABC):
         Needs the role standard user.
         """
 
+    async def keep_logged_on(self, *, timeout: float | None = None) -> None:
+        """KeepLoggedOn. Needs the role operator."""
+
     async def list_alarms(
         self,
         *,
@@ -630,6 +665,9 @@ class Requests(ABC):
     async def list_packages(self, *, timeout: float | None = None) -> list[PackageSummary]:
         """ListPackages. Needs the role operator."""
 
+    async def list_persons(self, *, timeout: float | None = None) -> ListPersonsData:
+        """ListPersons. Needs the role operator."""
+
     async def list_projects(self, *, timeout: float | None = None) -> list[ListProjectsData]:
         """ListProjects. Needs the role operator."""
 
@@ -649,6 +687,20 @@ class Requests(ABC):
 
     async def list_scenes(self, *, timeout: float | None = None) -> list[ListScenesData]:
         """ListScenes. Needs the role operator."""
+
+    async def log_off(self, *, timeout: float | None = None) -> None:
+        """LogOff. Needs the role operator."""
+
+    async def log_on(
+        self,
+        *,
+        person: str | Unset = UNSET,
+        pin: str | Unset = UNSET,
+        card: str | Unset = UNSET,
+        session: str | Unset = UNSET,
+        timeout: float | None = None,
+    ) -> LogOnData:
+        """LogOn: `person` (an id) and `pin`, or `card`, or `session` of an earlier answer. Needs the role operator."""
 
     async def make_function(
         self,
@@ -876,6 +928,9 @@ class Requests(ABC):
 
     async def remove_logic_item(self, logic_item_id: str, *, timeout: float | None = None) -> None:
         """RemoveLogicItem. Needs the role standard user."""
+
+    async def remove_person(self, id: str, *, timeout: float | None = None) -> None:
+        """RemovePerson. Needs the role programmer."""
 
     async def remove_project_parameter(self, id: str, *, dry_run: bool = False, timeout: float | None = None) -> None:
         """RemoveProjectParameter. Needs the role advanced user."""
@@ -1349,6 +1404,10 @@ class Requests(ABC):
     ) -> EventStream[TypedEvent[ProjectRobotJoints]]: ...
     @overload
     def follow(
+        self, name: Literal["LogOnChanged"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[LogOnChangedData]]: ...
+    @overload
+    def follow(
         self, name: Literal["LogicItemChanged"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[LogicItem]]: ...
     @overload
@@ -1411,6 +1470,8 @@ class Requests(ABC):
     ) -> EventStream[TypedEvent[PackageStateData]]: ...
     @overload
     def follow(self, name: Literal["PartsChanged"], /, *, limit: int = LIMIT) -> EventStream[TypedEvent[PartBooks]]: ...
+    @overload
+    def follow(self, name: Literal["PersonChanged"], /, *, limit: int = LIMIT) -> EventStream[TypedEvent[Person]]: ...
     @overload
     def follow(
         self, name: Literal["ProcessState"], /, *, limit: int = LIMIT

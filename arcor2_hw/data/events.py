@@ -28,6 +28,7 @@ from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHo
 from arcor2_hw.data.package import CollisionModels, PackageStateEnum, PackageSummary
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.parts import PartBooks
+from arcor2_hw.data.persons import LogOnChangedData, Person
 from arcor2_hw.data.position import ProgramPosition
 from arcor2_hw.data.project import (
     BareAction,
@@ -374,8 +375,10 @@ EVENTS: Final = {
         EventType("Held", HeldData, Role.OPERATOR, additional=True),
         EventType("HistoryChanged", HistoryChangedData, Role.OPERATOR, additional=True),
         EventType("HoldDecided", HoldDecidedData, Role.OPERATOR, additional=True),
+        EventType("LogOnChanged", LogOnChangedData, Role.OPERATOR, additional=True),
         EventType("MovePreview", MovePreviewData, Role.OPERATOR, additional=True),
         EventType("PartsChanged", PartBooks, Role.OPERATOR, additional=True),
+        EventType("PersonChanged", Person, Role.OPERATOR, additional=True),
         EventType("ProgramPosition", ProgramPosition, Role.OPERATOR, additional=True),
         EventType("ReachabilityChanged", ReachabilityData, Role.OPERATOR, additional=True),
         EventType("RunChanged", Run, Role.OPERATOR, additional=True),

@@ -1,9 +1,12 @@
 """Roles of users. Each role may do what the previous ones may."""
 
 import enum
-from typing import Final
+from typing import Final, Literal, TypeAlias, cast
 
 from arcor2_hw.messages import Message, translatable
+
+RoleName: TypeAlias = Literal["operator", "standard_user", "advanced_user", "technician", "programmer"]
+"""The name of a role in data and on the command line."""
 
 
 class Role(enum.IntEnum):
@@ -19,6 +22,11 @@ class Role(enum.IntEnum):
     """Sets up workplaces: objects, poses, calibration."""
     PROGRAMMER = 5
     """Adds object types."""
+
+    @property
+    def identifier(self) -> RoleName:
+        """The name in data."""
+        return cast("RoleName", self.name.lower())
 
     @property
     def shown(self) -> Message:

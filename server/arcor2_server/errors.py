@@ -26,3 +26,9 @@ class NotRegistered(RequestRefused):
     """The request needs a registered user."""
 
     code = "not_registered"
+
+
+class LogOnNeeded(RequestRefused):
+    """The request needs a person who is logged on."""
+
+    code = "log_on_needed"

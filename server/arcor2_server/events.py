@@ -8,6 +8,7 @@ import msgspec
 
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.events import EVENTS, ChangeType, Event
+from arcor2_hw.data.persons import Person
 from arcor2_hw.data.role import Role
 
 encode: Final = msgspec.json.Encoder().encode
@@ -29,9 +30,19 @@ class Connection(Protocol):
     number: int
     user: str | None
     """Name of the registered user, None before RegisterUser."""
-    role: Role
+    person: Person | None
+    """The person who is logged on at this device."""
+    address: str
     follows: frozenset[str]
     """Other users whose view states the client receives."""
+
+    @property
+    def role(self) -> Role:
+        """What the client may do: the lower role of its token and of the person who is logged on."""
+
+    @property
+    def device(self) -> str:
+        """The id of its token, else its address."""
 
     def put(self, message: bytes) -> None:
         """Queue an encoded message."""

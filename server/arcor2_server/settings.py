@@ -78,6 +78,8 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     """Role of clients if no token is required."""
     served_size: int = 16 * MIB
     drained_size: int = 32 * MIB
+    log_off_after: float = 300.0
+    """Time without activity after which a person is logged off at a shared device; 0: never."""
     requests_in_flight: int = 256
     """Maximum number of concurrent requests of a client; more are not read from its connection."""
     outgoing_bytes: int = 40 * MIB
@@ -219,6 +221,7 @@ _VARIABLES: Final = {
     DEVICE_FILES: "device_files",
     "ARCOR2_HW_HISTORY_LIMIT": "history_limit",
     "ARCOR2_HW_DEFAULT_ROLE": "default_role",
+    "ARCOR2_HW_LOG_OFF_AFTER": "log_off_after",
     "ARCOR2_HW_OUTGOING_BYTES": "outgoing_bytes",
     "ARCOR2_HW_OUTGOING_AGE": "outgoing_age",
     "ARCOR2_HW_PING_INTERVAL": "ping_interval",

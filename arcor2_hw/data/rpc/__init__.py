@@ -15,6 +15,7 @@ from arcor2_hw.data.rpc.history import *
 from arcor2_hw.data.rpc.locks import *
 from arcor2_hw.data.rpc.object_types import *
 from arcor2_hw.data.rpc.operation import *
+from arcor2_hw.data.rpc.persons import *
 from arcor2_hw.data.rpc.projects import *
 from arcor2_hw.data.rpc.robots import *
 from arcor2_hw.data.rpc.scenes import *
@@ -33,6 +34,7 @@ _ALL: Final = (
     *LOCK_RPCS,
     *OBJECT_TYPE_RPCS,
     *OPERATION_RPCS,
+    *PERSON_RPCS,
     *PROJECT_RPCS,
     *ROBOT_RPCS,
     *SCENE_RPCS,

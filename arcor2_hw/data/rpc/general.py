@@ -17,10 +17,11 @@ class AuthenticateArgs(Data, frozen=True):
 
 
 class AuthenticateData(Data, frozen=True):
-    """Answer to Authenticate: the name of the token and its role."""
+    """Answer to Authenticate: the name of the token and its role; `shared`: true if persons have to log on."""
 
     name: str
     role: str
+    shared: bool | Unset = UNSET
 
 
 class IdArgs(Data, frozen=True):

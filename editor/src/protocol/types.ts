@@ -238,6 +238,14 @@ export interface AddOverrideArgs {
   override: Parameter;
 }
 
+/** Arguments of AddPerson: name, role, and PIN, card or both. */
+export interface AddPersonArgs {
+  name: string;
+  role: "operator" | "standard_user" | "advanced_user" | "technician" | "programmer";
+  pin?: string;
+  card?: string;
+}
+
 /** Arguments of AddProjectParameter; actions can change a `variable`. */
 export interface AddProjectParameterArgs {
   name: string;
@@ -359,10 +367,11 @@ export interface AuthenticateArgs {
   token: string;
 }
 
-/** Answer to Authenticate: the name of the token and its role. */
+/** Answer to Authenticate: the name of the token and its role; `shared`: true if persons have to log on. */
 export interface AuthenticateData {
   name: string;
   role: string;
+  shared?: boolean;
 }
 
 /** An action without parameters and flows; `type` is `<object id>/<action name>`, or `<function id>/call`. */
@@ -536,6 +545,16 @@ export interface CarriedPart {
   model?: ObjectModel;
 }
 
+/** Arguments of ChangePerson: what changes. An empty `pin` or `card` is removed; `unlock` ends all lock-outs. */
+export interface ChangePersonArgs {
+  id: string;
+  name?: string;
+  role?: "operator" | "standard_user" | "advanced_user" | "technician" | "programmer";
+  pin?: string;
+  card?: string;
+  unlock?: boolean;
+}
+
 /** Kind of change of the item in an event. */
 export type ChangeType = "add" | "update" | "remove" | "update_base";
 
@@ -645,6 +664,12 @@ export interface CounterValue {
   id: string;
   name: string;
   value: number;
+}
+
+/** Arguments of CreateAdministrator: name and PIN of the first person. */
+export interface CreateAdministratorArgs {
+  name: string;
+  pin: string;
 }
 
 /** A cylinder around its origin along z, m. */
@@ -1201,6 +1226,22 @@ export interface ListCalibrationsData {
   records: CalibrationRecord[];
 }
 
+/**
+ * Answer to ListPersons.
+ *
+ * Args:
+ *     persons: all persons, by name.
+ *     shared: whether this connection needs a person who logs on.
+ *     needs_administrator: whether this connection may send CreateAdministrator.
+ *     logged_on: id of the person who is logged on at this connection.
+ */
+export interface ListPersonsData {
+  persons: Person[];
+  shared: boolean;
+  needs_administrator: boolean;
+  logged_on?: string;
+}
+
 /** Answer to ListProjects; `problem_messages` as in ListScenes. */
 export interface ListProjectsData {
   name: string;
@@ -1252,8 +1293,62 @@ export interface LockHolder {
   left?: string;
 }
 
+/**
+ * Wrong PINs of a person at a device.
+ *
+ * Args:
+ *     device: name of the token of the device, or its address.
+ *     wrong: number of wrong PINs since the last log-on there.
+ *     until: when the person can try again there; unset if they can try now.
+ */
+export interface LockOut {
+  device: string;
+  wrong: number;
+  until?: string;
+}
+
 /** Kinds of write lock. */
 export type LockType = "TREE" | "OBJECT";
+
+/** Arguments of LogOn: `person` (an id) and `pin`, or `card`, or `session` of an earlier answer. */
+export interface LogOnArgs {
+  person?: string;
+  pin?: string;
+  card?: string;
+  session?: string;
+}
+
+/**
+ * Data of LogOnChanged: who is logged on at the connection, and why somebody was logged off.
+ *
+ * Args:
+ *     role: the role of the connection.
+ *     person: the person; unset if nobody is logged on.
+ *     reason: why the server logged the person off; empty otherwise.
+ */
+export interface LogOnChangedData {
+  role: "operator" | "standard_user" | "advanced_user" | "technician" | "programmer";
+  person?: Person;
+  reason: string;
+  key?: string;
+  values?: Record<string, string | Message>;
+}
+
+/**
+ * Answer to LogOn.
+ *
+ * Args:
+ *     person: who is logged on.
+ *     role: the role of this connection, the lower one of the person and of the token.
+ *     session: a secret by which this device logs the person on again after a lost connection, and for REST.
+ *     log_off_after: time without activity after which the person is logged off, s; 0: never.
+ */
+export interface LogOnData {
+  person: Person;
+  role: "operator" | "standard_user" | "advanced_user" | "technician" | "programmer";
+  session: string;
+  log_off_after: number;
+}
 
 /**
  * A comparison of a value with a constant, or with another value.
@@ -1733,6 +1828,26 @@ export interface PartCounts {
   in_cell: number;
 }
 
+/**
+ * A person who logs on at shared devices.
+ *
+ * Args:
+ *     id: id of the person.
+ *     name: their name, which is unique.
+ *     role: their role. The token of the device may lower it.
+ *     pin: whether they log on with a PIN.
+ *     card: whether they log on with a card.
+ *     lock_outs: wrong PINs; only administrators receive them.
+ */
+export interface Person {
+  id: string;
+  name: string;
+  role: "operator" | "standard_user" | "advanced_user" | "technician" | "programmer";
+  pin: boolean;
+  card: boolean;
+  lock_outs: LockOut[];
+}
+
 /** Values of PivotEnum in UpdateObjectPoseUsingRobot. */
 export type Pivot = "top" | "middle" | "bottom";
 
@@ -2050,6 +2165,11 @@ export interface RemoveFunctionResultArgs {
 /** Arguments of RemoveLogicItem. */
 export interface RemoveLogicItemArgs {
   logic_item_id: string;
+}
+
+/** Arguments of RemovePerson. */
+export interface RemovePersonArgs {
+  id: string;
 }
 
 /** Arguments of RemoveProjectParameter. */
@@ -2956,6 +3076,7 @@ export interface Requests {
   AddLogicItem: { args: AddLogicItemArgs; data: undefined };
   AddObjectToScene: { args: AddObjectToSceneArgs; data: undefined };
   AddOverride: { args: AddOverrideArgs; data: undefined };
+  AddPerson: { args: AddPersonArgs; data: Person };
   AddProjectParameter: { args: AddProjectParameterArgs; data: undefined };
   AddSceneObject: { args: AddObjectToSceneArgs; data: undefined };
   AddSceneShape: { args: AddVirtualCollisionObjectToSceneArgs; data: undefined };
@@ -2969,6 +3090,7 @@ export interface Requests {
   CameraColorParameters: { args: CameraColorParametersArgs; data: CameraParameters };
   CancelAction: { args: undefined; data: undefined };
   CancelDryRun: { args: undefined; data: undefined };
+  ChangePerson: { args: ChangePersonArgs; data: Person };
   CheckCalibration: { args: CheckCalibrationArgs; data: CalibrationCheck };
   CheckConnection: { args: CheckConnectionArgs; data: CheckConnectionData };
   CheckScript: { args: ScriptArgs; data: CheckScriptData };
@@ -2978,6 +3100,7 @@ export interface Requests {
   CopyActionPoint: { args: CopyActionPointArgs; data: undefined };
   CopyProject: { args: CopyProjectArgs; data: undefined };
   CopyScene: { args: CopySceneArgs; data: string };
+  CreateAdministrator: { args: CreateAdministratorArgs; data: Person };
   DecideHeld: { args: DecideHeldArgs; data: undefined };
   DeleteObjectTypes: { args: string[] | undefined; data: DeleteObjectTypesData[] };
   DeleteOverride: { args: DeleteOverrideArgs; data: undefined };
@@ -3016,13 +3139,17 @@ export interface Requests {
   ImportScript: { args: ScriptArgs; data: ImportScriptData };
   InverseKinematics: { args: InverseKinematicsArgs; data: Joint[] };
   JogRobot: { args: JogRobotArgs; data: JogRobotData };
+  KeepLoggedOn: { args: undefined; data: undefined };
   ListAlarms: { args: ListAlarmsArgs | undefined; data: ListAlarmsData };
   ListCalibrations: { args: ListCalibrationsArgs | undefined; data: ListCalibrationsData };
   ListLocks: { args: undefined; data: LockHolder[] };
   ListPackages: { args: undefined; data: PackageSummary[] };
+  ListPersons: { args: undefined; data: ListPersonsData };
   ListProjects: { args: undefined; data: ListProjectsData[] };
   ListRuns: { args: ListRunsArgs | undefined; data: ListRunsData };
   ListScenes: { args: undefined; data: ListScenesData[] };
+  LogOff: { args: undefined; data: undefined };
+  LogOn: { args: LogOnArgs; data: LogOnData };
   MakeFunction: { args: MakeFunctionArgs; data: MakeFunctionData };
   MakeParallel: { args: MakeParallelArgs; data: MakeParallelData };
   MarkersCorners: { args: MarkersCornersArgs; data: MarkerCorners[] };
@@ -3058,6 +3185,7 @@ export interface Requests {
   RemoveFunctionParameter: { args: RemoveFunctionParameterArgs; data: undefined };
   RemoveFunctionResult: { args: RemoveFunctionResultArgs; data: undefined };
   RemoveLogicItem: { args: RemoveLogicItemArgs; data: undefined };
+  RemovePerson: { args: RemovePersonArgs; data: undefined };
   RemoveProjectParameter: { args: RemoveProjectParameterArgs; data: undefined };
   RenameAction: { args: RenameActionArgs; data: undefined };
   RenameActionPoint: { args: RenameActionPointArgs; data: undefined };
@@ -3146,6 +3274,7 @@ export interface Events {
   HistoryChanged: HistoryChangedData;
   HoldDecided: HoldDecidedData;
   JointsChanged: ProjectRobotJoints;
+  LogOnChanged: LogOnChangedData;
   LogicItemChanged: LogicItem;
   MovePreview: MovePreviewData;
   Notification: NotificationData;
@@ -3163,6 +3292,7 @@ export interface Events {
   PackageInfo: PackageInfoData;
   PackageState: PackageStateData;
   PartsChanged: PartBooks;
+  PersonChanged: Person;
   ProcessState: ProcessStateData;
   ProgramPosition: ProgramPosition;
   ProjectChanged: BareProject;
@@ -3227,6 +3357,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   AddLogicItem: 2,
   AddObjectToScene: 4,
   AddOverride: 3,
+  AddPerson: 5,
   AddProjectParameter: 3,
   AddSceneObject: 4,
   AddSceneShape: 4,
@@ -3240,6 +3371,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   CameraColorParameters: 1,
   CancelAction: 1,
   CancelDryRun: 2,
+  ChangePerson: 5,
   CheckCalibration: 1,
   CheckConnection: 4,
   CheckScript: 2,
@@ -3249,6 +3381,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   CopyActionPoint: 2,
   CopyProject: 2,
   CopyScene: 4,
+  CreateAdministrator: 1,
   DecideHeld: 1,
   DeleteObjectTypes: 5,
   DeleteOverride: 3,
@@ -3287,13 +3420,17 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   ImportScript: 2,
   InverseKinematics: 2,
   JogRobot: 2,
+  KeepLoggedOn: 1,
   ListAlarms: 1,
   ListCalibrations: 1,
   ListLocks: 1,
   ListPackages: 1,
+  ListPersons: 1,
   ListProjects: 1,
   ListRuns: 1,
   ListScenes: 1,
+  LogOff: 1,
+  LogOn: 1,
   MakeFunction: 2,
   MakeParallel: 2,
   MarkersCorners: 4,
@@ -3329,6 +3466,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   RemoveFunctionParameter: 2,
   RemoveFunctionResult: 2,
   RemoveLogicItem: 2,
+  RemovePerson: 5,
   RemoveProjectParameter: 3,
   RenameAction: 2,
   RenameActionPoint: 2,
@@ -3407,12 +3545,14 @@ export const ADDITIONAL_EVENTS = [
   "Held",
   "HistoryChanged",
   "HoldDecided",
+  "LogOnChanged",
   "MovePreview",
   "ObjectHealth",
   "ObjectObservations",
   "ObjectState",
   "ObjectValues",
   "PartsChanged",
+  "PersonChanged",
   "ProgramPosition",
   "ReachabilityChanged",
   "RobotHold",

@@ -16,7 +16,7 @@ from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.messages import Message, translatable
 from arcor2_server.access.connection_limits import CONNECTION
-from arcor2_server.access.route_options import AS_ROLE, OPEN, PERSON, ROLE
+from arcor2_server.access.route_options import AS_ROLE, OPEN, PERSON, ROLE, STOPS
 from arcor2_server.access.tokens import FILE, Token, TokenFile
 from arcor2_server.settings import ServerSettings
 
@@ -31,6 +31,9 @@ MAX_ADDRESSES: Final = 1000
 """Maximum number of addresses whose wrong tokens are counted."""
 PARAMETER: Final = "token"
 """The query parameter that may carry the token, for clients that cannot set headers, such as browsers."""
+SESSION: Final = "arcor2-session"
+"""The header with the session of a person who is logged on at a shared device."""
+LOG_ON_NEEDED: Final = Message.of("Log on at this device first.")
 
 
 class AccessRefused(Arcor2Error):
@@ -50,6 +53,16 @@ class Admission(Data, frozen=True):
 
     role: Role | None
     token: Token | None = None
+
+
+def right(ceiling: Role, *, shared: bool, person: Role | None) -> Role:
+    """Return the role of a client: the lower one of its token and of the person who is logged on.
+
+    A shared device at which nobody is logged on watches as an operator does.
+    """
+    if person is not None:
+        return min(ceiling, person)
+    return min(ceiling, Role.OPERATOR) if shared else ceiling
 
 
 def is_loopback(host: str) -> bool:
@@ -124,6 +137,10 @@ class Access:
         """The problem of the token file, empty if it is intact."""
         return self._tokens.damage
 
+    def device_names(self) -> dict[str, str]:
+        """Return the names of the tokens by id."""
+        return {token.id: token.name for token in self._tokens.all()}
+
     def repair(self) -> Message | None:
         """Repair the token file from its copy. Return its problem, None if it was intact."""
         return self._tokens.repair()
@@ -178,21 +195,30 @@ def role_needed(connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRou
     extensions: dict[str, Any] = connection.scope.get("extensions") or {}
     if role is not None and CONNECTION in extensions:
         extensions[CONNECTION].admit()
-    if admission.token is not None:
-        connection.state[PERSON] = admission.token.name
+    token, method, shared, person = admission.token, connection.scope.get("method", ""), False, None
+    if token is not None:
+        connection.state[PERSON], shared = token.name, token.shared
+    if (session := connection.headers.get(SESSION)) is not None:
+        device = address_of(connection) if token is None else token.id
+        person = connection.app.state.log_ons.person_of(session, device, active=method != "GET")
+    if person is not None:
+        connection.state[PERSON] = person.name
     if role is None:
         raise NotAuthorizedException(
             translatable("A token is needed: Authorization: Bearer ..."), headers={"WWW-Authenticate": "Bearer"}
         )
-    connection.state[AS_ROLE] = role
+    role = connection.state[AS_ROLE] = right(role, shared=shared, person=None if person is None else person.role)
     needed = handler.opt.get(ROLE, Role.PROGRAMMER)
-    if role < needed:
+    logged_off = shared and person is None
+    if role < needed or (logged_off and method != "GET" and not handler.opt.get(STOPS)):
         connection.app.state.audit.note(
             AuditOutcome.FORBIDDEN,
-            f"{connection.scope.get('method', '')} {connection.url.path}",
+            f"{method} {connection.url.path}",
             user=connection.state.get(PERSON, ""),
             role=role,
             address=address_of(connection),
         )
         message = Message.of("This needs the role {role} or a higher one.", role=needed.shown)
+        if logged_off:
+            message = LOG_ON_NEEDED
         raise PermissionDeniedException(message.text, extra=message.translation())

@@ -26,7 +26,8 @@ LONGEST_NAME: Final = 100
 class Token(Data, frozen=True):
     """One token: its name, role and expiry; `digest` is the SHA-256 of its secret.
 
-    The secret has 256 random bits, so that no slow hash is needed.
+    The secret has 256 random bits, so that no slow hash is needed. A `shared` token belongs to a device at which
+    persons log on; its role is the highest one that they have there.
     """
 
     id: str
@@ -35,6 +36,7 @@ class Token(Data, frozen=True):
     digest: str
     created: Timestamp
     expires: Timestamp | None = None
+    shared: bool = False
 
     @property
     def expired(self) -> bool:
@@ -122,13 +124,14 @@ class TokenFile:
         """Return whether a token still exists and has not expired."""
         return not token.expired and any(each.id == token.id for each in self.all())
 
-    def add(self, name: str, role: Role, days: int | None = None) -> tuple[Token, str]:
+    def add(self, name: str, role: Role, days: int | None = None, *, shared: bool = False) -> tuple[Token, str]:
         """Create a token; return it with its secret, which is not stored.
 
         Args:
             name: name of the user or device.
             role: role of the token.
             days: validity, days; None for unlimited.
+            shared: whether it belongs to a device at which persons log on.
 
         Raises:
             InvalidData: the name is not valid.
@@ -144,7 +147,7 @@ class TokenFile:
         if days is not None:
             expires = (datetime.now(UTC) + timedelta(days=days)).isoformat(timespec="seconds")
         digest = hashlib.sha256(secret.encode()).hexdigest()
-        token = Token(secrets.token_hex(4), name, role, digest, now(), expires)
+        token = Token(secrets.token_hex(4), name, role, digest, now(), expires, shared)
         with self._changing() as tokens:
             if any(each.name == name and not each.expired for each in tokens):
                 raise Conflict("There is a token for {name!r} already: revoke it first.", name=name)

@@ -48,6 +48,7 @@ from arcor2_server.rpc.object_types import ObjectTypeRequests
 from arcor2_server.rpc.operation import OperationRequests
 from arcor2_server.rpc.orientations import OrientationRequests
 from arcor2_server.rpc.parameters import ParameterRequests
+from arcor2_server.rpc.persons import PersonRequests
 from arcor2_server.rpc.project import ProjectRequests
 from arcor2_server.rpc.reachability import ReachabilityRequests
 from arcor2_server.rpc.registry import Handlers
@@ -84,6 +85,8 @@ def request_handlers(s: Server) -> Handlers:
         FunctionRequests(s.types, s.session, s.undo, editing),
         GeneralRequests(
             s.access,
+            s.persons,
+            s.log_ons,
             s.hub,
             s.users,
             s.locks,
@@ -106,6 +109,7 @@ def request_handlers(s: Server) -> Handlers:
         OperationRequests(s.types, s.session, s.online, s.execution, s.motion, s.stop_all),
         OrientationRequests(s.locks, s.session, s.online, editing),
         ParameterRequests(s.locks, s.types, s.session, editing),
+        PersonRequests(s.access, s.persons, s.log_ons),
         ProjectRequests(s.hub, s.locks, s.storage, s.types, s.session, s.online, s.type_notifications, editing, scenes),
         ReachabilityRequests(s.reachability),
         RobotRequests(s.locks, s.types, s.session, s.online, s.robots, s.kinematics, s.motion),

@@ -58,7 +58,16 @@ def endpoints(server: Server) -> tuple[Endpoint, Endpoint]:
     table = routes(handlers.by_request, handlers.cached)
 
     def endpoint(service: Service) -> Endpoint:
-        return Endpoint(service, server.settings, server.access, server.hub, server.users, server.damage, server.audit)
+        return Endpoint(
+            service,
+            server.settings,
+            server.access,
+            server.hub,
+            server.users,
+            server.damage,
+            server.audit,
+            server.log_ons,
+        )
 
     execution = execution_service(table, server.execution.state_and_info)
     return endpoint(Service(table, server.greeting)), endpoint(execution)
@@ -80,6 +89,7 @@ def create_app(server: Server) -> Litestar:
     app.state.audit = server.audit
     app.state.endpoint = endpoint
     app.state.execution = execution_endpoint
+    app.state.log_ons = server.log_ons
     app.state.host_names = HostNames.of(server.settings)
     app.state.settings = server.settings
     return app

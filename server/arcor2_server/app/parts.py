@@ -15,6 +15,9 @@ from arcor2_server.build.script_editing import ScriptEditing
 from arcor2_server.build.service import BuildService
 from arcor2_server.collaboration.lock_takeover import LockTakeover
 from arcor2_server.collaboration.locks import Locks
+from arcor2_server.collaboration.log_ons import LogOns
+from arcor2_server.collaboration.persons import Persons
+from arcor2_server.collaboration.pins import CardHashes
 from arcor2_server.collaboration.presence import PresenceBoard
 from arcor2_server.collaboration.previews import Previews
 from arcor2_server.collaboration.tasks import Tasks
@@ -55,6 +58,7 @@ from arcor2_server.storage.alarms import AlarmStore
 from arcor2_server.storage.calibrations import Calibrations
 from arcor2_server.storage.damage_notices import DataDamage
 from arcor2_server.storage.packages import Packages
+from arcor2_server.storage.persons import PersonStore
 from arcor2_server.storage.secret_migration import migrate_secrets
 from arcor2_server.storage.secret_store import SecretStore
 from arcor2_server.storage.setting_secrets import SettingSecrets
@@ -132,6 +136,8 @@ class Server:
             session, stored_name(types, storage), settings.lock_retries, settings.lock_retry_wait
         )
         users = self.users = closed(Users(hub, locks, settings))
+        persons = self.persons = Persons(PersonStore(storage), CardHashes(settings.data_dir))
+        log_ons = self.log_ons = closed(LogOns(hub, users, persons, audit, settings.log_off_after))
         lock_takeover = self.lock_takeover = LockTakeover(locks, users, session.name_of)
         tasks = self.tasks = closed(Tasks(hub))
         presence = self.presence = closed(PresenceBoard(hub, users))
@@ -166,6 +172,7 @@ class Server:
         online = self.online = closed(
             OnlineScene(scene_host, opening, hub, locks, session, robots, tasks, robot_calibrations)
         )
+        log_ons.on_end.append(online.held.logged_off)
         self.undo = Undo(locks, storage, types, session, online, dependents)
         motion = self.motion = RobotMotion(hub, types, session, online, robots, kinematics)
         cameras = self.cameras = Cameras(types, session, online)

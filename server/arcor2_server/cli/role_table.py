@@ -7,12 +7,14 @@ from litestar import Litestar
 
 from arcor2_hw.data.events import EVENTS
 from arcor2_hw.data.role import Role
-from arcor2_hw.data.rpc import RPCS
+from arcor2_hw.data.rpc import RPCS, WITHOUT_PERSON
 from arcor2_server.access.route_options import OPEN, ROLE
 
 _HEAD = """# Roles
 
 The minimum role for each request, event and route. Each role includes the permissions of the roles before it.
+A client has the role of its token. At a shared device it has the lower role of the token and of the person who is
+logged on ([persons](../protocol/persons.md)).
 This page is generated from the declarations in the source:
 `python -m arcor2_server.cli.role_table > docs/reference/roles.md`.
 """
@@ -43,6 +45,8 @@ def page(app: Litestar) -> str:
     """Return the Markdown page."""
     lines = _HEAD.splitlines()
     lines += _table("Requests", ((name, rpc.role) for name, rpc in RPCS.items()))
+    lines += ["", "## Commands of a shared device while nobody is logged on", ""]
+    lines += [", ".join(sorted(WITHOUT_PERSON)) + ". In addition every request of the role operator that only reads."]
     lines += _table("Events", ((name, event.role) for name, event in EVENTS.items()))
     lines += _table("REST", _routes(app))
     return "\n".join(lines) + "\n"

@@ -107,6 +107,16 @@ class Users:
         if client.user is not None and self._clients.get(client.user) is client:
             self._leave(client.user)
 
+    def unregister(self, client: Connection) -> None:
+        """Unregister the user of a connection that stays open, and release the locks."""
+        name = client.user
+        self.disconnected(client)
+        client.user = None
+        if name is not None and name not in self._clients:
+            if (handle := self._releases.get(name)) is not None:
+                handle.cancel()
+            self._release(name)
+
     def _leave(self, name: str) -> None:
         del self._clients[name]
         self._left[name] = now()

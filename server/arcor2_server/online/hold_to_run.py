@@ -313,6 +313,11 @@ class HoldToRun:
         for press in [press for press in self._held.values() if press.client is client]:
             self._end(press, Message.of("{user} is no longer connected", user=press.user))
 
+    def logged_off(self, client: Connection, reason: Message) -> None:
+        """Release the robots of a client at which a person was logged off."""
+        for press in [press for press in self._held.values() if press.client is client]:
+            self._end(press, reason)
+
     def stop(self, by: str) -> None:
         """End all holds because a user sent StopAll."""
         reason = Message.of("{user} stopped all motion", user=by) if by else Message.of("all motion was stopped")

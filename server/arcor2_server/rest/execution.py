@@ -198,7 +198,7 @@ class ExecutionOperations:
         how = How(query.break_on_first_action, breakpoints, by=person, on_error=query.on_error)
         await self._package_runs.run_package(id, how)
 
-    @operation("PUT", "/packages/stop", EXECUTION, Role.OPERATOR)
+    @operation("PUT", "/packages/stop", EXECUTION, Role.OPERATOR, stops=True)
     async def stop_package(self, person: str) -> None:
         """Stop the program."""
         self._execution.stop(person)

@@ -23,7 +23,7 @@ from arcor2_hw.data.audit import AuditOutcome
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.texts import check_texts
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
-from arcor2_server.access.route_options import AS_ROLE, OPEN, PERSON, ROLE
+from arcor2_server.access.route_options import AS_ROLE, OPEN, PERSON, ROLE, STOPS
 from arcor2_server.audit.changes import Change, collecting
 from arcor2_server.audit.commands import MAX_TARGET
 from arcor2_server.audit.trail import AuditTrail
@@ -85,8 +85,8 @@ class Operation:
     """A REST operation.
 
     Parameters of the handler with these names are filled from the request: `query` (a Struct), `body` (a type that
-    msgspec decodes), `upload`, `uploads`, `port` (the local port) and `person` (the name of the token, may be empty).
-    All other parameters are parts of the path.
+    msgspec decodes), `upload`, `uploads`, `port` (the local port) and `person` (the name of the person who is logged
+    on, else of the token; may be empty). All other parameters are parts of the path.
     """
 
     method: Literal["GET", "PUT", "POST", "DELETE"]
@@ -112,6 +112,8 @@ class Operation:
     """Whether the fields of the result are snake_case on the wire, as in later operations of the protocol."""
     open: bool = False
     """Whether the operation needs no token."""
+    stops: bool = False
+    """Whether a shared device may use it while nobody is logged on, since it stops something."""
     media_type: str = "application/json"
     """Media type of the result."""
     path_names: tuple[str, ...] = field(default=())
@@ -209,7 +211,9 @@ def route(declared: Operation, tasks: Tasks, audit: AuditTrail) -> HTTPRouteHand
 
     handle.__name__ = declared.handler.__name__
     handle.__doc__ = inspect.getdoc(declared.handler)
-    options = {ROLE: declared.role, SERVICE: declared.service} | ({OPEN: True} if declared.open else {})
+    options = {ROLE: declared.role, SERVICE: declared.service} | {STOPS: declared.stops}
+    if declared.open:
+        options[OPEN] = True
     return HTTPRouteHandler(
         "/".join(f"{part[:-1]}:str}}" if part.startswith("{") else part for part in declared.path.split("/")),
         http_method=HttpMethod(declared.method),

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from msgspec import Raw
 
-from arcor2_hw.data.base import Unset
+from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.events import EVENTS
 from arcor2_hw.data.rpc import (
     AuthenticateArgs,
@@ -15,20 +15,22 @@ from arcor2_hw.data.rpc import (
     SubscribeEventsArgs,
     SystemInfoData,
 )
-from arcor2_server.access.admission import Access, TooManyAttempts
+from arcor2_server.access.admission import LOG_ON_NEEDED, Access, TooManyAttempts
 from arcor2_server.collaboration.locks import Locks
+from arcor2_server.collaboration.log_ons import LogOns
+from arcor2_server.collaboration.persons import Persons
 from arcor2_server.collaboration.presence import PresenceBoard
 from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.collaboration.users import Users
 from arcor2_server.documents import Session
 from arcor2_server.documents.edit_notifications import EditNotifications
-from arcor2_server.errors import RequestRefused
+from arcor2_server.errors import LogOnNeeded, RequestRefused
 from arcor2_server.events import encode, make_event
 from arcor2_server.execution.service import Execution
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.rpc.registry import DECLARED, Context, cached, rpc
 from arcor2_server.settings import API_VERSION, VERSION
-from arcor2_server.websocket.client import CloseCode
+from arcor2_server.websocket.client import Client, CloseCode
 from arcor2_server.websocket.hub import Hub
 from arcor2_server.workspace.object_aiming import ObjectAimings
 from arcor2_server.workspace.reachability import ReachabilityBoard
@@ -58,6 +60,8 @@ class GeneralRequests:
     """Requests about the server, registration and event subscriptions."""
 
     _access: Access
+    _persons: Persons
+    _log_ons: LogOns
     _hub: Hub
     _users: Users
     _locks: Locks
@@ -91,23 +95,36 @@ class GeneralRequests:
             raise
         token = admission.token
         assert token is not None
+        if client.token is not None and client.token.id != token.id:
+            self._log_ons.log_off(client)
         was_admitted = client.admitted
         client.admit(token.role, token)
         if not was_admitted:
             context.events_to_caller += client.greeting()
             self._hub.add(client, client.events)
-        return AuthenticateData(token.name, token.role.name.lower())
+        return AuthenticateData(token.name, token.role.identifier, token.shared or UNSET)
 
     @rpc("RegisterUser")
     async def register_user(self, context: Context, args: RegisterUserArgs) -> None:
         """Register the user of this connection."""
         name = args.user_name
+        await self._require_own_name(context.client, name)
         context.events_to_caller += await self._users.register(context.client, name)
         if context.client in self._hub.subscribers("HistoryChanged"):
             context.events_to_caller.append(self._edit_notifications.history_of(context.client))
         aiming = self._object_aiming.of(name, self._session.document)
         if aiming is not None and not self._locks.holds(name, aiming.object_id):
             self._object_aiming.end(name)
+
+    async def _require_own_name(self, client: Client, name: str) -> None:
+        """Raise LogOnNeeded if a name may be used only by a person who has logged on."""
+        if client.person is not None:
+            if client.person.name != name:
+                raise LogOnNeeded("{name} is logged on at this device. Log off first.", name=client.person.name)
+        elif client.shared:
+            raise LogOnNeeded(LOG_ON_NEEDED)
+        elif await self._persons.has_name(name):
+            raise LogOnNeeded("{name} logs on with a PIN or a card. Use another name, or log on.", name=name)
 
     @rpc("SubscribeEvents")
     async def subscribe_events(self, context: Context, args: SubscribeEventsArgs) -> None:

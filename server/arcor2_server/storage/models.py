@@ -1,6 +1,6 @@
 """The database tables. Documents are stored as JSON; columns contain the fields for lists and look-ups."""
 
-from sqlalchemy import BigInteger, Boolean, ForeignKey, Integer, LargeBinary, String, Text
+from sqlalchemy import BigInteger, Boolean, Double, ForeignKey, Integer, LargeBinary, String, Text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 
@@ -160,3 +160,26 @@ class CalibrationRow(Base):
     kind: Mapped[str] = mapped_column(String(40))
     object_id: Mapped[str] = mapped_column(String(255), index=True)
     document: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class PersonRow(Base):
+    """A person who logs on at shared devices, as JSON. PIN and card are hashes."""
+
+    __tablename__ = "person"
+
+    id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    document: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class PersonLockOutRow(Base):
+    """The number of wrong PINs of a person at a device; `until`: when the next try is possible, s since the epoch.
+
+    `person` is empty for wrong cards.
+    """
+
+    __tablename__ = "person_lock_out"
+
+    person: Mapped[str] = mapped_column(String(255), primary_key=True)
+    device: Mapped[str] = mapped_column(String(255), primary_key=True)
+    wrong: Mapped[int] = mapped_column(Integer)
+    until: Mapped[float] = mapped_column(Double)

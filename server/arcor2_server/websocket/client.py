@@ -11,7 +11,9 @@ from typing import Final, Protocol
 import structlog
 
 from arcor2_hw.data.events import Event
+from arcor2_hw.data.persons import Person
 from arcor2_hw.data.role import Role
+from arcor2_server.access.admission import right
 from arcor2_server.access.tokens import Token
 from arcor2_server.settings import ServerSettings
 
@@ -82,7 +84,10 @@ class Client:
         self.address = address
         self.greeting = greeting
         self.events = events
-        self.role: Role = Role.OPERATOR
+        self.ceiling: Role = Role.OPERATOR
+        """The role of the token, which no person exceeds at this device."""
+        self.person: Person | None = None
+        """The person who is logged on."""
         self.token: Token | None = None
         """The token of the client, if it sent one."""
         self.follows: frozenset[str] = frozenset()
@@ -103,10 +108,31 @@ class Client:
 
     def admit(self, role: Role, token: Token | None = None) -> None:
         """Admit the client with a role."""
-        self.role, self.token, self.admitted = role, token, True
+        self.ceiling, self.token, self.admitted = role, token, True
         self._wire.admit()
         if token is not None:
             log.info("client admitted", client=self.number, token=token.id, name=token.name, role=role.name.lower())
+
+    @property
+    def shared(self) -> bool:
+        """Whether persons log on at this device."""
+        return self.token is not None and self.token.shared
+
+    @property
+    def logged_off(self) -> bool:
+        """Whether this device is shared and nobody is logged on, so that it may only watch and stop."""
+        return self.shared and self.person is None
+
+    @property
+    def role(self) -> Role:
+        """What the client may do: the lower role of its token and of the person who is logged on."""
+        person = None if self.person is None else Role[self.person.role.upper()]
+        return right(self.ceiling, shared=self.shared, person=person)
+
+    @property
+    def device(self) -> str:
+        """The id of the token, else the address."""
+        return self.address if self.token is None else self.token.id
 
     @property
     def name(self) -> str:

@@ -16,9 +16,11 @@ from arcor2_hw.data.rpc import Request, Rpc
 from arcor2_hw.data.texts import SHORTEST, check_texts
 from arcor2_hw.exceptions import Arcor2Error, TextTooLong
 from arcor2_hw.messages import Message
+from arcor2_server.access.admission import LOG_ON_NEEDED
 from arcor2_server.audit import commands
 from arcor2_server.audit.changes import Change, collecting
 from arcor2_server.audit.trail import AuditTrail
+from arcor2_server.collaboration.log_ons import LogOns
 from arcor2_server.errors import RequestRefused
 from arcor2_server.websocket.answers import Head, answer, refusal, shortened
 from arcor2_server.websocket.client import Client
@@ -40,9 +42,10 @@ def refuse(client: Client, request: "Request | Head", message: Message, code: st
 class Dispatcher:
     """Calls the handlers of requests and answers them."""
 
-    def __init__(self, hub: Hub, audit: AuditTrail) -> None:
+    def __init__(self, hub: Hub, audit: AuditTrail, log_ons: LogOns) -> None:
         self._hub = hub
         self._audit = audit
+        self._log_ons = log_ons
         self._holds: WeakKeyDictionary[Client, tuple[str, str, int, str]] = WeakKeyDictionary()
         """The last noted hold-to-run request of each client."""
 
@@ -81,11 +84,15 @@ class Dispatcher:
 
     async def _run(self, client: Client, request: Request, route: Route) -> None:
         rpc = route.rpc
-        if client.role < rpc.role:
+        if client.role < rpc.role and not (client.logged_off and commands.needs_person(rpc)):
             needed = Message.of(
                 "{request} needs the role {role} or a higher one.", request=rpc.name, role=Role(rpc.role).shown
             )
             refuse(client, request, needed, "forbidden")
+            self._note(AuditOutcome.FORBIDDEN, client, rpc, UNSET)
+            return
+        if client.logged_off and commands.needs_person(rpc):
+            refuse(client, request, LOG_ON_NEEDED, "log_on_needed")
             self._note(AuditOutcome.FORBIDDEN, client, rpc, UNSET)
             return
         args = route.default
@@ -113,6 +120,8 @@ class Dispatcher:
             missing = Message.of("{request} is not available in this version.", request=rpc.name)
             refuse(client, request, missing, "not_available")
             return
+        if client.person is not None and commands.is_command(rpc) and not self._is_renewal(client, rpc, args):
+            self._log_ons.touch(client)
         context = Context(client, request.dry_run and rpc.dry_run, rpc.name, request.codes, request.step)
         with collecting() as changes:
             try:
@@ -158,6 +167,11 @@ class Dispatcher:
             reason=reason,
             changes=changes,
         )
+
+    def _is_renewal(self, client: Client, rpc: Rpc, args: Any) -> bool:
+        """Return whether a request renews a hold-to-run motion. A button may be held without a person at the device."""
+        hold = getattr(args, "hold", None)
+        return hold is not None and self._holds.get(client, ())[:3] == (rpc.name, args.robot_id, hold)
 
     def _send(self, client: Client, message: bytes, context: Context) -> None:
         """Send an answer with the events of its request."""

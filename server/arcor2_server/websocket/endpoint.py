@@ -13,6 +13,7 @@ from arcor2_hw.messages import Message
 from arcor2_server.access.admission import Access, AccessRefused, address_of
 from arcor2_server.audit.trail import AuditTrail
 from arcor2_server.background import BackgroundTasks
+from arcor2_server.collaboration.log_ons import LogOns
 from arcor2_server.collaboration.users import Users
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage.damage_notices import DataDamage
@@ -66,6 +67,7 @@ class Endpoint:
         users: Users,
         damage: DataDamage,
         audit: AuditTrail,
+        log_ons: LogOns,
     ) -> None:
         self.service = service
         self._settings = settings
@@ -73,7 +75,8 @@ class Endpoint:
         self._hub = hub
         self._users = users
         self._damage = damage
-        self._dispatcher = Dispatcher(hub, audit)
+        self._log_ons = log_ons
+        self._dispatcher = Dispatcher(hub, audit, log_ons)
         self._requests = BackgroundTasks()
         self._watch: asyncio.Task[None] | None = None
 
@@ -115,7 +118,7 @@ class Endpoint:
             log.info("client disconnected", client=client.number, user=client.user)
 
     async def _watch_tokens(self) -> None:
-        """Close the connections with invalid tokens, and report a damaged token file."""
+        """Close the connections with invalid tokens, report a damaged token file, and apply changes of persons."""
         reported = self._access.damage
         while True:
             await asyncio.sleep(TOKENS_PERIOD)
@@ -127,6 +130,10 @@ class Endpoint:
                     break
                 if not valid:
                     client.close(CloseCode.NOT_ADMITTED, "the token is not valid any more")
+            try:
+                await self._log_ons.refresh()
+            except StorageError as error:
+                log.error("persons cannot be read", error=str(error))
             if reported != (reported := self._access.damage) and reported:
                 self._damage.report(reported)
 

@@ -14,6 +14,7 @@ from arcor2_hw.data.project import Action, ActionPoint, Flow, Project
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.messages import Message
 from arcor2_server.errors import RequestRefused
 from arcor2_server.online import hold_to_run
 from arcor2_server.rpc import operation as _operation  # noqa: F401 - for its handlers
@@ -230,6 +231,20 @@ async def test_a_closed_connection_stops_the_motion(arm: Server) -> None:
     assert (await report(arm))[1] == 1
     assert arm.services.online.held.holder(OBJ) is None
     assert arm.services.online.moving == set()
+
+
+@serving(with_arm)
+async def test_logging_off_stops_the_motion(arm: Server) -> None:
+    bob = await join(arm, "bob")
+    hand = Hand(arm)
+    await hand.jog(new=True)
+    arm.services.online.held.logged_off(bob, Message.of("bob logged off"))  # he holds no robot
+    arm.services.online.held.logged_off(arm.client, Message.of("alice logged off"))
+    event = await bob.event("RobotHold", lambda data: not data["held"])
+    assert event["reason"] == "alice logged off"
+    assert (await report(arm))[1] == 1
+    with pytest.raises(RequestRefused, match="press it again"):
+        await hand.jog()
 
 
 @serving(with_arm)

@@ -97,6 +97,8 @@ def meaningless(kind: Any) -> Any:
             return {"no_such_thing": None}
         case info.EnumType() as choice:
             return next(iter(choice.cls)).value
+        case info.LiteralType() as literal:
+            return literal.values[0]
         case info.UnionType() as union:
             return meaningless(union.types[0])
         case other:

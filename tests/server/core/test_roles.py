@@ -73,7 +73,7 @@ async def test_event_needs_its_role(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     hub, wires = Hub(), [NoWire(), NoWire()]
     for wire, role in zip(wires, (Role.OPERATOR, Role.TECHNICIAN), strict=True):
         client = Client(wire, settings)
-        client.role = role
+        client.ceiling = role
         hub.add(client)
         hub.send(client, make_event("SceneSaved"))
     hub.broadcast(make_event("SceneSaved"))

@@ -74,7 +74,7 @@ async def test_the_declared_role_is_required(tmp_path: Path) -> None:
     async with open_stage(tmp_path) as stage:
         operator = await stage.person("olga")
         (client,) = stage.services.hub.clients
-        client.role = Role.OPERATOR
+        client.ceiling = Role.OPERATOR
         for name, role in ROLES.items():
             assert RPCS[name].role is role
             if name == "StopAll":  # allowed in every state

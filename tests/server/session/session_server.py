@@ -35,6 +35,9 @@ from arcor2_server.audit.trail import AuditTrail
 from arcor2_server.build.script_editing import ScriptEditing
 from arcor2_server.collaboration.lock_takeover import LockTakeover
 from arcor2_server.collaboration.locks import Locks
+from arcor2_server.collaboration.log_ons import LogOns
+from arcor2_server.collaboration.persons import Persons
+from arcor2_server.collaboration.pins import CardHashes
 from arcor2_server.collaboration.presence import PresenceBoard
 from arcor2_server.collaboration.previews import Previews
 from arcor2_server.collaboration.tasks import Tasks
@@ -53,6 +56,7 @@ from arcor2_server.online.undo import Undo
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
 from arcor2_server.storage.damage_notices import DataDamage
+from arcor2_server.storage.persons import PersonStore
 from arcor2_server.storage.secret_store import SecretStore
 from arcor2_server.storage.setting_secrets import SettingSecrets
 from arcor2_server.storage.shared_data import SharedData
@@ -222,12 +226,14 @@ class Refused(Exception):
 class Person:
     """A client of the server. It stores answers and events in order until the test takes them."""
 
-    def __init__(self, server: "SessionServer") -> None:
+    def __init__(self, server: "SessionServer", token: str = "") -> None:
         self.server = server
         self._messages: list[dict[str, Any]] = []
         self._answers: dict[int, asyncio.Future[dict[str, Any]]] = {}
         self._number = 1000
         self._socket: Any = _Socket(self._received)
+        if token:
+            self._socket.query_params["token"] = token
         self._served = asyncio.create_task(server.endpoint.serve(self._socket))
 
     def _received(self, message: dict[str, Any]) -> None:
@@ -301,8 +307,8 @@ class SessionServer:
     def session(self) -> Session:
         return self.services.session
 
-    async def person(self, name: str = "") -> Person:
-        person = Person(self)
+    async def person(self, name: str = "", token: str = "") -> Person:
+        person = Person(self, token)
         self._people.append(person)
         if name:
             await person.ask("RegisterUser", user_name=name)
@@ -331,13 +337,17 @@ async def open_server(directory: Path, **settings: Any) -> AsyncIterator[Session
 
     locks = Locks(session, stored_name(known, storage), chosen.lock_retries, chosen.lock_retry_wait)
     users = Users(hub, locks, chosen)
+    audit = AuditTrail(chosen.audit_file, str)  # not opened: it only collects entries
+    persons = Persons(PersonStore(storage), CardHashes(directory))
     try:
         await session.open()
         try:
             parts: Any = Parts(
                 settings=chosen,
                 access=Access(chosen),
-                audit=AuditTrail(chosen.audit_file, str),  # not opened: it only collects entries
+                audit=audit,
+                persons=persons,
+                log_ons=(log_ons := LogOns(hub, users, persons, audit, chosen.log_off_after)),
                 hub=hub,
                 users=users,
                 locks=locks,
@@ -375,6 +385,7 @@ async def open_server(directory: Path, **settings: Any) -> AsyncIterator[Session
                 await parts.saved_problems.close()
                 for part in (parts.edit_notifications, parts.presence, parts.previews, parts.tasks):
                     part.close()
+                log_ons.close()
         finally:
             await session.close()
     finally:

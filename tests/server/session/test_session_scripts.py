@@ -168,10 +168,10 @@ async def test_import_needs_the_role_of_the_changes(server: SessionServer, alice
     checked = await alice.ask("CheckScript", script=with_parameter, revision=loaded["revision"])
     assert [(each["kind"], each["name"]) for each in checked["changes"]] == [("parameter", "speed")]
     [client] = [each for each in server.services.hub.clients if each.user == "alice"]
-    client.role = Role.STANDARD_USER
+    client.ceiling = Role.STANDARD_USER
     found = await alice.ask("CheckScript", script=with_parameter, revision=loaded["revision"])
     assert "advanced" in found["problems"][0]["message"]
-    client.role = Role.OPERATOR
+    client.ceiling = Role.OPERATOR
     assert (await alice.ask("ProjectScript"))["script"] == loaded["script"]
     with pytest.raises(Refused):
         await alice.ask("ImportScript", script=loaded["script"], revision=loaded["revision"])

@@ -183,7 +183,7 @@ async def test_undo_needs_the_role_of_the_edit(server: SessionServer, alice: Per
     await work.project("p")
     await alice.ask("AddProjectParameter", name="x", type="double", value="0.5")
     (client,) = [client for client in server.services.hub.clients if client.user == "alice"]
-    client.role = Role.STANDARD_USER
+    client.ceiling = Role.STANDARD_USER
     assert "advanced user" in (await refused(alice)).replace("_", " ")
     assert "advanced user" in (await refused(alice, "RestoreRevision", revision=0)).replace("_", " ")
     await alice.ask("Undo", number=server.session.revision - 1)

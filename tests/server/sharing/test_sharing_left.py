@@ -24,7 +24,7 @@ async def leave(person: Person) -> None:
 def of(person: Person, role: Role) -> None:
     client = person.server.services.users.client_of("bob")
     assert client is not None
-    client.role = role
+    client.ceiling = role
 
 
 async def test_locks_of_a_user_who_left_are_listed_and_taken_over(

@@ -141,7 +141,7 @@ async def test_invalid_drags_are_refused(
         await drag(alice, robot, 1.0)
     client = server.services.users.client_of("alice")
     assert client is not None
-    client.role = Role.STANDARD_USER
+    client.ceiling = Role.STANDARD_USER
     with pytest.raises(Refused, match="technician"):
         await drag(alice, robot, 1.0)
 

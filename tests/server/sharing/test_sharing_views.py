@@ -87,7 +87,7 @@ async def test_invalid_view_states_are_refused(
 async def test_an_operator_changes_only_own_view_states(alice: Person, server: SessionServer) -> None:
     client = server.services.users.client_of("alice")
     assert client is not None
-    client.role = Role.OPERATOR
+    client.ceiling = Role.OPERATOR
     await alice.ask("SetViewState", scope="user", values={"stars": []})
     with pytest.raises(Refused, match="standard_user"):
         await alice.ask("SetViewState", scope="shared", values={"place/END": 1})
