@@ -15,6 +15,7 @@ from typing import Final
 
 import msgspec
 import structlog
+from msgspec.structs import replace
 
 from arcor2_hw.data.audit import AuditChange, AuditCheck, AuditEntry, AuditQuery
 from arcor2_hw.exceptions import StorageError
@@ -34,6 +35,8 @@ _BUSY_TIMEOUT: Final = 5.0
 """Time to wait for a lock of the file, s: another process may read it."""
 _NO_DIGEST: Final = bytes(32)
 """Digest before the first entry."""
+_UNREADABLE: Final = b"unreadable"
+"""Stands for the digest of a damaged head."""
 _FIELDS: Final = tuple(field.name for field in msgspec.structs.fields(AuditEntry))
 _COLUMNS: Final = ", ".join(_FIELDS)
 _SCHEMA: Final = """
@@ -72,7 +75,7 @@ def _digest_after(previous: bytes, row: Row) -> bytes:
 
 
 class AuditFile:
-    """The file of the audit trail. One thread of one process writes it; others may read it.
+    """The file of the audit trail. Several processes may write and read it, each with one thread that writes.
 
     Raises:
         StorageError: each method, if the file cannot be used.
@@ -106,18 +109,27 @@ class AuditFile:
             self.close()
             raise _unusable(self.path, error) from error
 
-    def append(self, rows: Sequence[Row]) -> None:
-        """Write entries with consecutive numbers to the disk."""
+    def require_head(self) -> None:
+        """Raise StorageError if entries were removed at the end, so that a new entry does not hide that."""
+        number, digest = self._read_head()
+        if number > self.last or (number == self.last and digest != self._digest) or digest == _UNREADABLE:
+            raise _unusable(self.path, RuntimeError(f"it was edited: the newest entry is not {number}"))
+
+    def append(self, entries: Sequence[AuditEntry]) -> None:
+        """Write entries to the disk, with the next numbers."""
         assert self._connection is not None
-        digest = self._digest
         try:
             with self._connection:
                 self._connection.execute("begin immediate")
-                for row in rows:
+                number, digest = _newest(self._connection)
+                if number <= self.last:  # no other process has written; removed and edited entries stay noticeable
+                    number, digest = self.last, self._digest
+                for number, entry in enumerate(entries, number + 1):  # noqa: B020
+                    row = row_of(replace(entry, number=number))
                     digest = _digest_after(digest, row)
                     self._connection.execute(_INSERT, (*row, digest))
-                self._prune(rows[-1][0])
-            self.last, self._digest = rows[-1][0], digest
+                self._prune(number)
+            self.last, self._digest = number, digest
             head = f"{self.last} {digest.hex()}\n".encode().ljust(_HEAD_SIZE)
             os.pwrite(self._descriptor, head, 0)
         except (sqlite3.Error, OSError) as error:
@@ -199,7 +211,7 @@ class AuditFile:
         try:
             return (int(text[0]), bytes.fromhex(text[1])) if text else (0, _NO_DIGEST)
         except (ValueError, IndexError):
-            return 1, b"unreadable"  # reported as a difference
+            return 1, _UNREADABLE  # reported as a difference
 
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:

@@ -16,7 +16,7 @@ from arcor2_hw.data.base import now
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import StorageError
 from arcor2_hw.messages import Message
-from arcor2_server.audit.chain import AuditFile, row_of
+from arcor2_server.audit.chain import AuditFile
 from arcor2_server.audit.changes import Change
 from arcor2_server.files import aside
 
@@ -28,6 +28,8 @@ LARGEST_CHANGES: Final = 256 * 1024
 """Maximum size of the changes of an entry, bytes."""
 LONGEST_REASON: Final = 1000
 """Maximum length of the reason of a refusal, characters."""
+ENDED_EARLY: Final = "The request was cancelled after it had made these changes."
+"""Reason of the entry of a cancelled request."""
 MOST_WAITING: Final = 10_000
 """Maximum number of entries that wait for a file that cannot be written."""
 RETRY_AFTER: Final = 5.0
@@ -157,11 +159,10 @@ class AuditTrail:
 
     def _write_all(self, noted: list[Noted], lost: int) -> int:
         """Write entries and remove them from the list. Return by how much the number of lost entries changes."""
-        first = self._file.last + 1
         lines = [*noted, _losses(lost)] if lost else noted
         try:
             if lines:
-                self._file.append([row_of(_entry(number, each)) for number, each in enumerate(lines, first)])
+                self._file.append([_entry(each) for each in lines])
         except StorageError as error:
             log.error("audit trail not written", waiting=len(noted), lost=lost, reason=str(error))
             dropped = max(len(noted) - MOST_WAITING, 0)
@@ -184,14 +185,15 @@ class AuditTrail:
         return await asyncio.to_thread(self._file.check)
 
 
-def _entry(number: int, noted: Noted) -> AuditEntry:
+def _entry(noted: Noted) -> AuditEntry:
+    """Return an entry, which the file numbers."""
     changes = [AuditChange(each.kind, each.id, each.before, each.after) for each in noted.changes]
     reason = noted.reason
     if changes and len(msgspec.json.encode(changes)) > LARGEST_CHANGES:
         reason = f"Changed items: {len(changes)}. Their values are too large for the audit trail."
         changes = []
     return AuditEntry(
-        number, noted.time, noted.outcome, noted.request, noted.target, noted.user, noted.role, noted.address, reason,
+        0, noted.time, noted.outcome, noted.request, noted.target, noted.user, noted.role, noted.address, reason,
         changes,
     )  # fmt: skip
 

@@ -32,8 +32,6 @@ class ExitStatus(enum.IntEnum):
     """A cell file is damaged or contradictory."""
     DEVICE_UNREACHABLE = 12
     """A device did not connect, or is not ready for use."""
-    NO_TOKENS = 13
-    """Other machines could reach a server that requires no token."""
     CERTIFICATE_UNUSABLE = 14
     """The certificate or its key cannot be read, or they do not match."""
     DIFFERENT = 15

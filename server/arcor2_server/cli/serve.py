@@ -30,9 +30,10 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.cell import Cell, read_cell
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound, StorageError
-from arcor2_server.access.addresses import certified_hosts
-from arcor2_server.access.admission import is_local, is_loopback
+from arcor2_server.access.addresses import certified_hosts, server_addresses
+from arcor2_server.access.admission import PARAMETER, is_local, is_loopback
 from arcor2_server.access.tokens import TokenFile
+from arcor2_server.audit.command_line import note_command
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.log import setup as server_logging
 from arcor2_server.settings import DEVICE_FILES_NAME, LegacyListener, ServerSettings
@@ -51,6 +52,9 @@ PREPARE_AFTER = 0.5
 
 RENEW_PERIOD = 600.0
 """Time between two checks of the certificate, s."""
+
+FIRST_DEVICE = "first device"
+"""Name of the token that the first start on a network creates."""
 
 GC_THRESHOLD = (700, 10, 10)
 """The default thresholds of the interpreter, which `main` raises for the imports."""
@@ -145,11 +149,11 @@ def serve(
             data_directory(settings.data_dir),
             contextlib.ExitStack() as sockets,
         ):
-            check_access(settings)
             listener = sockets.enter_context(contextlib.closing(listen(settings.host, settings.port)))
             settings, classic_listeners = _bind_classic(settings, sockets)
             settings, legacy_listener = _bind_legacy(settings, sockets)
             settings, certificate = _certificate(settings, tls, self_signed)
+            welcome(settings, listener.getsockname()[1])
             with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
                 runner.run(run(settings, [listener, *classic_listeners], legacy_listener, certificate))
     except CannotServe as error:
@@ -174,22 +178,22 @@ def _markers(given: Path | None, path: Path | None, cell: Cell | None) -> Calibr
     return configuration_of(yaml_of(path.read_bytes(), str(path))["calibration"], f"{path}: calibration")
 
 
-def check_access(settings: ServerSettings) -> None:
-    """Check that other machines cannot connect without a token.
+def welcome(settings: ServerSettings, port: int) -> None:
+    """At the first start on a network, create the token of the first device and print an address with it.
+
+    The device asks for an administrator. Later it needs a person who logs on, so the address gives no more rights.
+    `port` is the bound port.
 
     Raises:
-        CannotServe: other machines can connect, and no token is required.
-        StorageError: the tokens cannot be read.
+        StorageError: the tokens cannot be read or written.
     """
     tokens = TokenFile(settings.data_dir)
     if is_local(settings) or settings.insecure or tokens.all() or tokens.unusable:
         return
-    raise CannotServe(
-        ExitStatus.NO_TOKENS,
-        f"other machines can connect to {settings.host}{' through a proxy' if settings.trusted_proxies else ''}, "
-        "but no token exists yet. "
-        "Create one with `arcor2-hw token add NAME --role programmer`, or use --insecure",
-    )
+    _, secret = tokens.add(FIRST_DEVICE, Role.PROGRAMMER, shared=True)
+    note_command(settings.audit_file, "serve", FIRST_DEVICE)
+    here = server_addresses(settings, port).addresses or ["http://ADDRESS-OF-THE-PROXY"]
+    sys.stderr.write(f"arcor2-hw serve: first start. Add an administrator at {here[0]}/?{PARAMETER}={secret}\n")
 
 
 def _legacy(address: str, role: LegacyRole) -> LegacyListener:

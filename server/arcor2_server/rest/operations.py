@@ -26,7 +26,7 @@ from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_server.access.route_options import AS_ROLE, OPEN, PERSON, ROLE, STOPS
 from arcor2_server.audit.changes import Change, collecting
 from arcor2_server.audit.commands import MAX_TARGET
-from arcor2_server.audit.trail import AuditTrail
+from arcor2_server.audit.trail import ENDED_EARLY, AuditTrail
 from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.rest.field_names import camelized, camelized_names, snake, snaked
 from arcor2_server.rest.responses import SERVICE, InternalError, Unsupported, refusal
@@ -185,6 +185,7 @@ def route(declared: Operation, tasks: Tasks, audit: AuditTrail) -> HTTPRouteHand
 
     async def handle(request: Request[Any, Any, Any]) -> Response[Any]:
         uploads: list[UploadFile] = []
+        changes: list[Change] = []
         try:
             with receiving(request, tasks, declared.title, declared.shown_from), collecting() as changes:
                 done = await declared.handler(**await _arguments(declared, request, uploads))
@@ -195,7 +196,11 @@ def route(declared: Operation, tasks: Tasks, audit: AuditTrail) -> HTTPRouteHand
             if error.detail:
                 log.info("request refused", path=declared.path, reason=str(error)[:1000], detail=error.detail[:1000])
             return refusal(declared.service, error)
-        except (HTTPException, asyncio.CancelledError):
+        except asyncio.CancelledError:
+            if changes:
+                note(AuditOutcome.REFUSED, request, ENDED_EARLY, changes)
+            raise
+        except HTTPException:
             raise
         except Exception:
             reference = secrets.token_hex(4)

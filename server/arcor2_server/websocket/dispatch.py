@@ -1,5 +1,6 @@
 """From a decoded request to its handler, and from the result to the answer."""
 
+import asyncio
 import logging
 import secrets
 from collections.abc import Sequence
@@ -19,7 +20,7 @@ from arcor2_hw.messages import Message
 from arcor2_server.access.admission import LOG_ON_NEEDED
 from arcor2_server.audit import commands
 from arcor2_server.audit.changes import Change, collecting
-from arcor2_server.audit.trail import AuditTrail
+from arcor2_server.audit.trail import ENDED_EARLY, AuditTrail
 from arcor2_server.collaboration.log_ons import LogOns
 from arcor2_server.errors import RequestRefused
 from arcor2_server.websocket.answers import Head, answer, refusal, shortened
@@ -136,6 +137,10 @@ class Dispatcher:
                 if not context.dry_run:
                     self._note(AuditOutcome.REFUSED, client, rpc, args, str(error), changes)
                 return
+            except asyncio.CancelledError:
+                if changes:
+                    self._note(AuditOutcome.REFUSED, client, rpc, args, ENDED_EARLY, changes)
+                raise
         self._send(client, answer(request, UNSET if data is None else data), context)
         if not context.dry_run:
             self._note(AuditOutcome.DONE, client, rpc, args, changes=changes)

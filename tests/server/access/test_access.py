@@ -24,7 +24,9 @@ from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.access import authority, certificate
 from arcor2_server.access.admission import Access, AccessRefused
 from arcor2_server.access.tokens import COPY, FILE, TokenFile
+from arcor2_server.audit.chain import AuditFile
 from arcor2_server.cli.exit_status import ExitStatus
+from arcor2_server.cli.serve import welcome
 from arcor2_server.settings import LegacyListener, ServerSettings
 from tests.server.core.serving import COMMAND, ServerProcess, Talker, running, talking
 
@@ -253,21 +255,37 @@ def start(tmp_path: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
 
 
-def test_other_machines_are_not_served_without_tokens(tmp_path: Path) -> None:
-    ended = start(tmp_path, "--host", "0.0.0.0")
-    assert ended.returncode == ExitStatus.NO_TOKENS
-    assert "token add" in ended.stderr
-    assert len(ended.stderr.splitlines()) == 1
+def test_the_first_start_on_a_network_prints_an_address_for_the_first_device(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    settings = ServerSettings(data_dir=tmp_path, host="192.0.2.7", port=0)
+    for local in (msgspec.structs.replace(settings, host="::1"), msgspec.structs.replace(settings, insecure=True)):
+        welcome(local, 1)
+    assert (TokenFile(tmp_path).all(), capsys.readouterr().err) == ([], "")
+    welcome(settings, 4711)
+    address, _, secret = capsys.readouterr().err.strip().rpartition("?token=")
+    assert address.endswith("http://192.0.2.7:4711/")
+    found = TokenFile(tmp_path).find(secret)
+    assert found is not None
+    assert (found.role, found.shared) == (Role.PROGRAMMER, True)
+    assert [entry.target for entry in AuditFile(settings.audit_file).all()] == [found.name]
+    welcome(settings, 4711)  # only once
+    assert capsys.readouterr().err == ""
 
 
-def test_a_trusted_proxy_admits_other_machines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_trusted_proxy_admits_other_machines(tmp_path: Path) -> None:
     settings = ServerSettings(data_dir=tmp_path, trusted_proxies=("127.0.0.1",))
     assert not Access(settings).open_to_all
     assert Access(msgspec.structs.replace(settings, trusted_proxies=())).open_to_all
-    monkeypatch.setenv("ARCOR2_HW_TRUSTED_PROXIES", "127.0.0.1")
-    ended = start(tmp_path)
-    assert ended.returncode == ExitStatus.NO_TOKENS
-    assert "proxy" in ended.stderr
+    async with running(tmp_path / "data", ARCOR2_HW_TRUSTED_PROXIES="127.0.0.1") as server:
+        async with connect(server.url) as socket:
+            assert "token" in await Talker(socket).refused("ListScenes")
+        (line,) = [line for line in server.log.read_text().splitlines() if "first start" in line]
+        async with connect(f"{server.url}/?token={line.rpartition('=')[2]}") as socket:
+            talker = Talker(socket)
+            assert (await talker.granted("ListPersons"))["needs_administrator"]
+            assert "Log on" in await talker.refused("NewScene", {"name": "hall"})
+            await talker.granted("StopAll")
 
 
 async def test_only_a_trusted_proxy_can_forward_client_addresses(tmp_path: Path) -> None:

@@ -10,7 +10,8 @@ from arcor2_hw.data.audit import AuditEntry, AuditOutcome, AuditQuery
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import StorageError
 from arcor2_server.audit import chain, trail
-from arcor2_server.audit.chain import AuditFile, row_of
+from arcor2_server.audit.chain import AuditFile
+from arcor2_server.audit.command_line import note_command
 from arcor2_server.audit.export import csv_chunks
 from arcor2_server.audit.trail import AuditTrail
 from tests.waiting import wait_for
@@ -21,7 +22,7 @@ def entry(number: int) -> AuditEntry:
 
 
 def append(file: AuditFile, *numbers: int) -> None:
-    file.append([row_of(entry(number)) for number in numbers])
+    file.append([entry(number) for number in numbers])
 
 
 @pytest.fixture
@@ -68,12 +69,36 @@ def test_edited_and_removed_entries_are_found(path: Path, statement: str, proble
     assert AuditFile(path).check().problem == problem
 
 
+def test_the_command_line_adds_entries_while_the_server_writes(path: Path) -> None:
+    with closing(AuditFile(path)) as server:
+        server.open()
+        append(server, 6)
+        note_command(path, "token add", "tablet")
+        append(server, 8)
+        assert [(each.number, each.request) for each in server.all()][-3:] == [
+            (6, "Request6"),
+            (7, "arcor2-hw token add"),
+            (8, "Request8"),
+        ]
+        assert server.check().problem == ""
+
+
+def test_a_new_entry_does_not_hide_removed_ones(path: Path) -> None:
+    with closing(AuditFile(path)) as server:
+        server.open()
+        change(path, "delete from entry where number = 5")
+        with pytest.raises(StorageError, match="edited"):
+            note_command(path, "token add", "tablet")
+        append(server, 6)
+        assert server.check().problem == "entries 5 to 5 are missing"
+
+
 def test_a_new_chain_does_not_match_the_head(path: Path) -> None:
     head = (path.parent / "audit.sqlite.head").read_bytes()
     path.unlink()
     with closing(AuditFile(path)) as file:
         file.open()
-        file.append([row_of(AuditEntry(n, entry(n).time, AuditOutcome.DONE, "Forged")) for n in range(1, 6)])
+        file.append([AuditEntry(n, entry(n).time, AuditOutcome.DONE, "Forged") for n in range(1, 6)])
     (path.parent / "audit.sqlite.head").write_bytes(head)
     assert "the digest of entry 5 differs from the head" in AuditFile(path).check().problem
 
