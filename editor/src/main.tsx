@@ -24,7 +24,8 @@ async function start(): Promise<void> {
   (name ? import("./engine/engine") : import("./ui/join/Join")).catch(() => {});
   const language = remembered("language");
   await persistently(() => loadCatalogue(isLanguage(language) ? language : preferredLanguage()));
-  if (name) session.join(name, remembered("token"));
+  const token = remembered("token");
+  if (name || token) session.join(name, token);
   const root = document.getElementById("root");
   if (!root) return;
   createRoot(root).render(

@@ -2,6 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { type ServerMessage, translate } from "../i18n/serverMessages";
+import { now } from "../store/store";
 import { remembered } from "./localStorage";
 
 /** Time limits, s: of requests, and of files, which have to be prepared and transferred. */
@@ -26,6 +27,8 @@ export async function rest(
   const headers = new Headers();
   const token = remembered("token");
   if (token) headers.set("Authorization", `Bearer ${token}`);
+  const { session } = now().connection;
+  if (session) headers.set("Arcor2-Session", session);
   if (json !== undefined) headers.set("Content-Type", "application/json");
   const content = json === undefined ? body : JSON.stringify(json);
   const signal = AbortSignal.timeout(deadline * 1000);

@@ -110,6 +110,8 @@ export class Session {
     else if (event.event === "ObjectObservations") now().runtime.takeObservations?.(event.data);
     else if (event.event === "AlarmChanged") for (const take of now().runtime.takeAlarm ?? []) take(event.data);
     else if (event.event === "PartsChanged") now().runtime.takeParts?.(event.data);
+    else if (event.event === "LogOnChanged")
+      void import("./logOn").then(({ changed }) => changed(event.data, () => this.onState("open", "", 0)));
     else {
       // Frequent events would push everything else out of the diary.
       if (event.event !== "MovePreview" && event.event !== "UserPresence")
@@ -183,10 +185,17 @@ export class Session {
     const isCurrent = () => epoch === this.epoch;
     try {
       if (this.token) {
-        const { role } = await call("Authenticate", { token: this.token });
-        setConnection({ role: ROLES[role.toLowerCase().replace(" ", "_") as keyof typeof ROLES] ?? ROLES.operator });
+        const { role, shared = false } = await call("Authenticate", { token: this.token });
+        setConnection({
+          role: ROLES[role.toLowerCase().replace(" ", "_") as keyof typeof ROLES] ?? ROLES.operator,
+          shared,
+        });
       }
-      await call("RegisterUser", { user_name: now().connection.user });
+      const { shared, user } = now().connection;
+      if (shared) await (await import("./logOn")).waitForPerson();
+      else if (user) await call("RegisterUser", { user_name: user });
+      else this.leave();
+      if (!isCurrent()) return;
       const server = await call("SystemInfo");
       if (!isCurrent()) return;
       setConnection({ server });

@@ -44,8 +44,8 @@ import type {
 import { initialRuntime, type Runtime } from "./runtime";
 import { initialUi, type Ui } from "./ui";
 
-/** `joining`: connected and loading. `lost`: reconnecting. */
-export type ConnectionStatus = "left" | "connecting" | "joining" | "ready" | "lost" | "refused";
+/** `person`: a person has to log on. `joining`: connected and loading. `lost`: reconnecting. */
+export type ConnectionStatus = "left" | "connecting" | "person" | "joining" | "ready" | "lost" | "refused";
 
 export interface Connection {
   status: ConnectionStatus;
@@ -54,8 +54,12 @@ export interface Connection {
   /** The server refused the connection because of a missing or invalid token. */
   needsToken: boolean;
   user: string;
-  /** Role from 1 to 5, given by the token. */
+  /** Role from 1 to 5, given by the token and by the person who is logged on. */
   role: number;
+  /** Whether persons log on at this device, the session of the one who did, and after which idle time it ends, s. */
+  shared: boolean;
+  session: string;
+  logOffAfter: number;
   server: SystemInfoData | null;
 }
 
@@ -252,7 +256,17 @@ export const NO_PROGRAM: Program = {
 
 export function initialState(): State {
   return {
-    connection: { status: "left", reason: "", needsToken: false, user: "", role: 5, server: null },
+    connection: {
+      status: "left",
+      reason: "",
+      needsToken: false,
+      user: "",
+      role: 5,
+      shared: false,
+      session: "",
+      logOffAfter: 0,
+      server: null,
+    },
     lists: { scenes: null, projects: null, packages: null, shown: "ProjectsList", highlight: "" },
     types: { byName: {}, robots: {}, actions: {} },
     doc: null,

@@ -1,4 +1,4 @@
-/** Choose the screen (join, home, workplace or operator) and frame it: connection and result above, Stop dock below. */
+/** Choose the screen (join, log-on, home, workplace or operator); connection and result above, Stop dock below. */
 
 import { t } from "@lingui/core/macro";
 import { Suspense, useEffect, useState, useSyncExternalStore } from "react";
@@ -9,9 +9,11 @@ import { isLive, isRunning, openId } from "../store/selectors";
 import { now, useEditor } from "../store/store";
 import { LostConnection } from "./connection/LostConnection";
 import { Dock } from "./dock/Dock";
+import { StopMotion } from "./dock/StopMotion";
 import { storeOpened } from "./home/recent";
 import { Waiting } from "./kit/kit";
 import { lazyComponent } from "./kit/lazy";
+import { Notices } from "./notices/Notices";
 import { Overlays } from "./search/Overlays";
 import { useScreenSettings } from "./settings/Settings";
 import { CellView } from "./workplace/CellView";
@@ -20,6 +22,7 @@ import { Workplace } from "./workplace/Workplace";
 
 /** Screens that most users see one of: a chunk each. */
 const Join = lazyComponent(() => import("./join/Join"));
+const LogOn = lazyComponent(() => import("./persons/LogOn"));
 const Home = lazyComponent(() => import("./home/Home").then((module) => ({ default: module.Home })));
 const Operator = lazyComponent(() => import("./operator/Operator"));
 const ControlBanner = lazyComponent(() => import("./workplace/ControlBanner"));
@@ -41,7 +44,7 @@ export function App() {
   const hash = useHash();
   const language = useLanguage();
   useScreenSettings();
-  const status = useEditor((state) => state.connection.status);
+  const { status, shared } = useEditor((state) => state.connection);
   const open = useEditor((state) => state.doc !== null);
   const live = useEditor(isLive);
   const touring = useEditor((state) => state.ui.tour !== null && state.doc !== null);
@@ -62,12 +65,16 @@ export function App() {
   // A lost connection does not bring users back to the join screen.
   const [been, setBeen] = useState(false);
   if (status === "ready" && !been) setBeen(true);
-  if ((status === "left" || status === "refused") && been) setBeen(false);
+  if ((status === "left" || status === "refused" || status === "person") && been) setBeen(false);
   if (!been) {
     return (
       <div className="screen">
         <Suspense fallback={<Waiting>{t`Connecting…`}</Waiting>}>
-          <Join />
+          {shared && status !== "left" && status !== "refused" ? (
+            <LogOn Stop={StopMotion} Notices={Notices} />
+          ) : (
+            <Join />
+          )}
         </Suspense>
       </div>
     );

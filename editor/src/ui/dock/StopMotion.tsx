@@ -9,7 +9,7 @@ import { useEditor } from "../../store/store";
 const TWICE = 700;
 
 export function StopMotion() {
-  const connected = useEditor((state) => state.connection.status === "ready");
+  const connected = useEditor((state) => ["ready", "person"].includes(state.connection.status));
   const [stopping, setStopping] = useState(false);
   const stop = () => {
     setStopping(true);

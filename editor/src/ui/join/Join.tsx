@@ -83,7 +83,7 @@ export default function Join() {
 }
 
 /** The language before login. A user who has chosen one sees that after joining. */
-function LanguageChoice() {
+export function LanguageChoice() {
   const language = useLanguage();
   return (
     <div className="field">

@@ -13,11 +13,12 @@ import { lazyComponent } from "../kit/lazy";
 import { colourOf, initials } from "./colours";
 import "./people.css";
 
+const LoggedOn = lazyComponent(() => import("../persons/LoggedOn"));
 const TakeOver = lazyComponent(() => import("./TakeOver"));
 
 export function People() {
   const users = useEditor((state) => state.users);
-  const me = useEditor((state) => state.connection.user);
+  const { user: me, shared } = useEditor((state) => state.connection);
   const doc = useEditor((state) => state.doc);
   const called = (name: string) => {
     if (name === me) return t`${name} (you)`;
@@ -60,6 +61,11 @@ export function People() {
         </span>
       )}
       <Gone />
+      {shared && (
+        <Suspense fallback={null}>
+          <LoggedOn />
+        </Suspense>
+      )}
     </div>
   );
 }

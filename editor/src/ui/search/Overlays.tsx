@@ -1,4 +1,4 @@
-/** Dialogs that open over every screen: search ("/"), about and keys ("?"), messages, audit trail. */
+/** Dialogs that open over every screen: search ("/"), about and keys ("?"), messages, audit trail, persons. */
 
 import { Suspense, useEffect } from "react";
 import { lazyComponent } from "../kit/lazy";
@@ -8,6 +8,7 @@ const OVERLAYS = {
   search: lazyComponent(() => import("./Palette")),
   about: lazyComponent(() => import("./About")),
   messages: lazyComponent(() => import("../notices/Messages")),
+  persons: lazyComponent(() => import("../persons/Persons")),
   audit: lazyComponent(() => import("../audit/AuditTrail")),
 };
 

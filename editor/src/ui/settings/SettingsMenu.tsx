@@ -3,6 +3,7 @@
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { chooseLanguage } from "../../commands/language";
+import { ask } from "../../commands/requests";
 import { LANGUAGES, type Language, useLanguage } from "../../i18n/catalogue";
 import { remember } from "../../session/localStorage";
 import { theSession } from "../../session/session";
@@ -21,7 +22,8 @@ const THEMES: Record<Ui["theme"], MessageDescriptor> = {
 
 export default function SettingsMenu({ defaultOpen }: { defaultOpen: boolean }) {
   const { theme, leftHanded } = useEditor((state) => state.ui);
-  const user = useEditor((state) => state.connection.user);
+  const { user, shared } = useEditor((state) => state.connection);
+  const noPersons = useEditor((state) => whyUnavailable(state, "AddPerson"));
   const language = useLanguage();
   // It needs the role that edits scenes.
   const noAudit = useEditor((state) => whyUnavailable(state, "SaveScene"));
@@ -52,8 +54,11 @@ export default function SettingsMenu({ defaultOpen }: { defaultOpen: boolean }) 
     },
     { id: "messages", label: t`Messages`, icon: "list", act: () => openOverlay("messages") },
     { id: "audit", label: t`Who did what`, icon: "people", not: noAudit, act: () => openOverlay("audit") },
+    { id: "persons", label: t`Persons`, icon: "people", not: noPersons, act: () => openOverlay("persons") },
     { id: "about", label: t`Invite others, about, keys ( ? )`, icon: "info", act: () => openOverlay("about") },
-    { id: "leave", label: t`Leave (you are ${user})`, icon: "close", act: () => theSession().leave() },
+    shared
+      ? { id: "leave", label: t`Log off ${user}`, icon: "close", act: () => void ask("LogOff") }
+      : { id: "leave", label: t`Leave (you are ${user})`, icon: "close", act: () => theSession().leave() },
   ];
   return <MoreMenu label={t`Settings`} icon="settings" choices={choices} defaultOpen={defaultOpen} />;
 }

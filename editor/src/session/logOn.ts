@@ -1,0 +1,83 @@
+/** Log-on of persons at a shared device: who is logged on, and the session that continues it after a lost connection. */
+
+import { translate } from "../i18n/serverMessages";
+import { type LogOnArgs, type LogOnChangedData, type LogOnData, ROLES } from "../protocol/types";
+import { now, setConnection } from "../store/store";
+import { call } from "./connection";
+
+declare module "../store/runtime" {
+  interface Runtime {
+    /** Receives the person who logs on while the page waits for one. */
+    takeLogOn?: ((data: LogOnData) => void) | undefined;
+  }
+}
+
+/** Kept for this page only, so that another person who opens the browser again has to log on. */
+const KEY = "arcor2-hw.session";
+
+function store(session: string): void {
+  setConnection({ session });
+  try {
+    sessionStorage.setItem(KEY, session);
+  } catch {
+    // private windows of some browsers refuse it
+  }
+}
+
+function stored(): string {
+  try {
+    return sessionStorage.getItem(KEY) ?? "";
+  } catch {
+    return now().connection.session;
+  }
+}
+
+/** Continue the session of this page, or wait until a person logs on. */
+export async function waitForPerson(): Promise<void> {
+  take((await resumed()) ?? (await entered()));
+  setConnection({ status: "joining", reason: "" });
+}
+
+async function resumed(): Promise<LogOnData | null> {
+  let tried = "";
+  // Another session may start meanwhile, by the card of the next person.
+  for (let session = stored(); session && session !== tried; session = stored()) {
+    const data = await call("LogOn", { session }).catch(() => null);
+    if (data) return data;
+    tried = session;
+  }
+  return null;
+}
+
+function entered(): Promise<LogOnData> {
+  store("");
+  return new Promise((resolve) => {
+    now().runtime.takeLogOn = resolve;
+    setConnection({ status: "person" });
+  });
+}
+
+/** Log a person on. Reject with the refusal of the server. */
+export async function logOn(args: LogOnArgs): Promise<void> {
+  const data = await call("LogOn", args);
+  take(data);
+  const { runtime } = now();
+  runtime.takeLogOn?.(data);
+  runtime.takeLogOn = undefined;
+}
+
+/** Log the person off; the log-on screen follows. */
+export const logOff = (): Promise<unknown> => call("LogOff");
+
+/** Take the data of LogOnChanged. `enter` starts over when nobody is logged on any more. */
+export function changed(data: LogOnChangedData, enter: () => void): void {
+  setConnection({ role: ROLES[data.role] });
+  if (data.person) return;
+  setConnection({ reason: translate({ ...data, text: data.reason }) });
+  enter();
+}
+
+function take({ person, role, session, log_off_after }: LogOnData): void {
+  store(session);
+  setConnection({ user: person.name, role: ROLES[role], logOffAfter: log_off_after });
+}

@@ -1,0 +1,33 @@
+import { useEffect, useRef } from "react";
+import { now } from "../../store/store";
+import { readCards } from "./cardReader";
+
+declare module "../../store/runtime" {
+  interface Runtime {
+    /** Receive the cards that are read; the newest one does. */
+    cardTakers?: ((card: string) => void)[];
+    /** Ends the reading of cards. */
+    endCards?: (() => void) | undefined;
+  }
+}
+
+/** Call `onCard` with each card that is read while `active`. Of several, the component that was shown last gets it. */
+export function useCards(onCard: (card: string) => void, active = true): void {
+  const latest = useRef(onCard);
+  latest.current = onCard;
+  useEffect(() => {
+    if (!active) return;
+    const { runtime } = now();
+    runtime.cardTakers ??= [];
+    const takers = runtime.cardTakers;
+    const take = (card: string) => latest.current(card);
+    takers.push(take);
+    runtime.endCards ??= readCards((card) => takers.at(-1)?.(card));
+    return () => {
+      takers.splice(takers.indexOf(take), 1);
+      if (takers.length > 0) return;
+      runtime.endCards?.();
+      runtime.endCards = undefined;
+    };
+  }, [active]);
+}
