@@ -106,6 +106,14 @@ class Tour:
         await page.get_by_role("dialog").get_by_role("listitem").first.wait_for()
         async for shown in self._dialog("audit trail"):
             yield shown
+        await self._button(texts.SETTINGS).click()
+        await page.get_by_role("menuitem", name=words("Persons"), exact=True).click()
+        await page.get_by_role("dialog").get_by_role("button", name=words("Add person"), exact=True).click()
+        yield "add person"
+        await page.keyboard.press("Escape")
+        await page.get_by_role("dialog").get_by_role("button", name=words("Add person"), exact=True).wait_for()
+        async for shown in self._dialog("persons"):
+            yield shown
         # As on a server that others can join.
         await page.route("**/api/joining", lambda route: route.fulfill(json=JOINING))
         for key, name in (("?", "about, with the addresses to join"), ("/", "search")):
