@@ -1,4 +1,4 @@
-"""Persons at a shared device: the first administrator, PIN and card, who is logged on, log-off, Stop without a person."""
+"""Persons at a shared device: the first administrator, PIN and card, log-off, and Stop without a person."""
 
 import asyncio
 import time

@@ -1,4 +1,4 @@
-/** Log-on of persons at a shared device: who is logged on, and the session that continues it after a lost connection. */
+/** Log-on of persons at a shared device, and the session that continues it after a lost connection. */
 
 import { translate } from "../i18n/serverMessages";
 import { type LogOnArgs, type LogOnChangedData, type LogOnData, ROLES } from "../protocol/types";

@@ -49,8 +49,8 @@ export class CardKeys {
 }
 
 /**
- * Call `onCard` with the number of each card that is read on this page, wherever the focus is. Keys of a person are given
- * to what has the focus, a little later. Return the function that ends it.
+ * Call `onCard` with the number of each card that is read on this page, wherever the focus is. Keys of a person are
+ * given to what has the focus, a little later. Return the function that ends it.
  */
 export function readCards(onCard: (card: string) => void): () => void {
   const keys = new CardKeys();
