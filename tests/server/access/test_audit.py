@@ -1,17 +1,28 @@
 """Every command and every refusal by role is one entry of the audit trail, and one line in the log."""
 
+import asyncio
 import csv
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
+from unittest.mock import AsyncMock
 
 import httpx
 
+from arcor2_hw.data.audit import AuditChange
 from arcor2_hw.data.role import Role
-from arcor2_hw.data.rpc import RPCS
+from arcor2_hw.data.rpc import RPCS, Request
 from arcor2_server.access.tokens import TokenFile
 from arcor2_server.audit import commands
 from arcor2_server.audit.chain import AuditFile
+from arcor2_server.audit.changes import record
+from arcor2_server.audit.trail import ENDED_EARLY, AuditTrail
+from arcor2_server.collaboration.log_ons import LogOns
+from arcor2_server.settings import ServerSettings
+from arcor2_server.websocket.client import Client, Wire
+from arcor2_server.websocket.dispatch import Dispatcher
+from arcor2_server.websocket.hub import Hub
+from arcor2_server.websocket.routes import Route
 from tests.server.core.serving import running, talking
 
 SECRET = "swordfish-4711"
@@ -71,6 +82,28 @@ async def test_commands_and_refusals_are_noted_once(tmp_path: Path) -> None:
     for text in (printed, exported, stored.decode(errors="replace")):
         assert SECRET not in text
         assert eva not in text
+
+
+async def test_a_cancelled_request_leaves_its_changes_in_the_trail(tmp_path: Path) -> None:
+    audit, wire, started = AuditTrail(tmp_path / "audit.sqlite", str), cast("Wire", AsyncMock()), asyncio.Event()
+    client = Client(wire, ServerSettings(data_dir=tmp_path))
+    client.ceiling = Role.TECHNICIAN
+
+    async def save(*_: Any) -> None:
+        record([AuditChange("scene", "s1", "old", "new")])
+        started.set()
+        await asyncio.Event().wait()
+
+    dispatcher = Dispatcher(Hub(), audit, cast("LogOns", None))
+    route = Route(RPCS["SaveScene"], save, None, None, None)
+    handling = asyncio.create_task(dispatcher.handle(client, Request(1, "SaveScene"), route))
+    await started.wait()
+    handling.cancel()
+    await asyncio.wait({handling})
+    noted = audit._waiting.get_nowait()
+    assert noted is not None
+    assert (noted.request, noted.outcome.value, noted.reason) == ("SaveScene", "refused", ENDED_EARLY)
+    assert [change.after for change in noted.changes] == ["new"]
 
 
 def test_requests_excluded_from_the_audit_trail_exist() -> None:
