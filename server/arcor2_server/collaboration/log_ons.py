@@ -27,6 +27,8 @@ log = structlog.get_logger(__name__)
 RESUMED_WITHIN: Final = 120.0
 """Time after a lost connection within which the device may log the person on again without a PIN, s."""
 
+ENDED: Final = Message.of("You were logged off. Log on again.")
+
 
 class LogOn:
     """A person who is logged on at a device."""
@@ -62,6 +64,7 @@ class LogOns:
         self._by_person: dict[str, LogOn] = {}
         self._by_session: dict[str, LogOn] = {}
         """By the digest of the session, so that a look-up reveals nothing by its duration."""
+        self._starting = asyncio.Lock()  # a name is registered for one person after the other
         self.on_end: list[Callable[[Connection, Message], None]] = []
         """Called with the connection at which a person was logged off, and the reason."""
         hub.on_leave.append(self._disconnected)
@@ -75,17 +78,16 @@ class LogOns:
         Raises:
             RequestRefused: a connected client has registered the name of the person.
         """
-        if (previous := self.at(client)) is not None:
-            self._end(previous, Message.of("{name} logged on at this device.", name=person.name))
-        if (elsewhere := self._by_person.get(person.id)) is not None:
-            self._end(elsewhere, Message.of("{name} logged on at another device.", name=person.name))
-        events = await self._users.register(client, person.name)
-        if (meanwhile := self._by_person.get(person.id)) is not None:
-            self._end(meanwhile, Message.of("{name} logged on at another device.", name=person.name))
-        started = LogOn(person, client)
-        self._by_person[person.id] = started
-        self._by_session[_digest(started.session)] = started
-        self._attach(started, client)
+        async with self._starting:
+            if (previous := self.at(client)) is not None:
+                self._end(previous, Message.of("{name} logged on at this device.", name=person.name))
+            if (elsewhere := self._by_person.get(person.id)) is not None:
+                self._end(elsewhere, Message.of("{name} logged on at another device.", name=person.name))
+            events = await self._users.register(client, person.name)
+            started = LogOn(person, client)
+            self._by_person[person.id] = started
+            self._by_session[_digest(started.session)] = started
+            self._attach(started, client)
         return self._answer(started, client), events
 
     async def resume(self, client: Connection, session: str) -> tuple[LogOnData, list[Event]]:
@@ -94,15 +96,19 @@ class LogOns:
         Raises:
             LogOnRefused: the session has ended, or belongs to another device.
         """
-        found = self._by_session.get(_digest(session))
-        if found is None or found.device != client.device:
-            raise LogOnRefused("You were logged off. Log on again.")
-        if (previous := self.at(client)) is not None and previous is not found:
-            self._end(previous, Message.of("{name} logged on at this device.", name=found.person.name))
-        if found.client is not None and found.client is not client:
-            self._detach(found.client)
-        events = await self._users.register(client, found.person.name)
-        self._attach(found, client)
+        async with self._starting:
+            found = self._by_session.get(_digest(session))
+            if found is None or found.device != client.device:
+                raise LogOnRefused(ENDED)
+            if (previous := self.at(client)) is not None and previous is not found:
+                self._end(previous, Message.of("{name} logged on at this device.", name=found.person.name))
+            if found.client is not None and found.client is not client:
+                self._detach(found.client)
+            events = await self._users.register(client, found.person.name)
+            if self._by_person.get(found.person.id) is not found:  # logged off meanwhile
+                self._users.unregister(client)
+                raise LogOnRefused(ENDED)
+            self._attach(found, client)
         return self._answer(found, client), events
 
     def at(self, client: Connection) -> LogOn | None:
@@ -161,11 +167,6 @@ class LogOns:
             if (client := found.client) is not None:
                 client.person = shown(person)
                 self._publish(client)
-
-    @property
-    def any(self) -> bool:
-        """Whether somebody is logged on."""
-        return bool(self._by_person)
 
     def close(self) -> None:
         """Cancel the timers."""
