@@ -18,7 +18,7 @@ CARD_KEY: Final = "cards.key"
 """File of the data directory with the key of the hashes of cards."""
 _KEY_SIZE: Final = 32
 _N: Final = 2**14
-"""Cost of scrypt. One hash takes about 50 ms and 16 MiB."""
+"""Cost of scrypt. One hash takes 50 to 100 ms and 16 MiB."""
 _R: Final = 8
 _P: Final = 1
 _MOST_MEMORY: Final = 64 * 1024 * 1024
@@ -34,7 +34,7 @@ def check_pin(pin: str) -> None:
 
 
 def hash_pin(pin: str) -> PinHash:
-    """Return the hash of a PIN. It takes about 50 ms, so call it in a thread."""
+    """Return the hash of a PIN. It takes 50 to 100 ms, so call it in a thread."""
     salt = secrets.token_bytes(16)
     return PinHash(salt.hex(), _scrypt(pin, salt, _N, _R, _P).hex(), _N, _R, _P)
 
