@@ -235,6 +235,12 @@ class PartUnconfirmed(PartError):
     code = "part_unconfirmed"
 
 
+class Interlocked(Conflict):
+    """An interlock prevents an action or a motion: a condition is not met, or another robot has the zone."""
+
+    code = "interlock"
+
+
 class InvalidProject(Arcor2Error):
     """A project cannot be converted to a program."""
 

@@ -5,7 +5,7 @@ import enum
 import inspect
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Final, NamedTuple, TypeVar, overload
+from typing import Any, Final, NamedTuple, TypeVar, overload
 
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.object_type import ActionMetadata, Again
@@ -124,6 +124,23 @@ def action(
         return function
 
     return mark if method is None else mark(method)
+
+
+def observation(method: F) -> F:
+    """Mark a method as an observation that interlocks compare.
+
+    The method returns a boolean, number, text or enumeration, or a Reading of one, and has at most one parameter, the
+    name of a point. It is called up to 20 times per second, on a thread of its own, also while an action runs. It
+    returns the newest known value, or raises DeviceError (Stale, ConnectionLost) if no recent value is known.
+    """
+    function: Any = method
+    function.__observation__ = True
+    return method
+
+
+def is_observation(method: object) -> bool:
+    """Return whether a method is an observation that interlocks compare."""
+    return bool(getattr(method, "__observation__", False))
 
 
 def metadata_of(method: object) -> ActionMetadata | None:

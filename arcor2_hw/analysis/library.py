@@ -12,6 +12,7 @@ from arcor2_hw.analysis.enumerations import enumerations_of
 from arcor2_hw.analysis.hierarchy import Hierarchy, is_known_library
 from arcor2_hw.analysis.keywords import keyword_only
 from arcor2_hw.analysis.module import ClassInfo, Import, Module, Value
+from arcor2_hw.analysis.observations import observations_of
 from arcor2_hw.analysis.presentation import display_name, of_type
 from arcor2_hw.analysis.robots import robot_meta
 from arcor2_hw.analysis.settings import SettingsReader
@@ -19,7 +20,7 @@ from arcor2_hw.analysis.source import UPLOADED, Broken, Problem, SourceFile, Sta
 from arcor2_hw.analysis.symbols import External, Resolver, is_framework
 from arcor2_hw.analysis.type_analysis import TypeAnalysis
 from arcor2_hw.data.base import UNSET
-from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ParameterMeta
+from arcor2_hw.data.object_type import ObjectAction, ObjectTypeMeta, ObservationMeta, ParameterMeta
 from arcor2_hw.data.older_names import not_offered
 from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.exceptions import InvalidData, NotFound
@@ -290,10 +291,12 @@ class Library:
         settings: list[ParameterMeta] = []
         abstract = True
         robot: RobotMeta | None = None
+        observations: list[ObservationMeta] = []
         bases = self._bases(info)
         try:
             abstract = bool(hierarchy.attribute(info, "_ABSTRACT", True)) or bool(hierarchy.unimplemented(info))
             settings = self._settings.settings(info)
+            observations = observations_of(info, hierarchy)
             if hierarchy.derives_from(info, "Robot") and not abstract:
                 robot = robot_meta(name, info, hierarchy)
         except Broken as error:
@@ -317,6 +320,7 @@ class Library:
             category=category,
             icon=icon,
             observable=True if observes is not None and observes[0].name != "Generic" else UNSET,
+            observations=observations or UNSET,
         )
         direct = hierarchy.bases(info)
         actions = tuple(self._all_actions(info, bases))

@@ -152,6 +152,21 @@ class ActionMetadata(Data, frozen=True):
     again: Again | Unset = UNSET
 
 
+class ObservationMeta(Data, frozen=True):
+    """An observation that interlocks compare: name, parameter type of its value, and description.
+
+    members: values of an enumeration, each as JSON. unit: SI; omitted without one. of_point: whether the observation
+    belongs to a point, such as an input of an I/O block, whose name the interlock states.
+    """
+
+    name: str
+    type: str
+    description: str = ""
+    unit: str | Unset = UNSET
+    members: list[str] | Unset = UNSET
+    of_point: bool | Unset = UNSET
+
+
 class Disableable(TranslatableData, frozen=True, kw_only=True):
     """Base of what a problem in a source disables; `key` and `values` translate the problem."""
 
@@ -208,7 +223,7 @@ class ObjectTypeMeta(Disableable, frozen=True):
     display_name: name for users; omitted when the type declares none.
     built_in: a base class or an installed type, which cannot be deleted. shadows: distribution and version of the
     installed type of the same name that this uploaded type replaces. observable: whether StreamObservations returns
-    values of its objects.
+    values of its objects. observations: those that interlocks compare.
     """
 
     type: str
@@ -226,6 +241,7 @@ class ObjectTypeMeta(Disableable, frozen=True):
     icon: str | Unset = UNSET
     shadows: str | Unset = UNSET
     observable: bool | Unset = UNSET
+    observations: list[ObservationMeta] | Unset = UNSET
 
     @property
     def shown_name(self) -> str:

@@ -8,6 +8,7 @@ from msgspec import field
 
 from arcor2_hw.data.base import UNSET, Data, MutableData, Timestamp, Unset
 from arcor2_hw.data.geometry import Orientation, Position
+from arcor2_hw.data.operator import Operator as Operator
 from arcor2_hw.data.parameter import Parameter, Range
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.scene import SceneObjectOverride
@@ -167,21 +168,6 @@ class ProjectLogicIf(Data, frozen=True):
     def parse_what(self) -> tuple[str, str, int]:
         """Return action id, flow and output index. Raises ValueError when `what` is not of that form."""
         return parse_link(self.what)
-
-
-class Operator(enum.StrEnum):
-    """Operators of comparisons. A range is an interval: `[` and `]` include the limit, `(` and `)` do not."""
-
-    EQUAL = "=="
-    DIFFERENT = "!="
-    LESS = "<"
-    LESS_EQUAL = "<="
-    GREATER = ">"
-    GREATER_EQUAL = ">="
-    CLOSED = "[]"
-    RIGHT_OPEN = "[)"
-    LEFT_OPEN = "(]"
-    OPEN = "()"
 
 
 class Match(enum.StrEnum):

@@ -4,6 +4,7 @@ from msgspec import field
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.interlocks import Interlock
 from arcor2_hw.data.parameter import Parameter
 
 
@@ -29,9 +30,10 @@ class BareScene(Data, frozen=True):
 
 
 class Scene(BareScene, frozen=True):
-    """A scene with its objects."""
+    """A scene with its objects. `interlocks` (not in ARCOR2) is omitted if there are none."""
 
     objects: list[SceneObject] = field(default_factory=list)
+    interlocks: list[Interlock] | Unset = UNSET
 
 
 class SceneObjectOverride(Data, frozen=True):

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, ClassVar, Final, TypeAlias
 
+from arcor2_hw.actions import observation
 from arcor2_hw.data.device import Identity, Observation, Reading
 from arcor2_hw.data.modbus_point import Point, Table, Value
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused
@@ -98,6 +99,23 @@ class MappedDevice(ModbusDevice[dict[str, Any]]):
         if name not in values:
             raise NotFound("{device} has no point {name!r} that can be read", device=self.who, name=name)
         return Reading(values[name], stamp, asked)
+
+    @observation
+    def point(self, name: str) -> Reading[float]:
+        """Return the newest value of a point that is a number. Raises NotFound, Stale, ConnectionLost."""
+        return self._newest(name, int | float)
+
+    @observation
+    def point_on(self, name: str) -> Reading[bool]:
+        """Return the newest value of a point that is a boolean. Raises NotFound, Stale, ConnectionLost."""
+        return self._newest(name, bool)
+
+    def _newest(self, name: str, kind: Any) -> Reading[Any]:
+        values, asked, stamp = self._polled.current()
+        value = values.get(name)
+        if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
+            raise NotFound("{device} has no point {name!r} of this type", device=self.who, name=name)
+        return Reading(value, stamp, asked)
 
     def observations(self) -> list[Observation]:
         """Return all points that are numbers or booleans. Raises Stale, NotConnected, ConnectionLost."""

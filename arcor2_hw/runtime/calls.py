@@ -1,8 +1,10 @@
 """Calls and stops of devices for the server. Each is answered exactly once; stops run concurrently with calls."""
 
+import contextlib
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any, Final
 
 import msgspec
 
@@ -12,12 +14,16 @@ from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.clock import Clock
 from arcor2_hw.runtime.device import STOP_DEADLINE, STOP_GRACE, Device, describe
+from arcor2_hw.runtime.interlocks import Interlocks
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.program import Program
 from arcor2_hw.runtime.stopping import SentStop, outcomes, send_stop
 from arcor2_hw.runtime.teaching import SET_MODE, Teaching
 
 Post = Callable[[m.ToServer], None]
+_Guard = Callable[[Mapping[str, Any]], contextlib.AbstractContextManager[None]]
+_ONLY_CONTROL: Final = frozenset({"check_if_ready_to_move"})
+"""Methods that the server calls to take control, and that move nothing."""
 
 
 def error_data(error: BaseException, object_id: str = "") -> m.ErrorData:
@@ -36,6 +42,7 @@ class Calls:
         clock: Runs the deadlines.
         stopping: Called for each device that is being stopped.
         teaching: Receives the changes of hand teaching mode.
+        interlocks: Admit the calls that act on a device.
     """
 
     def __init__(
@@ -45,12 +52,14 @@ class Calls:
         clock: Clock,
         stopping: Callable[[Device], None] = lambda _: None,
         teaching: Teaching | None = None,
+        interlocks: Interlocks | None = None,
     ) -> None:
         self._cell = cell
         self._post = post
         self._clock = clock
         self._stopping = stopping
         self._teaching = teaching
+        self._interlocks = interlocks
         self._answering: threading.Thread | None = None
 
     def call(self, message: m.Call) -> None:
@@ -63,7 +72,8 @@ class Calls:
             if method == "stop":
                 self.stop_motion(m.StopMotion(message.id, message.object_id))
                 return
-            job, own = device.prepare(method, message.arguments, message.control, answer)
+            guard, waits = self._guard(device, method, message.control)
+            job, own = device.prepare(method, message.arguments, message.control, answer, guard)
             lane = device.stop_lane if message.cancel else device.lane_for(method)
             lane.submit(job)
         except Exception as error:  # noqa: BLE001 - a call that cannot start is answered too
@@ -72,8 +82,23 @@ class Calls:
             return
         deadline = own if message.deadline is None else message.deadline
         if deadline is not None:
-            within = deadline
+            within = deadline + waits
             self._clock.after(within, lambda: lane.expire(job, within))
+
+    def _guard(self, device: Device, method: str, control: bool) -> tuple[_Guard | None, float]:
+        """Return the context of a call that acts on its device, and how long it may wait in it, s."""
+        interlocks = self._interlocks
+        if interlocks is None or not control or method in _ONLY_CONTROL:
+            return None, 0.0
+
+        def wait(seconds: float) -> None:
+            time.sleep(seconds)
+            device.lane_for(method).check_wanted()
+
+        return (
+            lambda keywords: interlocks.guarded(device, method, keywords.values(), wait),
+            interlocks.longest_wait(device, method),
+        )
 
     def _answer(self, message: m.Call, device: Device) -> Callable[[Job], None]:
         number = message.id

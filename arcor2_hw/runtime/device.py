@@ -1,5 +1,6 @@
 """A device in the cell host: the instance of the object type and its lanes."""
 
+import contextlib
 import inspect
 import time
 from collections.abc import Callable, Mapping
@@ -219,7 +220,12 @@ class Device:
             instance.take_control()
 
     def prepare(
-        self, method: str, arguments: Mapping[str, bytes], control: bool, notify: Callable[[Job], None]
+        self,
+        method: str,
+        arguments: Mapping[str, bytes],
+        control: bool,
+        notify: Callable[[Job], None],
+        guard: Callable[[Mapping[str, Any]], contextlib.AbstractContextManager[None]] | None = None,
     ) -> tuple[Job, float | None]:
         """Prepare the call of a method, and return it with the deadline of the method, s.
 
@@ -228,6 +234,7 @@ class Device:
             arguments: JSON by name of the parameter.
             control: Whether to take control before the call.
             notify: Called with the call when it has ended.
+            guard: Returns the context in which it runs, from its arguments by name.
 
         Raises:
             NotConnected: The device is not connected.
@@ -245,11 +252,12 @@ class Device:
         keywords = decode_arguments(bound, arguments, self.name)
 
         def run() -> Any:
-            if control:
-                self.require_not_lost(method)
-                self.take_control()
-                self.lane_for(method).check_wanted()  # a stop may have arrived while control was being taken
-            return bound(**keywords)
+            with contextlib.nullcontext() if guard is None else guard(keywords):
+                if control:
+                    self.require_not_lost(method)
+                    self.take_control()
+                    self.lane_for(method).check_wanted()  # a stop may have arrived while control was being taken
+                return bound(**keywords)
 
         return Job(method, run, notify=notify), deadline_of(bound)
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from arcor2_hw.actions.json_values import encode as encode_json
+from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.exceptions import Arcor2Error, Cancelled, Refused
 from arcor2_hw.objects import Robot
@@ -17,6 +18,7 @@ from arcor2_hw.runtime.calls import Calls, Post, error_data
 from arcor2_hw.runtime.cell import CONTROL_DEADLINE, Cell
 from arcor2_hw.runtime.clock import Clock
 from arcor2_hw.runtime.device import Device, describe
+from arcor2_hw.runtime.interlocks import Guard, Interlocks
 from arcor2_hw.runtime.jogging import Jog
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.teaching import SET_MODE, Teaching
@@ -37,6 +39,7 @@ class _Hold:
         self.arm: dict[str, Any] = {} if lease.arm_id is None else {"arm_id": lease.arm_id}
         self.newest = lease
         self.jog: Jog | None = None
+        self.guard: Guard | None = None
         self.driver_started = False
         self.lease_ids: list[int] = []
         """Ids of the leases that the next call of the driver answers."""
@@ -49,9 +52,18 @@ class _Hold:
 class Holds:
     """At most one hold of each device. Leases arrive on the reader thread and expire on the clock thread."""
 
-    def __init__(self, cell: Callable[[], Cell], post: Post, clock: Clock, calls: Calls, teaching: Teaching) -> None:
+    def __init__(
+        self,
+        cell: Callable[[], Cell],
+        post: Post,
+        clock: Clock,
+        calls: Calls,
+        teaching: Teaching,
+        interlocks: Interlocks,
+    ) -> None:
         self._cell = cell
         self._teaching = teaching
+        self._interlocks = interlocks
         self._post = post
         self._clock = clock
         self._calls = calls
@@ -144,7 +156,11 @@ class Holds:
         device, robot = hold.device, hold.device.require()
         assert isinstance(robot, Robot)
         if not hold.driver_started:
-            device.require_not_lost("jog" if hold.kind is HoldKind.JOG else "hand teaching")
+            what = "jog" if hold.kind is HoldKind.JOG else "hand teaching"
+            device.require_not_lost(what)
+            twist, frame = hold.newest.twist, hold.newest.frame
+            velocity = Position(*twist[:3]) if twist is not None and frame == "world" else None
+            hold.guard = self._interlocks.hold(device, what, velocity, lambda error: self.end(hold, error))
             device.take_control()
             device.lane.check_wanted()
             if hold.kind is HoldKind.JOG:
@@ -230,6 +246,8 @@ class Holds:
 
     def _report_end(self, hold: _Hold, problem: BaseException | None) -> None:
         device = hold.device
+        if hold.guard is not None:
+            self._interlocks.leave(hold.guard)
         error = hold.error if problem is None else describe(device, problem)
         with self._lock:
             self._ended[device.id] = hold.number

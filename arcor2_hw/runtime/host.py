@@ -25,6 +25,7 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.device import Connection
 from arcor2_hw.data.held import HeldData
+from arcor2_hw.data.interlocks import InterlockState
 from arcor2_hw.data.position import MAIN_BRANCH, Frame
 from arcor2_hw.exceptions import Arcor2Error, Conflict, ProgramFinished, ProgramStopped, Refused
 from arcor2_hw.messages import Message
@@ -35,6 +36,7 @@ from arcor2_hw.runtime.clock import Clock
 from arcor2_hw.runtime.creation import write_sources
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.holding import Holds
+from arcor2_hw.runtime.interlocks import Interlocks
 from arcor2_hw.runtime.link import Link
 from arcor2_hw.runtime.program import Program, set_current, traceback_text
 from arcor2_hw.runtime.record import RunRecord
@@ -81,8 +83,13 @@ class Host:
         self._work: SimpleQueue[m.HostBound] = SimpleQueue()
         self._subscribed: dict[str, m.Subscribe] = {}
         self._teaching = Teaching(lambda *ended: self._holds.teaching_ended(*ended))
-        self._calls = Calls(lambda: self._cell, self.link.post, self.clock, self._stopping, self._teaching)
-        self._holds = Holds(lambda: self._cell, self.link.post, self.clock, self._calls, self._teaching)
+        self._interlocks = Interlocks(lambda: self._cell, self._interlocks_changed)
+        self._calls = Calls(
+            lambda: self._cell, self.link.post, self.clock, self._stopping, self._teaching, self._interlocks
+        )
+        self._holds = Holds(
+            lambda: self._cell, self.link.post, self.clock, self._calls, self._teaching, self._interlocks
+        )
         self._streams = Streams(self.link.post_stream)
         self._rated = RatedStreams(lambda: self._cell, self.clock, self._streams)
         self._watch = Watch(self._cell, self.link.post, self._device_lost)
@@ -105,6 +112,7 @@ class Host:
         self.clock.every(OBSERVE_PERIOD, lambda: self._watch.check_all())
         self.clock.every(INTERRUPT_PERIOD, self._interrupt_script)
         self.clock.every(TEACHING_PERIOD, self._teaching.check_all)
+        self.clock.every(OBSERVE_PERIOD, self._publish_interlocks)
         self.clock.start()
         self.link.post(m.Ready(os.getpid()))
         threading.Thread(target=self._read, name="from server", daemon=True).start()
@@ -151,6 +159,7 @@ class Host:
             return False
         for device in self._cell:  # clients receive the state of each device before the scene is online
             self._watch.check_connection(device)
+        self._interlocks.configure(message.scene.interlocks)
         self.link.post(m.SceneOpened())
         self.clock.every(message.streaming_period if message.streaming_period > 0 else 0.1, self._stream_subscribed)
         return True
@@ -224,6 +233,7 @@ class Host:
             or self._holds.any
             or any(device.lane.busy_with or device.moving for device in self._cell)
         )
+        self._interlocks.close()
         stopped = wait_stopped(self._cell.stop_all(), 0.5) if active else None
         problem = self._cell.close() or stopped
         self.link.post(m.SceneClosed(None if problem is None else error_data(problem)))
@@ -239,6 +249,7 @@ class Host:
             secrets=message.secrets,
             held=self._held if message.hold_on_error else None,
             record=self._record(message),
+            interlock_states=self._interlocks_changed,
         )
         self._cell = program.cell
         self._cell.assets, self._cell.updates = message.assets, self._updates
@@ -268,6 +279,7 @@ class Host:
             save_traceback(directory, program.error)
         problem = program.settle(failed)
         self._calls.settle()  # before the devices are closed
+        program.interlocks.close()
         problem = program.cell.close() or problem
         if program.record is not None:
             program.record.close()
@@ -372,10 +384,18 @@ class Host:
                 self.program.gate.step(message.mode, message.branch)
             case m.SetBreakpoints() if self.program is not None:
                 self.program.set_shared_breakpoints(frozenset(message.shared_breakpoints))
+            case m.SetInterlocks():
+                self._interlocks.configure(message.interlocks)
             case m.DecideHeld():
                 self._decide(message)
             case m.ConfirmParts():
                 self._confirm_parts(message)
+
+    def _interlocks_changed(self, states: list[InterlockState]) -> None:
+        self.link.post(m.InterlocksChanged(states))
+
+    def _publish_interlocks(self) -> None:
+        (self._interlocks if self.program is None else self.program.interlocks).publish()
 
     def _held(self, held: HeldData, device: Device, error: BaseException) -> None:
         """Report that the program is held."""

@@ -12,6 +12,7 @@ from arcor2_hw import framing
 from arcor2_hw.data.cell import Cell
 from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.data.held import HeldData, HoldChoice
+from arcor2_hw.data.interlocks import Interlock, InterlockState
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.data.parts import ConfirmedPart, PartBooks
@@ -262,6 +263,12 @@ class ConfirmParts(ToHost, frozen=True):
     parts: list[ConfirmedPart]
 
 
+class SetInterlocks(ToHost, frozen=True):
+    """Replace the interlocks of the open scene. Those of a program are in its package."""
+
+    interlocks: list[Interlock]
+
+
 class StopProgram(ToHost, frozen=True):
     """Stop all devices, then end the script by an exception."""
 
@@ -397,6 +404,12 @@ class PartsChanged(ToServer, frozen=True):
     books: PartBooks
 
 
+class InterlocksChanged(ToServer, frozen=True):
+    """The states of all interlocks, after a change."""
+
+    states: list[InterlockState]
+
+
 class HandTeachingEnded(ToServer, frozen=True):
     """A robot has left hand teaching mode without a request. `error`: the reason."""
 
@@ -454,6 +467,7 @@ HostBound = (
     | SetBreakpoints
     | DecideHeld
     | ConfirmParts
+    | SetInterlocks
     | StopProgram
     | CloseScene
 )
@@ -473,6 +487,7 @@ ServerBound = (
     | ProgramChanged
     | ProgramHeld
     | PartsChanged
+    | InterlocksChanged
     | DeviceChanged
     | LogLine
 )

@@ -5,7 +5,7 @@ import itertools
 import threading
 import time
 import traceback
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence, Set
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple, Protocol
 
@@ -20,6 +20,7 @@ from arcor2_hw.data.events import (
     ProjectExceptionData,
 )
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.interlocks import InterlockState
 from arcor2_hw.data.position import MAIN_BRANCH, Frame
 from arcor2_hw.data.project import CALL, Project, ProjectRobotJoints
 from arcor2_hw.data.secret import ObjectSecrets
@@ -36,6 +37,7 @@ from arcor2_hw.messages import Message
 from arcor2_hw.runtime.branches import Action, Branches
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
+from arcor2_hw.runtime.interlocks import Interlocks
 from arcor2_hw.runtime.pacing import Gate
 from arcor2_hw.runtime.record import RunRecord
 from arcor2_hw.runtime.recovery import ActionCall, Decision, Post, Recovery, mark_decided
@@ -110,6 +112,7 @@ class Program:
         secrets: Mapping[str, ObjectSecrets] = MappingProxyType({}),
         held: Post | None = None,
         record: RunRecord | None = None,
+        interlock_states: Callable[[list[InterlockState]], None] = lambda _: None,
     ) -> None:
         self.channel = channel
         self.record = record
@@ -120,6 +123,7 @@ class Program:
         """Values of the secret settings by object id."""
         self.package_id = package_id
         self.cell = Cell()
+        self.interlocks = Interlocks(lambda: self.cell, interlock_states)
         self.breakpoints = frozenset(breakpoints)
         self.gate = Gate(
             channel.changed,
@@ -362,6 +366,10 @@ class Program:
         self.branches.current.failure.action = error, action
         duration = time.monotonic() - action.began
         self.channel.action_over(action.number, duration, message_of(error), action.waited)
+
+    def wait_briefly(self, seconds: float) -> None:
+        """Wait in the thread of an action. Raises ProgramStopped if the program is stopped."""
+        self.gate.sleep(self.branches.current, seconds)
 
     def pause_before_retry(self, seconds: float) -> None:
         """Wait before an action is repeated. Raises ProgramStopped if the program is stopped."""

@@ -67,12 +67,13 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
         record, step = program.record, None
         while True:
             try:
-                if program.recovery is not None:
-                    program.recovery.take_control(device)
-                if record is not None:
-                    branch = program.branches.current
-                    step = record.begin(action, an or what, branch, device, bound, arguments, keywords)
-                value = lane.call(name, bound, arguments, keywords, deadline)
+                with program.interlocks.guarded(device, name, shown, program.wait_briefly):
+                    if program.recovery is not None:
+                        program.recovery.take_control(device)
+                    if record is not None:
+                        branch = program.branches.current
+                        step = record.begin(action, an or what, branch, device, bound, arguments, keywords)
+                    value = lane.call(name, bound, arguments, keywords, deadline)
                 if record is not None and step is not None:
                     record.end(step, value)
             except ProgramFinished:

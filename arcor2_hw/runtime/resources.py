@@ -170,6 +170,7 @@ class Resources:
             local = [] if program.cell_file is None else overlay(program.cell_file, data.scene)
             overridden = [*data.project.object_overrides, *local]
             program.cell.open(recipes(data.scene, classes, data.models, overridden, secrets=program.secrets))
+            program.interlocks.configure(data.scene.interlocks)
             program.check()
             program.cell.take_control()
         except SceneFault as fault:
@@ -198,6 +199,7 @@ class Resources:
         self._program.ended = True
         problem = self._program.settle(failed)
         if self._standalone is not None:
+            self._program.interlocks.close()
             problem = self._program.cell.close() or problem
             self._standalone.end()
         return problem

@@ -20,8 +20,9 @@ JOINTS_TIMEOUT: Final = 0.5
 class SceneSurroundings(ByReference):
     """Return the obstacles and robots around one robot of a scene, at their current poses.
 
-    Obstacles are the enabled collision objects and the added bodies. A body replaces the collision object of the same
-    id. Objects that failed to connect, and parts held by a robot that is not in the scene, are missing.
+    Obstacles are the enabled collision objects, except zones, and the added bodies. A body replaces the collision
+    object of the same id. Objects that failed to connect, and parts held by a robot that is not in the scene, are
+    missing.
     """
 
     def __init__(self, robot: str, devices: Iterable[Device], assets: Mapping[str, str], updates: WorldUpdates) -> None:
@@ -34,6 +35,8 @@ class SceneSurroundings(ByReference):
             names[device.id] = device.name
             instance = device.instance
             if not isinstance(instance, CollisionObject) or not instance.enabled or device.id in bodies:
+                continue
+            if device.id in self._updates.zones:
                 continue
             if instance.collision_model is not None:
                 found.append(Obstacle(instance.name, instance.collision_model, instance.pose))

@@ -14,6 +14,8 @@ class WorldUpdates:
         self._lock = threading.Lock()
         self._bodies: dict[str, AddedBody] = {}
         self._calibrations: dict[str, KinematicCalibration] = {}
+        self.zones: frozenset[str] = frozenset()
+        """Collision bodies that are zones of interlocks, and therefore no obstacles."""
 
     def put(self, body: AddedBody) -> None:
         """Add a body, replacing one of the same id."""

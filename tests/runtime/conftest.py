@@ -14,9 +14,11 @@ from typing import Any, TypeVar
 
 import msgspec
 import pytest
+from msgspec import UnsetType
 
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.interlocks import Interlock
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene, SceneObject
@@ -142,7 +144,7 @@ HEADER = """
 import os, time, threading, ctypes, sys
 from pathlib import Path
 from dataclasses import dataclass, field
-from arcor2_hw.actions import action
+from arcor2_hw.actions import action, observation
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.data.project import ProjectRobotJoints
@@ -189,11 +191,18 @@ class Package:
         self.directory = directory
 
     def write(
-        self, types: dict[str, str], objects: list[SceneObject], project: Project, body: str, *, script: str = SCRIPT
+        self,
+        types: dict[str, str],
+        objects: list[SceneObject],
+        project: Project,
+        body: str,
+        *,
+        script: str = SCRIPT,
+        interlocks: list[Interlock] | UnsetType = UNSET,
     ) -> Path:
         data = self.directory / "data"
         (data / "models").mkdir(parents=True)
-        scene = Scene("scene", id="scn_1", objects=objects)
+        scene = Scene("scene", id="scn_1", objects=objects, interlocks=interlocks)
         (data / "scene.json").write_bytes(msgspec.json.encode(scene))
         (data / "project.json").write_bytes(msgspec.json.encode(project))
         package = self.directory / "object_types"

@@ -2,7 +2,7 @@
 
 from typing import ClassVar, Final
 
-from arcor2_hw.actions import action
+from arcor2_hw.actions import action, observation
 from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction, Reading
 from arcor2_hw.exceptions import ConnectionLost, NotFound, NotInControl, OutOfRange, Refused
 from arcor2_hw.messages import Phrase
@@ -171,11 +171,13 @@ class Conveyor(PolledControl[State], Machine, Axis):
         return now, go_on
 
     # -------------------------------------------------------------------------------- values
+    @observation
     def position(self) -> Reading[float]:
         """Return the position of the belt, m. Raises Stale when the newest is too old, NotConnected, ConnectionLost."""
         now, asked, stamp = self._observer.current()
         return Reading(self._units.metres(now.position), stamp, asked)
 
+    @observation
     def velocity(self) -> Reading[float]:
         """Return the velocity of the belt, m/s. Raises like `position`."""
         now, asked, stamp = self._observer.current()

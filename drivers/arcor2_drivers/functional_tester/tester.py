@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Final
 
+from arcor2_hw.actions import observation
 from arcor2_hw.data.base import Timestamp, now
 from arcor2_hw.exceptions import (
     DeviceError,
@@ -101,6 +102,21 @@ class Tester(ModbusDevice[Inputs]):
                 age=age,
             )
         return newest
+
+    @observation
+    def door_open(self) -> bool:
+        """Return whether the door is completely open."""
+        return bool(self.current().door_open)
+
+    @observation
+    def door_closed(self) -> bool:
+        """Return whether the door is closed."""
+        return bool(self.current().door_closed)
+
+    @observation
+    def board_in_fixture(self) -> bool:
+        """Return whether a board is in the fixture."""
+        return bool(self.current().board_present)
 
     # -------------------------------------------------------------------------------- control
     def arm(self) -> None:

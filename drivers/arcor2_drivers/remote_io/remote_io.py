@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from arcor2_hw.actions import action
+from arcor2_hw.actions import action, observation
 from arcor2_hw.data.device import Quality, Reading
 from arcor2_hw.exceptions import DeviceFault
 from arcor2_hw.objects import IOBlock
@@ -37,6 +37,23 @@ class RemoteIO(PointActions, Block, IOBlock):
             if self.io_points[name].direction is PointDirection.INPUT
         }
         return {name: float(on) for name, on in states.items() if on is not None}
+
+    @observation
+    def digital_point(self, name: str) -> bool:
+        """Return whether a digital point is on, debounced. Raises OutOfRange, Refused, Stale, ConnectionLost."""
+        self.require_point(name, PointKind.DIGITAL)
+        self.current()
+        return self.digital(name)
+
+    @observation
+    def analog_point(self, name: str) -> Reading[float]:
+        """Return the value of an analogue point. Raises OutOfRange, Refused, Stale, ConnectionLost."""
+        self.require_point(name, PointKind.ANALOG)
+        image, asked, stamp = self._polled.current()
+        point = self.block_points[name]
+        raw = image.analog(point.kind, point.channel)
+        quality = Quality.BAD if point.kind == "AI" and raw == BROKEN_WIRE else Quality.GOOD
+        return Reading(point.physical(raw), stamp, asked, quality)
 
     def point_label(self, name: str) -> str:
         """Return the terminal of a point."""

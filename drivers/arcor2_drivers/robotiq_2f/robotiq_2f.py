@@ -3,7 +3,7 @@
 import contextlib
 from typing import ClassVar, Final
 
-from arcor2_hw.actions import action
+from arcor2_hw.actions import action, observation
 from arcor2_hw.data.base import Timestamp, now
 from arcor2_hw.data.device import Alarm, Health, LossReaction
 from arcor2_hw.data.geometry import Pose, Position
@@ -208,6 +208,11 @@ class Robotiq2F(PolledControl[Status], Gripper):
         if self._lost:
             return GripperState.LOST
         return GripperState.HOLDING if status.object in HELD else GripperState.AT_POSITION
+
+    @observation
+    def holding(self) -> bool:
+        """Return whether a part is held. Raise Stale, NotConnected or ConnectionLost."""
+        return self.state() is GripperState.HOLDING
 
     def width(self) -> float:
         """Return the width between the fingers, m. Raise Stale, NotConnected or ConnectionLost."""

@@ -1,0 +1,487 @@
+"""Interlocks in the cell host: conditions of actions and motions, and zones that belong to one robot at a time.
+
+Each device whose state matters is read by a thread of its own, so that a slow driver delays no other. None of this is a
+safety function.
+"""
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+from arcor2_hw.collision.description import Obstacle
+from arcor2_hw.collision.lines import first_hit
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.interlocks import Interlock, InterlockCondition, InterlockState, InterlockTarget, Unmet
+from arcor2_hw.data.project import ProjectRobotJoints
+from arcor2_hw.data.robot import Joint
+from arcor2_hw.exceptions import Arcor2Error, Interlocked
+from arcor2_hw.messages import Message
+from arcor2_hw.objects import CollisionObject, MultiArmRobot, Robot
+from arcor2_hw.runtime.cell import Cell
+from arcor2_hw.runtime.device import Device
+from arcor2_hw.runtime.needs import Key, Seen, Verdict, key_of, read, verdict
+from arcor2_hw.runtime.stopping import send_stop
+from arcor2_hw.runtime.zones import ZoneTokens
+
+READ_PERIOD: Final = 0.05
+"""Period at which observations and positions are read, s."""
+POLL: Final = 0.02
+"""Period at which a waiting action is checked, s."""
+POSITION_TIMEOUT: Final = 0.5
+"""Time in which a robot has to return its position, s."""
+LOOK_AHEAD: Final = 0.3
+"""Time for which a motion with an unknown target is extrapolated, s: reading, stopping and braking."""
+FIRST_READING: Final = 1.0
+"""Time after the start in which an action waits for the first values, s, also if it should not wait."""
+
+Wait = Callable[[float], None]
+"""Waits for a time, s. It raises if the action is stopped."""
+
+
+class Guard:
+    """An action or hold-to-run motion that was admitted and has not ended.
+
+    Args:
+        device: its device.
+        what: its name, for messages.
+        zones: the zones that it has.
+        watched: ids of the interlocks whose conditions it needs until its end.
+        targets_known: whether the targets were known when it was admitted.
+        stop: stops it, with the reason.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        what: str,
+        zones: set[str],
+        watched: set[str],
+        targets_known: bool,
+        stop: Callable[[Interlocked], None],
+    ) -> None:
+        self.device, self.what, self.zones, self.watched = device, what, zones, watched
+        self.targets_known, self.stop = targets_known, stop
+        self.broken: Interlocked | None = None
+        """Why it was stopped."""
+
+
+class _Obstruction(NamedTuple):
+    """Why an action may not start. patience: how long it may wait, s."""
+
+    reason: Message
+    patience: float
+
+
+class _Track(NamedTuple):
+    """The positions of the end effectors of a robot. inside: the zones in which they are."""
+
+    at: float
+    tips: list[Position]
+    inside: frozenset[str]
+
+
+class Interlocks:
+    """The interlocks of a scene. Any thread calls it.
+
+    Args:
+        cell: returns the devices.
+        post: called with the states of all interlocks when they have changed.
+    """
+
+    def __init__(self, cell: Callable[[], Cell], post: Callable[[list[InterlockState]], None] = lambda _: None) -> None:
+        self._cell, self._post = cell, post
+        self._lock = threading.RLock()
+        self._closed = threading.Event()
+        self._interlocks: dict[str, Interlock] = {}
+        self._needed: dict[str, set[Key]] = {}
+        """What is read of each device; nothing but the position of a robot."""
+        self._threads: dict[str, threading.Thread] = {}
+        self._seen: dict[Key, Seen] = {}
+        self._tracks: dict[str, _Track] = {}
+        self._tokens = ZoneTokens()
+        self._guards: dict[str, Guard] = {}
+        self._waiting: dict[str, set[str]] = {}
+        """The interlocks for which devices wait."""
+        self._posted: list[InterlockState] = []
+        self._started = 0.0
+
+    # -------------------------------------------------------------------------------- life
+    def configure(self, interlocks: Iterable[Interlock] | Unset) -> None:
+        """Replace the interlocks. Actions that run keep their zones."""
+        found = {} if isinstance(interlocks, Unset) else {one.id: one for one in interlocks}
+        cell = self._cell()
+        with self._lock:
+            self._interlocks = found
+            self._started = time.monotonic()
+            needed: dict[str, set[Key]] = {}
+            for need in (need for one in found.values() for need in one.needs):
+                needed.setdefault(need.object_id, set()).add(key_of(need))
+            if self._zones:
+                for device in cell:
+                    if issubclass(device.recipe.cls, Robot):
+                        needed.setdefault(device.id, set())
+            self._needed = needed
+            cell.updates.zones = self._zones
+            for object_id in needed.keys() - self._threads.keys():
+                thread = threading.Thread(
+                    target=self._watch, args=(object_id,), name=f"interlocks {object_id}", daemon=True
+                )
+                self._threads[object_id] = thread
+                thread.start()
+        self.publish()
+
+    def close(self) -> None:
+        """End the threads."""
+        self._closed.set()
+
+    @property
+    def _zones(self) -> frozenset[str]:
+        return frozenset(one.zone for one in self._interlocks.values() if one.zone)
+
+    # -------------------------------------------------------------------------------- reading
+    def _watch(self, object_id: str) -> None:
+        while not self._closed.is_set():
+            with self._lock:
+                if object_id not in self._needed:
+                    del self._threads[object_id]
+                    return
+                keys = list(self._needed[object_id])
+            with contextlib.suppress(Arcor2Error):  # the object has failed; it is not read until it is retried
+                device = self._cell()[object_id]
+                for key in keys:
+                    self._seen[key] = read(device, key[1], key[2], self._seen.get(key, Seen()))
+                if self._zones and issubclass(device.recipe.cls, Robot):
+                    self._follow(device)
+            self._check_guards()
+            self._closed.wait(READ_PERIOD)
+
+    def _tips(self, device: Device) -> list[Position]:
+        """Return the positions of the end effectors of a robot in the world. Raises Arcor2Error."""
+        robot = device.require()
+
+        def read_tips() -> list[Position]:
+            if isinstance(robot, MultiArmRobot):
+                pairs = [(each, arm) for arm in robot.get_arm_ids() for each in robot.get_end_effectors_ids(arm)]
+                return [robot.get_end_effector_pose(each, arm).position for each, arm in pairs]
+            assert isinstance(robot, Robot)
+            return [robot.get_end_effector_pose(each).position for each in robot.get_end_effectors_ids()]
+
+        found: list[Position] = device.watch_lane.call("get_end_effector_pose", read_tips, deadline=POSITION_TIMEOUT)
+        return found
+
+    def _follow(self, device: Device) -> None:
+        """Read the position of a robot: it releases zones that it has left, and enters others only if it may."""
+        before = self._tracks.get(device.id)
+        now = time.monotonic()
+        tips = self._tips(device)
+        inside = self._touched((tip, tip) for tip in tips)
+        self._tracks[device.id] = _Track(now, tips, frozenset(inside))
+        guard, error = self._guards.get(device.id), None
+        if guard is None:
+            with self._lock:
+                if device.id not in self._guards and not any(device.id in ids for ids in self._waiting.values()):
+                    self._tokens.release(device.id, keep=inside)
+                    if inside and self._tokens.take(device.id, inside):
+                        self._tokens.release(device.id, keep=inside)  # it stands there, and does not wait
+            return
+        entered = set(inside)
+        if before is not None and not guard.targets_known and len(tips) == len(before.tips) and now > before.at:
+            share = LOOK_AHEAD / max(now - before.at, READ_PERIOD)
+            entered |= self._touched((b, _extrapolated(a, b, share)) for a, b in zip(before.tips, tips, strict=True))
+        with self._lock:
+            entered -= guard.zones
+            if not entered or guard.broken is not None:
+                return
+            found = self._obstruction(device.id, "", guard.zones | entered, inside - entered)
+            if found is None:
+                guard.zones |= entered
+                guard.watched |= self._watched(device.id, "", guard.zones)
+            else:
+                error = self._stopped(guard, found.reason)
+        if error is not None:
+            guard.stop(error)
+
+    def _touched(self, lines: Iterable[tuple[Position, Position]]) -> set[str]:
+        """Return the zones that straight lines enter, at the present poses of their bodies."""
+        found: set[str] = set()
+        bodies = list(self._bodies())
+        for start, end in lines:
+            found |= {key for key, body in bodies if first_hit(start, end, [(key, body)], 0.0) is not None}
+        return found
+
+    def _bodies(self) -> Iterator[tuple[str, Obstacle]]:
+        cell = self._cell()
+        for zone in self._zones:
+            with contextlib.suppress(Arcor2Error):
+                instance = cell[zone].require()
+                if isinstance(instance, CollisionObject) and instance.collision_model is not None:
+                    yield zone, Obstacle.of(instance.collision_model, instance.pose)
+
+    # -------------------------------------------------------------------------------- checks
+    def _verdicts(self, interlock: Interlock) -> Iterator[Verdict]:
+        names = {device.id: device.name for device in self._cell()}
+        for need in interlock.needs:
+            yield verdict(need, self._seen.get(key_of(need)), names.get(need.object_id, need.object_id))
+
+    def _unmet(self, interlock: Interlock) -> Verdict | None:
+        """Return the first condition of an interlock that is not met, None if all are."""
+        return next((one for one in self._verdicts(interlock) if one.state is not InterlockCondition.MET), None)
+
+    def _concerned(self, object_id: str, method: str, entered: Iterable[str]) -> list[Interlock]:
+        """Return the interlocks of an action and of zones. method: empty for no action."""
+        entered = set(entered)
+        return [
+            one
+            for one in self._interlocks.values()
+            if (
+                one.zone in entered
+                if one.on is InterlockTarget.ZONE
+                else bool(method) and one.object_id == object_id and (not one.actions or method in one.actions)
+            )
+        ]
+
+    def _watched(self, object_id: str, method: str, zones: Iterable[str]) -> set[str]:
+        return {one.id for one in self._concerned(object_id, method, zones) if one.during}
+
+    def _obstruction(self, object_id: str, method: str, zones: set[str], inside: Iterable[str]) -> _Obstruction | None:
+        """Take zones for an action, unless a condition is not met or another robot has one of them.
+
+        Args:
+            object_id: the device.
+            method: the action.
+            zones: the zones that it touches.
+            inside: those of them in which the robot is already; their conditions count only if they last.
+        """
+        inside = set(inside)
+        for one in self._concerned(object_id, method, zones):
+            if one.zone in inside and not one.during:
+                continue
+            unmet = self._unmet(one)
+            if unmet is not None and unmet.text is not None:
+                self._tokens.release(object_id, keep=inside)
+                self._waiting.setdefault(one.id, set()).add(object_id)
+                reason = Message.of("Interlock {interlock}: {reason}", interlock=one.name, reason=unmet.text)
+                return _Obstruction(reason, self._patience([one]))
+        busy = self._tokens.take(object_id, zones)
+        if busy is None:
+            return None
+        names = {device.id: device.name for device in self._cell()}
+        zone, owner = names.get(busy.zone, busy.zone), names.get(busy.owner, busy.owner)
+        users = self._concerned(object_id, "", [busy.zone])
+        for one in users:
+            self._waiting.setdefault(one.id, set()).add(object_id)
+        if busy.deadlock:
+            text = "Zone {zone}: {owner} is in it, and waits for a zone of {robot}. Neither can continue."
+            return _Obstruction(Message.of(text, zone=zone, owner=owner, robot=names.get(object_id, object_id)), 0.0)
+        return _Obstruction(Message.of("Zone {zone}: {owner} has it", zone=zone, owner=owner), self._patience(users))
+
+    def _patience(self, interlocks: Sequence[Interlock]) -> float:
+        waits = [one.within if one.otherwise is Unmet.WAIT else 0.0 for one in interlocks]
+        return max(min(waits, default=0.0), self._started + FIRST_READING - time.monotonic())
+
+    def _check_guards(self) -> None:
+        """Stop what runs although a condition that it needs is not met any more."""
+        broken: list[tuple[Guard, Interlocked]] = []
+        with self._lock:
+            for guard in self._guards.values():
+                if guard.broken is not None:
+                    continue
+                for one in (self._interlocks[key] for key in guard.watched if key in self._interlocks):
+                    unmet = self._unmet(one)
+                    if unmet is not None and unmet.text is not None:
+                        reason = Message.of("Interlock {interlock}: {reason}", interlock=one.name, reason=unmet.text)
+                        broken.append((guard, self._stopped(guard, reason)))
+                        break
+        for guard, error in broken:
+            guard.stop(error)
+
+    def _stopped(self, guard: Guard, reason: Message) -> Interlocked:
+        guard.broken = Interlocked(
+            "{device}: {what} was stopped. {reason}", device=guard.device.name, what=guard.what, reason=reason
+        )
+        return guard.broken
+
+    # -------------------------------------------------------------------------------- actions
+    @contextlib.contextmanager
+    def guarded(self, device: Device, method: str, arguments: Iterable[Any], wait: Wait) -> Iterator[None]:
+        """Run an action in this context as its interlocks allow it.
+
+        Args:
+            device: the device.
+            method: name of the action.
+            arguments: its arguments. Poses and joints of robots are its targets.
+            wait: waits between two checks.
+
+        Raises:
+            Interlocked: a condition is not met in time, or not any more; or another robot has a zone.
+        """
+        if not self._interlocks:
+            yield
+            return
+        guard = self._admit(device, method, list(arguments), wait, lambda _: send_stop(device))
+        try:
+            yield
+        except Arcor2Error as error:
+            if guard.broken is not None:
+                raise guard.broken from error
+            raise
+        finally:
+            self.leave(guard)
+
+    def longest_wait(self, device: Device, method: str) -> float:
+        """Return how long an action may wait before it starts, s."""
+        found = [one for one in self._interlocks.values() if one.zone or one in self._concerned(device.id, method, ())]
+        return FIRST_READING + sum(one.within for one in found if one.otherwise is Unmet.WAIT) if found else 0.0
+
+    def hold(
+        self, device: Device, what: str, velocity: Position | None, stop: Callable[[Interlocked], None]
+    ) -> Guard | None:
+        """Admit a hold-to-run motion without waiting; None without interlocks. Call `leave` at its end.
+
+        Args:
+            device: the robot.
+            what: name of the motion.
+            velocity: of the end effector in the world, m/s; None if it is unknown.
+            stop: ends the motion, with the reason.
+
+        Raises:
+            Interlocked: a condition is not met, or another robot has a zone.
+        """
+        if not self._interlocks:
+            return None
+        ahead = [] if velocity is None else [Position(*(LOOK_AHEAD * each for each in velocity))]
+        return self._admit(device, what, [], None, stop, ahead)
+
+    def _admit(
+        self,
+        device: Device,
+        method: str,
+        arguments: Sequence[Any],
+        wait: Wait | None,
+        stop: Callable[[Interlocked], Any],
+        ahead: Sequence[Position] = (),
+    ) -> Guard:
+        """Wait until an action may start, and return its guard. wait: None if it does not wait."""
+        began = time.monotonic()
+        inside: set[str] = set()
+        admitted = False
+        try:
+            while True:
+                zones: set[str] = set()
+                targets: list[Position] = []
+                found: _Obstruction | None = None
+                if self._zones and issubclass(device.recipe.cls, Robot):
+                    try:
+                        tips = self._tips(device)
+                    except Arcor2Error as error:
+                        reason = Message.of(
+                            "The position of {device} is unknown: {reason}", device=device.name, reason=error
+                        )
+                        found = _Obstruction(reason, 0.0)
+                    else:
+                        targets = list(_targets(device, arguments))
+                        inside = self._touched((tip, tip) for tip in tips)
+                        zones = (
+                            inside
+                            | self._touched(_path(tips, targets))
+                            | self._touched((tip, tip + step) for tip in tips for step in ahead)
+                        )
+                with self._lock:
+                    for ids in self._waiting.values():
+                        ids.discard(device.id)
+                    found = found or self._obstruction(device.id, method, zones, inside)
+                    if found is None:
+                        watched = self._watched(device.id, method, zones)
+                        guard = Guard(device, method, zones, watched, bool(targets), stop)
+                        self._guards[device.id] = guard
+                        admitted = True
+                        return guard
+                if wait is None or time.monotonic() - began >= found.patience:
+                    raise Interlocked(
+                        "{device}: {what} was not started. {reason}",
+                        device=device.name,
+                        what=method,
+                        reason=found.reason,
+                    )
+                self.publish()
+                wait(POLL)
+        finally:
+            with self._lock:
+                for ids in self._waiting.values():
+                    ids.discard(device.id)
+                if not admitted:
+                    self._tokens.release(device.id, keep=inside)
+
+    def leave(self, guard: Guard) -> None:
+        """End an action or motion. The robot keeps the zones in which it is, also if its position is unknown."""
+        device = guard.device
+        keep = set(guard.zones)
+        if keep:
+            with contextlib.suppress(Arcor2Error):
+                keep = self._touched((tip, tip) for tip in self._tips(device))
+        with self._lock:
+            if self._guards.get(device.id) is guard:
+                del self._guards[device.id]
+                self._tokens.release(device.id, keep=keep)
+
+    # -------------------------------------------------------------------------------- states
+    def publish(self) -> None:
+        """Publish the states of the interlocks if they have changed."""
+        with self._lock:
+            states = [self._state(one) for one in self._interlocks.values()]
+            if states == self._posted:
+                return
+            self._posted = states
+            self._post(states)
+
+    def _state(self, interlock: Interlock) -> InterlockState:
+        unmet = self._unmet(interlock)
+        owner = self._tokens.owner(interlock.zone) if interlock.zone else ""
+        waiting = sorted(self._waiting.get(interlock.id, ()))
+        if unmet is None or unmet.text is None:
+            return InterlockState(interlock.id, InterlockCondition.MET, owner=owner, waiting=waiting)
+        return InterlockState(interlock.id, unmet.state, unmet.text.text, owner, waiting, **unmet.text.translation())
+
+
+def _extrapolated(before: Position, now: Position, share: float) -> Position:
+    return now + Position(*(share * each for each in now - before))
+
+
+def _path(tips: Iterable[Position], targets: Sequence[Position]) -> Iterator[tuple[Position, Position]]:
+    """Return the straight lines from each end effector over all targets."""
+    for tip in tips:
+        last = tip
+        for target in targets:
+            yield last, target
+            last = target
+
+
+def _targets(device: Device, arguments: Iterable[Any]) -> Iterator[Position]:
+    """Return the positions to which an action moves a robot, as far as its arguments state them."""
+    for argument in arguments:
+        match argument:
+            case Pose():
+                yield argument.position
+            case ProjectRobotJoints():
+                yield from _reached(device, argument.joints)
+            case list() if argument and all(isinstance(each, Joint) for each in argument):
+                yield from _reached(device, argument)
+            case list() | tuple():
+                yield from _targets(device, argument)
+            case Mapping():
+                yield from _targets(device, argument.values())
+            case _:
+                pass
+
+
+def _reached(device: Device, joints: list[Joint]) -> Iterator[Position]:
+    """Return the positions of the end effectors for joint values; none if the driver cannot compute them."""
+    robot = device.require()
+    if not isinstance(robot, Robot) or isinstance(robot, MultiArmRobot):
+        return
+    for each in robot.get_end_effectors_ids():
+        with contextlib.suppress(Arcor2Error):
+            yield robot.forward_kinematics(each, joints).position
