@@ -53,7 +53,8 @@ from arcor2_hw.data.events import (
 )
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.held import HeldData, HoldChoice, HoldDecidedData, OnError
-from arcor2_hw.data.object_type import ObjectAction, ObjectModel, ObjectTypeMeta, ParameterMeta
+from arcor2_hw.data.interlocks import Interlock, InterlockStates
+from arcor2_hw.data.object_type import ObjectAction, ObjectModel, ObjectTypeMeta, ObservationMeta, ParameterMeta
 from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHoldData
 from arcor2_hw.data.package import PackageSummary
 from arcor2_hw.data.parameter import IdValue, Parameter
@@ -92,6 +93,7 @@ from arcor2_hw.data.rpc.functions import (
 )
 from arcor2_hw.data.rpc.general import AuthenticateData, SystemInfoData
 from arcor2_hw.data.rpc.history import HistoryData, RestoreRevisionData, UndoData
+from arcor2_hw.data.rpc.interlocks import ListInterlocksData, PutInterlockData
 from arcor2_hw.data.rpc.locks import LockHolder, LockType, TakeOverLocksData
 from arcor2_hw.data.rpc.object_types import DeleteObjectTypesData, ObjectAimingAddPointData
 from arcor2_hw.data.rpc.operation import JogFrame, JogRobotData, StopAllData
@@ -413,6 +415,9 @@ class Requests(ABC):
     ) -> None:
         """DecideHeld. Needs the role operator."""
 
+    async def delete_interlock(self, id: str, *, dry_run: bool = False, timeout: float | None = None) -> None:
+        """DeleteInterlock. Needs the role technician."""
+
     async def delete_object_types(
         self, items: set[str] | None = None, *, dry_run: bool = False, timeout: float | None = None
     ) -> list[DeleteObjectTypesData]:
@@ -659,6 +664,9 @@ class Requests(ABC):
     ) -> ListCalibrationsData:
         """ListCalibrations: maximum number, latest date, object, kind. Needs the role operator."""
 
+    async def list_interlocks(self, *, timeout: float | None = None) -> ListInterlocksData:
+        """ListInterlocks. Needs the role operator."""
+
     async def list_locks(self, *, timeout: float | None = None) -> list[LockHolder]:
         """ListLocks. Needs the role operator."""
 
@@ -789,6 +797,7 @@ class Requests(ABC):
         icon: str | Unset = UNSET,
         shadows: str | Unset = UNSET,
         observable: bool | Unset = UNSET,
+        observations: list[ObservationMeta] | Unset = UNSET,
         key: str | Unset = UNSET,
         values: dict[str, str | Message] | Unset = UNSET,
         disabled: bool = False,
@@ -861,6 +870,11 @@ class Requests(ABC):
 
     async def projects_with_scene(self, id: str, *, timeout: float | None = None) -> set[str]:
         """ProjectsWithScene. Needs the role operator."""
+
+    async def put_interlock(
+        self, interlock: Interlock, *, dry_run: bool = False, timeout: float | None = None
+    ) -> PutInterlockData:
+        """PutInterlock: a new interlock without an id, or a changed one. Needs the role technician."""
 
     async def reachability(
         self,
@@ -1398,6 +1412,14 @@ class Requests(ABC):
     def follow(
         self, name: Literal["HoldDecided"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[HoldDecidedData]]: ...
+    @overload
+    def follow(
+        self, name: Literal["InterlockChanged"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[Interlock]]: ...
+    @overload
+    def follow(
+        self, name: Literal["InterlockStates"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[InterlockStates]]: ...
     @overload
     def follow(
         self, name: Literal["JointsChanged"], /, *, limit: int = LIMIT

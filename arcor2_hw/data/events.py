@@ -23,6 +23,7 @@ from arcor2_hw.data.editor import (
 )
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.held import HeldData, HoldDecidedData
+from arcor2_hw.data.interlocks import Interlock, InterlockStates
 from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHoldData
 from arcor2_hw.data.package import CollisionModels, PackageStateEnum, PackageSummary
@@ -375,6 +376,8 @@ EVENTS: Final = {
         EventType("Held", HeldData, Role.OPERATOR, additional=True),
         EventType("HistoryChanged", HistoryChangedData, Role.OPERATOR, additional=True),
         EventType("HoldDecided", HoldDecidedData, Role.OPERATOR, additional=True),
+        EventType("InterlockChanged", Interlock, Role.OPERATOR, additional=True),
+        EventType("InterlockStates", InterlockStates, Role.OPERATOR, additional=True),
         EventType("LogOnChanged", LogOnChangedData, Role.OPERATOR, additional=True),
         EventType("MovePreview", MovePreviewData, Role.OPERATOR, additional=True),
         EventType("PartsChanged", PartBooks, Role.OPERATOR, additional=True),

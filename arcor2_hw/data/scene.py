@@ -36,6 +36,12 @@ class Scene(BareScene, frozen=True):
     interlocks: list[Interlock] | Unset = UNSET
 
 
+def zones_of(scene: Scene | None) -> frozenset[str]:
+    """Return the ids of the collision bodies that are zones of interlocks, and therefore no obstacles."""
+    interlocks = UNSET if scene is None else scene.interlocks
+    return frozenset() if isinstance(interlocks, Unset) else frozenset(one.zone for one in interlocks if one.zone)
+
+
 class SceneObjectOverride(Data, frozen=True):
     """Settings of one scene object that a project overrides."""
 

@@ -12,6 +12,7 @@ from arcor2_hw.data.rpc.execution import *
 from arcor2_hw.data.rpc.functions import *
 from arcor2_hw.data.rpc.general import *
 from arcor2_hw.data.rpc.history import *
+from arcor2_hw.data.rpc.interlocks import *
 from arcor2_hw.data.rpc.locks import *
 from arcor2_hw.data.rpc.object_types import *
 from arcor2_hw.data.rpc.operation import *
@@ -31,6 +32,7 @@ _ALL: Final = (
     *FUNCTION_RPCS,
     *GENERAL_RPCS,
     *HISTORY_RPCS,
+    *INTERLOCK_RPCS,
     *LOCK_RPCS,
     *OBJECT_TYPE_RPCS,
     *OPERATION_RPCS,

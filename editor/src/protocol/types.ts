@@ -1153,6 +1153,52 @@ export interface ImportScriptData {
   changes: HistoryItem[];
 }
 
+/**
+ * Conditions for actions of an object, or for a zone.
+ *
+ * object_id: the object, or the collision body that is the zone. A zone belongs to one robot at a time. actions: names
+ * of actions of the object; none for all its actions and motions. during: whether the conditions are needed as long as
+ * the action runs, or a robot moves in the zone. within: longest time for which an action waits, s.
+ */
+export interface Interlock {
+  name: string;
+  on: InterlockTarget;
+  object_id: string;
+  actions: string[];
+  needs: Need[];
+  during: boolean;
+  within: number;
+  else: Unmet;
+  id: string;
+}
+
+/** Whether the conditions of an interlock are met. Unknown counts as not met. */
+export type InterlockCondition = "met" | "not_met" | "unknown";
+
+/**
+ * The present state of an interlock.
+ *
+ * text: the first condition that is not met. owner: id of the robot that has the zone. waiting: ids of the objects
+ * whose actions wait.
+ */
+export interface InterlockState {
+  id: string;
+  state: InterlockCondition;
+  text: string;
+  owner: string;
+  waiting: string[];
+  key?: string;
+  values?: Record<string, string | Message>;
+}
+
+/** The states of all interlocks of the online scene, or of the running program; none while it is offline. */
+export interface InterlockStates {
+  interlocks: InterlockState[];
+}
+
+/** What an interlock applies to: actions of an object, or a zone. */
+export type InterlockTarget = "action" | "zone";
+
 /** Arguments of InverseKinematics. */
 export interface InverseKinematicsArgs {
   robot_id: string;
@@ -1224,6 +1270,12 @@ export interface ListCalibrationsArgs {
 /** Answer to ListCalibrations: records, newest first. */
 export interface ListCalibrationsData {
   records: CalibrationRecord[];
+}
+
+/** Answer to ListInterlocks: the interlocks of the open scene, and their states while they are known. */
+export interface ListInterlocksData {
+  interlocks: Interlock[];
+  states: InterlockState[];
 }
 
 /**
@@ -1537,6 +1589,21 @@ export interface NamedReference {
   robot_id?: string;
 }
 
+/**
+ * A condition: an observation of an object, compared with a constant.
+ *
+ * observation: name of the observation in the metadata of the type. point: name of the point, for an observation of
+ * many points. value, and upper of a range: JSON in a string.
+ */
+export interface Need {
+  object_id: string;
+  observation: string;
+  operator: Operator;
+  value: string;
+  upper?: string;
+  point: string;
+}
+
 /** Arguments of NewProject. */
 export interface NewProjectArgs {
   scene_id: string;
@@ -1656,7 +1723,7 @@ export interface ObjectStateData {
  * display_name: name for users; omitted when the type declares none.
  * built_in: a base class or an installed type, which cannot be deleted. shadows: distribution and version of the
  * installed type of the same name that this uploaded type replaces. observable: whether StreamObservations returns
- * values of its objects.
+ * values of its objects. observations: those that interlocks compare.
  */
 export interface ObjectTypeMeta {
   type: string;
@@ -1674,6 +1741,7 @@ export interface ObjectTypeMeta {
   icon?: string;
   shadows?: string;
   observable?: boolean;
+  observations?: ObservationMeta[];
   key?: string;
   values?: Record<string, string | Message>;
   disabled: boolean;
@@ -1701,6 +1769,21 @@ export interface Observation {
   value: number | boolean | null;
   unit: string;
   quality: Quality;
+}
+
+/**
+ * An observation that interlocks compare: name, parameter type of its value, and description.
+ *
+ * members: values of an enumeration, each as JSON. unit: SI; omitted without one. of_point: whether the observation
+ * belongs to a point, such as an input of an I/O block, whose name the interlock states.
+ */
+export interface ObservationMeta {
+  name: string;
+  type: string;
+  description: string;
+  unit?: string;
+  members?: string[];
+  of_point?: boolean;
 }
 
 /** What a program does when an action fails and no error exit applies: end, or hold until a person decides. */
@@ -2048,6 +2131,16 @@ export interface ProjectScriptData {
   revision: number;
   script: string;
   editable: boolean;
+}
+
+/** Arguments of PutInterlock: a new interlock without an id, or a changed one. */
+export interface PutInterlockArgs {
+  interlock: Interlock;
+}
+
+/** Answer to PutInterlock. */
+export interface PutInterlockData {
+  id: string;
 }
 
 /** Reliability of a reading (good, uncertain, bad, as in OPC UA). */
@@ -2501,7 +2594,7 @@ export interface RunningAction {
   frames: Frame[];
 }
 
-/** A scene with its objects. */
+/** A scene with its objects. `interlocks` (not in ARCOR2) is omitted if there are none. */
 export interface Scene {
   name: string;
   description: string;
@@ -2510,6 +2603,7 @@ export interface Scene {
   int_modified?: string;
   id: string;
   objects: SceneObject[];
+  interlocks?: Interlock[];
 }
 
 /** One object; `pose` is set exactly when its type has one. */
@@ -2855,6 +2949,9 @@ export interface UndoData {
   revision: number;
 }
 
+/** What an action does while a condition is not met: wait, then hold the program; or hold it at once. */
+export type Unmet = "wait" | "hold";
+
 /** Arguments of UpdateAction. */
 export interface UpdateActionArgs {
   action_id: string;
@@ -3102,6 +3199,7 @@ export interface Requests {
   CopyScene: { args: CopySceneArgs; data: string };
   CreateAdministrator: { args: CreateAdministratorArgs; data: Person };
   DecideHeld: { args: DecideHeldArgs; data: undefined };
+  DeleteInterlock: { args: IdArgs; data: undefined };
   DeleteObjectTypes: { args: string[] | undefined; data: DeleteObjectTypesData[] };
   DeleteOverride: { args: DeleteOverrideArgs; data: undefined };
   DeletePackage: { args: IdArgs; data: undefined };
@@ -3142,6 +3240,7 @@ export interface Requests {
   KeepLoggedOn: { args: undefined; data: undefined };
   ListAlarms: { args: ListAlarmsArgs | undefined; data: ListAlarmsData };
   ListCalibrations: { args: ListCalibrationsArgs | undefined; data: ListCalibrationsData };
+  ListInterlocks: { args: undefined; data: ListInterlocksData };
   ListLocks: { args: undefined; data: LockHolder[] };
   ListPackages: { args: undefined; data: PackageSummary[] };
   ListPersons: { args: undefined; data: ListPersonsData };
@@ -3170,6 +3269,7 @@ export interface Requests {
   PreviewMove: { args: MovePreview; data: undefined };
   ProjectScript: { args: undefined; data: ProjectScriptData };
   ProjectsWithScene: { args: IdArgs; data: string[] };
+  PutInterlock: { args: PutInterlockArgs; data: PutInterlockData };
   Reachability: { args: ReachabilityArgs | undefined; data: ReachabilityData[] };
   ReadLock: { args: ReadLockArgs; data: undefined };
   ReadUnlock: { args: ReadUnlockArgs; data: undefined };
@@ -3273,6 +3373,8 @@ export interface Events {
   Held: HeldData;
   HistoryChanged: HistoryChangedData;
   HoldDecided: HoldDecidedData;
+  InterlockChanged: Interlock;
+  InterlockStates: InterlockStates;
   JointsChanged: ProjectRobotJoints;
   LogOnChanged: LogOnChangedData;
   LogicItemChanged: LogicItem;
@@ -3383,6 +3485,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   CopyScene: 4,
   CreateAdministrator: 1,
   DecideHeld: 1,
+  DeleteInterlock: 4,
   DeleteObjectTypes: 5,
   DeleteOverride: 3,
   DeletePackage: 3,
@@ -3423,6 +3526,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   KeepLoggedOn: 1,
   ListAlarms: 1,
   ListCalibrations: 1,
+  ListInterlocks: 1,
   ListLocks: 1,
   ListPackages: 1,
   ListPersons: 1,
@@ -3451,6 +3555,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   PreviewMove: 2,
   ProjectScript: 1,
   ProjectsWithScene: 1,
+  PutInterlock: 4,
   Reachability: 1,
   ReadLock: 1,
   ReadUnlock: 1,
@@ -3545,6 +3650,8 @@ export const ADDITIONAL_EVENTS = [
   "Held",
   "HistoryChanged",
   "HoldDecided",
+  "InterlockChanged",
+  "InterlockStates",
   "LogOnChanged",
   "MovePreview",
   "ObjectHealth",

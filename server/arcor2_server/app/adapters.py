@@ -39,6 +39,7 @@ from arcor2_server.rpc.execution import ExecutionRequests
 from arcor2_server.rpc.functions import FunctionRequests
 from arcor2_server.rpc.general import GeneralRequests
 from arcor2_server.rpc.history import HistoryRequests
+from arcor2_server.rpc.interlocks import InterlockRequests
 from arcor2_server.rpc.joints import JointsRequests
 from arcor2_server.rpc.lists import ListRequests
 from arcor2_server.rpc.locking import LockRequests
@@ -100,6 +101,7 @@ def request_handlers(s: Server) -> Handlers:
             s.reachability,
         ),
         HistoryRequests(s.session, s.undo, editing),
+        InterlockRequests(s.locks, s.types, s.session, s.online, s.execution, editing),
         JointsRequests(s.locks, s.session, s.online, editing),
         ListRequests(s.storage, s.types, s.type_notifications, answers, s.saved_problems),
         LockRequests(s.users, s.locks, s.lock_takeover),

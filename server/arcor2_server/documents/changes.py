@@ -7,6 +7,7 @@ from typing import Any, Final
 import msgspec
 from msgspec import Raw, Struct
 
+from arcor2_hw.data.interlocks import Interlock
 from arcor2_hw.data.project import (
     Action,
     BareActionPoint,
@@ -25,6 +26,7 @@ class Kind(enum.StrEnum):
 
     SCENE = "scene"
     OBJECT = "object"
+    INTERLOCK = "interlock"
     PROJECT = "project"
     POINT = "action_point"
     ORIENTATION = "orientation"
@@ -39,6 +41,7 @@ class Kind(enum.StrEnum):
 VALUE_TYPES: Final[dict[Kind, type]] = {
     Kind.SCENE: Scene,
     Kind.OBJECT: SceneObject,
+    Kind.INTERLOCK: Interlock,
     Kind.PROJECT: Project,
     Kind.POINT: BareActionPoint,
     Kind.ORIENTATION: NamedOrientation,
@@ -50,7 +53,7 @@ VALUE_TYPES: Final[dict[Kind, type]] = {
     Kind.OVERRIDE: SceneObjectOverride,
 }
 
-OF_SCENE: Final = frozenset({Kind.SCENE, Kind.OBJECT})
+OF_SCENE: Final = frozenset({Kind.SCENE, Kind.OBJECT, Kind.INTERLOCK})
 """Kinds that belong to the scene; all others belong to the project."""
 
 

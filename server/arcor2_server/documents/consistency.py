@@ -10,6 +10,7 @@ from arcor2_hw.messages import Message
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.checks.actions import action_meta, check_action
 from arcor2_server.documents.checks.functions import check_function
+from arcor2_server.documents.checks.interlocks import check_interlock, using
 from arcor2_server.documents.checks.object_types import Types
 from arcor2_server.documents.checks.scene import object_problems
 from arcor2_server.documents.document import OUTPUT, Document
@@ -18,7 +19,7 @@ from arcor2_server.documents.logic import check_logic_item, check_no_loops, scop
 from arcor2_server.documents.reparenting import check_no_loop, check_parent
 
 _NAMED_IN_POINT = (Kind.ORIENTATION, Kind.JOINTS)
-_NAMED = (Kind.OBJECT, Kind.POINT, Kind.ACTION, Kind.PARAMETER, Kind.FUNCTION, *_NAMED_IN_POINT)
+_NAMED = (Kind.OBJECT, Kind.INTERLOCK, Kind.POINT, Kind.ACTION, Kind.PARAMETER, Kind.FUNCTION, *_NAMED_IN_POINT)
 
 
 class Inconsistent(InvalidData):
@@ -62,6 +63,8 @@ def title(change: Change) -> str:
 def _check_unused(document: Document, change: Change) -> None:
     key = change.id
     users: list[str] = [user.id for user in document.users_of(key)]
+    if change.kind is Kind.OBJECT:
+        users += [one.id for one in using(key, document.interlocks())]
     if change.kind is Kind.POINT:
         users += [point.id for point in document.points_of(key)]
         users += [item.id for kind in OWNED for item in document.owned(key, kind)]
@@ -96,6 +99,14 @@ def _check_name(document: Document, change: Change) -> None:
 def _object(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001
     if problems := object_problems(change.after, types):
         raise Inconsistent(Message.joined(problems), [])
+
+
+def _interlock(document: Document, change: Change, types: Types) -> None:
+    try:
+        check_interlock(change.after, document.scene_object, types)
+    except Arcor2Error as error:
+        needed = {need.object_id for need in change.after.needs}
+        raise Inconsistent(error.message, {change.after.object_id, *needed}) from None
 
 
 def _point(document: Document, change: Change, types: Types) -> None:  # noqa: ARG001
@@ -215,6 +226,7 @@ def _project(document: Document, change: Change, types: Types) -> None:  # noqa:
 
 _CHECKS: dict[Kind, Callable[[Document, Change, Types], None]] = {
     Kind.OBJECT: _object,
+    Kind.INTERLOCK: _interlock,
     Kind.PROJECT: _project,
     Kind.POINT: _point,
     Kind.ORIENTATION: _owned,

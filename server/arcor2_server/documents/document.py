@@ -9,6 +9,7 @@ import msgspec
 from msgspec import UNSET
 from msgspec.structs import replace
 
+from arcor2_hw.data.interlocks import Interlock
 from arcor2_hw.data.project import (
     Action,
     ActionPoint,
@@ -25,7 +26,7 @@ from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.documents.changes import OF_SCENE, Change, Item, Kind
 from arcor2_server.documents.item_indexes import OWNED, ItemIndexes, action_of, place_of
 
-ROOTS: Final = (Kind.OBJECT, Kind.PARAMETER, Kind.FUNCTION, Kind.SCENE, Kind.PROJECT)
+ROOTS: Final = (Kind.OBJECT, Kind.INTERLOCK, Kind.PARAMETER, Kind.FUNCTION, Kind.SCENE, Kind.PROJECT)
 """Kinds of items that are roots of lock trees, in addition to action points without a parent."""
 
 _TITLES: Final = {
@@ -76,8 +77,9 @@ class Document:
     def changes_to_fill(self, scene: Scene, project: Project | None = None) -> list[Change]:
         """Return the changes that put a scene and project into an empty document."""
         add = self.add
-        changes = [add(Kind.SCENE, scene.id, replace(scene, objects=[], **UNTIMED))]
+        changes = [add(Kind.SCENE, scene.id, replace(scene, objects=[], interlocks=UNSET, **UNTIMED))]
         changes += [add(Kind.OBJECT, obj.id, obj) for obj in scene.objects]
+        changes += [add(Kind.INTERLOCK, one.id, one) for one in scene.interlocks or ()]
         if project is None:
             return changes
         bare = replace(project, action_points=[], parameters=[], functions=[], logic=[], object_overrides=[], **UNTIMED)
@@ -179,7 +181,9 @@ class Document:
     def scene(self) -> Scene | None:
         """The scene, None if the document is empty."""
         if self._scene is None and (base := self._bare(Kind.SCENE)) is not None:
-            self._scene = replace(base, objects=[item.value for item in self.of_kind(Kind.OBJECT)])
+            interlocks = self.interlocks() or UNSET
+            objects = [item.value for item in self.of_kind(Kind.OBJECT)]
+            self._scene = replace(base, objects=objects, interlocks=interlocks)
         return self._scene
 
     @property
@@ -224,6 +228,15 @@ class Document:
     def scene_object(self, object_id: str) -> SceneObject:
         """Return an object of the scene."""
         value: SceneObject = self._get(Kind.OBJECT, object_id).value
+        return value
+
+    def interlocks(self) -> list[Interlock]:
+        """Return the interlocks of the scene."""
+        return [item.value for item in self.of_kind(Kind.INTERLOCK)]
+
+    def interlock(self, interlock_id: str) -> Interlock:
+        """Return an interlock."""
+        value: Interlock = self._get(Kind.INTERLOCK, interlock_id).value
         return value
 
     def action_point(self, action_point_id: str) -> BareActionPoint:

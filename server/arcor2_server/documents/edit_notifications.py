@@ -91,6 +91,7 @@ _ITEMS: Final = translatable(
     {
         Kind.SCENE: "the scene {name}",
         Kind.OBJECT: "the object {name}",
+        Kind.INTERLOCK: "the interlock {name}",
         Kind.PROJECT: "the project {name}",
         Kind.FUNCTION: "the function {name}",
         Kind.POINT: "the action point {name}",

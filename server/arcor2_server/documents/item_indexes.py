@@ -104,7 +104,7 @@ class ItemIndexes:
         """Return each index with the key under which it lists the item, each key at most once."""
         value = item.value
         match item.kind:
-            case Kind.OBJECT | Kind.PARAMETER:
+            case Kind.OBJECT | Kind.PARAMETER | Kind.INTERLOCK:
                 yield self.names, (item.kind, value.name)
             case Kind.POINT:
                 yield self.names, (item.kind, value.name)

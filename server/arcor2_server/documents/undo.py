@@ -95,7 +95,7 @@ _LOCKABLE = (*OWNED, *ROOTS, Kind.POINT)
 def _locked_ids(change: Change) -> list[str]:
     values = [value for value in (change.before, change.after) if value is not None]
     match change.kind:
-        case Kind.OBJECT:
+        case Kind.OBJECT | Kind.INTERLOCK:
             return [change.id if change.before is not None else SCENE]
         case Kind.PARAMETER | Kind.FUNCTION:
             return [change.id if change.before is not None else PROJECT]

@@ -10,6 +10,7 @@ from arcor2_hw.data.base import UNSET, Data
 from arcor2_hw.data.cell import Cell, overlay, strangers
 from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.data.events import ObjectStateData
+from arcor2_hw.data.interlocks import InterlockState, InterlockStates
 from arcor2_hw.data.operation import CarriedPart, ObjectHealthData, ObjectValuesData
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.data.secret import HIDDEN
@@ -93,6 +94,8 @@ class DeviceBoard:
         self._objects: dict[str, SceneObject] = {}
         self._reports: dict[str, DeviceChanged] = {}
         self.answering = True
+        self.interlocks: list[InterlockState] = []
+        """The states of the interlocks; none while they are unknown."""
 
     def _publish(self, data: ObjectStateData) -> None:
         self._hub.broadcast(make_event("ObjectState", data))
@@ -120,6 +123,8 @@ class DeviceBoard:
         self._objects.clear()
         self._overlaid = {}
         self.answering = True
+        if self.interlocks:
+            self.interlocks_changed([])
 
     def _notify_obstacles(self) -> None:
         for notify in self.on_obstacles_changed:
@@ -164,6 +169,11 @@ class DeviceBoard:
         if _obstacles(before) != _obstacles(message):
             self._notify_obstacles()
         self._notify_report(message)
+
+    def interlocks_changed(self, states: list[InterlockState]) -> None:
+        """Handle the states of the interlocks from the cell host."""
+        self.interlocks = states
+        self._hub.broadcast(make_event("InterlockStates", InterlockStates(states)))
 
     def healths(self) -> list[ObjectHealthData]:
         """Return the health of every object, in the order of the scene."""

@@ -19,6 +19,7 @@ from arcor2_server.background import BackgroundTasks
 from arcor2_server.collaboration.locks import PROJECT, SCENE, SERVER, Locks
 from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.documents import Session
+from arcor2_server.documents.changes import Edit, Kind
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
 from arcor2_server.hosts.devices import DeviceBoard
@@ -88,6 +89,7 @@ class OnlineScene:
         host.observe(self._handle, self._host_ended)
         host.board.on_connection.append(self._connection_changed)
         hub.on_leave.append(self.held.forget)
+        session.on_change.append(self._edited)
 
     # -------------------------------------------------------------------------------- state
     @property
@@ -239,6 +241,11 @@ class OnlineScene:
             await self.host.add(message)
         except Arcor2Error as error:  # ObjectState has reported the reason, unless the scene went offline meanwhile
             log.warning("added object is not connected", object=obj.name, reason=str(error))
+
+    def _edited(self, edit: Edit | None) -> None:
+        """Let the host use changed interlocks at once."""
+        if edit is not None and self.online and any(change.kind is Kind.INTERLOCK for change in edit.changes):
+            self.host.send(m.SetInterlocks(self._session.document.interlocks()))
 
     # -------------------------------------------------------------------------------- going offline
     async def begin_stop(self, by: str, *, dry_run: bool = False) -> None:

@@ -13,7 +13,7 @@ from arcor2_hw.data.scene import SceneObjectOverride
 from arcor2_hw.exceptions import Conflict, InvalidData, NotFound
 from arcor2_server.documents.extensions import keep_extensions
 from arcor2_server.rest.operations import operation
-from arcor2_server.rest.scenes import STORAGE, IdDesc, check_id
+from arcor2_server.rest.scenes import STORAGE, IdDesc, PutQuery, check_id
 from arcor2_server.storage import Storage
 from arcor2_server.storage.project_tables import ProjectTables
 
@@ -32,12 +32,6 @@ class CloneQuery(Data, frozen=True):
     new_project_name: str
     new_project_id: str | Unset = UNSET
     new_description: str | Unset = UNSET
-
-
-class PutProjectQuery(Data, frozen=True):
-    """`exact`: store the project exactly as it is in the body."""
-
-    exact: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +54,7 @@ class ProjectOperations:
         return await self._storage.project(project_id)
 
     @operation("PUT", "/projects", STORAGE, Role.ADVANCED_USER)
-    async def put_project(self, query: PutProjectQuery, body: Project) -> Timestamp:
+    async def put_project(self, query: PutQuery, body: Project) -> Timestamp:
         """Save a new or changed project; return the time. Its scene must be saved before.
 
         Functions, error exits and names of errors that the body lacks are kept by their ids, unless `exact`.

@@ -1,11 +1,14 @@
 """Scenes over REST (protocol, section 13)."""
 
+import contextlib
 from dataclasses import dataclass
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidData, NotFound
+from arcor2_hw.messages import Message
+from arcor2_server.documents.checks.interlocks import interlock_problems, keep_interlocks
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.rest.operations import operation
 from arcor2_server.storage import Storage
@@ -22,6 +25,12 @@ class IdDesc(Data, frozen=True):
     created: Timestamp
     modified: Timestamp
     description: str | Unset = UNSET
+
+
+class PutQuery(Data, frozen=True):
+    """`exact`: store the document exactly as it is in the body."""
+
+    exact: bool = False
 
 
 def check_id(key: str, what: str) -> None:
@@ -56,9 +65,17 @@ class SceneOperations:
         return await self._storage.scene(scene_id)
 
     @operation("PUT", "/scenes", STORAGE, Role.TECHNICIAN)
-    async def put_scene(self, body: Scene) -> Timestamp:
-        """Save a new or changed scene; return the time. All its object types must be known."""
+    async def put_scene(self, body: Scene, query: PutQuery) -> Timestamp:
+        """Save a new or changed scene; return the time. All its object types must be known.
+
+        Interlocks that the body lacks are kept, unless `exact`.
+        """
         check_id(body.id, "scene")
+        if not query.exact:
+            with contextlib.suppress(NotFound):
+                body = keep_interlocks(body, await self._storage.scene(body.id))
+        if problems := interlock_problems(body, self._types):
+            raise InvalidData(Message.joined(problems))
         for placed in body.objects:
             if not self._types.known(placed.type):
                 raise NotFound("The object {name} has the unknown type {type!r}.", name=placed.name, type=placed.type)

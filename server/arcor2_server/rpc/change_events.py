@@ -17,6 +17,7 @@ from arcor2_server.rpc.registry import Context
 
 EVENTS: Final = {
     Kind.OBJECT: "SceneObjectChanged",
+    Kind.INTERLOCK: "InterlockChanged",
     Kind.POINT: "ActionPointChanged",
     Kind.ORIENTATION: "OrientationChanged",
     Kind.JOINTS: "JointsChanged",
@@ -29,7 +30,7 @@ EVENTS: Final = {
 _UPDATE_BASE_KINDS: Final = (Kind.ORIENTATION, Kind.JOINTS, Kind.ACTION)
 """Kinds of items whose renaming is published as update_base."""
 _ORDER: Final = (
-    *(Kind.SCENE, Kind.PROJECT, Kind.OBJECT, Kind.OVERRIDE, Kind.PARAMETER),
+    *(Kind.SCENE, Kind.PROJECT, Kind.OBJECT, Kind.INTERLOCK, Kind.OVERRIDE, Kind.PARAMETER),
     *(Kind.POINT, Kind.ORIENTATION, Kind.JOINTS, Kind.ACTION, Kind.LOGIC),
 )
 """Kinds in the order in which added and changed items are published; removed items are published in reverse."""

@@ -8,6 +8,7 @@ from msgspec import Raw
 
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.events import EVENTS
+from arcor2_hw.data.interlocks import InterlockStates
 from arcor2_hw.data.rpc import (
     AuthenticateArgs,
     AuthenticateData,
@@ -152,6 +153,9 @@ class GeneralRequests:
         if "ObjectValues" in args.events:
             values = self._execution.board.values() or self._online.board.values()
             events += [make_event("ObjectValues", each) for each in values]
+        if "InterlockStates" in args.events:
+            known = self._execution.board.interlocks or self._online.board.interlocks
+            events.append(make_event("InterlockStates", InterlockStates(known)))
         if "RobotHold" in args.events:
             events += [make_event("RobotHold", hold) for hold in self._online.held.states()]
         if "UserPresence" in args.events:

@@ -32,6 +32,7 @@ from arcor2_hw.runtime.network_search import addresses_of
 from arcor2_server.collaboration.locks import ADDING_OBJECT, SCENE, Locks
 from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Kind
+from arcor2_server.documents.checks.interlocks import using
 from arcor2_server.documents.checks.names import check_name
 from arcor2_server.documents.checks.scene import object_problems, settings_problems
 from arcor2_server.documents.dependents import VIRTUAL, Dependents, invalid_joints_below
@@ -185,6 +186,12 @@ class SceneObjectRequests:
         async with self._locks.auto_skip_held(context.user, args.id):
             self._online.require_offline()
             obj = document.scene_object(args.id)
+            for interlock in using(args.id, document.interlocks()):
+                raise RequestRefused(
+                    "{name} is used by the interlock {interlock}. Delete it first.",
+                    name=obj.name,
+                    interlock=interlock.name,
+                )
             if not args.force and (users := await self._dependents.uses_object(args.id)):
                 names = ", ".join(
                     sorted([project.name for project in await self._storage.projects() if project.id in users])

@@ -23,7 +23,7 @@ from arcor2_hw.data.events import PackageInfoData
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Mesh, Models
 from arcor2_hw.data.robot import Joint
-from arcor2_hw.data.scene import SceneObject
+from arcor2_hw.data.scene import SceneObject, zones_of
 from arcor2_hw.exceptions import Conflict
 from arcor2_hw.kinematics.primitives import primitive_of
 from arcor2_hw.messages import Message
@@ -51,10 +51,11 @@ def _of_program(encoded: bytes) -> tuple[tuple[str, str, Obstacle], ...]:
     kinds = info.collision_models
     every: list[Models] = [*kinds.boxes, *kinds.spheres, *kinds.cylinders, *kinds.meshes]
     models = {one.id: one for one in every}
+    zones = zones_of(info.scene)
     return tuple(
         (obstacle.id, obstacle.name, Obstacle.of(models[obstacle.type], obstacle.pose))
         for obstacle in info.scene.objects
-        if obstacle.type in models and not isinstance(obstacle.pose, Unset)
+        if obstacle.type in models and obstacle.id not in zones and not isinstance(obstacle.pose, Unset)
     )
 
 
@@ -125,10 +126,12 @@ class SceneCollisions:
     def _of_open_scene(self) -> list[tuple[str, str, Obstacle]]:
         """Return id, name and collision model of the objects of the open scene."""
         scene = self._session.scene
+        zones = zones_of(scene)
         return [
             (obj.id, obj.name, Obstacle.of(model.model(), obj.pose))
             for obj in (() if scene is None else scene.objects)
-            if not isinstance(model := self._types.meta(obj.type).object_model, Unset)
+            if obj.id not in zones
+            and not isinstance(model := self._types.meta(obj.type).object_model, Unset)
             and not isinstance(obj.pose, Unset)
         ]
 

@@ -149,6 +149,22 @@ async def test_error_exits_survive_a_client_that_does_not_know_them(http: httpx.
     granted(await http.delete("/projects/pro_e"))
 
 
+async def test_interlocks_survive_a_client_that_does_not_know_them(http: httpx.AsyncClient) -> None:
+    sent = scene("scn_i", "FunctionalTester", "FlowActions")
+    tester, other = sent["objects"]
+    need = {"objectId": tester["id"], "observation": "door_open"}
+    interlock = {"id": "ilk_1", "name": "Door", "on": "action", "objectId": other["id"], "needs": [need]}
+    granted(await http.put("/scenes", json=sent | {"interlocks": [interlock]}))
+    granted(await http.put("/scenes", json=sent | {"description": "theirs"}))
+    [kept] = granted(await http.get("/scenes/scn_i"))["interlocks"]
+    assert (kept["name"], kept["needs"][0]["observation"]) == ("Door", "door_open")
+    refused(await http.put("/scenes", json=sent | {"objects": [other]}), 400, "Argument")
+    wrong = interlock | {"needs": [need | {"observation": "window_open"}]}
+    refused(await http.put("/scenes", json=sent | {"interlocks": [wrong]}), 400, "Argument")
+    granted(await http.put("/scenes?exact=true", json=sent))
+    assert "interlocks" not in granted(await http.get("/scenes/scn_i"))
+
+
 async def test_comparisons_survive_a_client_that_does_not_know_them(http: httpx.AsyncClient) -> None:
     granted(await http.put("/scenes", json=scene("scn_w", "FlowActions")))
     point = {"id": "acp_1", "name": "point", "position": POSE["position"]}

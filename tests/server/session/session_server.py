@@ -164,7 +164,7 @@ class FakeCell:
         self.pose = Pose(Position(0.4, 0.1, 0.3), Orientation(1, 0, 0, 0))
         self.joints = [Joint("j1", 0.1), Joint("j2", -0.2)]
         self.moved: list[tuple[str, Pose]] = []
-        self.board = SimpleNamespace(states=list, healths=list)
+        self.board = SimpleNamespace(states=list, healths=list, interlocks=[])
 
     @property
     def online(self) -> bool:
@@ -358,7 +358,10 @@ async def open_server(directory: Path, **settings: Any) -> AsyncIterator[Session
                 session=session,
                 online=cell,
                 execution=SimpleNamespace(
-                    busy=False, greeting=list, state_and_info=None, board=SimpleNamespace(states=list, healths=list)
+                    busy=False,
+                    greeting=list,
+                    state_and_info=None,
+                    board=SimpleNamespace(states=list, healths=list, interlocks=[]),
                 ),
                 type_notifications=TypeNotifications(known, hub),
                 dependents=(dependents := Dependents(storage, known, session)),
