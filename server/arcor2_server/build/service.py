@@ -9,7 +9,7 @@ from msgspec import field
 
 from arcor2_hw.analysis import Enumeration
 from arcor2_hw.data.base import Data, Unset, new_id, now
-from arcor2_hw.data.object_type import ObjectAction, ObjectModel
+from arcor2_hw.data.object_type import Model3dType, Models, ObjectAction, ObjectModel
 from arcor2_hw.data.package import PackageMeta
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
@@ -17,6 +17,8 @@ from arcor2_hw.exceptions import InvalidProject, NotFound
 from arcor2_hw.parsing import paused_garbage_collection
 from arcor2_server.build import package, points, script, snapshot
 from arcor2_server.build.frame import TypeFacts
+from arcor2_server.build.zones import check_zones
+from arcor2_server.documents.checks.interlocks import interlock_problems
 from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.object_types.catalog import PackageType
 from arcor2_server.object_types.registry import ObjectTypes
@@ -140,6 +142,9 @@ class BuildService:
                 raise InvalidProject(
                     "object type {name} cannot be used: {problem}", name=meta.shown_name, problem=meta.why_disabled
                 )
+        for problem in interlock_problems(scene, types):
+            raise InvalidProject(problem)
+        check_zones(scene, project, self._model_of, lambda name: types.derives_from(name, "Robot"))
         extra = [] if isinstance(project.project_objects_ids, Unset) else project.project_objects_ids
         code = package_code(types, used, extra)
         modules = {packaged_type.name: packaged_type.module for packaged_type in code}
@@ -163,6 +168,10 @@ class BuildService:
             {name: list(types.enumerations(name).values()) for name in used},
             source,
         )
+
+    def _model_of(self, name: str) -> Models | None:
+        model = self._types.meta(name).object_model
+        return None if isinstance(model, Unset) or model.type is Model3dType.NONE else model.model()
 
     async def build(self, project_id: str, package_name: str, package_id: str = "") -> str:
         """Store the package of a saved project and return its id. The default is a new id."""
