@@ -87,6 +87,8 @@ def verdict(need: Need, seen: Seen | None, device: str) -> Verdict:
         met = False
     if met:
         return Verdict(InterlockCondition.MET)
+    if isinstance(seen.value, bool):
+        return Verdict(InterlockCondition.NOT_MET, Message.of("{device}: {need} is not met", device=device, need=shown))
     value = _shown(encode(seen.value))
     text = Message.of("{device}: {need} is not met, it is {value}", device=device, need=shown, value=value)
     return Verdict(InterlockCondition.NOT_MET, text)

@@ -127,7 +127,7 @@ def test_unknown_and_old_values_do_not_count() -> None:
     old = verdict(need, Seen(True, time.monotonic() - FRESH_FOR - 2.0), "door")
     assert (old.state, str(old.text)) == ("unknown", "door: open is not confirmed, last known 3 s ago")
     closed = verdict(need, Seen(False, time.monotonic()), "door")
-    assert (closed.state, str(closed.text)) == ("not_met", "door: open is not met, it is false")
+    assert (closed.state, str(closed.text)) == ("not_met", "door: open is not met")
 
 
 # ------------------------------------------------------------------------------------------------ the host
@@ -294,7 +294,7 @@ arm.move(Pose(Position(0.0, 0.0, 0.0)), an="leave")
 def test_a_program_waits_for_the_door(cell: Cell) -> None:
     cell.run(PROGRAM, ENTER)
     waiting = cell.expect_state(lambda state: bool(state.waiting))
-    assert (waiting.state, waiting.text) == (InterlockCondition.NOT_MET, "door: open is not met, it is false")
+    assert (waiting.state, waiting.text) == (InterlockCondition.NOT_MET, "door: open is not met")
     assert waiting.waiting == ["obj_arm"]
     cell.door("open")
     assert cell.host.expect_state("stopped").finished
@@ -307,7 +307,7 @@ def test_a_door_that_closes_midway_holds_the_program(cell: Cell) -> None:
     wait_for(lambda: "arm enters" in cell.log())
     cell.door("closed")
     held = cell.host.expect(m.ProgramHeld).held
-    assert held.text == "arm: move was stopped. Interlock Door: door: open is not met, it is false"
+    assert held.text == "arm: move was stopped. Interlock Door: door: open is not met"
     assert (held.kind, held.action_name, held.device) == ("interlock", "enter", "obj_arm")
     assert "arm leaves" not in cell.log()
     cell.host.send(m.DecideHeld(1, held.number, HoldChoice.RETRY))
@@ -322,7 +322,7 @@ def test_an_action_that_does_not_wait_fails_at_once(cell: Cell) -> None:
     error = cell.host.answer(cell.move(INSIDE))
     assert (error.code, str(error.message)) == (
         "interlock",
-        "arm: move was not started. Interlock Door: door: open is not met, it is false",
+        "arm: move was not started. Interlock Door: door: open is not met",
     )
     cell.door("open")
     cell.expect_state(lambda state: state.state is InterlockCondition.MET)

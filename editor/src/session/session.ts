@@ -43,6 +43,10 @@ declare module "../store/runtime" {
     takeAlarm?: Set<(record: AlarmRecord) => void>;
     /** Receives changed books of parts, which bypass the store, while they are shown. */
     takeParts?: ((books: PartBooks) => void) | undefined;
+    /** Receives changed interlocks and their states, which bypass the store, while they are shown. */
+    takeInterlocks?:
+      | ((event: Extract<ServerEvent, { event: "InterlockStates" | "InterlockChanged" }>) => void)
+      | undefined;
   }
 }
 
@@ -112,6 +116,8 @@ export class Session {
     else if (event.event === "PartsChanged") now().runtime.takeParts?.(event.data);
     else if (event.event === "LogOnChanged")
       void import("./logOn").then(({ changed }) => changed(event.data, () => this.onState("open", "", 0)));
+    else if (event.event === "InterlockStates" || event.event === "InterlockChanged")
+      now().runtime.takeInterlocks?.(event);
     else {
       // Frequent events would push everything else out of the diary.
       if (event.event !== "MovePreview" && event.event !== "UserPresence")

@@ -162,6 +162,7 @@ export interface Ui {
   tour: number | null;
   /** The dialog that is open over the screen. */
   overlay: "" | "search" | "about" | "messages" | "audit" | "persons";
+  overlay: "" | "search" | "about" | "messages" | "audit" | "interlocks";
   /** Settings as typed, by the id of the object or, for a new device, by the name of its type. */
   forms: Record<string, FormDraft>;
   scriptDraft?: ScriptDraft | undefined;

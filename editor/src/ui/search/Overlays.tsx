@@ -10,6 +10,7 @@ const OVERLAYS = {
   messages: lazyComponent(() => import("../notices/Messages")),
   persons: lazyComponent(() => import("../persons/Persons")),
   audit: lazyComponent(() => import("../audit/AuditTrail")),
+  interlocks: lazyComponent(() => import("../interlocks/Interlocks")),
 };
 
 export function Overlays() {

@@ -1,6 +1,7 @@
 """Checks of interlocks."""
 
 from collections.abc import Callable, Iterable
+from typing import Final
 
 from msgspec.structs import replace
 
@@ -14,6 +15,9 @@ from arcor2_hw.messages import Message
 from arcor2_server.documents.checks.object_types import Types
 from arcor2_server.documents.comparisons import comparison_problem, decoded
 
+_BODY: Final = "VirtualCollisionObject"
+"""Base of the types of collision bodies without a device."""
+
 FindObject = Callable[[str], SceneObject]
 """Returns an object of the scene by its id. Raises NotFound."""
 
@@ -26,7 +30,8 @@ def check_interlock(interlock: Interlock, find: FindObject, types: Types) -> Non
     meta = types.meta(target.type)
     if interlock.on is InterlockTarget.ZONE:
         model = meta.object_model
-        if isinstance(model, Unset) or model.type in (Model3dType.NONE, Model3dType.MESH):
+        # A device must remain an obstacle.
+        if meta.base != _BODY or isinstance(model, Unset) or model.type in (Model3dType.NONE, Model3dType.MESH):
             raise InvalidData("{name} cannot be a zone. Use a box, a cylinder or a sphere.", name=target.name)
         if interlock.actions:
             raise InvalidData("{interlock}: an interlock of a zone has no actions.", interlock=interlock.name)

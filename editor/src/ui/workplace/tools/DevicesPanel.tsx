@@ -11,6 +11,7 @@ import { whyUnavailable } from "../../../store/permissions";
 import { derivesFrom } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
 import { Button } from "../../kit/kit";
+import { openOverlay } from "../../search/overlay";
 import { stateName, TONE } from "../sections/about";
 import { uncontrolledOnline } from "../uncontrolled";
 import "../../alarms/alarms.css";
@@ -85,6 +86,9 @@ export default function Panel() {
           );
         })}
       </ul>
+      {doc && serves("ListInterlocks") && (
+        <Button onPress={() => openOverlay("interlocks")}>{t`Interlocks and zones`}</Button>
+      )}
       {serves("ListAlarms") && <Alarms />}
     </>
   );

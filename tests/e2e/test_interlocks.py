@@ -1,0 +1,138 @@
+"""The fake arm enters a zone only while the door of the fake tester is confirmed open, as their joint log shows."""
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+
+from arcor2_hw.client import Client, RequestFailed
+from arcor2_hw.data import rpc
+from arcor2_hw.data.events import MoveEventType, SceneStateEnum
+from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.interlocks import Interlock, InterlockStates, InterlockTarget, Need
+from arcor2_hw.data.object_type import Box, Model3dType, ObjectModel
+from tests.e2e.harness import Cell, running_cell, scene_state, until
+
+ZONE = "inside"
+DOWN = 0.15
+"""Way of the arm from its start into the zone, m; the zone begins 0.05 m above its end."""
+
+
+class JointLog:
+    """What the fakes do: the state of the door, and whether the arm is in the zone."""
+
+    def __init__(self, cell: Cell) -> None:
+        self.cell = cell
+        self.lines: list[tuple[str, str]] = []
+        self._start = 0.0
+
+    async def height(self) -> float:
+        return float((await self.cell.command_fake("robot", "truth"))["tcp_pose"][2])
+
+    @contextlib.asynccontextmanager
+    async def recording(self) -> AsyncIterator[None]:
+        self._start = await self.height()
+        task = asyncio.create_task(self._follow())
+        try:
+            yield
+        finally:
+            task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await task
+
+    async def _follow(self) -> None:
+        while True:
+            # The arm first: a line with an open door and an arm inside cannot come from an arm that was too early.
+            inside = self._start - await self.height() > DOWN - 0.05
+            door = (await self.cell.command_fake("tester", "truth"))["door"]
+            line = (door, "inside" if inside else "outside")
+            if not self.lines or line != self.lines[-1]:
+                self.lines.append(line)
+            await asyncio.sleep(0.01)
+
+
+class Arm:
+    """The arm and its motions by requests."""
+
+    def __init__(self, client: Client, robot_id: str) -> None:
+        self.client, self.id = client, robot_id
+
+    async def pose(self) -> Pose:
+        found: Pose = await self.client.call("GetEndEffectorPose", rpc.GetEndEffectorPoseArgs(self.id, "tcp"))
+        return found
+
+    async def move(self, to: Pose, speed: float) -> None:
+        arguments = rpc.MoveToPoseArgs(self.id, "tcp", speed, to.position, to.orientation, safe=False)
+        await self.client.call("MoveToPose", arguments)
+
+    async def ended(self) -> str:
+        """Wait for the end of the motion; return why it failed, empty if it did not."""
+        while True:
+            event = await self.client.next_event("RobotMoveToPose", timeout=60)
+            if event.data.move_event_type is not MoveEventType.START:
+                return str(event.data.message or "")
+
+
+@pytest.mark.asyncio
+async def test_the_arm_enters_only_while_the_door_is_confirmed_open(tmp_path: Path) -> None:
+    async with running_cell(tmp_path) as cell:
+        client = await cell.client("technician")
+        scene, _ = await cell.open(client)
+        ids = {obj.name: obj.id for obj in scene.objects}
+        await client.call("StartScene")
+        await scene_state(client, SceneStateEnum.STARTED)
+        arm = Arm(client, ids["robot"])
+        start = await arm.pose()
+        await arm.move(start, 0.5)  # takes control, which sets the tool
+        assert await arm.ended() == ""
+        await client.call("StopScene")
+        await scene_state(client, SceneStateEnum.STOPPED)
+
+        inside = Pose(start.position + Position(0.0, 0.0, -DOWN), start.orientation)
+        model = ObjectModel(Model3dType.BOX, Box(ZONE, 0.2, 0.2, 0.1))
+        at = Pose(inside.position)
+        await client.call("AddSceneShape", rpc.AddVirtualCollisionObjectToSceneArgs(ZONE, at, model))
+        zone = (await client.next_event("SceneObjectChanged")).data.id
+        needs = [Need(ids["tester"], "door_open")]
+        door = Interlock("Door", InterlockTarget.ZONE, zone, needs=needs, during=True, within=60.0)
+        await client.call("PutInterlock", rpc.PutInterlockArgs(door))
+        await client.call("SubscribeEvents", rpc.SubscribeEventsArgs({"InterlockStates"}))
+        await client.call("StartScene")
+        await scene_state(client, SceneStateEnum.STARTED)
+        await arm.move(start, 0.5)
+        assert await arm.ended() == ""
+
+        log = JointLog(cell)
+        async with log.recording():
+            await arm.move(inside, 0.5)
+            while not (await states(client)).interlocks[0].waiting:
+                pass
+            await cell.command_fake("tester", "push_door", opening=True)
+            assert await arm.ended() == ""
+            assert ("open", "inside") in log.lines
+            # The door closes while the arm moves slowly out.
+            await arm.move(start, 0.02)
+            await cell.command_fake("tester", "push_door", opening=False)
+            why = await arm.ended()
+            assert why.startswith("robot: move_to_pose was stopped. Interlock Door: tester: door open is not met")
+            await until(lambda: log.lines[-1] == ("closed", "inside"), "the door is closed")
+        assert not [line for line in log.lines[: log.lines.index(("open", "inside"))] if line[1] == "inside"]
+
+        up = rpc.JogRobotArgs(ids["robot"], 1, 0.0, 300, linear=Position(0.0, 0.0, 0.05))
+        await client.call("WriteLock", rpc.WriteLockArgs(ids["robot"]))
+        with pytest.raises(RequestFailed, match=r"jog was not started\..*door open is not met"):
+            await client.call("JogRobot", up)
+        await client.call("WriteUnlock", rpc.WriteUnlockArgs(ids["robot"]))
+        await cell.command_fake("tester", "push_door", opening=True)
+        await arm.move(start, 0.5)
+        assert await arm.ended() == ""
+
+
+async def states(client: Client) -> InterlockStates:
+    """Return the next states that name at least one interlock."""
+    while True:
+        found: InterlockStates = (await client.next_event("InterlockStates", timeout=30)).data
+        if found.interlocks:
+            return found
