@@ -95,6 +95,15 @@ class Calls:
             time.sleep(seconds)
             device.lane_for(method).check_wanted()
 
+        if method == SET_MODE:
+            return (
+                lambda keywords: (
+                    interlocks.guarded(device, method, (), None)
+                    if keywords.get("enabled")
+                    else contextlib.nullcontext()
+                ),
+                0.0,
+            )
         return (
             lambda keywords: interlocks.guarded(device, method, keywords.values(), wait),
             interlocks.longest_wait(device, method),

@@ -306,14 +306,14 @@ class Interlocks:
 
     # -------------------------------------------------------------------------------- actions
     @contextlib.contextmanager
-    def guarded(self, device: Device, method: str, arguments: Iterable[Any], wait: Wait) -> Iterator[None]:
+    def guarded(self, device: Device, method: str, arguments: Iterable[Any], wait: Wait | None) -> Iterator[None]:
         """Run an action in this context as its interlocks allow it.
 
         Args:
             device: the device.
             method: name of the action.
             arguments: its arguments. Poses and joints of robots are its targets.
-            wait: waits between two checks.
+            wait: waits between two checks; None if the action does not wait.
 
         Raises:
             Interlocked: a condition is not met in time, or not any more; or another robot has a zone.

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 from collections.abc import AsyncIterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,13 +12,20 @@ from arcor2_hw.client import Client, RequestFailed
 from arcor2_hw.data import rpc
 from arcor2_hw.data.events import MoveEventType, SceneStateEnum
 from arcor2_hw.data.geometry import Pose, Position
-from arcor2_hw.data.interlocks import Interlock, InterlockStates, InterlockTarget, Need
+from arcor2_hw.data.interlocks import Interlock, InterlockStates, InterlockTarget
 from arcor2_hw.data.object_type import Box, Model3dType, ObjectModel
+from arcor2_hw.data.parameter import Parameter
+from arcor2_server.demo.fakes import free_loopback_address
+from tests.docs.test_interlocks_page import CLIENT
 from tests.e2e.harness import Cell, running_cell, scene_state, until
 
 ZONE = "inside"
 DOWN = 0.15
 """Way of the arm from its start into the zone, m; the zone begins 0.05 m above its end."""
+
+
+CYCLES = 4
+"""Number of times that each of two arms enters the zone."""
 
 
 class JointLog:
@@ -28,12 +36,9 @@ class JointLog:
         self.lines: list[tuple[str, str]] = []
         self._start = 0.0
 
-    async def height(self) -> float:
-        return float((await self.cell.command_fake("robot", "truth"))["tcp_pose"][2])
-
     @contextlib.asynccontextmanager
     async def recording(self) -> AsyncIterator[None]:
-        self._start = await self.height()
+        self._start = await height(self.cell, "robot")
         task = asyncio.create_task(self._follow())
         try:
             yield
@@ -45,7 +50,7 @@ class JointLog:
     async def _follow(self) -> None:
         while True:
             # The arm first: a line with an open door and an arm inside cannot come from an arm that was too early.
-            inside = self._start - await self.height() > DOWN - 0.05
+            inside = self._start - await height(self.cell, "robot") > DOWN - 0.05
             door = (await self.cell.command_fake("tester", "truth"))["door"]
             line = (door, "inside" if inside else "outside")
             if not self.lines or line != self.lines[-1]:
@@ -95,9 +100,9 @@ async def test_the_arm_enters_only_while_the_door_is_confirmed_open(tmp_path: Pa
         at = Pose(inside.position)
         await client.call("AddSceneShape", rpc.AddVirtualCollisionObjectToSceneArgs(ZONE, at, model))
         zone = (await client.next_event("SceneObjectChanged")).data.id
-        needs = [Need(ids["tester"], "door_open")]
-        door = Interlock("Door", InterlockTarget.ZONE, zone, needs=needs, during=True, within=60.0)
-        await client.call("PutInterlock", rpc.PutInterlockArgs(door))
+        page: dict[str, Any] = {}
+        exec(CLIENT, page)
+        await page["wait_for_door"](client, zone, ids["tester"])
         await client.call("SubscribeEvents", rpc.SubscribeEventsArgs({"InterlockStates"}))
         await client.call("StartScene")
         await scene_state(client, SceneStateEnum.STARTED)
@@ -128,6 +133,77 @@ async def test_the_arm_enters_only_while_the_door_is_confirmed_open(tmp_path: Pa
         await cell.command_fake("tester", "push_door", opening=True)
         await arm.move(start, 0.5)
         assert await arm.ended() == ""
+
+
+@pytest.mark.asyncio
+async def test_two_fake_arms_never_share_a_zone(tmp_path: Path) -> None:
+    second = free_loopback_address()
+    async with running_cell(tmp_path) as cell:
+        await cell.start_fake("second", "arcor2_fakes.ur", "--host", second)
+        client = await cell.client("technician")
+        scene, _ = await cell.open(client)
+        robot = next(obj for obj in scene.objects if obj.name == "robot")
+        assert isinstance(robot.pose, Pose)
+        beside = Pose(robot.pose.position + Position(0.0, 0.1, 0.0), robot.pose.orientation)
+        settings = [
+            Parameter(each.name, each.type, f'"{second}"') if each.name == "host" else each for each in robot.parameters
+        ]
+        await client.call("AddSceneObject", rpc.AddObjectToSceneArgs("second", robot.type, beside, settings))
+        other = (await client.next_event("SceneObjectChanged")).data.id
+        await client.call("StartScene")
+        await scene_state(client, SceneStateEnum.STARTED)
+        arms = {"robot": Arm(client, robot.id), "second": Arm(client, other)}
+        above = {}
+        for name, arm in arms.items():
+            await arm.move(await arm.pose(), 0.5)  # takes control, which sets the tool
+            assert await arm.ended() == ""
+            above[name] = await arm.pose()
+        await client.call("StopScene")
+        await scene_state(client, SceneStateEnum.STOPPED)
+        middle = above["robot"].position + Position(0.0, 0.05, -DOWN)
+        model = ObjectModel(Model3dType.BOX, Box(ZONE, 0.3, 0.3, 0.1))
+        await client.call("AddSceneShape", rpc.AddVirtualCollisionObjectToSceneArgs(ZONE, Pose(middle), model))
+        zone = (await client.next_event("SceneObjectChanged")).data.id
+        shared = Interlock("Shared", InterlockTarget.ZONE, zone, within=60.0)
+        await client.call("PutInterlock", rpc.PutInterlockArgs(shared))
+        await client.call("StartScene")
+        await scene_state(client, SceneStateEnum.STARTED)
+
+        heights = {name: await height(cell, name) for name in arms}
+        together: list[set[str]] = [set()]
+
+        async def follow() -> None:
+            while True:
+                inside = {name for name in arms if heights[name] - await height(cell, name) > DOWN - 0.05}
+                if inside != together[-1]:
+                    together.append(inside)
+
+        following = asyncio.create_task(follow())
+        ends = dict.fromkeys(arms, 0)
+        for name, arm in arms.items():
+            await arm.move(lowered(above[name]), 1.0)
+        while min(ends.values()) < 2 * CYCLES:
+            data = (await client.next_event("RobotMoveToPose", timeout=60)).data
+            if data.move_event_type is MoveEventType.START:
+                continue
+            assert data.move_event_type is MoveEventType.END, data.message
+            name = next(each for each, arm in arms.items() if arm.id == data.robot_id)
+            ends[name] += 1
+            if ends[name] < 2 * CYCLES:
+                await arms[name].move(above[name] if ends[name] % 2 else lowered(above[name]), 1.0)
+        following.cancel()
+        assert max(map(len, together)) == 1
+        for name in arms:
+            assert sum(name in inside for inside in together) >= CYCLES
+
+
+def lowered(pose: Pose) -> Pose:
+    return Pose(pose.position + Position(0.0, 0.0, -DOWN), pose.orientation)
+
+
+async def height(cell: Cell, robot: str) -> float:
+    """Return the height of the tool in the fake, m."""
+    return float((await cell.command_fake(robot, "truth"))["tcp_pose"][2])
 
 
 async def states(client: Client) -> InterlockStates:

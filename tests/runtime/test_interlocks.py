@@ -186,6 +186,9 @@ class Arm(Robot):
     def jog(self, *, twist=None, frame="world", joint_velocities=None, valid_for, **_):
         self.velocity, self.until = twist[0], time.monotonic() + valid_for
 
+    def set_hand_teaching_mode(self, enabled):
+        self.log(f"by hand {enabled}")
+
     def jogs(self):
         while True:
             time.sleep(0.005)
@@ -259,11 +262,15 @@ class Cell:
         (directory / "data" / "models" / "zone.json").write_bytes(msgspec.json.encode(MODELS["Zone"]))
         self.host.send(m.RunPackage("pkg_1", str(directory), hold_on_error=True))
 
-    def move(self, pose: Pose, object_id: str = "obj_arm") -> int:
+    def command(self, method: str, **arguments: Any) -> int:
+        """Call a method of the arm as the server does for a request that acts on it."""
         self.host._calls += 1
-        arguments = {"pose": msgspec.json.encode(pose)}
-        self.host.send(m.Call(self.host._calls, object_id, "move", arguments, control=True))
+        encoded = {name: msgspec.json.encode(value) for name, value in arguments.items()}
+        self.host.send(m.Call(self.host._calls, "obj_arm", method, encoded, control=True))
         return self.host._calls
+
+    def move(self, pose: Pose) -> int:
+        return self.command("move", pose=pose)
 
     def expect_state(self, where: Callable[[Any], bool]) -> Any:
         """Wait for the state of the first interlock."""
@@ -324,6 +331,11 @@ def test_an_action_that_does_not_wait_fails_at_once(cell: Cell) -> None:
         "interlock",
         "arm: move was not started. Interlock Door: door: open is not met",
     )
+    assert cell.host.answer(cell.command("set_hand_teaching_mode", enabled=True)).code == "interlock"
+    assert cell.host.answer(cell.command("set_hand_teaching_mode", enabled=False)) is None
+    assert cell.log()[1:] == ["arm by hand False"], "hand teaching can always be switched off"
+    cell.host.send(m.SetInterlocks([replace(on_action, otherwise=Unmet.WAIT, within=0.05)]))
+    assert cell.host.answer(cell.move(INSIDE)).code == "interlock"
     cell.door("open")
     cell.expect_state(lambda state: state.state is InterlockCondition.MET)
     assert cell.host.answer(cell.move(INSIDE)) is None

@@ -89,7 +89,7 @@ class _Text(str):
 def _names(archive: Archive) -> dict[str, str]:
     names = {START: START, END: END}
     if archive.scene is not None:
-        names |= {obj.id: obj.name for obj in archive.scene.objects}
+        names |= {one.id: one.name for one in (*archive.scene.objects, *(archive.scene.interlocks or ()))}
     project = archive.project
     if project is not None:
         names |= {one.id: one.name for one in project.parameters}

@@ -13,6 +13,7 @@ from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, InvalidProject, NotFound
 from arcor2_server.build import script
 from arcor2_server.build.combined_types import CombinedTypes
+from arcor2_server.documents.checks.interlocks import interlock_problems, interlocks_of
 from arcor2_server.documents.checks.project import project_findings
 from arcor2_server.documents.checks.scene import scene_findings
 from arcor2_server.documents.renamed_actions import with_present_names
@@ -119,7 +120,10 @@ def _document_findings(archive: Archive, types: Known) -> Iterator[tuple[str, st
             document, _, inner = entry.partition(".")
             yield _titled(SCENE if document == "scene" else PROJECT, inner, names), problem.text
         yield from _logic(project)
-    yield from _duplicate_ids(SCENE, [scene.id, *(obj.id for obj in scene.objects)])
+    for interlock in interlock_problems(scene, types):
+        yield SCENE, interlock.text
+    keys = [*(obj.id for obj in scene.objects), *(one.id for one in interlocks_of(scene))]
+    yield from _duplicate_ids(SCENE, [scene.id, *keys])
     if project is not None:
         ids = [project.id, *(one.id for one in project.parameters), *(item.id for item in project.logic)]
         for point in project.action_points:
