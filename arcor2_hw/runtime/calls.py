@@ -91,9 +91,10 @@ class Calls:
         if interlocks is None or not control or method in _ONLY_CONTROL:
             return None, 0.0
 
-        def wait(seconds: float) -> None:
+        def wait(seconds: float) -> float:
             time.sleep(seconds)
             device.lane_for(method).check_wanted()
+            return 0.0
 
         if method == SET_MODE:
             return (

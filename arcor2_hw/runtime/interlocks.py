@@ -37,8 +37,8 @@ LOOK_AHEAD: Final = 0.3
 FIRST_READING: Final = 1.0
 """Time after the start in which an action waits for the first values, s, also if it should not wait."""
 
-Wait = Callable[[float], None]
-"""Waits for a time, s. It raises if the action is stopped."""
+Wait = Callable[[float], float]
+"""Waits for a time, s, and returns how long the program was paused meanwhile. It raises if the action is stopped."""
 
 
 class Guard:
@@ -407,7 +407,7 @@ class Interlocks:
                         reason=found.reason,
                     )
                 self.publish()
-                wait(POLL)
+                began += wait(POLL)
         finally:
             with self._lock:
                 for ids in self._waiting.values():

@@ -3,6 +3,7 @@
 import enum
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterable, Set
 
 from arcor2_hw.data.position import ProgramStep
@@ -186,6 +187,24 @@ class Gate:
         with self._changed:
             self._changed.wait_for(lambda: self._stopped or branch.held, seconds)
             self._check(branch)
+
+    def wait_to_start(self, branch: Branch, seconds: float) -> float:
+        """Wait in an action that has not started yet, as long as the program is paused or held, else for a time.
+
+        Return for how long the program was paused, s. Raises ProgramStopped.
+        """
+        with self._changed:
+            if not self._is_blocked(branch) and self._hold is None:
+                self._changed.wait_for(lambda: self._stopped or branch.held, seconds)
+                self._check(branch)
+                return 0.0
+            began = time.monotonic()
+            self._running -= 1
+            try:
+                self._wait(branch)
+            finally:
+                self._running += 1
+            return time.monotonic() - began
 
     def _is_blocked(self, branch: Branch) -> bool:
         """Return whether a branch has to wait. A step of one branch leaves the others of its parallel work paused."""

@@ -367,9 +367,9 @@ class Program:
         duration = time.monotonic() - action.began
         self.channel.action_over(action.number, duration, message_of(error), action.waited)
 
-    def wait_briefly(self, seconds: float) -> None:
-        """Wait in the thread of an action. Raises ProgramStopped if the program is stopped."""
-        self.gate.sleep(self.branches.current, seconds)
+    def wait_to_start(self, seconds: float) -> float:
+        """Wait in an action that an interlock prevents from starting; see `Gate.wait_to_start`."""
+        return self.gate.wait_to_start(self.branches.current, seconds)
 
     def pause_before_retry(self, seconds: float) -> None:
         """Wait before an action is repeated. Raises ProgramStopped if the program is stopped."""

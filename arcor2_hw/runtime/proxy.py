@@ -67,7 +67,7 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
         record, step = program.record, None
         while True:
             try:
-                with program.interlocks.guarded(device, name, shown, program.wait_briefly):
+                with program.interlocks.guarded(device, name, shown, program.wait_to_start):
                     if program.recovery is not None:
                         program.recovery.take_control(device)
                     if record is not None:

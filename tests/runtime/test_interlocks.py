@@ -308,6 +308,18 @@ def test_a_program_waits_for_the_door(cell: Cell) -> None:
     assert cell.log() == ["door closed", "door open", "arm enters", "arm leaves"]
 
 
+def test_a_program_can_be_paused_while_it_waits(cell: Cell) -> None:
+    cell.run(PROGRAM, ENTER)
+    cell.expect_state(lambda state: bool(state.waiting))
+    cell.host.send(m.Pause())
+    cell.host.expect_state("paused")
+    cell.door("open")
+    cell.expect_state(lambda state: state.state is InterlockCondition.MET)
+    assert "arm enters" not in cell.log()
+    cell.host.send(m.Resume())
+    assert cell.host.expect_state("stopped").finished
+
+
 def test_a_door_that_closes_midway_holds_the_program(cell: Cell) -> None:
     cell.door("open")
     cell.run(PROGRAM.replace('0)), an="enter"', '0)), 0.5, an="enter"'), ENTER)
