@@ -59,7 +59,7 @@ export function InterlockForm({ interlock, onDone }: { interlock: Interlock; onD
         {zone && (
           <p className="quiet small">
             {bodies.length > 0
-              ? t`One robot at a time may be in it. Robots can move through the body, so make it as large as the part of the robot that enters.`
+              ? t`One robot at a time may be in it. Make it as large as the part of the robot that enters.`
               : t`Add a box, a cylinder or a sphere to the scene first.`}
           </p>
         )}

@@ -55,7 +55,7 @@ export default function Interlocks({ onClose }: { onClose: () => void }) {
       {!open && <p>{t`No scene or project is open.`}</p>}
       {open && !found && <Waiting>{t`Loading…`}</Waiting>}
       {found?.interlocks.length === 0 && (
-        <p>{t`No interlocks. Add one so that a robot waits until a door is open, or so that two robots share a place.`}</p>
+        <p>{t`No interlocks. They let a robot wait for an open door, or two robots share a place.`}</p>
       )}
       <ul className="interlocks">
         {found?.interlocks.map((each) => (
