@@ -139,6 +139,12 @@ class Cancelled(DeviceError):
     code = "cancelled"
 
 
+class ProgramInterrupted(Arcor2Error):
+    """The program was interrupted at this action. A person decides how it continues."""
+
+    code = "program_interrupted"
+
+
 class PathBlocked(DeviceError):
     """An obstacle came into the path of a robot during a safe move; the robot was stopped."""
 
@@ -170,7 +176,7 @@ ERROR_KINDS: Final[Mapping[str, type[Arcor2Error]]] = MappingProxyType(
 )
 """The kinds of errors that an error exit of an action can name, in the order in which exits apply; `error` is any."""
 
-ENDS_PROGRAM: Final = (NotConnected, ConnectionLost, NotInControl, SafetyStop, Cancelled)
+ENDS_PROGRAM: Final = (NotConnected, ConnectionLost, NotInControl, SafetyStop, Cancelled, ProgramInterrupted)
 """Errors that no error exit of an action catches: they end the program."""
 
 

@@ -21,6 +21,7 @@ from arcor2_hw.exceptions import (
     Conflict,
     InvalidData,
     NotConnected,
+    ProgramInterrupted,
     message_of,
 )
 from arcor2_hw.messages import Message
@@ -95,7 +96,8 @@ class Recovery:
         self._lost: dict[str, tuple[Device, Arcor2Error]] = {}
         self._uncontrolled: set[str] = set()
         self._present: _Hold | None = None
-        self._decision: Decision | None = None
+        self._decisions: dict[int, Decision] = {}
+        """Decisions that have not taken effect, by the number of the action: the next hold may begin before."""
 
     def load(self, project: Project) -> None:
         """Read the error exits of the project, and which results it uses."""
@@ -172,7 +174,7 @@ class Recovery:
             self._uncontrolled.discard(device.id)
 
     def _data(self, call: ActionCall, device: Device, error: BaseException, choices: list[HoldChoice]) -> HeldData:
-        message = describe(device, error).message
+        message = error.message if isinstance(error, ProgramInterrupted) else describe(device, error).message
         code = error.code if isinstance(error, Arcor2Error) else "error"
         return HeldData(
             0, call.number, call.ids[0], call.name, device.id, code, message.text, choices, now(),
@@ -185,7 +187,7 @@ class Recovery:
 
     def _wait(self, branch: Branch, hold: _Hold) -> Decision:
         def begin() -> None:
-            self._present, self._decision = hold, None
+            self._present = hold
             self._post(hold.data, hold.device, hold.error)
 
         try:
@@ -193,8 +195,7 @@ class Recovery:
         finally:
             if self._present is hold:  # the program or the branch was stopped
                 self._present = None
-        decision = self._decision
-        assert decision is not None
+        decision = self._decisions.pop(hold.data.number)
         self._lost.pop(hold.device.id, None)
         self._uncontrolled = {device.id for device in self._cell}
         if decision.error is not None:
@@ -226,7 +227,7 @@ class Recovery:
                 decision = Decision(choice, error=self._forced(hold, message.exit_id))
             case HoldChoice.END:
                 decision = Decision(choice, error=hold.error)
-        self._present, self._decision = None, decision
+        self._present, self._decisions[message.number] = None, decision
 
     def release(self) -> None:
         """Let the program continue after a decision."""
@@ -282,5 +283,14 @@ def _decoded(hold: _Hold, results: Sequence[str]) -> Any:
             expected=len(hold.hints),
             count=len(results),
         )
-    values = [decode_json(text, hint) for text, hint in zip(results, hold.hints, strict=True)]
+    return _values(results, hold.hints)
+
+
+def decode_results(method: Any, results: Sequence[str]) -> Any:
+    """Return the value of an action for its stored results. Raises InvalidData."""
+    return _values(results, _members(return_hint(method)))
+
+
+def _values(results: Sequence[str], hints: Sequence[Any]) -> Any:
+    values = [decode_json(text, hint) for text, hint in zip(results, hints, strict=True)]
     return values[0] if len(values) == 1 else tuple(values)

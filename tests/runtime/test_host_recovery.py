@@ -3,19 +3,25 @@
 import json
 import textwrap
 import threading
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
 import pytest
 from msgspec.structs import replace
 
+from arcor2_hw.data.device import Connection
 from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.held import HeldData, HoldChoice, HoldExit, ResultType
 from arcor2_hw.data.project import END, Action, ActionPoint, Flow, LogicItem, Project, ProjectFunction
+from arcor2_hw.exceptions import ConnectionLost
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.branches import Branch
+from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.pacing import Gate
+from arcor2_hw.runtime.recovery import ActionCall, Decision, Recovery
 
 from .conftest import HostProcess, Package, scene_object
 
@@ -368,3 +374,26 @@ def test_another_branch_waits_at_its_next_action() -> None:
     assert passed.wait(20)
     holder.join(20)
     assert reports == ["paused", "running"]
+
+
+def test_another_hold_begins_before_the_decision_takes_effect() -> None:
+    seen: list[str] = []
+
+    class OneAtATime(Gate):
+        def hold_program(self, branch: Branch, begin: Callable[[], None]) -> None:
+            begin()
+            recovery.decide(m.DecideHeld(1, len(seen), HoldChoice.RETRY if len(seen) == 1 else HoldChoice.END, []))
+            if len(seen) == 1:  # the thread of the decided branch has not continued yet
+                assert hold(2).choice is HoldChoice.END
+
+    def hold(number: int) -> Decision:
+        found = recovery.before_action(Branch(), ActionCall(number, "work", ["act_work"]))
+        assert found is not None
+        return found
+
+    recovery = Recovery(OneAtATime(lambda _: None), Cell(), lambda: None, lambda held, *_: seen.append(held.text))
+    tool = SimpleNamespace(connection=Connection.ONLINE)
+    recipe = SimpleNamespace(cls=SimpleNamespace, address="")
+    device: Any = SimpleNamespace(id=OBJ, name="tool", instance=tool, require=lambda: tool, recipe=recipe)
+    recovery.lost(device, ConnectionLost("cable cut"))
+    assert hold(1).choice is HoldChoice.RETRY
