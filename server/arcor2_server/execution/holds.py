@@ -70,6 +70,7 @@ class ProgramHold:
     def begin(self, run: int, held: HeldData) -> None:
         """Handle that the program is held."""
         self.present = replace(held, run=run)
+        self._last = None  # an action before which the program was held may fail afterwards
         self._began = time.monotonic()
         self._record = ActionHold(held.since)
         self._runs.set_hold(held.number, self._record)

@@ -6,10 +6,12 @@ from typing import Any
 
 import pytest
 from msgspec import UNSET
+from msgspec.structs import replace
 
-from arcor2_hw.data.base import Unset
+from arcor2_hw.data.base import Unset, now
 from arcor2_hw.data.editor import RunEnd
 from arcor2_hw.data.geometry import Position
+from arcor2_hw.data.held import HeldData, HoldChoice
 from arcor2_hw.data.object_type import ObjectAction
 from arcor2_hw.data.project import (
     END,
@@ -22,12 +24,14 @@ from arcor2_hw.data.project import (
     Project,
     ProjectFunction,
 )
+from arcor2_hw.data.rpc import DecideHeldArgs
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.build import points
 from arcor2_server.build.frame import TypeFacts
 from arcor2_server.build.script import from_logic
 from arcor2_server.errors import RequestRefused
+from arcor2_server.execution.holds import ProgramHold
 from tests.e2e.harness import until
 from tests.runtime.conftest import Package, scene_object
 
@@ -256,3 +260,26 @@ async def test_a_failed_branch_is_retried_while_the_other_one_waits(server: Serv
     report = next(span for span in spans.values() if span.action_id == "act_report")
     assert (again.action_id, again.lane, again.error) == ("act_fill", "act_filling", UNSET)
     assert again.start + again.duration <= report.start
+
+
+class _Nothing:
+    """Accepts every call: the event hub, the list of runs, the cell host."""
+
+    def broadcast(self, event: object) -> None: ...
+    def set_hold(self, number: int, hold: object) -> None: ...
+    async def decide(self, *decision: object) -> None: ...
+
+
+async def test_an_action_may_fail_after_the_program_was_held_before_it() -> None:
+    nothing: Any = _Nothing()
+    hold = ProgramHold(nothing, nothing)
+    data = HeldData(
+        0, 7, "act_put", "put", "obj_box", "connection_lost", "lost", [HoldChoice.RETRY], now(), before=True
+    )
+    retry = DecideHeldArgs(7, HoldChoice.RETRY)
+    for held in (data, replace(data, kind="device_fault", before=UNSET)):
+        hold.begin(1, held)
+        await hold.decide(nothing, retry, "ann")
+        with pytest.raises(RequestRefused, match="ann has already decided"):
+            await hold.decide(nothing, retry, "ben")
+        hold.end()
