@@ -29,7 +29,9 @@ class DigitalGripper(HoldsParts, DigitalIO):
     def pick(
         self, pose: Pose, approach: float = 0.1, speed: float = 0.5, slow_speed: float = 0.1, *, an: str | None = None
     ) -> None:
-        """Pick a part: approach along the tool, grip, wait until the part is held, retreat.
+        """Pick a part: open the gripper, approach along the tool, grip, wait until the part is held, retreat.
+
+        It is refused while the sensor detects a part in the gripper.
 
         :param pose: where the part is gripped
         :param approach: distance of the approach, m
@@ -40,6 +42,9 @@ class DigitalGripper(HoldsParts, DigitalIO):
         assert 0.01 <= speed <= 1.0
         assert 0.01 <= slow_speed <= 1.0
         output, guard, above = self._gripper_output(), self._control.stops.guard(), _behind(pose, approach)
+        if self.part_present():
+            raise Refused("{name} cannot pick: its gripper holds a part already.", name=self.name)
+        self._switch(output, False)  # it is closed after a part was lost
         self._motion.to_pose(above, False, speed, 0.5, guard)
         self._motion.to_pose(pose, True, slow_speed, 0.5, guard)
         self._switch(output, True)
