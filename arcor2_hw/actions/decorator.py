@@ -66,6 +66,7 @@ def action(
     takes_from: str = "",
     puts_to: str = "",
     identifies: bool = False,
+    ends_with_program: bool = False,
 ) -> Callable[[F], F]: ...
 
 
@@ -85,6 +86,7 @@ def action(
     takes_from: str = "",
     puts_to: str = "",
     identifies: bool = False,
+    ends_with_program: bool = False,
 ) -> F | Callable[[F], F]:
     """Mark a method as an action.
 
@@ -103,6 +105,8 @@ def action(
         takes_from: Name of the parameter with the pose at which the device takes a part.
         puts_to: Name of the parameter with the pose at which the device puts its part.
         identifies: Whether the returned text is the serial number of the part at the place of the action.
+        ends_with_program: Whether its effect lasts after the action but ends with the program, such as a running belt.
+            An interrupted program that continues repeats it.
 
     Raises:
         TypeError: The method has no parameter that `takes_from` or `puts_to` names, or both are stated.
@@ -121,6 +125,7 @@ def action(
         function.__quick__ = quick  # type: ignore[attr-defined]
         function.__renamed__ = renamed  # type: ignore[attr-defined]
         function.__part_flow__ = flow  # type: ignore[attr-defined]
+        function.__ends_with_program__ = ends_with_program  # type: ignore[attr-defined]
         return function
 
     return mark if method is None else mark(method)
@@ -153,6 +158,11 @@ def part_flow_of(method: object) -> PartFlow:
     """Return what an action does with a part."""
     found = getattr(method, "__part_flow__", None)
     return found if isinstance(found, PartFlow) else PartFlow()
+
+
+def ends_with_program(method: object) -> bool:
+    """Return whether the effect of an action lasts after it, until the program ends."""
+    return bool(getattr(method, "__ends_with_program__", False))
 
 
 def is_quick(method: object) -> bool:

@@ -1015,6 +1015,7 @@ class Requests(ABC):
         shared_breakpoints: bool | Unset = UNSET,
         on_error: OnError | Unset = UNSET,
         checkpoints: bool | Unset = UNSET,
+        continues: bool | Unset = UNSET,
         timeout: float | None = None,
     ) -> None:
         """RunPackage. Needs the role operator."""

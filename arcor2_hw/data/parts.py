@@ -3,6 +3,7 @@
 import enum
 
 from msgspec import field
+from msgspec.structs import replace
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 from arcor2_hw.data.position import Frame
@@ -86,12 +87,36 @@ class RunningAction(Data, frozen=True):
     frames: list[Frame] = field(default_factory=list)
 
 
+class DoneAction(Data, frozen=True):
+    """An action of the present cycle that has ended. Clients do not receive it.
+
+    branch: of the program. action_id, name, device: the action and its object. results: in JSON. stored: whether the
+    results are stored. error, code, text: kind, code and message of an error that the program has handled. lasts:
+    whether its effect ends with the program. moved: whether it has moved a part.
+    """
+
+    branch: str
+    action_id: str
+    name: str
+    device: str
+    results: list[str] = field(default_factory=list)
+    stored: bool = True
+    error: str = ""
+    code: str = ""
+    text: str = ""
+    lasts: bool = False
+    moved: bool = False
+
+
 class RunCheckpoint(Data, frozen=True):
     """State of a run before or after an action.
 
     package_hash: SHA-256 of script and project. cycle: number of the present cycle, from 1. actions: those that have
     started and not ended; empty between two actions. last: the action that ended last. results: the newest results of
-    each action by its id, in JSON. ended: whether the program has ended in an orderly way.
+    each action by its id, in JSON. ended: whether the program has ended in an orderly way. done: what the present
+    cycle has done. complete: whether `done` is complete. interrupted: whether the server has noticed that the run was
+    interrupted. confirmed: whether a person has confirmed since where all parts are.
+    continues, continues_at: whether the program can continue, and at which actions (empty: after `last`).
     """
 
     run: int
@@ -103,6 +128,44 @@ class RunCheckpoint(Data, frozen=True):
     last: str = ""
     results: dict[str, list[str]] = field(default_factory=dict)
     ended: bool = False
+    done: list[DoneAction] = field(default_factory=list)
+    complete: bool = False
+    interrupted: bool = False
+    confirmed: bool = False
+    continues: bool = False
+    continues_at: list[str] = field(default_factory=list)
+
+    def split_done(self) -> tuple[list[DoneAction], list[DoneAction]]:
+        """Return the actions whose results are used when the program continues, and those that are repeated.
+
+        An action is repeated if its effect has ended with the program, and with it what its branch has done since.
+        """
+        newest = {each.device: index for index, each in enumerate(self.done)}
+        first: dict[str, int] = {}
+        for index, each in enumerate(self.done):
+            if each.lasts and newest[each.device] == index:
+                first.setdefault(each.branch, index)
+        kept: list[DoneAction] = []
+        repeated: list[DoneAction] = []
+        for index, each in enumerate(self.done):
+            (kept if index < first.get(each.branch, len(self.done)) else repeated).append(each)
+        return kept, repeated
+
+    def why_not(self) -> str:
+        """Return the name of the action because of which the program cannot continue; empty if it can."""
+        kept, repeated = self.split_done()
+        return next(
+            (each.name for each in (*kept, *repeated) if not each.stored or (each in repeated and each.moved)), ""
+        )
+
+    def published(self) -> "RunCheckpoint":
+        """Return the run as clients see it: with what a person can decide, without what the program has done."""
+        _, repeated = self.split_done()
+        branches = {each.branch for each in repeated}
+        at = [action.action_name for action in self.actions if action.branch not in branches]
+        first = {each.branch: each.name for each in reversed(repeated)}
+        can = self.complete and self.cycle > 0 and not self.why_not()
+        return replace(self, done=[], continues=can, continues_at=[*first.values(), *at] if can else [])
 
 
 class PartBooks(Data, frozen=True):
@@ -128,9 +191,12 @@ class ConfirmedPart(Data, frozen=True):
     """The place of a part as a person has found it.
 
     number: of the part; 0: a part that is not in the books, which counts as fed. place: id of the place; empty: the
-    part was taken out of the cell, which counts as rejected. serial: corrects the serial number.
+    part was taken out of the cell, which counts as rejected. serial: corrects the serial number. exists: false if there
+    has never been such a part, for example because a sensor was wrong: it does not count as fed. A part that was read
+    has existed.
     """
 
     number: int
     place: str
     serial: str | Unset = UNSET
+    exists: bool = True

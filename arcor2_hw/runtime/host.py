@@ -301,6 +301,7 @@ class Host:
             message.package_id,
             lambda books: self.link.post(m.PartsChanged(books)),
             each_action=message.checkpoints,
+            continues=message.continues,
         )
 
     # -------------------------------------------------------------------------------- channel of the program

@@ -168,7 +168,7 @@ class Ledger:
         Raises:
             NotFound: there is no such part or place.
             PlaceOccupied: too many parts would be at a place.
-            Conflict: a serial number is given to two parts.
+            Conflict: a serial number is given to two parts, or a part that was read is said not to exist.
         """
         parts = dict(self._parts)
         fed = self._fed
@@ -178,9 +178,15 @@ class Ledger:
                 part = parts.get(one.number)
                 if part is None:
                     raise NotFound("There is no part {number} in the cell.", number=one.number)
+                if not one.exists:
+                    if part.serial:
+                        raise Conflict("Part {part} was read, so it exists. Say where it is.", part=part.serial)
+                    del parts[part.number]
+                    fed -= 1
+                    continue
             else:
                 fed += 1
-                part = Part(fed, "")
+                part = Part(_next_number(fed, parts), "")
             place = self._places.get(one.place)
             if place is None and (one.place or not one.number):
                 raise NotFound("The cell has no place {place}.", place=one.place)
@@ -212,7 +218,7 @@ class Ledger:
     # -------------------------------------------------------------------------------- helpers
     def _new(self, place_id: str) -> Part:
         self._fed += 1
-        part = Part(self._fed, place_id)
+        part = Part(_next_number(self._fed, self._parts), place_id)
         self._parts[part.number] = part
         return part
 
@@ -255,3 +261,8 @@ class Ledger:
             place=self.name_of(part.place),
             other=self.name_of(to),
         )
+
+
+def _next_number(fed: int, parts: Iterable[int]) -> int:
+    """Return the number of a new part: usually how many were fed, but unique if some of them did not exist."""
+    return max(fed, 1 + max(parts, default=0))

@@ -113,7 +113,8 @@ class RunPackage(ToHost, frozen=True):
     actions, all of which must exist. shared_breakpoints: further ids; those that the project lacks are ignored. assets,
     bodies, calibrations, secrets: as in OpenScene. hold_on_error: whether a failed action holds the program, see
     ProgramHeld. run: number of the run. records: directory of the books of parts and of checkpoints; empty to store
-    nothing. checkpoints: whether the state is stored before and after each action.
+    nothing. checkpoints: whether the state is stored before and after each action. continues: whether the program
+    continues where it was interrupted.
     """
 
     package_id: str
@@ -131,6 +132,7 @@ class RunPackage(ToHost, frozen=True):
     run: int = 0
     records: str = ""
     checkpoints: bool = True
+    continues: bool = False
 
 
 class AddBody(ToHost, frozen=True):

@@ -21,6 +21,7 @@ from arcor2_hw.data.events import (
 )
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.interlocks import InterlockState
+from arcor2_hw.data.parts import DoneAction
 from arcor2_hw.data.position import MAIN_BRANCH, Frame
 from arcor2_hw.data.project import CALL, Project, ProjectRobotJoints
 from arcor2_hw.data.secret import ObjectSecrets
@@ -36,6 +37,7 @@ from arcor2_hw.exceptions import (
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime.branches import Action, Branches
 from arcor2_hw.runtime.cell import Cell
+from arcor2_hw.runtime.continuing import value_of
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
 from arcor2_hw.runtime.interlocks import Interlocks
 from arcor2_hw.runtime.pacing import Gate
@@ -370,6 +372,18 @@ class Program:
     def wait_to_start(self, seconds: float) -> float:
         """Wait in an action that an interlock prevents from starting; see `Gate.wait_to_start`."""
         return self.gate.wait_to_start(self.branches.current, seconds)
+    def id_of(self, name: str | None) -> str:
+        """Return the id of an action by its name; empty if the project has no such action."""
+        return self._action_ids.get(name or "", "")
+
+    def outcome_of(self, done: DoneAction, device: Device, method: Any) -> Any:
+        """Return the stored result of an action of the interrupted program, or raise the error that it has handled."""
+        self.check()
+        try:
+            return value_of(done, method)
+        except Arcor2Error as error:
+            self.record_error_source(device, error)
+            raise
 
     def pause_before_retry(self, seconds: float) -> None:
         """Wait before an action is repeated. Raises ProgramStopped if the program is stopped."""

@@ -8,7 +8,7 @@ from typing import Any, cast
 from arcor2_hw.actions import deadline_of, metadata_of
 from arcor2_hw.actions.decorator import with_present_names
 from arcor2_hw.data.held import HoldChoice
-from arcor2_hw.exceptions import InvalidData, ProgramFinished, ProgramStopped
+from arcor2_hw.exceptions import Arcor2Error, InvalidData, ProgramFinished, ProgramStopped
 from arcor2_hw.objects import Generic
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device
 from arcor2_hw.runtime.lane import on_any_lane
@@ -59,12 +59,20 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
     what = f"{device.name}.{name}"
 
     def run(an: str | None, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
+        record, step = program.record, None
+        continuation = None if record is None else record.continuation
+        if continuation is not None:
+            done = continuation.take(program.branches.current, program.id_of(an), an or what)
+            if done is not None:
+                return program.outcome_of(done, device, bound)
         keywords = with_present_names(bound, keywords)
         shown = _bind(bound, arguments, keywords) if keywords else arguments
         action = program.action_begins(device.id, what, an, shown)
         if an is not None:
             keywords["an"] = an
-        record, step = program.record, None
+        interruption = None
+        if continuation is not None:
+            interruption = continuation.interruption(program.branches.current, action, an or what)
         while True:
             try:
                 with program.interlocks.guarded(device, name, shown, program.wait_to_start):
@@ -74,6 +82,15 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
                         branch = program.branches.current
                         step = record.begin(action, an or what, branch, device, bound, arguments, keywords)
                     value = lane.call(name, bound, arguments, keywords, deadline)
+                if interruption is not None:
+                    error, interruption = interruption, None
+                    raise error
+                if program.recovery is not None:
+                    program.recovery.take_control(device)
+                if record is not None:
+                    branch = program.branches.current
+                    step = record.begin(action, an or what, branch, device, bound, arguments, keywords)
+                value = lane.call(name, bound, arguments, keywords, deadline)
                 if record is not None and step is not None:
                     record.end(step, value)
             except ProgramFinished:
@@ -84,8 +101,15 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
             except BaseException as error:
                 if record is not None and step is not None:
                     record.fail(step)
-                decision = program.hold(action, an or what, device, bound, error)
+                try:
+                    decision = program.hold(action, an or what, device, bound, error)
+                except Arcor2Error as chosen:  # the error of an error exit
+                    if record is not None:
+                        record.handled(action, an or what, program.branches.current, device, bound, chosen)
+                    raise
                 if decision is None:
+                    if record is not None and not program.stop_requested:
+                        record.handled(action, an or what, program.branches.current, device, bound, error)
                     program.action_failed(action, error)
                     if program.stop_requested and isinstance(error, Exception):
                         raise ProgramStopped from error
@@ -97,6 +121,8 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
                     continue
                 if record is not None and step is not None:  # the action counts as done
                     record.end(step, value)
+                elif record is not None:
+                    record.decided(action, an or what, program.branches.current, device, bound, value)
             program.action_ended(action, value)
             return value
 

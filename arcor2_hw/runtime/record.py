@@ -12,10 +12,10 @@ from typing import Any, Final, NamedTuple
 from msgspec.structs import replace
 
 from arcor2_hw.actions import metadata_of
-from arcor2_hw.actions.decorator import PartFlow, part_flow_of
+from arcor2_hw.actions.decorator import PartFlow, ends_with_program, part_flow_of
 from arcor2_hw.data.base import UNSET, Unset, now
 from arcor2_hw.data.geometry import Orientation, Pose, Position
-from arcor2_hw.data.parts import ConfirmedPart, PartBooks, Place, PlaceKind, RunCheckpoint, RunningAction
+from arcor2_hw.data.parts import ConfirmedPart, DoneAction, PartBooks, Place, PlaceKind, RunCheckpoint, RunningAction
 from arcor2_hw.data.project import START, Project
 from arcor2_hw.exceptions import (
     Arcor2Error,
@@ -29,12 +29,15 @@ from arcor2_hw.exceptions import (
 from arcor2_hw.runtime.branches import Action, Branch
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.checkpoints import CheckpointFile
+from arcor2_hw.runtime.continuing import Continuation, kind_of
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.ledger import Ledger
 from arcor2_hw.runtime.values import results
 
 LONGEST_RESULT: Final = 10_000
 """Length of results that are stored in checkpoints, characters. Longer ones are not stored."""
+MOST_DONE: Final = 300
+"""Number of actions of a cycle that are stored. A program whose cycle has more cannot continue."""
 _STORED: Final = (bool, int, float, str, enum.Enum, Pose, Position, Orientation)
 """Types of results that are stored in checkpoints."""
 
@@ -45,7 +48,7 @@ class Step(NamedTuple):
     """A started action. part: number of the part that it moves. place: where it identifies or judges one."""
 
     number: int
-    action_id: str
+    done: DoneAction
     part: int | None = None
     place: str = ""
     identifies: bool = False
@@ -63,6 +66,7 @@ class RunRecord:
         package_id: the package.
         changed: called with the books after each change of a part.
         each_action: whether a checkpoint is stored before and after each action, or only of the start and the end.
+        continues: whether the program continues where it was interrupted.
     """
 
     def __init__(
@@ -73,6 +77,7 @@ class RunRecord:
         changed: Callable[[PartBooks], None],
         *,
         each_action: bool = True,
+        continues: bool = False,
     ) -> None:
         self._directory, self._changed, self._each_action = directory, changed, each_action
         self._run = RunCheckpoint(run, package_id, "", now())
@@ -94,7 +99,14 @@ class RunRecord:
         """The actions whose results have names, so that other actions can use them."""
         self._running: dict[int, RunningAction] = {}
         self._results: dict[str, list[str]] = {}
+        self._held: dict[tuple[str, str], RunningAction] = {}
+        """Actions that have failed, about which a person has to decide, by branch and id."""
         self._interrupted = False
+        self._done: list[DoneAction] = []
+        """What the present cycle has done; at most MOST_DONE actions."""
+        self._continues = continues
+        self.continuation: Continuation | None = None
+        """What the interrupted cycle has done already; None if the program starts from its beginning."""
 
     def open(self, project: Project, cell: Cell, package: Path) -> None:
         """Read the books of the scene, and store that the run has started. All devices are connected.
@@ -102,6 +114,7 @@ class RunRecord:
         Raises:
             StorageError: the checkpoint cannot be stored.
             PartUnconfirmed: a person has to confirm the place of a part first.
+            Conflict: the program cannot continue, because it was not interrupted, or was changed since.
         """
         self._cell = cell
         self._file = CheckpointFile(self._directory, project.scene_id)
@@ -115,10 +128,23 @@ class RunRecord:
         self._first = next((item.end for item in project.logic if item.start == START), "")
         self._named = {action.id for action in project.all_actions() if action.outputs()}
         self._run = replace(self._run, package_hash=package_hash(package))
+        if self._continues:
+            self._continue(former.run)
         if self._keeps_books:
             self._ledger.set_places(self._find_places(project, cell))
         self._store(always=True)
         self._publish()
+
+    def _continue(self, former: RunCheckpoint | Unset) -> None:
+        """Use what an interrupted run has done in its last cycle. Raises Conflict."""
+        if isinstance(former, Unset) or former.ended or not former.published().continues:
+            raise Conflict("The program cannot continue: it was not interrupted. Start it from its beginning.")
+        if former.package_hash != self._run.package_hash:
+            raise Conflict("The program cannot continue: it was changed. Start it from its beginning.")
+        self.continuation = Continuation(former)
+        self._results = dict(former.results)
+        self._done = former.split_done()[0]
+        self._run = replace(self._run, cycle=former.cycle, last=former.last, complete=True)
 
     def _find_places(self, project: Project, cell: Cell) -> list[Place]:
         """Return the places of the scene and of the project, and assign action points and actions to them."""
@@ -176,11 +202,14 @@ class RunRecord:
         """
         action_id = action.id or ""
         with self._lock:
-            step = Step(action.number, action_id)
+            step = Step(action.number, _done(action, name, branch, device, bound))
             if self._keeps_books:
                 step = self._begin_part(step, device, bound, arguments, keywords)
-            if action_id and action_id == self._first and action.attempt == 1:
-                self._run = replace(self._run, cycle=self._run.cycle + 1)
+            if action_id and action_id == self._first and (action.attempt == 1 or self.continuation is not None):
+                self._run = replace(self._run, cycle=self._run.cycle + 1, complete=True)
+                self._done.clear()
+                self.continuation = None
+            self._held.pop((branch.id, action_id), None)
             frames = [each.frame for each in (*branch.calls, action) if each.frame is not None]
             self._running[action.number] = RunningAction(action.number, action_id, name, branch.id, frames)
             self._store()
@@ -193,7 +222,7 @@ class RunRecord:
         judges = found is not None and found.verdict is True
         if flow == PartFlow() and not judges:
             return step
-        own = self._own.get(step.action_id, "")
+        own = self._own.get(step.done.action_id, "")
         if flow.takes_from or flow.puts_to:
             there = self._place_of(bound, flow.takes_from or flow.puts_to, arguments, keywords) or own
             if not there:
@@ -207,7 +236,7 @@ class RunRecord:
             self._compare(source, target)
             part = self._ledger.move(source, target)
             self._publish()
-            return step._replace(part=part)
+            return step._replace(part=part, done=replace(step.done, moved=True))
         if judges and self._ledger.has_part(device.id):
             own = device.id
         elif flow.identifies:
@@ -261,10 +290,7 @@ class RunRecord:
             if step.place and step.judges and isinstance(value, bool):
                 self._ledger.judge(step.place, value)
             self._running.pop(step.number, None)
-            if step.action_id:
-                if step.action_id in self._named:
-                    self._results[step.action_id] = _stored(value)
-                self._run = replace(self._run, last=step.action_id)
+            self._add_done(step.done, value)
             self._store_later()
             if step.part is not None or step.place:
                 self._publish()
@@ -272,13 +298,48 @@ class RunRecord:
     def fail(self, step: Step) -> None:
         """Record that an action has failed or was stopped: the part may be at its source or its target."""
         with self._lock:
-            if not self._interrupted:
-                self._running.pop(step.number, None)
+            if not self._interrupted and (running := self._running.pop(step.number, None)) is not None:
+                self._held[running.branch, running.action_id] = running
             if step.part is not None:
                 self._ledger.fail(step.part)
             self._store_later()
             if step.part is not None:
                 self._publish(sense=True)
+
+    def decided(self, action: Action, name: str, branch: Branch, device: Device, bound: Any, value: Any) -> None:
+        """Record that an action that has not started counts as done, by the decision of a person."""
+        with self._lock:
+            self._add_done(_done(action, name, branch, device, bound), value)
+            self._store_later()
+
+    def handled(
+        self, action: Action, name: str, branch: Branch, device: Device, bound: Any, error: BaseException
+    ) -> None:
+        """Record that an action has failed with an error that the program may handle."""
+        with self._lock:
+            if isinstance(error, Arcor2Error) and not self._interrupted:
+                done = replace(
+                    _done(action, name, branch, device, bound),
+                    error=kind_of(error), code=error.code, text=str(error), lasts=False,
+                )  # fmt: skip
+                self._append(done)
+                self._store_later()
+
+    def _add_done(self, done: DoneAction, value: Any) -> None:
+        if not done.action_id:
+            return
+        if done.action_id in self._named:
+            stored = self._results[done.action_id] = _stored(value)
+            done = replace(done, results=stored, stored=bool(stored) or value is None)
+        self._run = replace(self._run, last=done.action_id)
+        self._append(done)
+
+    def _append(self, done: DoneAction) -> None:
+        self._held.pop((done.branch, done.action_id), None)
+        if len(self._done) < MOST_DONE:
+            self._done.append(done)
+        else:
+            self._run = replace(self._run, complete=False)
 
     def interrupt(self) -> None:
         """Record that the program is stopped because the server has ended. The actions that ran remain recorded."""
@@ -291,6 +352,7 @@ class RunRecord:
                 if not self._interrupted:
                     self._run = replace(self._run, ended=True)
                     self._running.clear()
+                    self._held.clear()
                 self._store_later(always=True)
                 self._file.close()
                 self._file = None
@@ -326,7 +388,9 @@ class RunRecord:
 
     def _store(self, *, always: bool = False) -> None:
         if self._file is not None and (always or self._each_action):
-            run = replace(self._run, actions=list(self._running.values()), results=self._results)
+            unfinished = [] if self.continuation is None else self.continuation.unfinished
+            actions = [*self._running.values(), *self._held.values(), *unfinished]
+            run = replace(self._run, actions=actions, results=self._results, done=self._done)
             self._file.write(replace(self._ledger.books, run=run))
 
     def _store_later(self, *, always: bool = False) -> None:
@@ -335,6 +399,10 @@ class RunRecord:
             self._store(always=always)
         except StorageError as error:
             log.error("%s", error)
+
+
+def _done(action: Action, name: str, branch: Branch, device: Device, bound: Any) -> DoneAction:
+    return DoneAction(branch.id, action.id or "", name, device.id, lasts=ends_with_program(bound))
 
 
 def package_hash(directory: Path) -> str:

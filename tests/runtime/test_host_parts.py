@@ -220,3 +220,29 @@ def test_checkpoints_of_actions_can_be_switched_off(cell: Cell) -> None:
     decide(host, found.number, HoldChoice.END)
     host.expect_state("stopped")
     assert cell.books().parts == [Part(1, "obj_feeder", "A-1")]
+
+
+def test_an_interrupted_program_continues_at_its_interrupted_action(cell: Cell) -> None:
+    body = ONE + 'arm.test(True, an="test")\narm.pick(inside, an="take")\narm.place(box, an="into_box")'
+    (cell.directory / "hang").touch()
+    host = cell.start(body)
+    host.expect(m.ProgramEvent, lambda event: event.name == "pick")
+    while not cell.notes():
+        pass
+    os.kill(host.process.pid, signal.SIGKILL)
+    host.gone()
+    (cell.directory / "hang").unlink()
+    run = cell.books().run
+    assert run is not UNSET
+    assert (run.published().continues, run.published().continues_at) == (True, ["pick"])
+
+    host = cell.start(body, continues=True)
+    found = held(host)
+    assert (found.kind, found.action_name, found.choices) == (
+        "program_interrupted", "pick", [HoldChoice.RETRY, HoldChoice.SKIP, HoldChoice.END]
+    )  # fmt: skip
+    assert cell.notes() == ["pick"]  # nothing has moved
+    decide(host, found.number, HoldChoice.RETRY)
+    assert host.expect_state("stopped").finished
+    assert cell.notes() == ["pick", "pick", "place", "pick", "place"]
+    assert cell.books().counts.good == 1

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 from msgspec import UNSET
+from msgspec.structs import replace
 
-from arcor2_hw.data.parts import ConfirmedPart, PartBooks, Place, PlaceKind
+from arcor2_hw.data.parts import ConfirmedPart, DoneAction, PartBooks, Place, PlaceKind, RunCheckpoint
 from arcor2_hw.exceptions import Conflict, NotFound, PartError, PartUnconfirmed, PlaceEmpty, PlaceOccupied, WrongPart
 from arcor2_hw.runtime.checkpoints import CheckpointFile, stored_scenes
 from arcor2_hw.runtime.ledger import Ledger
@@ -108,7 +109,9 @@ def test_books_balance_after_random_operations(ledger: Ledger) -> None:
                 case 1:
                     ledger.judge(chance.choice(ids), chance.random() < 0.5)
                 case 2 if parts:
-                    ledger.confirm([ConfirmedPart(chance.choice(parts).number, chance.choice([*ids, ""]))])
+                    part = chance.choice(parts)
+                    exists = bool(part.serial) or chance.random() < 0.8
+                    ledger.confirm([ConfirmedPart(part.number, chance.choice([*ids, ""]), exists=exists)])
                 case 3:
                     ledger.identify("stop", str(chance.randrange(1000)))
                 case 4:
@@ -123,6 +126,33 @@ def test_books_balance_after_random_operations(ledger: Ledger) -> None:
         held = [part.place for part in books.parts]
         assert len(held) == len(set(held)), seed
     assert ledger.books.counts.good, seed
+
+
+def test_a_part_that_a_sensor_has_invented_does_not_count(ledger: Ledger) -> None:
+    carry(ledger, "stop", "robot")
+    number = ledger.move("stop", "nest")
+    ledger.fail(number)
+    ledger.confirm([ConfirmedPart(1, "", exists=False)])
+    assert (ledger.books.counts.fed, ledger.books.counts.in_cell, ledger.books.counts.rejected) == (1, 1, 0)
+    ledger.confirm([ConfirmedPart(number, "nest")])
+    ledger.identify("stop", "A-1")
+    assert [part.number for part in ledger.books.parts] == [2, 3]
+    with pytest.raises(Conflict, match="A-1 was read, so it exists"):
+        ledger.confirm([ConfirmedPart(3, "", exists=False)])
+
+
+def test_what_ended_with_the_program_is_repeated() -> None:
+    def done(branch: str, name: str, device: str, **more: bool) -> DoneAction:
+        return DoneAction(branch, f"act_{name}", name, device, **more)
+
+    belt = [done("next", "run", "belt", lasts=True), done("next", "wait", "io")]
+    run = RunCheckpoint(1, "pkg", "", "", cycle=1, complete=True, done=[done("main", "scan", "reader"), *belt])
+    assert [[each.name for each in part] for part in run.split_done()] == [["scan"], ["run", "wait"]]
+    assert (run.published().continues, run.published().continues_at) == (True, ["run"])
+    halted = replace(run, done=[*run.done, done("next", "halt", "belt")])
+    assert halted.split_done() == (halted.done, [])
+    moved = replace(run, done=[*run.done, done("next", "pick", "robot", moved=True)])
+    assert (moved.why_not(), moved.published().continues) == ("pick", False)
 
 
 def test_a_power_cut_leaves_the_checkpoint_before(tmp_path: Path) -> None:

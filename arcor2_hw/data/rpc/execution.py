@@ -43,7 +43,8 @@ class RunPackageArgs(IdArgs, frozen=True):
 
     shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
     on_error: what the program does when an action fails and no error exit applies. checkpoints: whether the state is
-    stored before and after each action; default: true.
+    stored before and after each action; default: true. continues: whether the program continues where it was
+    interrupted, which requires that it is held on errors.
     """
 
     start_paused: bool = False
@@ -51,6 +52,7 @@ class RunPackageArgs(IdArgs, frozen=True):
     shared_breakpoints: bool | Unset = UNSET
     on_error: OnError | Unset = UNSET
     checkpoints: bool | Unset = UNSET
+    continues: bool | Unset = UNSET
 
 
 class TemporaryPackageArgs(Data, frozen=True):

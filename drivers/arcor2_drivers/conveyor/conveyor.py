@@ -366,7 +366,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
 
         self.move_relative(distance, speed)
 
-    @action
+    @action(ends_with_program=True)
     def run(self, velocity: float = 0.1, *, an: str | None = None) -> None:
         """Run the belt until it is halted; return when it has reached its velocity.
 

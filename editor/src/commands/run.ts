@@ -40,10 +40,17 @@ export async function run({ paused = false } = {}): Promise<boolean> {
   }
 }
 
-export const runPackage = (id: string, paused = false) =>
+/** Run a package. `continues`: where it was interrupted, see `continues` of the books of parts. */
+export const runPackage = (id: string, paused = false, continues = false) =>
   ask(
     "RunPackage",
-    { id, start_paused: paused, ...(serves("SetBreakpoints") ? { shared_breakpoints: true } : {}), ...holding() },
+    {
+      id,
+      start_paused: paused,
+      ...(serves("SetBreakpoints") ? { shared_breakpoints: true } : {}),
+      ...holding(),
+      ...(continues && { continues }),
+    },
     { deadline: BUILT_WITHIN },
   );
 export const pause = () => ask("PausePackage");

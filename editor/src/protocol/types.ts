@@ -624,12 +624,15 @@ export interface ConfirmPartsArgs {
  * The place of a part as a person has found it.
  *
  * number: of the part; 0: a part that is not in the books, which counts as fed. place: id of the place; empty: the
- * part was taken out of the cell, which counts as rejected. serial: corrects the serial number.
+ * part was taken out of the cell, which counts as rejected. serial: corrects the serial number. exists: false if there
+ * has never been such a part, for example because a sensor was wrong: it does not count as fed. A part that was read
+ * has existed.
  */
 export interface ConfirmedPart {
   number: number;
   place: string;
   serial?: string;
+  exists?: boolean;
 }
 
 /** State of a connection. */
@@ -741,6 +744,27 @@ export interface DissolveCallData {
 /** Arguments of DissolveParallel: a parallel action, whose calls then run one after the other. */
 export interface DissolveParallelArgs {
   action_id: string;
+}
+
+/**
+ * An action of the present cycle that has ended. Clients do not receive it.
+ *
+ * branch: of the program. action_id, name, device: the action and its object. results: in JSON. stored: whether the
+ * results are stored. error, code, text: kind, code and message of an error that the program has handled. lasts:
+ * whether its effect ends with the program. moved: whether it has moved a part.
+ */
+export interface DoneAction {
+  branch: string;
+  action_id: string;
+  name: string;
+  device: string;
+  results: string[];
+  stored: boolean;
+  error: string;
+  code: string;
+  text: string;
+  lasts: boolean;
+  moved: boolean;
 }
 
 /**
@@ -2502,7 +2526,10 @@ export interface Run {
  *
  * package_hash: SHA-256 of script and project. cycle: number of the present cycle, from 1. actions: those that have
  * started and not ended; empty between two actions. last: the action that ended last. results: the newest results of
- * each action by its id, in JSON. ended: whether the program has ended in an orderly way.
+ * each action by its id, in JSON. ended: whether the program has ended in an orderly way. done: what the present
+ * cycle has done. complete: whether `done` is complete. interrupted: whether the server has noticed that the run was
+ * interrupted. confirmed: whether a person has confirmed since where all parts are.
+ * continues, continues_at: whether the program can continue, and at which actions (empty: after `last`).
  */
 export interface RunCheckpoint {
   run: number;
@@ -2514,6 +2541,12 @@ export interface RunCheckpoint {
   last: string;
   results: Record<string, string[]>;
   ended: boolean;
+  done: DoneAction[];
+  complete: boolean;
+  interrupted: boolean;
+  confirmed: boolean;
+  continues: boolean;
+  continues_at: string[];
 }
 
 /** How a run ended: completed, stopped by a user, by an error, or with the server or its host. */
@@ -2524,7 +2557,8 @@ export type RunEnd = "running" | "finished" | "stopped" | "failed" | "lost";
  *
  * shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
  * on_error: what the program does when an action fails and no error exit applies. checkpoints: whether the state is
- * stored before and after each action; default: true.
+ * stored before and after each action; default: true. continues: whether the program continues where it was
+ * interrupted, which requires that it is held on errors.
  */
 export interface RunPackageArgs {
   id: string;
@@ -2533,6 +2567,7 @@ export interface RunPackageArgs {
   shared_breakpoints?: boolean;
   on_error?: OnError;
   checkpoints?: boolean;
+  continues?: boolean;
 }
 
 /**

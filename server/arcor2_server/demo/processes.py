@@ -38,6 +38,12 @@ class Child:
         """Return whether the process has ended."""
         return self._process is not None and self._process.returncode is not None
 
+    @property
+    def pid(self) -> int:
+        """Return the id of the started process."""
+        assert self._process is not None
+        return self._process.pid
+
     async def start(self) -> str:
         """Start it and return the rest of its ready line. Raise ChildFailed with the last line of its log."""
         with self._log.open("wb") as log:

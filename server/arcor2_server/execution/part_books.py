@@ -65,6 +65,29 @@ class AllPartBooks:
             )
         return scene_id
 
+    async def require_continues(self, scene_id: str, package_id: str) -> None:
+        """Check that the last program of a scene was interrupted and can continue.
+
+        Raises:
+            RequestRefused: it cannot. The message names the missing condition.
+        """
+        books = await self._stored(scene_id)
+        run = UNSET if books is None else books.run
+        if isinstance(run, Unset) or run.package_id != package_id:
+            raise RequestRefused("This program was not interrupted. Start it from its beginning.")
+        if not run.confirmed:
+            raise RequestRefused("Confirm first where the parts are, then continue the program.")
+        if name := run.why_not():
+            raise RequestRefused(
+                "The program cannot continue, because the result of {action} is not stored, or it would have to "
+                "be repeated. Start it from its beginning.",
+                action=name,
+            )
+        if not run.published().continues:
+            raise RequestRefused(
+                "The program cannot continue, because its cycle is not stored. Start it from its beginning."
+            )
+
     def begin_run(self, scene_id: str) -> None:
         """Handle the start of a run. The cell host keeps the books of its scene."""
         self._scene_id, self._live = scene_id, None
@@ -83,14 +106,18 @@ class AllPartBooks:
         """Publish the stored books of a scene."""
         books = await self._stored(scene_id) if scene_id else None
         if books is not None and (books.places or not isinstance(books.run, Unset)):
-            self._hub.broadcast(make_event(PARTS, books))
+            self._hub.broadcast(make_event(PARTS, _published(books)))
 
     # -------------------------------------------------------------------------------- people
     async def all(self) -> list[PartBooks]:
         """Return the books of all scenes; `run` only of a run that was interrupted."""
         scenes = await asyncio.to_thread(stored_scenes, self.directory)
         found = [self._live if scene == self._scene_id else await self._stored(scene) for scene in scenes]
-        return [books for books in found if books is not None and (books.places or not isinstance(books.run, Unset))]
+        return [
+            _published(books)
+            for books in found
+            if books is not None and (books.places or not isinstance(books.run, Unset))
+        ]
 
     async def confirm(self, host: CellHost | None, scene_id: str, parts: list[ConfirmedPart], by: str) -> None:
         """Record where a person has found parts. Nothing moves.
@@ -122,10 +149,11 @@ class AllPartBooks:
             ledger = Ledger(books)
             ledger.confirm(parts)
             corrected = ledger.books
-            if corrected.unconfirmed:  # the card still shows what was running
-                corrected = replace(corrected, run=books.run)
+            if not isinstance(books.run, Unset):  # it can continue once all parts are confirmed
+                run = replace(books.run, interrupted=True, confirmed=not corrected.unconfirmed)
+                corrected = replace(corrected, run=run)
             await asyncio.to_thread(self._write, corrected)
-        self._hub.broadcast(make_event(PARTS, corrected))
+        self._hub.broadcast(make_event(PARTS, _published(corrected)))
 
     # -------------------------------------------------------------------------------- files
     async def _stored(self, scene_id: str) -> PartBooks | None:
@@ -139,9 +167,10 @@ class AllPartBooks:
             return books
         if books.run.ended:
             return replace(books, run=UNSET)
+        if books.run.interrupted:  # a person has confirmed some of the parts
+            return books
         ledger = Ledger(books)
-        if not all(part.confirmed is False for part in books.parts):
-            ledger.interrupt()
+        ledger.interrupt()
         return replace(ledger.books, run=books.run)
 
     def _write(self, books: PartBooks) -> None:
@@ -150,3 +179,8 @@ class AllPartBooks:
             file.write(books)
         finally:
             file.close()
+
+
+def _published(books: PartBooks) -> PartBooks:
+    """Return books as clients see them."""
+    return books if isinstance(books.run, Unset) else replace(books, run=books.run.published())

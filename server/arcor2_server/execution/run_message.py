@@ -43,6 +43,7 @@ class RunMessages:
             hold_on_error=how.on_error is OnError.HOLD,
             records=str(self._settings.checkpoints_dir),
             checkpoints=how.checkpoints,
+            continues=how.continues,
         )
 
     async def complete(self, message: m.RunPackage, shared_of: str) -> m.RunPackage:

@@ -94,6 +94,7 @@ class How(Struct, frozen=True):
         by: name of the user.
         on_error: what the program does when an action fails and no error exit applies.
         checkpoints: store the state before and after each action.
+        continues: continue where the program was interrupted.
     """
 
     start_paused: bool = False
@@ -102,6 +103,7 @@ class How(Struct, frozen=True):
     by: str = ""
     on_error: OnError = OnError.END
     checkpoints: bool = True
+    continues: bool = False
 
 
 class Runs:

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from arcor2_hw.data import events as e
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.events import Event, MainScreen, ProjectExceptionData
-from arcor2_hw.data.held import HoldDecidedData
+from arcor2_hw.data.held import HoldDecidedData, OnError
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.position import ProgramStep
 from arcor2_hw.data.rpc import ConfirmPartsArgs, DecideHeldArgs
@@ -210,6 +210,10 @@ class Execution(PackageLibrary):
         directory = await asyncio.to_thread(self.packages.directory, package_id)
         project_id = await asyncio.to_thread(self.packages.project_id, package_id) if how.shared_breakpoints else ""
         scene_id = await self.parts.require_confirmed(directory)
+        if how.continues:
+            if how.on_error is not OnError.HOLD:
+                raise RequestRefused("A program can only continue if it is held on errors.")
+            await self.parts.require_continues(scene_id, package_id)
         self._require_idle()
         self._online.last_stop.require_none_since(requested_at)
         self.program = program = ProgramRun(self._runs, package_id, project_id)

@@ -40,7 +40,8 @@ def _run_options(context: Context, args: RunPackageArgs | TemporaryPackageArgs) 
     breakpoints = frozenset[str]() if isinstance(args.breakpoints, Unset) else args.breakpoints
     on_error = OnError.END if isinstance(args.on_error, Unset) else args.on_error
     shared, checkpoints = args.shared_breakpoints is True, args.checkpoints is not False
-    return How(args.start_paused, breakpoints, shared, context.client.name, on_error, checkpoints)
+    continues = isinstance(args, RunPackageArgs) and args.continues is True
+    return How(args.start_paused, breakpoints, shared, context.client.name, on_error, checkpoints, continues)
 
 
 @dataclass(frozen=True, slots=True)

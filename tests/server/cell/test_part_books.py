@@ -3,17 +3,23 @@
 import os
 import signal
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from msgspec import UNSET
 
+from arcor2_hw.data.base import now
+from arcor2_hw.data.parts import ConfirmedPart, Part, PartBooks, PartCounts, Place, PlaceKind, RunCheckpoint
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.runtime.checkpoints import CheckpointFile
 from arcor2_server.errors import RequestRefused
+from arcor2_server.execution.part_books import AllPartBooks
 from tests.runtime.test_host_parts import ONE, write_package
 
 from .conftest import Recorder, running_server
 from .test_execution_history import subscribe
 
+CONTINUE = {"id": "pkg_1", "on_error": "hold", "continues": True}
 CONFIRMED = {"scene_id": "scn_1", "parts": [{"number": 1, "place": "obj_arm"}]}
 
 
@@ -41,21 +47,44 @@ async def test_after_an_interruption_a_person_confirms_where_parts_are(tmp_path:
         assert "PartsChanged" not in str(old.got)
 
     async with running_server(tmp_path / "data") as server:  # as after a power cut
-        subscribe(server, "PartsChanged")
+        subscribe(server, "PartsChanged", "Held")
         (books,) = await server.ask("GetParts")
         assert books.run.package_id == "pkg_1"
         assert [part.confirmed for part in books.parts] == [False]
         with pytest.raises(RequestRefused, match=r"Confirm where these parts are .*: A-1 \(feeder\)"):
             await server.ask("RunPackage", {"id": "pkg_1"})
+        with pytest.raises(RequestRefused, match=r"Confirm where these parts are"):
+            await server.ask("RunPackage", CONTINUE)
         await server.ask("ConfirmParts", CONFIRMED)
         published = await server.client.event("PartsChanged")
         assert published["parts"] == [{"number": 1, "place": "obj_arm", "serial": "A-1", "confirmed": True}]
-        assert "run" not in published
+        run = published["run"]
+        assert (run["confirmed"], run["continues"], run["continues_at"], run["done"]) == (True, True, ["pick"], [])
         assert (tmp_path / "notes").read_text().split() == ["pick"]  # nothing has moved
 
         (tmp_path / "hang").unlink()
-        await server.ask("RunPackage", {"id": "pkg_1"})  # the gripper is not empty: the program ends
-        error = await server.client.event("ProjectException")
-        assert "A-1 was read at feeder, but it is expected at arm" in error["message"]
+        await server.ask("RunPackage", CONTINUE)
+        held = await server.client.event("Held")
+        assert (held["kind"], held["action_name"]) == ("program_interrupted", "pick")
+        await server.ask("DecideHeld", {"number": held["number"], "choice": "skip"})  # the part is in the gripper
         await server.client.state("stopped", "PackageState")
-        assert (tmp_path / "notes").read_text().split() == ["pick"]
+        assert (tmp_path / "notes").read_text().split() == ["pick", "place"]
+        (books,) = await server.ask("GetParts")
+        assert [(part.serial, part.place) for part in books.parts] == [("A-1", "obj_nest")]
+        with pytest.raises(RequestRefused, match="was not interrupted"):
+            await server.ask("RunPackage", CONTINUE)
+
+
+async def test_parts_are_confirmed_one_after_the_other(tmp_path: Path) -> None:
+    hub = SimpleNamespace(broadcast=lambda event: None)
+    books = AllPartBooks(hub, tmp_path)  # type: ignore[arg-type]
+    places = [Place(each, each, PlaceKind.HOLDER) for each in ("nest", "arm")]
+    run = RunCheckpoint(1, "pkg_1", "", now(), cycle=1, complete=True)
+    file = CheckpointFile(tmp_path, "scn_1")
+    file.write(PartBooks("scn_1", [Part(1, "nest"), Part(2, "arm")], places, PartCounts(2, in_cell=2), run))
+    file.close()
+    for part, left in ((ConfirmedPart(1, "nest"), [2]), (ConfirmedPart(2, "arm"), [])):
+        await books.confirm(None, "scn_1", [part], "ann")
+        (found,) = await books.all()
+        assert [each.number for each in found.unconfirmed] == left
+        assert found.run.confirmed is (not left)  # type: ignore[union-attr]

@@ -3,7 +3,8 @@
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { ask } from "../../commands/requests";
-import type { Part, PartBooks, Place } from "../../protocol/types";
+import { runPackage } from "../../commands/run";
+import type { ConfirmedPart, Part, PartBooks, Place } from "../../protocol/types";
 import { call, serves } from "../../session/connection";
 import { whyUnavailable } from "../../store/permissions";
 import { now, useEditor } from "../../store/store";
@@ -20,6 +21,10 @@ export function withBooks(known: readonly PartBooks[], changed: PartBooks): Part
 /** Return the parts about which the card asks: those that are not confirmed, or all of them. */
 export const askedParts = (books: PartBooks, all: boolean): Part[] =>
   books.parts.filter((part) => all || !part.confirmed);
+
+/** Return whether the card asks about the interrupted program: for a confirmation, or whether it is to continue. */
+export const asksAboutRun = ({ run }: PartBooks): boolean =>
+  run !== undefined && (!run.confirmed || run.continues === true);
 
 /** Return the places where a part may be, the likely ones first. */
 export function answersFor(part: Part, books: PartBooks): Place[] {
@@ -55,20 +60,23 @@ function useBooks(): [PartBooks[], (books: PartBooks[]) => void] {
 /** Show the first scene with a question. With `all`, all parts can be corrected, because the program is held. */
 export default function PartsCard({ all = false }: { all?: boolean }) {
   const [books] = useBooks();
-  const open = books.find((each) => askedParts(each, all).length > 0 || each.run !== undefined);
+  const open = books.find((each) => askedParts(each, all).length > 0 || asksAboutRun(each));
   return open ? <Books books={open} all={all} /> : null;
 }
 
 function Books({ books, all }: { books: PartBooks; all: boolean }) {
   const [chosen, setChosen] = useState<number>();
   const why = useEditor((state) => whyUnavailable(state, "ConfirmParts"));
+  const whyContinue = useEditor((state) => whyUnavailable(state, "RunPackage"));
   const parts = askedParts(books, all);
   const part = parts.find((each) => each.number === chosen) ?? (all ? undefined : parts[0]);
   const packages = useEditor((state) => state.lists.packages) ?? [];
-  const confirm = (found: { number: number; place: string }[]) =>
+  const confirm = (found: ConfirmedPart[]) =>
     ask("ConfirmParts", { scene_id: books.scene_id, parts: found }).then(() => setChosen(undefined));
   const { run } = books;
-  const program = packages.find((each) => each.id === run?.package_id)?.package_meta.name ?? t`The program`;
+  const found = packages.find((each) => each.id === run?.package_id);
+  const program = found?.package_meta.name ?? t`The program`;
+  const at = run?.continues_at?.join(", ");
   const running = run?.actions.map((each) => each.action_name).join(", ");
   return (
     <section className="held" data-parts aria-label={t`Parts in the cell`}>
@@ -80,7 +88,11 @@ function Books({ books, all }: { books: PartBooks; all: boolean }) {
           <p className="held-what">
             {running ? t`${program} was at ${running}.` : t`${program} was between two actions.`}
           </p>
-          <p>{t`Nothing moves by itself. Confirm where the parts are, then press Start.`}</p>
+          <p>
+            {run.confirmed
+              ? t`It can continue there with the results so far. It first waits for your decision. Start starts it from its beginning.`
+              : t`Nothing moves by itself. Confirm where the parts are, then press Start.`}
+          </p>
         </div>
       )}
       {(!run || parts.length > 0) && <Places books={books} />}
@@ -110,11 +122,23 @@ function Books({ books, all }: { books: PartBooks; all: boolean }) {
             <Button why={why} onPress={() => void confirm([{ number: part.number, place: "" }])}>
               {t`I have taken it out of the cell`}
             </Button>
+            {part.serial === "" && (
+              <Button why={why} onPress={() => void confirm([{ number: part.number, place: "", exists: false }])}>
+                {t`There was no part`}
+              </Button>
+            )}
             {all && <Button onPress={() => setChosen(undefined)}>{t`Back`}</Button>}
           </div>
         </>
       )}
-      {run && parts.length === 0 && (
+      {run?.confirmed && found && (
+        <div className="held-choices">
+          <Button look="primary" why={whyContinue} onPress={() => void runPackage(found.id, false, true)}>
+            {at ? t`Continue at ${at}` : t`Continue after the last action`}
+          </Button>
+        </div>
+      )}
+      {run && !run.confirmed && parts.length === 0 && (
         <div className="held-choices">
           <Button look="primary" why={why} onPress={() => void confirm([])}>
             {t`There are no parts in the cell`}

@@ -1,0 +1,87 @@
+"""Continues an interrupted program: what its present cycle has done already is not done again."""
+
+import threading
+from collections import deque
+from collections.abc import Iterable
+from typing import Any
+
+from arcor2_hw.data.parts import DoneAction, RunCheckpoint, RunningAction
+from arcor2_hw.exceptions import ERROR_KINDS, Arcor2Error, Conflict, ProgramInterrupted
+from arcor2_hw.runtime.branches import Action, Branch
+from arcor2_hw.runtime.recovery import decode_results
+
+
+class Continuation:
+    """The actions of the interrupted cycle. The script runs from its start; they return their stored results.
+
+    The first action that has not been done, the first one that is repeated in a branch, and each that was running holds
+    the program, so that a person decides.
+
+    Args:
+        run: the interrupted run. Its results are complete.
+    """
+
+    def __init__(self, run: RunCheckpoint) -> None:
+        self._lock = threading.Lock()
+        kept, repeated = run.split_done()
+        self._done: dict[str, deque[DoneAction]] = {}
+        for each in kept:
+            self._done.setdefault(each.branch, deque()).append(each)
+        first = {each.branch: each for each in reversed(repeated)}
+        unfinished = [RunningAction(0, each.action_id, each.name, each.branch) for each in first.values()]
+        self._unfinished = {(each.branch, each.action_id): each for each in (*unfinished, *run.actions)}
+        self._first = True
+
+    def take(self, branch: Branch, action: str | None, name: str) -> DoneAction | None:
+        """Return the outcome of the next action of a branch; None if it has not been done.
+
+        Raises:
+            Conflict: the interrupted program has done another action here.
+        """
+        with self._lock:
+            waiting = self._done.get(branch.id)
+            if not waiting:
+                return None
+            done = waiting.popleft()
+            if done.action_id != action:
+                raise Conflict(
+                    "The program cannot continue: it was at {expected}, not at {action}. Start it from its beginning.",
+                    expected=done.name,
+                    action=name,
+                )
+            return done
+
+    @property
+    def unfinished(self) -> list[RunningAction]:
+        """The actions about which a person still has to decide."""
+        with self._lock:
+            return list(self._unfinished.values())
+
+    def interruption(self, branch: Branch, action: Action, name: str) -> ProgramInterrupted | None:
+        """Return why a person has to decide about an action that was not done; None if that is not necessary."""
+        key = branch.id, action.id or ""
+        with self._lock:
+            first, self._first = self._first, False
+            if self._unfinished.pop(key, None) is not None:
+                return ProgramInterrupted(
+                    "{action} was interrupted. Check what it has done, then decide how the program continues.",
+                    action=name,
+                )
+            if first:
+                return ProgramInterrupted("The program was interrupted before {action}.", action=name)
+        return None
+
+
+def value_of(done: DoneAction, method: Any) -> Any:
+    """Return the stored result of an action. Raises the error that the program has handled."""
+    if done.error:
+        error = ERROR_KINDS.get(done.error, Arcor2Error)(done.text)
+        vars(error)["code"] = done.code
+        raise error
+    return decode_results(method, done.results) if done.results else None
+
+
+def kind_of(error: BaseException) -> str:
+    """Return the kind of an error by which a program handles it."""
+    kinds: Iterable[tuple[str, type[Arcor2Error]]] = ERROR_KINDS.items()
+    return next((code for code, kind in kinds if isinstance(error, kind)), Arcor2Error.code)
