@@ -15,6 +15,7 @@ from typing import Final
 
 from benchmarks import (
     analysing,
+    books,
     building,
     buses,
     calibration,
@@ -59,6 +60,7 @@ GROUPS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
     "kinematics": lambda report, _: kinematics.run(report),
     "stops": lambda report, _: stops.run(report, LONG in sys.argv),
     "demo": lambda report, folder: demo.run(report, folder, LONG in sys.argv),
+    "books": lambda report, folder: books.run(report, folder, LONG in sys.argv),
     "dry_run": dry_run.run,
     "recovery": lambda report, _: recovery.run(report, LONG in sys.argv),
 }

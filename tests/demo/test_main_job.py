@@ -1,4 +1,4 @@
-"""Tests of the demo's main program: five readings agree, each fault is reported, and the cell restarts."""
+"""Tests of the demo's main program: five readings agree, and faults are reported. See test_books for random faults."""
 
 import asyncio
 import io
@@ -153,9 +153,6 @@ async def test_the_belt_brings_the_next_board_while_the_tester_works(cell: Cell)
     work = order[order.index("+test_and_fetch") : order.index("-test_and_fetch")]
     assert work.index("+close") < work.index("-halt"), "the tester starts before the belt has ended"
     assert work.index("+bring") < work.index("-open_again"), "the belt starts before the tester has ended"
-    second = order[order.index("-test_and_fetch") :]
-    assert "+picture" in second
-    assert "+bring" not in second, "the second board is at the stop already"
 
 
 async def test_good_boards_carry_their_own_label(cell: Cell) -> None:
@@ -174,9 +171,9 @@ async def test_the_tower_was_green_while_the_program_ran_and_is_red_after_it(cel
     assert world["tower"] == {"red": True, "amber": False, "green": False, "white": False}
 
 
-# ---------------------------------------------------------------------------------------------------- sabotage
-async def test_each_fault_is_reported_and_the_cell_restarts(cell: Cell) -> None:
-    command_fake, run = cell.run.command_fake, cell.run
+# ---------------------------------------------------------------------------------------------------- faults
+async def test_a_board_that_is_not_read_and_a_planning_service_that_is_down(cell: Cell) -> None:
+    command_fake = cell.run.command_fake
     async with Client(cell.url, "tests") as client:
         # The label of the board cannot be read: the board is rejected and reported, and the program goes on.
         await cell.renew()
@@ -191,58 +188,7 @@ async def test_each_fault_is_reported_and_the_cell_restarts(cell: Cell) -> None:
         assert "no code was read" in unread["note"]
         await command_fake("erp", "add_order", order="AGAIN", product="Controller board", quantity=1)
 
-        # The barcode reader does not answer.
-        await cell.renew()
-        await command_fake("reader", "silence")
-        problem = await cell.program(client)
-        assert "reader" in problem
-        await command_fake("reader", "heal")
-
-        # The belt has a following error, which the command line injects and clears.
-        await cell.renew()
-        status, output = await run.command("fake", "fault", "belt", "follow_error")
-        assert (status, output) == (0, "belt: follow_error done\n")
-        problem = await cell.program(client)
-        assert "belt" in problem
-        assert "8611" in problem or "following error" in problem.lower(), problem
-        assert (await run.command("fake", "fault", "belt", "follow_error", "on=false"))[0] == 0
-        assert (await run.command("fake", "fault", "belt", "power_cycle"))[0] == 0
-
-        # The light barrier detects nothing.
-        await cell.renew()
-        await command_fake("world", "barrier", number=0, stuck=False)
-        problem = await cell.program(client)
-        assert "io" in problem
-        assert "board_at_stop" in problem
-
-        # The gripper has no air; the light barrier is repaired.
-        await cell.renew()
-        await command_fake("world", "gripper", works=False)
-        problem = await cell.program(client)
-        assert "robot picked nothing" in problem
-
-        # The tester has no contact.
-        await cell.renew()
-        problem = await cell.program(client, {"test": lambda: command_fake("tester", "fault", code=103, armed=True)})
-        assert "tester" in problem
-        assert "no contact" in problem.lower()
-        await command_fake("tester", "command", name="clear")
-        await until(lambda: _state(run, "Stopped"), "the tester to be cleared")
-        await command_fake("tester", "push_door", opening=True)
-
-        # The printer is out of labels.
-        await cell.renew()
-        problem = await cell.program(client, {"label": lambda: command_fake("printer", "media", labels=0)})
-        assert "printer" in problem
-        assert "out of labels" in problem
-        await command_fake("printer", "media", labels=100)
-        (board,) = (await command_fake("world", "truth"))["boards"]
-        assert (board["place"], board["label"]) == ("label", None)
-        assert [
-            result for result in (await command_fake("erp", "truth"))["results"] if result["order"] == "AGAIN"
-        ] == []
-
-        # After all that the cell starts again. The planning service stops meanwhile: production continues.
+        # The planning service stops: production continues, and the result is delivered afterwards.
         await cell.renew()
         missing: list[int] = []
 
@@ -296,11 +242,6 @@ def with_the_settings_of(package: Path, other: Path) -> bytes:
                 content = json.dumps(scene).encode()
             target.writestr(name, content)
     return packed.getvalue()
-
-
-async def _state(run: Run, wanted: str) -> bool:
-    state: str = (await run.command_fake("tester", "truth"))["state"]
-    return state == wanted
 
 
 async def test_once_prints_one_line_when_a_fault_ends_the_program(tmp_path: Path) -> None:
