@@ -194,8 +194,6 @@ class Cell:
         """Start everything, and build the package."""
         wanted = fakes(self._boards, self._seed, fast=True)
         options = {"robot": ("--time-scale", "0.1")}  # its times for unlocking
-        # A pty gets another path when it is plugged in again, a link does not.
-        options |= {name: ("--link", str(self.folder.absolute() / name)) for name in ("reader", "press")}
         children = [self._child(fake.name, [*fake.command(), *options.get(fake.name, ())]) for fake in wanted]
         async with asyncio.TaskGroup() as starts:
             found = [starts.create_task(child.start_json()) for child in children]

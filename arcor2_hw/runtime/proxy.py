@@ -60,9 +60,8 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
 
     def run(an: str | None, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Any:
         record, step = program.record, None
-        continuation = None if record is None else record.continuation
-        if continuation is not None:
-            done = continuation.take(program.branches.current, program.id_of(an), an or what)
+        if record is not None:
+            done = record.outcome(program.branches.current, program.id_of(an), an or what)
             if done is not None:
                 return program.outcome_of(done, device, bound)
         keywords = with_present_names(bound, keywords)
@@ -71,8 +70,8 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
         if an is not None:
             keywords["an"] = an
         interruption = None
-        if continuation is not None:
-            interruption = continuation.interruption(program.branches.current, action, an or what)
+        if record is not None and record.continuation is not None:
+            interruption = record.continuation.interruption(program.branches.current, action, an or what)
         while True:
             try:
                 with program.interlocks.guarded(device, name, shown, program.wait_to_start):

@@ -104,6 +104,8 @@ class RunRecord:
         self._interrupted = False
         self._done: list[DoneAction] = []
         """What the present cycle has done; at most MOST_DONE actions."""
+        self._cycle_call = 0
+        """Number of the call with which the present cycle has started; 0 if it started with an action."""
         self._continues = continues
         self.continuation: Continuation | None = None
         """What the interrupted cycle has done already; None if the program starts from its beginning."""
@@ -205,7 +207,7 @@ class RunRecord:
             step = Step(action.number, _done(action, name, branch, device, bound))
             if self._keeps_books:
                 step = self._begin_part(step, device, bound, arguments, keywords)
-            if action_id and action_id == self._first and (action.attempt == 1 or self.continuation is not None):
+            if self._starts_cycle(action, branch):
                 self._run = replace(self._run, cycle=self._run.cycle + 1, complete=True)
                 self._done.clear()
                 self.continuation = None
@@ -214,6 +216,27 @@ class RunRecord:
             self._running[action.number] = RunningAction(action.number, action_id, name, branch.id, frames)
             self._store()
         return step
+
+    def _starts_cycle(self, action: Action, branch: Branch) -> bool:
+        """Return whether an action is the first one of a cycle: that after START, or the first inside a call there."""
+        outer = branch.calls[0] if branch.calls else action
+        if not outer.id or outer.id != self._first:
+            return False
+        if outer is action:
+            return action.attempt == 1 or self.continuation is not None
+        former, self._cycle_call = self._cycle_call, outer.number
+        return outer.number != former
+
+    def outcome(self, branch: Branch, action_id: str, name: str) -> DoneAction | None:
+        """Return what the interrupted program has done as the next action of a branch, None if it has to be executed.
+
+        Raises:
+            Conflict: the interrupted program has done another action here.
+        """
+        done = None if self.continuation is None else self.continuation.take(branch, action_id, name)
+        if done is not None and branch.calls:
+            self._cycle_call = branch.calls[0].number  # the call around it belongs to the interrupted cycle
+        return done
 
     def _begin_part(
         self, step: Step, device: Device, bound: Any, arguments: Sequence[Any], keywords: Mapping[str, Any]

@@ -2,15 +2,26 @@
 
 import os
 import signal
+import textwrap
 from pathlib import Path
 
 import pytest
 from msgspec import UNSET
+from msgspec.structs import replace
 
 from arcor2_hw.data.geometry import Orientation, Position
 from arcor2_hw.data.held import HeldData, HoldChoice
 from arcor2_hw.data.parts import ConfirmedPart, Part, PartBooks
-from arcor2_hw.data.project import START, Action, ActionPoint, Flow, LogicItem, NamedOrientation, Project
+from arcor2_hw.data.project import (
+    START,
+    Action,
+    ActionPoint,
+    Flow,
+    LogicItem,
+    NamedOrientation,
+    Project,
+    ProjectFunction,
+)
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.checkpoints import CheckpointFile
 
@@ -83,7 +94,7 @@ stop, inside, box = (res.pose(f"ori_{name}") for name in ("stop", "inside", "box
 ONE = BODY + 'arm.scan("A-1", an="scan")\narm.pick(stop, an="pick")\narm.place(inside, an="insert")\n'
 
 
-def write_package(package: Path, directory: Path, body: str) -> Path:
+def write_package(package: Path, directory: Path, body: str, project: Project = PROJECT) -> Path:
     """Write a package whose arm writes notes to the directory, and finds its faults there."""
     objects = [
         scene_object("arm", "Arm", directory=str(directory)),
@@ -91,7 +102,7 @@ def write_package(package: Path, directory: Path, body: str) -> Path:
         scene_object("nest", "PartHolder", pose=True),
         scene_object("good", "PartBox", pose=True, counts_as="good"),
     ]
-    return Package(package).write({"Arm": ARM}, objects, PROJECT, body)
+    return Package(package).write({"Arm": ARM}, objects, project, body)
 
 
 class Cell:
@@ -101,11 +112,11 @@ class Cell:
         self.runs = 0
         self.hosts: list[HostProcess] = []
 
-    def start(self, body: str, **options: object) -> HostProcess:
+    def start(self, body: str, project: Project = PROJECT, **options: object) -> HostProcess:
         host = HostProcess()
         self.hosts.append(host)
         self.runs += 1
-        path = write_package(self.directory / f"pkg_{self.runs}", self.directory, body)
+        path = write_package(self.directory / f"pkg_{self.runs}", self.directory, body, project)
         more = {"records": str(self.records), "run": self.runs, "hold_on_error": True} | options
         host.send(m.RunPackage("pkg_1", str(path), streaming_period=0, **more))  # type: ignore[arg-type]
         return host
@@ -222,10 +233,29 @@ def test_checkpoints_of_actions_can_be_switched_off(cell: Cell) -> None:
     assert cell.books().parts == [Part(1, "obj_feeder", "A-1")]
 
 
-def test_an_interrupted_program_continues_at_its_interrupted_action(cell: Cell) -> None:
-    body = ONE + 'arm.test(True, an="test")\narm.pick(inside, an="take")\narm.place(box, an="into_box")'
+STEPS = f"""{ONE}arm.test(True, an="test")
+arm.pick(inside, an="take")
+arm.place(box, an="into_box")
+"""
+CALLED = replace(
+    PROJECT,
+    action_points=[
+        *PROJECT.action_points,
+        ActionPoint("p", Position(), actions=[Action("all", "pfu_1/call", "act_all")]),
+    ],
+    functions=[ProjectFunction("work", [], id="pfu_1")],
+    logic=[LogicItem(START, "act_all", id="lit_1")],
+)
+
+
+@pytest.mark.parametrize("called", [False, True], ids=["actions", "a function"])
+def test_an_interrupted_program_continues_at_its_interrupted_action(cell: Cell, called: bool) -> None:
+    body, project = STEPS, PROJECT
+    if called:
+        inside = f"@res.function\ndef work(*, an: str) -> None:\n{textwrap.indent(STEPS, '    ')}"
+        body, project = f'{inside}\nwork(an="all")', CALLED
     (cell.directory / "hang").touch()
-    host = cell.start(body)
+    host = cell.start(body, project)
     host.expect(m.ProgramEvent, lambda event: event.name == "pick")
     while not cell.notes():
         pass
@@ -236,7 +266,7 @@ def test_an_interrupted_program_continues_at_its_interrupted_action(cell: Cell) 
     assert run is not UNSET
     assert (run.published().continues, run.published().continues_at) == (True, ["pick"])
 
-    host = cell.start(body, continues=True)
+    host = cell.start(body, project, continues=True)
     found = held(host)
     assert (found.kind, found.action_name, found.choices) == (
         "program_interrupted", "pick", [HoldChoice.RETRY, HoldChoice.SKIP, HoldChoice.END]
@@ -246,3 +276,5 @@ def test_an_interrupted_program_continues_at_its_interrupted_action(cell: Cell) 
     assert host.expect_state("stopped").finished
     assert cell.notes() == ["pick", "pick", "place", "pick", "place"]
     assert cell.books().counts.good == 1
+    assert cell.books().run.cycle == 1  # type: ignore[union-attr]
+    assert [done.name for done in cell.books().run.done] == ["scan", "pick", "insert", "test", "take", "into_box"]  # type: ignore[union-attr]
