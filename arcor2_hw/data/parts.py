@@ -87,7 +87,7 @@ class RunningAction(Data, frozen=True):
     frames: list[Frame] = field(default_factory=list)
 
 
-class DoneAction(Data, frozen=True):
+class DoneAction(Data, frozen=True, omit_defaults=True):
     """An action of the present cycle that has ended. Clients do not receive it.
 
     branch: of the program. action_id, name, device: the action and its object. results: in JSON. stored: whether the

@@ -758,13 +758,13 @@ export interface DoneAction {
   action_id: string;
   name: string;
   device: string;
-  results: string[];
-  stored: boolean;
-  error: string;
-  code: string;
-  text: string;
-  lasts: boolean;
-  moved: boolean;
+  results?: string[];
+  stored?: boolean;
+  error?: string;
+  code?: string;
+  text?: string;
+  lasts?: boolean;
+  moved?: boolean;
 }
 
 /**
