@@ -1,8 +1,8 @@
 """Measure all metrics: JSON lines on standard output, a table on standard error (`make bench`).
 
 `python -m benchmarks [--long] [GROUP ...]` measures the named groups, or all. `--long` increases the number of samples:
-recovery 50 cycles (3 without it), stops 500 for each driver in a busy process (100), demo 5 runs (1), calibration
-2,000 pictures of each kind (200), robot_pose 300 views (30).
+recovery 50 cycles (3 without it), stops 500 for each driver in a busy process (100), demo 5 runs (1), books 10 seeds
+(1), calibration 2,000 pictures of each kind (200), robot_pose 300 views (30).
 """
 
 import asyncio

@@ -18,7 +18,7 @@ from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.position import ProgramStep
 from arcor2_hw.data.rpc import ConfirmPartsArgs, DecideHeldArgs
 from arcor2_hw.data.scene import SceneObject
-from arcor2_hw.exceptions import Arcor2Error, NotFound
+from arcor2_hw.exceptions import Arcor2Error, NotFound, ProgramInterrupted
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.background import BackgroundTasks
@@ -430,8 +430,9 @@ class Execution(PackageLibrary):
             self._enter(S.PAUSING)
         run = self.program.number
         self.hold.begin(run, message.held)
-        for notify in self.on_error:
-            notify(message.error, run, message.held.action_name)
+        if message.held.kind != ProgramInterrupted.code:  # the interruption has its own alarm
+            for notify in self.on_error:
+                notify(message.error, run, message.held.action_name)
 
     def _end_hold(self) -> None:
         if self.hold.present is None:
