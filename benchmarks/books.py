@@ -631,7 +631,14 @@ class Trial:
             await self._confirm(client)
             await self._start(client)
             await until(lambda: not self._cell.waiting_results(), "the results to be delivered", SILENT_AFTER)
-            await client.call("StopPackage")
+
+            async def stopped() -> bool:
+                with contextlib.suppress(RequestFailed):  # while it starts
+                    await client.call("StopPackage")
+                    return True
+                return False
+
+            await until(stopped, "the program to be stopped", DECIDED_WITHIN)
 
     async def _check_results(self) -> None:
         """Compare the results that the planning service has received with the boards of the world."""

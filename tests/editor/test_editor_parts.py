@@ -50,6 +50,9 @@ async def test_operator_confirms_a_part_and_continues_after_kill(tmp_path: Path,
                 await parts.get_by_role("button", name="Continue at pick").click()
                 held = screen.page.get_by_role("region", name="The program is held")
                 await expect(held).to_contain_text("pick was interrupted.")
+                await held.get_by_text("Parts in the cell").click()
+                await expect(held.get_by_role("button", name="Correct A-1")).to_be_visible()
+                assert await screen.faults() == []
                 await screen.picture("parts, held")
                 assert notes.read_text().split() == ["pick"]  # nothing has moved
                 await held.get_by_role("button", name="Done by hand, continue").click()

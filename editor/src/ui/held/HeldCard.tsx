@@ -42,7 +42,7 @@ export default function HeldCard({ held }: { held: HeldData }) {
         </details>
       )}
       <Remedies held={held} />
-      {PART_ERRORS.includes(held.kind) && <PartsCard all />}
+      <PartsCard all folded={!PART_ERRORS.includes(held.kind)} />
       <p>
         {t`Fix the cause first. The program starts nothing until you decide.`}{" "}
         {t`What is switched on stays on, such as a belt.`}

@@ -57,11 +57,21 @@ function useBooks(): [PartBooks[], (books: PartBooks[]) => void] {
   return [books, setBooks];
 }
 
-/** Show the first scene with a question. With `all`, all parts can be corrected, because the program is held. */
-export default function PartsCard({ all = false }: { all?: boolean }) {
+/**
+ * Show the first scene with a question. With `all`, all parts can be corrected, because the program is held. With
+ * `folded`, the card is folded as long as all parts are confirmed.
+ */
+export default function PartsCard({ all = false, folded = false }: { all?: boolean; folded?: boolean }) {
   const [books] = useBooks();
   const open = books.find((each) => askedParts(each, all).length > 0 || asksAboutRun(each));
-  return open ? <Books books={open} all={all} /> : null;
+  if (!open) return null;
+  if (!folded || askedParts(open, false).length > 0) return <Books books={open} all={all} />;
+  return (
+    <details>
+      <summary>{t`Parts in the cell`}</summary>
+      <Books books={open} all={all} />
+    </details>
+  );
 }
 
 function Books({ books, all }: { books: PartBooks; all: boolean }) {
