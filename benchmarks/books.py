@@ -534,8 +534,11 @@ class Trial:
         """Return that the movement counts as done if the books agree, otherwise end the program."""
         (books,) = await client.get_parts()
         there = {books.name_of(part.place) for part in books.parts}
-        recent = NAMES[target] in there or target in ("good", "bad")
-        return (HoldChoice.SKIP if recent and HoldChoice.SKIP in held.choices else HoldChoice.END), []
+        if target in ("good", "bad"):  # the part that was moved has left the books
+            arrived = not there & {NAMES[place] for place in ("gripper", "label", "tester")}
+        else:
+            arrived = NAMES[target] in there
+        return (HoldChoice.SKIP if arrived and HoldChoice.SKIP in held.choices else HoldChoice.END), []
 
     async def _take_out(self, client: Client, code: str) -> None:
         """Take a board out of the cell, and tell the books."""

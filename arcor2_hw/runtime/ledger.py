@@ -30,6 +30,8 @@ class Ledger:
         counts = books.counts
         self._left = {PlaceKind.GOOD: counts.good, PlaceKind.BAD: counts.bad, PlaceKind.REJECTED: counts.rejected}
         self._fed = counts.fed
+        self._gone: dict[int, str] = {}
+        """Where parts have left the cell, by number: the id of a box; empty: taken out by hand."""
         self.tests = False
         """Whether the program tests parts, so that only those that have passed may go into a good box."""
 
@@ -148,6 +150,19 @@ class Ledger:
                 self._parts[part.number] = replace(part, good=good)
                 return
 
+    def require_arrived(self, number: int, target: str) -> None:
+        """Check that nobody has confirmed a part elsewhere than at the target of its movement. Raises WrongPart."""
+        part = self._parts.get(number)
+        if part is not None and isinstance(part.moving_to, Unset) and part.place != target:
+            raise WrongPart(
+                "Part {part} is at {place}, not at {target}. Bring it there and confirm that, or decide otherwise.",
+                part=part.shown,
+                place=self.name_of(part.place),
+                target=self.name_of(target),
+            )
+        if part is None and self._gone.get(number, target) != target:
+            raise WrongPart("The part is not at {target}: it has left the cell.", target=self.name_of(target))
+
     def has_part(self, place_id: str) -> bool:
         """Return whether a part is at a place, or may be."""
         return any(place_id in (part.place, part.moving_to) for part in self._parts.values())
@@ -233,6 +248,7 @@ class Ledger:
 
     def _leave(self, part: Part, place: Place | None) -> None:
         """Count a part that has left the cell, in a box or by hand."""
+        self._gone[part.number] = "" if place is None else place.id
         self._left[PlaceKind.REJECTED if place is None else place.kind] += 1
         if place is not None:
             self._serials[place.id].append(part.shown)

@@ -328,8 +328,13 @@ class Program:
         self._report_failure(action, error)
         self._leave()
 
-    def hold(self, action: Action, name: str, device: Device, method: Any, error: BaseException) -> Decision | None:
+    def hold(
+        self, action: Action, name: str, device: Device, method: Any, error: BaseException,
+        check_done: Callable[[], None],
+    ) -> Decision | None:  # fmt: skip
         """Hold the program because an action has failed, and return the decision; None if the error is to be raised.
+
+        check_done: raises an error if the action cannot count as done by hand.
 
         Raises:
             ProgramStopped: The program was stopped.
@@ -344,7 +349,7 @@ class Program:
             return None
         self._report_failure(action, error)
         action.failed_after = time.monotonic() - action.began
-        decision = self.recovery.after_failure(branch, call, device, method, error)
+        decision = self.recovery.after_failure(branch, call, device, method, error, check_done)
         if decision.error is not None:
             branch.failure.action = decision.error, action
             self.record_error_source(device, decision.error)

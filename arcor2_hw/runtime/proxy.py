@@ -3,6 +3,7 @@
 import inspect
 import types
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, cast
 
 from arcor2_hw.actions import deadline_of, metadata_of
@@ -101,7 +102,8 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
                 if record is not None and step is not None:
                     record.fail(step)
                 try:
-                    decision = program.hold(action, an or what, device, bound, error)
+                    check = partial(record.require_arrived, step) if record is not None else lambda: None
+                    decision = program.hold(action, an or what, device, bound, error, check)
                 except Arcor2Error as chosen:  # the error of an error exit
                     if record is not None:
                         record.handled(action, an or what, program.branches.current, device, bound, chosen)

@@ -45,11 +45,15 @@ log = logging.getLogger(__name__)
 
 
 class Step(NamedTuple):
-    """A started action. part: number of the part that it moves. place: where it identifies or judges one."""
+    """A started action.
+
+    part, target: number of the part that it moves, and where to. place: where it identifies or judges one.
+    """
 
     number: int
     done: DoneAction
     part: int | None = None
+    target: str = ""
     place: str = ""
     identifies: bool = False
     judges: bool = False
@@ -259,7 +263,7 @@ class RunRecord:
             self._compare(source, target)
             part = self._ledger.move(source, target)
             self._publish()
-            return step._replace(part=part, done=replace(step.done, moved=True))
+            return step._replace(part=part, target=target, done=replace(step.done, moved=True))
         if judges and self._ledger.has_part(device.id):
             own = device.id
         elif flow.identifies:
@@ -328,6 +332,12 @@ class RunRecord:
             self._store_later()
             if step.part is not None:
                 self._publish(sense=True)
+
+    def require_arrived(self, step: Step | None) -> None:
+        """Check that a movement may count as done by hand. Raises WrongPart if a person has confirmed otherwise."""
+        if step is not None and step.part is not None:
+            with self._lock:
+                self._ledger.require_arrived(step.part, step.target)
 
     def decided(self, action: Action, name: str, branch: Branch, device: Device, bound: Any, value: Any) -> None:
         """Record that an action that has not started counts as done, by the decision of a person."""

@@ -49,12 +49,13 @@ class Decision(NamedTuple):
 
 
 class _Hold(NamedTuple):
-    """The present hold. hints: types of the results."""
+    """The present hold. hints: types of the results. check_done: raises an error if the action cannot count as done."""
 
     data: HeldData
     device: Device
     error: BaseException
     hints: Sequence[Any]
+    check_done: Callable[[], None] = lambda: None
 
 
 class ActionCall(NamedTuple):
@@ -122,9 +123,12 @@ class Recovery:
         return not any(isinstance(error, ERROR_KINDS[kind]) for kind in kinds if kind in ERROR_KINDS)
 
     def after_failure(
-        self, branch: Branch, call: ActionCall, device: Device, method: Any, error: BaseException
-    ) -> Decision:
+        self, branch: Branch, call: ActionCall, device: Device, method: Any, error: BaseException,
+        check_done: Callable[[], None],
+    ) -> Decision:  # fmt: skip
         """Hold the program at an action that has failed, and return the decision. The action no longer counts.
+
+        check_done: raises an error if the action cannot count as done by hand.
 
         Raises:
             ProgramStopped: the program was stopped.
@@ -153,7 +157,7 @@ class Recovery:
             returns=known if choices[HoldChoice.RESULT] else UNSET,
             exits=[self._exit(item) for item in exits] or UNSET,
         )
-        return self._wait(branch, _Hold(data, device, error, hints))
+        return self._wait(branch, _Hold(data, device, error, hints, check_done))
 
     def lost(self, device: Device, error: Arcor2Error) -> None:
         """Record a lost connection. It holds the program before the next action."""
@@ -210,6 +214,7 @@ class Recovery:
             Conflict: the program is not held at this action.
             InvalidData: this is not one of the choices, or the results are not valid.
             NotConnected: the connection of the device is lost.
+            WrongPart: the part is not where the action would have put it.
         """
         hold, choice = self._present, message.choice
         if hold is None or hold.data.number != message.number:
@@ -221,7 +226,10 @@ class Recovery:
         match choice:
             case HoldChoice.RETRY:
                 _require_connected(hold.device)
+            case HoldChoice.SKIP:
+                hold.check_done()
             case HoldChoice.RESULT:
+                hold.check_done()
                 decision = Decision(choice, _decoded(hold, message.results))
             case HoldChoice.ERROR_EXIT:
                 decision = Decision(choice, error=self._forced(hold, message.exit_id))

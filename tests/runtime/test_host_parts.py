@@ -233,6 +233,19 @@ def test_checkpoints_of_actions_can_be_switched_off(cell: Cell) -> None:
     assert cell.books().parts == [Part(1, "obj_feeder", "A-1")]
 
 
+def test_a_part_that_is_elsewhere_does_not_count_as_moved(cell: Cell) -> None:
+    (cell.directory / "fault").touch()
+    host = cell.start(ONE)
+    found = held(host)
+    for where, reason in (("obj_nest", "A-1 is at nest, not at arm"), ("", "not at arm: it has left the cell")):
+        assert confirm(host, ConfirmedPart(1, where)) is None
+        host._calls += 1
+        host.send(m.DecideHeld(host._calls, found.number, HoldChoice.SKIP, []))
+        assert reason in host.answer(host._calls).message.text
+    decide(host, found.number, HoldChoice.END)
+    host.expect_state("stopped")
+
+
 STEPS = f"""{ONE}arm.test(True, an="test")
 arm.pick(inside, an="take")
 arm.place(box, an="into_box")
