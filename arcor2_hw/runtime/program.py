@@ -377,6 +377,7 @@ class Program:
     def wait_to_start(self, seconds: float) -> float:
         """Wait in an action that an interlock prevents from starting; see `Gate.wait_to_start`."""
         return self.gate.wait_to_start(self.branches.current, seconds)
+
     def id_of(self, name: str | None) -> str:
         """Return the id of an action by its name; empty if the project has no such action."""
         return self._action_ids.get(name or "", "")

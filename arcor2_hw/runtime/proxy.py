@@ -75,6 +75,9 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
             interruption = record.continuation.interruption(program.branches.current, action, an or what)
         while True:
             try:
+                if interruption is not None:
+                    error, interruption = interruption, None
+                    raise error
                 with program.interlocks.guarded(device, name, shown, program.wait_to_start):
                     if program.recovery is not None:
                         program.recovery.take_control(device)
@@ -82,15 +85,6 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
                         branch = program.branches.current
                         step = record.begin(action, an or what, branch, device, bound, arguments, keywords)
                     value = lane.call(name, bound, arguments, keywords, deadline)
-                if interruption is not None:
-                    error, interruption = interruption, None
-                    raise error
-                if program.recovery is not None:
-                    program.recovery.take_control(device)
-                if record is not None:
-                    branch = program.branches.current
-                    step = record.begin(action, an or what, branch, device, bound, arguments, keywords)
-                value = lane.call(name, bound, arguments, keywords, deadline)
                 if record is not None and step is not None:
                     record.end(step, value)
             except ProgramFinished:

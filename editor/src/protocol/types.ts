@@ -2245,7 +2245,7 @@ export interface RegisterUserArgs {
   user_name: string;
 }
 
-/** Arguments of RemoveAction. With `with_steps` the action is also removed from the logic, in the same edit. */
+/** Arguments of RemoveAction. With `with_steps`, its connections and parallel calls are removed in the same edit. */
 export interface RemoveActionArgs {
   id: string;
   with_steps?: boolean;

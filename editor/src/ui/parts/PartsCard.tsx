@@ -100,7 +100,7 @@ function Books({ books, all }: { books: PartBooks; all: boolean }) {
           </p>
           <p>
             {run.confirmed
-              ? t`It can continue there with the results so far. It first waits for your decision. Start starts it from its beginning.`
+              ? t`It can continue there with its results, after your decision. Start starts it from its beginning.`
               : t`Nothing moves by itself. Confirm where the parts are, then press Start.`}
           </p>
         </div>
