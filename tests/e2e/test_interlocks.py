@@ -139,7 +139,7 @@ async def test_the_arm_enters_only_while_the_door_is_confirmed_open(tmp_path: Pa
 async def test_two_fake_arms_never_share_a_zone(tmp_path: Path) -> None:
     second = free_loopback_address()
     async with running_cell(tmp_path) as cell:
-        await cell.start_fake("second", "arcor2_fakes.ur", "--host", second)
+        await cell.start_fake("second", "ur", "--host", second)
         client = await cell.client("technician")
         scene, _ = await cell.open(client)
         robot = next(obj for obj in scene.objects if obj.name == "robot")

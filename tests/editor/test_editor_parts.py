@@ -1,6 +1,5 @@
 """The operator's tablet after an interruption: where the parts are, and how the program continues."""
 
-import asyncio
 import os
 import signal
 from pathlib import Path
@@ -21,10 +20,15 @@ from tests.runtime.test_host_parts import ONE, write_package
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
+def hang(folder: Path, hangs: bool) -> None:
+    """Let the gripper of the package hang while it picks."""
+    (folder / "hang").touch() if hangs else (folder / "hang").unlink()
+
+
 async def test_operator_confirms_a_part_and_continues_after_kill(tmp_path: Path, browser: Browser) -> None:
     notes = tmp_path / "notes"
-    await asyncio.to_thread((tmp_path / "hang").touch)
-    await asyncio.to_thread(write_package, tmp_path / "data" / "packages" / "pkg_1", tmp_path, ONE)
+    hang(tmp_path, True)
+    write_package(tmp_path / "data" / "packages" / "pkg_1", tmp_path, ONE)
     serve = python_module("arcor2_server.cli.main", "serve", "--port", "0", "--data-dir", str(tmp_path / "data"))
     server = Child("server", serve, tmp_path / "server.log")
     url = await server.start()
@@ -35,7 +39,7 @@ async def test_operator_confirms_a_part_and_continues_after_kill(tmp_path: Path,
             for process in psutil.Process(server.pid).children():
                 if "arcor2_hw.runtime.host" in process.cmdline():
                     os.kill(process.pid, signal.SIGKILL)
-            await asyncio.to_thread((tmp_path / "hang").unlink)
+            hang(tmp_path, False)
             async with screen_of(browser, url.replace("ws://", "http://"), "ipad", touch=True) as screen:
                 await screen.join("Olga", "/?q=low#/operator?kiosk")
                 parts = screen.page.get_by_role("region", name="Parts in the cell")
@@ -44,7 +48,7 @@ async def test_operator_confirms_a_part_and_continues_after_kill(tmp_path: Path,
                 assert await screen.faults() == []
                 await screen.picture("parts, where")
                 await parts.get_by_role("button", name="arm", exact=True).click()
-                await expect(parts).to_contain_text("It first waits for your decision.")
+                await expect(parts).to_contain_text("after your decision.")
                 assert await screen.faults() == []
                 await screen.picture("parts, continue")
                 await parts.get_by_role("button", name="Continue at pick").click()
