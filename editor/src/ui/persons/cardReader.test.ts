@@ -26,7 +26,7 @@ test("keys of a person reach the field in their order", () => {
   expect(typed("Eva 2580\n", 120)).toEqual({ cards: [], page: "Eva 2580\n" });
 });
 
-test("a few fast keys are no card", () => {
+test("does not take a few fast keys for a card", () => {
   expect(typed("258\n", 10)).toEqual({ cards: [], page: "258\n" });
   expect(typed("Eva 2580", 10)).toEqual({ cards: [], page: "Eva 2580" });
 });
