@@ -114,8 +114,9 @@ class RunCheckpoint(Data, frozen=True):
     package_hash: SHA-256 of script and project. cycle: number of the present cycle, from 1. actions: those that have
     started and not ended; empty between two actions. last: the action that ended last. results: the newest results of
     each action by its id, in JSON. ended: whether the program has ended in an orderly way. done: what the present
-    cycle has done. complete: whether `done` is complete. interrupted: whether the server has noticed that the run was
-    interrupted. confirmed: whether a person has confirmed since where all parts are.
+    cycle has done. variables: the values of the program's variables at its start, by name, in JSON. complete: whether
+    `done` is complete. interrupted: whether the server has noticed that the run was interrupted. confirmed: whether a
+    person has confirmed since where all parts are.
     continues, continues_at: whether the program can continue, and at which actions (empty: after `last`).
     """
 
@@ -129,6 +130,7 @@ class RunCheckpoint(Data, frozen=True):
     results: dict[str, list[str]] = field(default_factory=dict)
     ended: bool = False
     done: list[DoneAction] = field(default_factory=list)
+    variables: dict[str, str] = field(default_factory=dict)
     complete: bool = False
     interrupted: bool = False
     confirmed: bool = False
@@ -165,7 +167,7 @@ class RunCheckpoint(Data, frozen=True):
         at = [action.action_name for action in self.actions if action.branch not in branches]
         first = {each.branch: each.name for each in reversed(repeated)}
         can = self.complete and self.cycle > 0 and not self.why_not()
-        return replace(self, done=[], continues=can, continues_at=[*first.values(), *at] if can else [])
+        return replace(self, done=[], variables={}, continues=can, continues_at=[*first.values(), *at] if can else [])
 
 
 class PartBooks(Data, frozen=True):

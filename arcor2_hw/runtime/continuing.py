@@ -1,9 +1,12 @@
 """Continues an interrupted program: what its present cycle has done already is not done again."""
 
+import ast
 import threading
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
+
+import msgspec
 
 from arcor2_hw.data.parts import DoneAction, RunCheckpoint, RunningAction
 from arcor2_hw.exceptions import ERROR_KINDS, Arcor2Error, Conflict, ProgramInterrupted
@@ -70,6 +73,32 @@ class Continuation:
             if first:
                 return ProgramInterrupted("The program was interrupted before {action}.", action=name)
         return None
+
+
+def set_variables(script: ast.Module, values: Mapping[str, str]) -> None:
+    """Let a script start with other values of its variables, such as `count: int = 0`.
+
+    Args:
+        script: the syntax tree of the script, which is changed.
+        values: the values by the name of the variable, in JSON.
+
+    Raises:
+        Conflict: the script assigns no initial value to one of the variables.
+    """
+    assigned: dict[str, ast.AnnAssign] = {}
+    for body in (each.body for each in script.body if isinstance(each, ast.FunctionDef)):
+        for statement in body:
+            if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
+                assigned.setdefault(statement.target.id, statement)
+    for name, value in values.items():
+        if (found := assigned.get(name)) is None or found.value is None:
+            raise Conflict(
+                "The program cannot continue: the script has no variable {name}. Start it from its beginning.",
+                name=name,
+            )
+        kind = float if isinstance(found.annotation, ast.Name) and found.annotation.id == "float" else None
+        constant = ast.Constant(msgspec.json.decode(value, type=kind or Any))
+        found.value = ast.copy_location(constant, found.value)
 
 
 def value_of(done: DoneAction, method: Any) -> Any:

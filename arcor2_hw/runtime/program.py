@@ -317,7 +317,10 @@ class Program:
         if action.id is None:
             self.channel.action_over(action.number, duration, None, action.waited)
         else:
-            data = ActionStateAfterData(action.id, results(value) or msgspec.UNSET)
+            found = results(value)
+            if found and self.record is not None:
+                self.record.store_variables(action.id, found)
+            data = ActionStateAfterData(action.id, found or msgspec.UNSET)
             encoded = _encode(Event("ActionStateAfter", data=data))
             self.channel.event(
                 "ActionStateAfter", encoded, action.number, time=duration, waited=action.waited, call=action.call

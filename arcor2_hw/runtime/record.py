@@ -101,6 +101,10 @@ class RunRecord:
         self._first = ""
         self._named: set[str] = set()
         """The actions whose results have names, so that other actions can use them."""
+        self._outputs: dict[str, list[str]] = {}
+        """The names of the results of the actions that store one in a variable."""
+        self._variables: dict[str, str] = {}
+        """The present values of the variables, by name, in JSON."""
         self._running: dict[int, RunningAction] = {}
         self._results: dict[str, list[str]] = {}
         self._held: dict[tuple[str, str], RunningAction] = {}
@@ -110,7 +114,8 @@ class RunRecord:
         """What the present cycle has done; at most MOST_DONE actions."""
         self._cycle_call = 0
         """Number of the call with which the present cycle has started; 0 if it started with an action."""
-        self._continues = continues
+        self.continues = continues
+        """Whether the program continues where it was interrupted."""
         self.continuation: Continuation | None = None
         """What the interrupted cycle has done already; None if the program starts from its beginning."""
 
@@ -133,8 +138,11 @@ class RunRecord:
         self._keeps_books = not kinds <= {None, PlaceKind.HOLDER}
         self._first = next((item.end for item in project.logic if item.start == START), "")
         self._named = {action.id for action in project.all_actions() if action.outputs()}
-        self._run = replace(self._run, package_hash=package_hash(package))
-        if self._continues:
+        self._variables = {one.name: one.value for one in project.parameters if one.variable}
+        stores = ((action.id, action.outputs()) for action in project.all_actions())
+        self._outputs = {key: names for key, names in stores if not self._variables.keys().isdisjoint(names)}
+        self._run = replace(self._run, package_hash=package_hash(package), variables=dict(self._variables))
+        if self.continues:
             self._continue(former.run)
         if self._keeps_books:
             self._ledger.set_places(self._find_places(project, cell))
@@ -150,7 +158,10 @@ class RunRecord:
         self.continuation = Continuation(former)
         self._results = dict(former.results)
         self._done = former.split_done()[0]
-        self._run = replace(self._run, cycle=former.cycle, last=former.last, complete=True)
+        self._variables |= former.variables
+        self._run = replace(
+            self._run, cycle=former.cycle, last=former.last, complete=True, variables=dict(self._variables)
+        )
 
     def _find_places(self, project: Project, cell: Cell) -> list[Place]:
         """Return the places of the scene and of the project, and assign action points and actions to them."""
@@ -212,7 +223,8 @@ class RunRecord:
             if self._keeps_books:
                 step = self._begin_part(step, device, bound, arguments, keywords)
             if self._starts_cycle(action, branch):
-                self._run = replace(self._run, cycle=self._run.cycle + 1, complete=True)
+                variables = dict(self._variables)
+                self._run = replace(self._run, cycle=self._run.cycle + 1, complete=True, variables=variables)
                 self._done.clear()
                 self.continuation = None
             self._held.pop((branch.id, action_id), None)
@@ -373,6 +385,18 @@ class RunRecord:
             self._done.append(done)
         else:
             self._run = replace(self._run, complete=False)
+
+    def store_variables(self, action_id: str, results: Sequence[str]) -> None:
+        """Record the results, in JSON, that an action or a call stores in variables."""
+        if (names := self._outputs.get(action_id)) is not None:
+            with self._lock:
+                found = dict(zip(names, results, strict=False))
+                self._variables |= {name: value for name, value in found.items() if name in self._variables}
+
+    def former_variables(self, scene_id: str) -> Mapping[str, str]:
+        """Return the values of the variables with which an interrupted program continues, by name, in JSON."""
+        former = CheckpointFile(self._directory, scene_id).read()
+        return {} if former is None or isinstance(former.run, Unset) else former.run.variables
 
     def interrupt(self) -> None:
         """Record that the program is stopped because the server has ended. The actions that ran remain recorded."""

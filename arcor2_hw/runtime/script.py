@@ -1,5 +1,6 @@
 """The script of a package: executes it, and stores the traceback of its failure."""
 
+import ast
 import contextlib
 import os
 import sys
@@ -7,6 +8,9 @@ import types
 from datetime import UTC, datetime
 from pathlib import Path
 
+from arcor2_hw.data.project import Project
+from arcor2_hw.runtime.continuing import set_variables
+from arcor2_hw.runtime.documents import read_document
 from arcor2_hw.runtime.package import put_on_path
 from arcor2_hw.runtime.program import Program, traceback_text
 
@@ -20,7 +24,11 @@ def execute(directory: Path, program: Program) -> None:
     module = types.ModuleType("__main__")
     module.__file__ = str(script)
     sys.modules["__main__"] = module
-    code = compile(script.read_bytes(), str(script), "exec")
+    source = ast.parse(script.read_bytes(), str(script))
+    if program.record is not None and program.record.continues:
+        scene_id = read_document(directory / "data" / "project.json", Project).scene_id
+        set_variables(source, program.record.former_variables(scene_id))
+    code = compile(source, str(script), "exec")
     try:
         program.inside = False
         exec(code, module.__dict__)  # noqa: S102 - this process exists to run the script

@@ -21,6 +21,7 @@ from arcor2_hw.data.project import (
     NamedOrientation,
     Project,
     ProjectFunction,
+    ProjectParameter,
 )
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.checkpoints import CheckpointFile
@@ -291,3 +292,44 @@ def test_an_interrupted_program_continues_at_its_interrupted_action(cell: Cell, 
     assert cell.books().counts.good == 1
     assert cell.books().run.cycle == 1  # type: ignore[union-attr]
     assert [done.name for done in cell.books().run.done] == ["scan", "pick", "insert", "test", "take", "into_box"]  # type: ignore[union-attr]
+
+
+COUNTING = f"""{BODY}
+last: str = ""
+while True:
+    arm.pick(stop, an="pick")
+    arm.place(inside, an="insert")
+    arm.test(True, an="test")
+    arm.pick(inside, an="take")
+    arm.place(box, an="into_box")
+    last = arm.scan(last + "x", an="scan")
+"""
+WITH_VARIABLE = replace(
+    PROJECT,
+    action_points=[
+        replace(each, actions=[replace(one, flows=[Flow(outputs=["last"])]) if one.name == "scan" else one
+                               for one in each.actions])
+        for each in PROJECT.action_points
+    ],
+    logic=[LogicItem(START, "act_pick", id="lit_1")],
+    parameters=[ProjectParameter("last", "string", '""', id="pco_last", variable=True)],
+)  # fmt: skip
+
+
+def test_an_interrupted_program_continues_with_its_variables(cell: Cell) -> None:
+    host = cell.start(COUNTING, WITH_VARIABLE)
+    host.expect(m.ProgramEvent, lambda event: event.name == "scan")
+    (cell.directory / "hang").touch()
+    while len(cell.notes()) < 5:  # the second cycle has started
+        pass
+    os.kill(host.process.pid, signal.SIGKILL)
+    host.gone()
+    (cell.directory / "hang").unlink()
+    assert cell.books().run.variables == {"last": '"x"'}  # type: ignore[union-attr]
+
+    host = cell.start(COUNTING, WITH_VARIABLE, continues=True)
+    decide(host, held(host).number, HoldChoice.RETRY)
+    scanned = host.expect(
+        m.ProgramEvent, lambda event: event.event == "ActionStateAfter" and b"act_scan" in event.encoded
+    )
+    assert b'"xx\\"' in scanned.encoded

@@ -2527,8 +2527,9 @@ export interface Run {
  * package_hash: SHA-256 of script and project. cycle: number of the present cycle, from 1. actions: those that have
  * started and not ended; empty between two actions. last: the action that ended last. results: the newest results of
  * each action by its id, in JSON. ended: whether the program has ended in an orderly way. done: what the present
- * cycle has done. complete: whether `done` is complete. interrupted: whether the server has noticed that the run was
- * interrupted. confirmed: whether a person has confirmed since where all parts are.
+ * cycle has done. variables: the values of the program's variables at its start, by name, in JSON. complete: whether
+ * `done` is complete. interrupted: whether the server has noticed that the run was interrupted. confirmed: whether a
+ * person has confirmed since where all parts are.
  * continues, continues_at: whether the program can continue, and at which actions (empty: after `last`).
  */
 export interface RunCheckpoint {
@@ -2542,6 +2543,7 @@ export interface RunCheckpoint {
   results: Record<string, string[]>;
   ended: boolean;
   done: DoneAction[];
+  variables: Record<string, string>;
   complete: boolean;
   interrupted: boolean;
   confirmed: boolean;
