@@ -12,6 +12,7 @@ from msgspec import UNSET
 from msgspec.structs import replace
 
 from arcor2_hw.data.project import END, START, Action, Flow, LogicItem, Project
+from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import InvalidProject
 from arcor2_server.build.merging.matching import walk
 from arcor2_server.build.merging.meaning import action_name
@@ -27,6 +28,7 @@ from tests.server.build.projects import (
     with_comparisons,
     with_exits,
     with_functions,
+    with_parallel_work,
     with_retries,
     with_variables,
     without_doubles,
@@ -68,7 +70,9 @@ def reformatted(source: str, rng: random.Random) -> str:
     return "\n".join([*lines, *([""] * rng.randrange(3))])
 
 
-def program(seed: int, size: int, joining: float, ending: float, conditions: str, functions: int) -> Project:
+def program(
+    seed: int, size: int, joining: float, ending: float, conditions: str, functions: int, parallel: bool
+) -> tuple[Scene, Project]:
     rng = random.Random(seed)
     draft = without_doubles(random_draft(rng, size, joining, ending, 3))
     if conditions:
@@ -77,7 +81,9 @@ def program(seed: int, size: int, joining: float, ending: float, conditions: str
     project = draft.project()
     steps = [(item.start, item.end, item.is_error_exit) for item in project.logic]
     assume(len(steps) == len(set(steps)))  # no editor makes two steps from one action to the same one
-    return with_functions(project, rng, functions) if functions else project
+    if functions:
+        project = with_functions(project, rng, functions)
+    return with_parallel_work(project, rng) if parallel else (SCENE, project)
 
 
 programs = st.builds(
@@ -88,6 +94,7 @@ programs = st.builds(
     st.sampled_from([0.0, 0.1]),
     st.sampled_from(["", "choices", "comparisons"]),
     st.sampled_from([0, 0, 2]),
+    st.sampled_from([False, False, True]),
 )
 
 
@@ -155,32 +162,34 @@ def comments_of(source: str) -> dict[str, tuple[list[str], str]]:
 
 @settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 @given(programs, st.integers(0, 2**32))
-def test_an_imported_script_is_generated_unchanged(project: Project, seed: int) -> None:
-    source = reformatted(from_logic(SCENE, project, TYPES), random.Random(seed))
-    imported = read_with_text(source, SCENE, project, TYPES)
+def test_an_imported_script_is_generated_unchanged(made: tuple[Scene, Project], seed: int) -> None:
+    scene, project = made
+    source = reformatted(from_logic(scene, project, TYPES), random.Random(seed))
+    imported = read_with_text(source, scene, project, TYPES)
     assert replace(imported, script=UNSET) == project, source
-    assert from_logic(SCENE, imported, TYPES) == source
+    assert from_logic(scene, imported, TYPES) == source
     # A script without a person's text is not stored, and stored text does not change without an edit.
-    assert read_with_text(source, SCENE, imported, TYPES) == imported
-    plain = from_logic(SCENE, project, TYPES)
-    assert read_with_text(plain, SCENE, imported, TYPES) == project
+    assert read_with_text(source, scene, imported, TYPES) == imported
+    plain = from_logic(scene, project, TYPES)
+    assert read_with_text(plain, scene, imported, TYPES) == project
 
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 @given(programs, st.integers(0, 2**32))
-def test_comments_survive_an_edit_of_the_logic(project: Project, seed: int) -> None:
+def test_comments_survive_an_edit_of_the_logic(made: tuple[Scene, Project], seed: int) -> None:
+    scene, project = made
     rng = random.Random(seed)
-    source = reformatted(from_logic(SCENE, project, TYPES), rng)
-    imported = read_with_text(source, SCENE, project, TYPES)
+    source = reformatted(from_logic(scene, project, TYPES), rng)
+    imported = read_with_text(source, scene, project, TYPES)
     changed, touched = edited(imported, rng)
     try:
-        plain = from_logic(SCENE, replace(changed, script=UNSET), TYPES)
+        plain = from_logic(scene, replace(changed, script=UNSET), TYPES)
     except InvalidProject:
         assume(False)  # a program that cannot be built
-    back = from_script(plain, SCENE, changed, TYPES)
+    back = from_script(plain, scene, changed, TYPES)
     assume(back == changed)
-    merged = from_logic(SCENE, changed, TYPES)
-    assert from_script(merged, SCENE, changed, TYPES) == changed, merged
+    merged = from_logic(scene, changed, TYPES)
+    assert from_script(merged, scene, changed, TYPES) == changed, merged
     before, after = comments_of(source), comments_of(merged)
     assert after.keys() == comments_of(plain).keys()
     for name in after.keys() - touched:
