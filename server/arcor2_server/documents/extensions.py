@@ -1,9 +1,38 @@
 """Fields of projects that clients of the original do not know, and that survive when such a client stores a project."""
 
+from typing import Final
+
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.project import Action, LogicItem, Project
+from arcor2_hw.messages import Message, translatable
+
+_NAMES: Final = translatable(
+    {
+        "functions": "functions",
+        "parallel": "parallel work",
+        "errors": "error exits",
+        "comparisons": "conditions with comparisons",
+        "variables": "variables",
+        "retries": "automatic retries",
+    }
+)
+
+
+def extensions_of(project: Project) -> list[Message]:
+    """Return the names of what a project contains that clients of the original cannot show or edit."""
+    actions = list(project.all_actions())
+    logic = [*project.logic, *(item for function in project.functions for item in function.logic)]
+    contained = {
+        "functions": bool(project.functions),
+        "parallel": any(action.is_parallel for action in actions),
+        "errors": any(item.is_error_exit for item in logic),
+        "comparisons": any(item.has_comparisons for item in logic),
+        "variables": any(parameter.variable for parameter in project.parameters),
+        "retries": any(action.retry for action in actions),
+    }
+    return [Message.of(_NAMES[key]) for key, found in contained.items() if found]
 
 
 def keep_extensions(sent: Project, stored: Project) -> Project:

@@ -35,6 +35,7 @@ from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Kind
 from arcor2_server.documents.checks.project import project_problems
 from arcor2_server.documents.document import reduce_to
+from arcor2_server.documents.extensions import extensions_of
 from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
@@ -143,12 +144,16 @@ class ProjectRequests:
             await self._save_scene_changes(context)
             await session.show(session.scene or scene, with_present_names(scene, project, self._types))
             self._emit_opened(context)
-            if project.functions:
-                self._notify_older_clients()
+            self._notify_older_clients(project)
 
-    def _notify_older_clients(self) -> None:
-        """Tell the users of clients that do not know functions what they cannot edit."""
-        text = Message.of("This project contains functions. Your client shows their calls, but not what is in them.")
+    def _notify_older_clients(self, project: Project) -> None:
+        """Notify the users of clients that do not know functions of what they cannot show or edit."""
+        if not (parts := extensions_of(project)):
+            return
+        text = Message.of(
+            "This project contains {parts}. Your client cannot show or edit them. They are kept when it saves.",
+            parts=Message.listed(parts),
+        )
         data = NotificationData(text.text, NotificationLevel.INFO, **text.translation())
         notice = make_event("Notification", data)
         for client in self._hub.clients - set(self._hub.subscribers("FunctionChanged")):

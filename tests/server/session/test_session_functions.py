@@ -263,12 +263,20 @@ async def test_clients_that_do_not_know_functions_are_notified(
     server: SessionServer, alice: Person, work: Work
 ) -> None:
     await made(work, "try_luck", "draw")
+    await alice.ask("AddProjectParameter", name="count", type="integer", value="0", variable=True)
     await alice.ask("SaveProject")
     await alice.ask("CloseProject")
     bob = await server.person("bob")
     await bob.ask("SubscribeEvents", events=["FunctionChanged"])
     await alice.ask("OpenProject", id=(await alice.ask("ListProjects"))[0]["id"])
-    assert [len([e for e in each.events() if e["event"] == "Notification"]) for each in (alice, bob)] == [1, 0]
+    notices = [[e["data"]["message"] for e in each.events() if e["event"] == "Notification"] for each in (alice, bob)]
+    assert notices == [
+        [
+            "This project contains functions, variables. "
+            "Your client cannot show or edit them. They are kept when it saves."
+        ],
+        [],
+    ]
 
 
 async def test_functions_survive_a_client_that_does_not_know_them(work: Work) -> None:
