@@ -179,6 +179,7 @@ class Gate:
 
     def _wait_not_held(self, branch: Branch) -> None:
         while self._hold is not None and not self._stopped and not branch.held:
+            self._report_paused()  # this may have been the last action that ran
             self._changed.wait()
         self._check(branch)
 

@@ -376,6 +376,25 @@ def test_another_branch_waits_at_its_next_action() -> None:
     assert reports == ["paused", "running"]
 
 
+def test_the_program_is_paused_when_the_action_of_another_branch_fails_too() -> None:
+    begun, paused = threading.Event(), threading.Event()
+    gate = Gate(lambda state: paused.set() if state == "paused" else None)
+    for _ in range(2):
+        gate.before(Branch())
+    holders = [threading.Thread(target=gate.hold_program, args=(Branch(), begun.set), daemon=True) for _ in range(2)]
+    holders[0].start()
+    assert begun.wait(20)
+    assert not paused.is_set(), "the other action still runs"
+    holders[1].start()
+    assert paused.wait(5)
+    begun.clear()
+    gate.release()
+    assert begun.wait(20), "the second failure is shown after the first decision"
+    gate.release()
+    for holder in holders:
+        holder.join(20)
+
+
 def test_another_hold_begins_before_the_decision_takes_effect() -> None:
     seen: list[str] = []
 
