@@ -373,6 +373,7 @@ class Trial:
 
     async def _follow(self, client: Client) -> None:
         names: dict[str, str] = {}
+        held: HeldData | None = None
         while True:
             event = await self._next(client)
             match event.event:
@@ -391,7 +392,11 @@ class Trial:
                     if name == "order" and await self._finished():
                         await client.call("StopPackage")
                 case "Held":
-                    await self._resolve(client, event.data)
+                    held = event.data
+                case "PackageState" if event.data.state is PackageStateEnum.PAUSED and held is not None:
+                    # The actions of other branches have ended.
+                    await self._resolve(client, held)
+                    held = None
                 case "ProjectException":
                     self._say(f"  ended: {event.data.message}")
                 case "PackageState" if event.data.state is PackageStateEnum.STOPPED:
@@ -534,10 +539,8 @@ class Trial:
         """Return that the movement counts as done if the books agree, otherwise end the program."""
         (books,) = await client.get_parts()
         there = {books.name_of(part.place) for part in books.parts}
-        if target in ("good", "bad"):  # the part that was moved has left the books
-            arrived = not there & {NAMES[place] for place in ("gripper", "label", "tester")}
-        else:
-            arrived = NAMES[target] in there
+        # A part that was moved into a box has left the books.
+        arrived = NAMES["gripper"] not in there if target in ("good", "bad") else NAMES[target] in there
         return (HoldChoice.SKIP if arrived and HoldChoice.SKIP in held.choices else HoldChoice.END), []
 
     async def _take_out(self, client: Client, code: str) -> None:

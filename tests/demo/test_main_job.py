@@ -15,6 +15,7 @@ import pytest
 import pytest_asyncio
 from pymodbus.client import AsyncModbusTcpClient
 
+from arcor2_fakes.cell.boards import draw_boards
 from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
 from arcor2_hw.data.base import Unset
@@ -25,8 +26,9 @@ from tests.demo.running import Run, demo
 from tests.e2e.harness import until
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
-SEED = random.SystemRandom().randrange(1_000_000)
 BOARDS = 2
+SEED = next(seed for seed in random.SystemRandom().sample(range(1_000_000), 100) if draw_boards(BOARDS, seed)[0].good)
+"""A random one whose first board is good, so that the second one is loaded while the first one gets its label."""
 GOOD = 3
 """A seed whose first board is good."""
 FIRST_VERSION = Path(__file__).parents[1] / "compatibility" / "recorded" / "demo-package.zip"
@@ -153,6 +155,13 @@ async def test_the_belt_brings_the_next_board_while_the_tester_works(cell: Cell)
     work = order[order.index("+test_and_fetch") : order.index("-test_and_fetch")]
     assert work.index("+close") < work.index("-halt"), "the tester starts before the belt has ended"
     assert work.index("+bring") < work.index("-open_again"), "the belt starts before the tester has ended"
+
+
+async def test_the_robot_loads_the_next_board_while_the_press_works(cell: Cell) -> None:
+    order = cell.order
+    work = order[order.index("+label_and_load") : order.index("-label_and_load")]
+    assert work.index("+pick") < work.index("-label"), "the robot starts before the printer has ended"
+    assert work.index("+press_away") < work.index("-insert"), "the press ends before the robot has ended"
 
 
 async def test_good_boards_carry_their_own_label(cell: Cell) -> None:

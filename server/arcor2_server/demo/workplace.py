@@ -16,6 +16,7 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import ViewScope
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box, Model3dType, ObjectAction, ObjectModel
+from arcor2_hw.data.operator import Operator
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.parts import ConfirmedPart
 from arcor2_hw.data.project import (
@@ -23,6 +24,8 @@ from arcor2_hw.data.project import (
     ERROR_PARTS,
     ActionParameter,
     Flow,
+    LogicComparison,
+    LogicWhen,
     Project,
     ProjectLogicIf,
 )
@@ -82,8 +85,8 @@ class Step(Struct, frozen=True, forbid_unknown_fields=True):
     """An action.
 
     An object that is the name of a function stands for a call of it. A parameter "@point" is the pose of an action
-    point, "$name" a project parameter, "#result" the result of an earlier step, "#error.text" a part of the error named
-    `error`.
+    point, "$name" a project parameter or a variable, "#result" the result of an earlier step, "#error.text" a part of
+    the error named `error`. A result with the name of a variable is stored in it.
     """
 
     name: str
@@ -98,13 +101,15 @@ class Step(Struct, frozen=True, forbid_unknown_fields=True):
 class Link(Struct, frozen=True, forbid_unknown_fields=True):
     """A connection of the logic.
 
-    With `result`, it is followed if the result has the value; with `errors`, if `start` fails with one of these kinds.
+    With `result`, it is followed if the result has the value; with `variable`, if the variable has another one; with
+    `errors`, if `start` fails with one of these kinds.
     """
 
     start: str
     end: str
     result: str = ""
-    value: bool = True
+    variable: str = ""
+    value: Scalar = True
     errors: list[str] = field(default_factory=list)
 
 
@@ -135,6 +140,7 @@ class Workplace(Struct, frozen=True, forbid_unknown_fields=True):
     steps: list[Step]
     logic: list[Link]
     constants: dict[str, Scalar]
+    variables: dict[str, Scalar] = field(default_factory=dict)
     places: list[Place] = field(default_factory=list)
     part_sensors: list[PartSensor] = field(default_factory=list)
     functions: list[Function] = field(default_factory=list)
@@ -287,10 +293,10 @@ class Creation:
     async def _fill(self, scene: Scene, constants: dict[str, Scalar]) -> None:
         objects = {obj.name: obj for obj in scene.objects}
         parameters: dict[str, str] = {}
-        for name, value in (self._workplace.constants | constants).items():
-            await self._client.call(
-                "AddProjectParameter", rpc.AddProjectParameterArgs(name, _KINDS[type(value)], _json(value))
-            )
+        variables = self._workplace.variables
+        for name, value in (self._workplace.constants | constants | variables).items():
+            args = rpc.AddProjectParameterArgs(name, _KINDS[type(value)], _json(value), name in variables or UNSET)
+            await self._client.call("AddProjectParameter", args)
             parameters[name] = (await self._client.next_event("ProjectParameterChanged")).data.id
         points: dict[str, str] = {}
         orientations: dict[str, str] = {}
@@ -333,9 +339,8 @@ class Creation:
     async def _add_step(self, step: Step, object_id: str, places: "_Places") -> None:
         kind = next((obj.type for obj in self._workplace.objects if obj.name == step.object), "")
         declared = {action.name: action for action in await self._client.get_actions(kind)} if kind else {}
-        given = [
-            self._parameter(step, name, value, declared[step.action], places) for name, value in step.parameters.items()
-        ]
+        action = declared.get(step.action)
+        given = [self._parameter(step, name, value, action, places) for name, value in step.parameters.items()]
         flows = [Flow(outputs=step.results)]
         args = rpc.AddActionArgs(
             places.points[step.point], step.name, f"{object_id}/{step.action}", given, flows, step.error or UNSET
@@ -356,9 +361,13 @@ class Creation:
             if link.start not in ids or link.end not in ids:
                 continue
             condition: ProjectLogicIf | Unset = UNSET
+            when: LogicWhen | Unset = UNSET
             if link.result:
                 condition = ProjectLogicIf(places.results[link.result], _json(link.value))
-            args = rpc.AddLogicItemArgs(ids[link.start], ids[link.end], condition, link.errors or UNSET)
+            elif link.variable:
+                variable = places.parameters[link.variable]
+                when = LogicWhen([LogicComparison(variable, Operator.DIFFERENT, _json(link.value))])
+            args = rpc.AddLogicItemArgs(ids[link.start], ids[link.end], condition, link.errors or UNSET, when)
             await self._client.call("AddLogicItem", args)
         return [link for link in links if link.start not in ids or link.end not in ids]
 
@@ -367,10 +376,14 @@ class Creation:
         step: Step,
         name: str,
         value: Scalar,
-        action: ObjectAction,
+        action: ObjectAction | None,
         places: "_Places",
     ) -> ActionParameter:
-        meta = next((meta for meta in action.parameters if meta.name == name), None)
+        references = {"$": ("project_parameter", places.parameters), "#": ("link", places.results)}
+        if isinstance(value, str) and value[:1] in references:
+            kind, ids = references[value[0]]
+            return ActionParameter(name, kind, _json(ids[value[1:]]))
+        meta = next((meta for meta in action.parameters if meta.name == name), None) if action else None
         if meta is None:
             raise InvalidData(
                 "Step {name}: {action} has no parameter {other_name}.",
@@ -378,14 +391,8 @@ class Creation:
                 action=step.action,
                 other_name=name,
             )
-        references = {
-            "@": (meta.type, places.orientations),
-            "$": ("project_parameter", places.parameters),
-            "#": ("link", places.results),
-        }
-        if isinstance(value, str) and value[:1] in references:
-            kind, ids = references[value[0]]
-            return ActionParameter(name, kind, _json(ids[value[1:]]))
+        if isinstance(value, str) and value.startswith("@"):
+            return ActionParameter(name, meta.type, _json(places.orientations[value[1:]]))
         return ActionParameter(name, meta.type, _json(value))
 
 
