@@ -7,7 +7,7 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence, Set
 from types import MappingProxyType
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple
 
 import msgspec
 
@@ -22,7 +22,7 @@ from arcor2_hw.data.events import (
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.interlocks import InterlockState
 from arcor2_hw.data.parts import DoneAction
-from arcor2_hw.data.position import MAIN_BRANCH, Frame
+from arcor2_hw.data.position import Frame
 from arcor2_hw.data.project import CALL, Project, ProjectRobotJoints
 from arcor2_hw.data.secret import ObjectSecrets
 from arcor2_hw.exceptions import (
@@ -37,6 +37,7 @@ from arcor2_hw.exceptions import (
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime.branches import Action, Branches
 from arcor2_hw.runtime.cell import Cell
+from arcor2_hw.runtime.channel import Channel
 from arcor2_hw.runtime.continuing import value_of
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
 from arcor2_hw.runtime.interlocks import Interlocks
@@ -57,35 +58,6 @@ RETRIES: Final = contextvars.ContextVar("retries", default=0)
 """How often an action is repeated automatically if it fails."""
 
 _encode = msgspec.json.Encoder().encode
-
-
-class Channel(Protocol):
-    """Destination of the events of a program."""
-
-    def event(
-        self,
-        name: str,
-        encoded: bytes,
-        number: int = 0,
-        action: str = "",
-        time: float = 0.0,
-        device: str = "",
-        waited: float = 0.0,
-        call: int = 0,
-        frames: Sequence[Frame] = (),
-        branch: str = MAIN_BRANCH,
-        attempt: int = 1,
-    ) -> None:
-        """Send an encoded event. The other arguments describe the call of an action, see ProgramEvent."""
-
-    def changed(self, state: str) -> None:
-        """Report that the program is running or paused."""
-
-    def action_over(self, number: int, duration: float, error: Message | None, waited: float) -> None:
-        """Report the end of an action that sends no event at its end: it failed, or the project declares no actions.
-
-        See ActionFailed.
-        """
 
 
 class ActionError(NamedTuple):
