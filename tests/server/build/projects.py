@@ -676,7 +676,7 @@ def with_parallel_work(project: Project, rng: random.Random) -> tuple[Scene, Pro
     separate: set[str] = set()
     """The functions that run in parallel or contain parallel work, also through calls."""
     scopes = ["", *(item.id for item in document.of_kind(Kind.FUNCTION))]
-    for number in range(8):
+    for number in range(24):
         scope = rng.choice(scopes)
         steps = [item.value for item in (document.owned(scope, Kind.LOGIC) if scope else document.program_logic())]
         steps = [one for one in steps if one.start != START and one.end != END]
