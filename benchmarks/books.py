@@ -53,7 +53,7 @@ PLACES: Final = {
     "insert": "tester", "into_nest": "label", "into_good_box": "good", "into_bad_box": "bad", "reject_unread": "bad",
 }  # fmt: skip
 NAMES: Final = {
-    "stop": "feeder", "gripper": "robot", "tester": "tester", "label": "label_place",
+    "stop": "feeder", "belt": "feeder", "gripper": "robot", "tester": "tester", "label": "label_place",
     "good": "good_boards", "bad": "bad_boards",
 }  # fmt: skip
 """The place in the books for each physical place; all others are outside of the cell."""
@@ -624,7 +624,7 @@ class Trial:
             in_cell = truth["gripper"] + truth["tester"] + truth["label"] + known
             fed = in_cell + truth["good"] + truth["bad"] + truth["removed"]
             wanted = PartCounts(fed, truth["good"], truth["bad"], truth["removed"], in_cell)
-            if books.counts != wanted or truth["lost"] or known > truth["stop"]:
+            if books.counts != wanted or truth["lost"] or known > truth["stop"] + truth["belt"]:
                 self._found_wrong(self.result.unaccounted, f"books {books.counts}, cell {wanted}, lost {truth['lost']}")
 
     async def _last_results(self) -> None:
