@@ -96,9 +96,10 @@ def set_variables(script: ast.Module, values: Mapping[str, str]) -> None:
                 "The program cannot continue: the script has no variable {name}. Start it from its beginning.",
                 name=name,
             )
-        kind = float if isinstance(found.annotation, ast.Name) and found.annotation.id == "float" else None
-        constant = ast.Constant(msgspec.json.decode(value, type=kind or Any))
-        found.value = ast.copy_location(constant, found.value)
+        start: Any = msgspec.json.decode(value)
+        if isinstance(found.annotation, ast.Name) and found.annotation.id == "float":
+            start = float(start)
+        found.value = ast.copy_location(ast.Constant(start), found.value)
 
 
 def value_of(done: DoneAction, method: Any) -> Any:

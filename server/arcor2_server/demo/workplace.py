@@ -295,8 +295,8 @@ class Creation:
         parameters: dict[str, str] = {}
         variables = self._workplace.variables
         for name, value in (self._workplace.constants | constants | variables).items():
-            args = rpc.AddProjectParameterArgs(name, _KINDS[type(value)], _json(value), name in variables or UNSET)
-            await self._client.call("AddProjectParameter", args)
+            added = rpc.AddProjectParameterArgs(name, _KINDS[type(value)], _json(value), name in variables or UNSET)
+            await self._client.call("AddProjectParameter", added)
             parameters[name] = (await self._client.next_event("ProjectParameterChanged")).data.id
         points: dict[str, str] = {}
         orientations: dict[str, str] = {}
