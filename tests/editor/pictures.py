@@ -89,7 +89,7 @@ async def _tablet(browser: Browser, run: Run, to: Path) -> None:
         await graph.get_by_role("button", name=texts.SELECT_SEVERAL).click()
         for name in ("into_nest", "out_of_nest"):
             await graph.locator(f'.react-flow__node[aria-label^="{name},"]').click()
-        await page.get_by_text("5 actions selected").wait_for()
+        await page.get_by_text("3 actions selected").wait_for()
         await take("function")
         await page.get_by_role("group", name="Make a function").get_by_role("button", name=texts.CANCEL).click()
         await graph.locator('.react-flow__node[aria-label^="label_and_load"] .flow-title').first.click()
