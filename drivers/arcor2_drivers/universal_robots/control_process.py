@@ -165,8 +165,9 @@ class ControlProgram:
         if now >= self._jog_ends:
             self.do("speedStop", [])
         elif now >= self._written + self._period:
+            # Before the signal: the robot receives it later, so its watchdog never trips earlier than it seems here.
+            self._written = now
             (self._registers.kick if self._own else self._control.kickWatchdog)()
-            self._written = time.monotonic()
         return max(min(self._written + self._period, self._jog_ends) - time.monotonic(), 0.0)
 
     def _exit_if_too_slow(self) -> None:
