@@ -20,11 +20,17 @@ NOTHING_RENAMED: Final[Mapping[str, str]] = MappingProxyType({})
 
 
 class PartFlow(NamedTuple):
-    """What an action does with a part. takes_from, puts_to: names of the parameters with the places; empty: none."""
+    """What an action does with a part.
+
+    takes_from, puts_to: names of the parameters with the places. serial, order: names of the parameters with the serial
+    number of the part and the id of its order. Empty: none.
+    """
 
     takes_from: str = ""
     puts_to: str = ""
     identifies: bool = False
+    serial: str = ""
+    order: str = ""
 
 
 F = TypeVar("F", bound=Callable[..., object])
@@ -66,6 +72,8 @@ def action(
     takes_from: str = "",
     puts_to: str = "",
     identifies: bool = False,
+    serial: str = "",
+    order: str = "",
     ends_with_program: bool = False,
 ) -> Callable[[F], F]: ...
 
@@ -86,6 +94,8 @@ def action(
     takes_from: str = "",
     puts_to: str = "",
     identifies: bool = False,
+    serial: str = "",
+    order: str = "",
     ends_with_program: bool = False,
 ) -> F | Callable[[F], F]:
     """Mark a method as an action.
@@ -105,14 +115,18 @@ def action(
         takes_from: Name of the parameter with the pose at which the device takes a part.
         puts_to: Name of the parameter with the pose at which the device puts its part.
         identifies: Whether the returned text is the serial number of the part at the place of the action.
+        serial: Name of the parameter with the serial number of a part, such as that of a label or a report. The action
+            then belongs to the record of this part.
+        order: Name of the parameter with the id of the order of this part.
         ends_with_program: Whether its effect lasts after the action but ends with the program, such as a running belt.
             An interrupted program that continues repeats it.
 
     Raises:
-        TypeError: The method has no parameter that `takes_from` or `puts_to` names, or both are stated.
+        TypeError: The method has no parameter that `takes_from`, `puts_to`, `serial` or `order` names, or both of the
+            former are stated.
     """
     repeated = UNSET if again == Again.ASK else Again(again)
-    flow = PartFlow(takes_from, puts_to, identifies)
+    flow = PartFlow(takes_from, puts_to, identifies, serial, order)
 
     def mark(function: F) -> F:
         if takes_from or puts_to:
@@ -120,6 +134,9 @@ def action(
                 raise TypeError("an action cannot declare both takes_from and puts_to")
             if (takes_from or puts_to) not in inspect.signature(function).parameters:
                 raise TypeError(f"the action has no parameter {takes_from or puts_to!r}, which is to name a place")
+        for parameter in filter(None, (serial, order)):
+            if parameter not in inspect.signature(function).parameters:
+                raise TypeError(f"the action has no parameter {parameter!r}")
         function.__action__ = ActionMetadata(composite, hidden, verdict=verdict or UNSET, again=repeated)  # type: ignore[attr-defined]
         function.__deadline__ = deadline  # type: ignore[attr-defined]
         function.__quick__ = quick  # type: ignore[attr-defined]

@@ -77,6 +77,7 @@ from arcor2_hw.data.project import (
     ProjectRobotJoints,
     Retry,
 )
+from arcor2_hw.data.recipes import Changeover, Recipe, RecipeComparison, RecipeState, RecipeValue
 from arcor2_hw.data.robot import Joint, RobotArg, RobotMeta
 from arcor2_hw.data.rpc.alarms import AlarmStatisticsData, ListAlarmsData
 from arcor2_hw.data.rpc.calibrations import ListCalibrationsData
@@ -99,10 +100,13 @@ from arcor2_hw.data.rpc.object_types import DeleteObjectTypesData, ObjectAimingA
 from arcor2_hw.data.rpc.operation import JogFrame, JogRobotData, StopAllData
 from arcor2_hw.data.rpc.persons import ListPersonsData, LogOnData
 from arcor2_hw.data.rpc.projects import ListProjectsData
+from arcor2_hw.data.rpc.recipes import ListRecipesData, PackageParametersData
 from arcor2_hw.data.rpc.robots import RobotEventKind, StepAxis, StepMode, StepWhat
 from arcor2_hw.data.rpc.scenes import CheckConnectionData, FoundDevice, ListScenesData, Pivot
 from arcor2_hw.data.rpc.scripts import CheckScriptData, ImportScriptData, ProjectScriptData
+from arcor2_hw.data.rpc.units import ListUnitsData
 from arcor2_hw.data.scene import BareScene, Scene, SceneObject
+from arcor2_hw.data.units import Production, Unit, UnitRecord, UnitState
 from arcor2_hw.messages import Message
 
 class Requests(ABC):
@@ -334,6 +338,9 @@ class Requests(ABC):
     async def cancel_dry_run(self, *, timeout: float | None = None) -> None:
         """CancelDryRun. Needs the role standard user."""
 
+    async def change_over(self, id: str, *, timeout: float | None = None) -> Changeover:
+        """ChangeOver. Needs the role operator."""
+
     async def change_person(
         self,
         id: str,
@@ -380,6 +387,9 @@ class Requests(ABC):
 
     async def close_scene(self, *, force: bool = False, dry_run: bool = False, timeout: float | None = None) -> None:
         """CloseScene. Needs the role standard user."""
+
+    async def compare_recipes(self, *, before: str, after: str, timeout: float | None = None) -> RecipeComparison:
+        """CompareRecipes: ids of two recipes. Needs the role operator."""
 
     async def confirm_parts(self, *, scene_id: str, parts: list[ConfirmedPart], timeout: float | None = None) -> None:
         """ConfirmParts: where a person has found parts. No parts: only that a program was interrupted.
@@ -433,6 +443,9 @@ class Requests(ABC):
 
     async def delete_project(self, id: str, *, timeout: float | None = None) -> None:
         """DeleteProject. Needs the role standard user."""
+
+    async def delete_recipe(self, id: str, *, timeout: float | None = None) -> None:
+        """DeleteRecipe. Needs the role advanced user."""
 
     async def delete_scene(self, id: str, *, dry_run: bool = False, timeout: float | None = None) -> set[str]:
         """DeleteScene. Needs the role technician."""
@@ -524,8 +537,16 @@ class Requests(ABC):
     async def get_object_types(self, *, timeout: float | None = None) -> list[ObjectTypeMeta]:
         """GetObjectTypes. Needs the role operator."""
 
+    async def get_package_parameters(self, id: str, *, timeout: float | None = None) -> PackageParametersData:
+        """GetPackageParameters. Needs the role operator."""
+
     async def get_parts(self, *, timeout: float | None = None) -> list[PartBooks]:
         """GetParts. Needs the role operator."""
+
+    async def get_production(
+        self, *, since: str | Unset = UNSET, until: str | Unset = UNSET, timeout: float | None = None
+    ) -> Production:
+        """GetProduction: the period, by default the last 8 hours. Needs the role operator."""
 
     async def get_program_position(self, *, timeout: float | None = None) -> ProgramPosition:
         """GetProgramPosition. Needs the role operator."""
@@ -551,6 +572,9 @@ class Requests(ABC):
         self, robot_id: str, *, arm_id: str | Unset = UNSET, timeout: float | None = None
     ) -> set[str]:
         """GetSuctions. Needs the role operator."""
+
+    async def get_unit(self, number: int, *, timeout: float | None = None) -> UnitRecord:
+        """GetUnit: number of the record. Needs the role operator."""
 
     async def get_view_state(
         self, scope: ViewScope, *, document: str = "", user: str | Unset = UNSET, timeout: float | None = None
@@ -679,6 +703,11 @@ class Requests(ABC):
     async def list_projects(self, *, timeout: float | None = None) -> list[ListProjectsData]:
         """ListProjects. Needs the role operator."""
 
+    async def list_recipes(
+        self, *, product: str | Unset = UNSET, state: RecipeState | Unset = UNSET, timeout: float | None = None
+    ) -> ListRecipesData:
+        """ListRecipes: only those of a product, or in a state. Needs the role operator."""
+
     async def list_runs(
         self,
         *,
@@ -695,6 +724,22 @@ class Requests(ABC):
 
     async def list_scenes(self, *, timeout: float | None = None) -> list[ListScenesData]:
         """ListScenes. Needs the role operator."""
+
+    async def list_units(
+        self,
+        *,
+        serial: str | Unset = UNSET,
+        order: str | Unset = UNSET,
+        product: str | Unset = UNSET,
+        run: int | Unset = UNSET,
+        state: UnitState | Unset = UNSET,
+        since: str | Unset = UNSET,
+        until: str | Unset = UNSET,
+        before: int | Unset = UNSET,
+        limit: int = 100,
+        timeout: float | None = None,
+    ) -> ListUnitsData:
+        """ListUnits: which units, newest first. Needs the role operator."""
 
     async def log_off(self, *, timeout: float | None = None) -> None:
         """LogOff. Needs the role operator."""
@@ -876,6 +921,19 @@ class Requests(ABC):
     ) -> PutInterlockData:
         """PutInterlock: a new interlock without an id, or a changed one. Needs the role technician."""
 
+    async def put_recipe(
+        self,
+        *,
+        product: str,
+        package_id: str,
+        id: str | Unset = UNSET,
+        values: Sequence[RecipeValue] = (),
+        planned_rate: float | Unset = UNSET,
+        note: str = "",
+        timeout: float | None = None,
+    ) -> Recipe:
+        """PutRecipe: a new draft, or a draft to change. Needs the role advanced user."""
+
     async def reachability(
         self,
         *,
@@ -1016,6 +1074,9 @@ class Requests(ABC):
         on_error: OnError | Unset = UNSET,
         checkpoints: bool | Unset = UNSET,
         continues: bool | Unset = UNSET,
+        recipe_id: str | Unset = UNSET,
+        recipe_values: dict[str, str] | Unset = UNSET,
+        order: str | Unset = UNSET,
         timeout: float | None = None,
     ) -> None:
         """RunPackage. Needs the role operator."""
@@ -1063,6 +1124,11 @@ class Requests(ABC):
 
     async def shelve_alarm(self, *, number: int, seconds: float, note: str = "", timeout: float | None = None) -> None:
         """ShelveAlarm: number of the record, time in s (0 ends the shelving), and a note. Needs the role technician."""
+
+    async def sign_recipe(
+        self, *, id: str, state: RecipeState, person: str, pin: str, note: str = "", timeout: float | None = None
+    ) -> Recipe:
+        """SignRecipe: the new state, and the person who signs, with their PIN. Needs the role advanced user."""
 
     async def start_dry_run(
         self,
@@ -1389,6 +1455,10 @@ class Requests(ABC):
     ) -> EventStream[TypedEvent[list[ObjectTypeMeta]]]: ...
     @overload
     def follow(
+        self, name: Literal["ChangeoverChanged"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[Changeover]]: ...
+    @overload
+    def follow(
         self, name: Literal["DryRunChanged"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[DryRunHead]]: ...
     @overload
@@ -1524,6 +1594,8 @@ class Requests(ABC):
         self, name: Literal["ReachabilityChanged"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[ReachabilityData]]: ...
     @overload
+    def follow(self, name: Literal["RecipeChanged"], /, *, limit: int = LIMIT) -> EventStream[TypedEvent[Recipe]]: ...
+    @overload
     def follow(self, name: Literal["RobotEef"], /, *, limit: int = LIMIT) -> EventStream[TypedEvent[RobotEefData]]: ...
     @overload
     def follow(
@@ -1577,6 +1649,8 @@ class Requests(ABC):
     def follow(
         self, name: Literal["TaskState"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[TaskStateData]]: ...
+    @overload
+    def follow(self, name: Literal["UnitChanged"], /, *, limit: int = LIMIT) -> EventStream[TypedEvent[Unit]]: ...
     @overload
     def follow(
         self, name: Literal["UserPresence"], /, *, limit: int = LIMIT

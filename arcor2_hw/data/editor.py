@@ -8,6 +8,7 @@ from msgspec import Meta, field
 from arcor2_hw.data.base import UNSET, Data, Timestamp, TranslatableData, Unset
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.held import ActionHold
+from arcor2_hw.data.recipes import UsedRecipe
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.messages import Message
 
@@ -218,7 +219,8 @@ class Run(TranslatableData, frozen=True):
     project_modified: modification time of the built project, which identifies its revision. temporary: run from the
     editor; its package is deleted. started_by, stopped_by: name of a user or token. actions: number of started actions.
     last_action: action that was active at the end. error: error that ended the run, with `key` and `values` as in
-    ProjectException. statistics: omitted until the devices are connected, and in runs of older servers.
+    ProjectException. statistics: omitted until the devices are connected, and in runs of older servers. recipe: the
+    recipe; omitted without one. order: id of the order that was given at the start.
     """
 
     number: int
@@ -239,6 +241,8 @@ class Run(TranslatableData, frozen=True):
     error: str | Unset = UNSET
     error_type: str | Unset = UNSET
     statistics: RunStatistics | Unset = UNSET
+    recipe: UsedRecipe | Unset = UNSET
+    order: str | Unset = UNSET
 
 
 class TraceEntry(TranslatableData, frozen=True):

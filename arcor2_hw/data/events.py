@@ -42,9 +42,11 @@ from arcor2_hw.data.project import (
     ProjectParameter,
     ProjectRobotJoints,
 )
+from arcor2_hw.data.recipes import Changeover, Recipe
 from arcor2_hw.data.robot import EefPose, Joint
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.scene import BareScene, Scene, SceneObject
+from arcor2_hw.data.units import Unit
 
 
 class EventType(Struct, frozen=True):
@@ -383,6 +385,9 @@ EVENTS: Final = {
         EventType("PartsChanged", PartBooks, Role.OPERATOR, additional=True),
         EventType("PersonChanged", Person, Role.OPERATOR, additional=True),
         EventType("ProgramPosition", ProgramPosition, Role.OPERATOR, additional=True),
+        EventType("ChangeoverChanged", Changeover, Role.OPERATOR, additional=True),
+        EventType("RecipeChanged", Recipe, Role.OPERATOR, additional=True),
+        EventType("UnitChanged", Unit, Role.OPERATOR, additional=True),
         EventType("ReachabilityChanged", ReachabilityData, Role.OPERATOR, additional=True),
         EventType("RunChanged", Run, Role.OPERATOR, additional=True),
         EventType("RunStatistics", RunStatisticsData, Role.OPERATOR, additional=True),

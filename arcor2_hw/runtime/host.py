@@ -250,6 +250,7 @@ class Host:
             held=self._held if message.hold_on_error else None,
             record=self._record(message),
             interlock_states=self._interlocks_changed,
+            values=message.values,
         )
         self._cell = program.cell
         self._cell.assets, self._cell.updates = message.assets, self._updates
@@ -300,6 +301,7 @@ class Host:
             message.run,
             message.package_id,
             lambda books: self.link.post(m.PartsChanged(books)),
+            lambda *concerned: self.link.post(m.PartStep(*concerned)),
             each_action=message.checkpoints,
             continues=message.continues,
         )

@@ -167,6 +167,10 @@ class Ledger:
         """Return whether a part is at a place, or may be."""
         return any(place_id in (part.place, part.moving_to) for part in self._parts.values())
 
+    def part_at(self, place_id: str) -> int:
+        """Return the number of the part at a place, 0 if there is none."""
+        return next((part.number for part in self._parts.values() if place_id and part.place == place_id), 0)
+
     def name_of(self, place_id: str) -> str:
         """Return the name of a place."""
         place = self._places.get(place_id)

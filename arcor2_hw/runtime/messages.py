@@ -114,7 +114,8 @@ class RunPackage(ToHost, frozen=True):
     bodies, calibrations, secrets: as in OpenScene. hold_on_error: whether a failed action holds the program, see
     ProgramHeld. run: number of the run. records: directory of the books of parts and of checkpoints; empty to store
     nothing. checkpoints: whether the state is stored before and after each action. continues: whether the program
-    continues where it was interrupted.
+    continues where it was interrupted. values: values of constants and variables of the project by their ids, JSON in
+    a string, which replace those of the package.
     """
 
     package_id: str
@@ -133,6 +134,7 @@ class RunPackage(ToHost, frozen=True):
     records: str = ""
     checkpoints: bool = True
     continues: bool = False
+    values: dict[str, str] = field(default_factory=dict)
 
 
 class AddBody(ToHost, frozen=True):
@@ -406,6 +408,19 @@ class PartsChanged(ToServer, frozen=True):
     books: PartBooks
 
 
+class PartStep(ToServer, frozen=True):
+    """An action that ends now concerned a part: the number of the action, and the part by its number or serial number.
+
+    order: id of the order, if the action names one. verdict: its result, if it has tested the part.
+    """
+
+    action: int
+    part: int = 0
+    serial: str = ""
+    order: str = ""
+    verdict: bool | None = None
+
+
 class InterlocksChanged(ToServer, frozen=True):
     """The states of all interlocks, after a change."""
 
@@ -489,6 +504,7 @@ ServerBound = (
     | ProgramChanged
     | ProgramHeld
     | PartsChanged
+    | PartStep
     | InterlocksChanged
     | DeviceChanged
     | LogLine

@@ -2,7 +2,9 @@
 
 import copy
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import msgspec
@@ -16,6 +18,7 @@ from arcor2_hw.data.scene import Scene
 from arcor2_hw.runtime.creation import prepare_for_sources
 from arcor2_hw.runtime.documents import read_document
 from arcor2_hw.runtime.program import ACTION_POINT_ATTRIBUTE
+from arcor2_hw.runtime.program_values import with_values
 
 T = TypeVar("T")
 
@@ -29,12 +32,12 @@ def package_name(directory: Path, default: str) -> str:
 
 
 class PackageData:
-    """Scene, project and models of a package."""
+    """Scene, project and models of a package. `values`: values that replace those of the project, by id."""
 
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, directory: Path, values: Mapping[str, str] = MappingProxyType({})) -> None:
         data = directory / "data"
         self.scene = read_document(data / "scene.json", Scene)
-        self.project = read_document(data / "project.json", Project)
+        self.project = with_values(read_document(data / "project.json", Project), values)
         self.models: dict[str, ObjectModel] = {}
         for path in sorted((data / "models").glob("*.json")):
             model = read_document(path, ObjectModel)

@@ -87,6 +87,7 @@ class Program:
         held: Post | None = None,
         record: RunRecord | None = None,
         interlock_states: Callable[[list[InterlockState]], None] = lambda _: None,
+        values: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         self.channel = channel
         self.record = record
@@ -95,6 +96,8 @@ class Program:
         """Settings of devices in this cell, which override those of the package."""
         self.secrets = secrets
         """Values of the secret settings by object id."""
+        self.values = values
+        """Values of constants and variables by id, JSON in a string, which replace those of the package."""
         self.package_id = package_id
         self.cell = Cell()
         self.interlocks = Interlocks(lambda: self.cell, interlock_states)

@@ -48,6 +48,7 @@ class Step(NamedTuple):
     """A started action.
 
     part, target: number of the part that it moves, and where to. place: where it identifies or judges one.
+    concerns: number of the part that it concerns otherwise. serial, order: of the part, as arguments state them.
     """
 
     number: int
@@ -57,6 +58,9 @@ class Step(NamedTuple):
     place: str = ""
     identifies: bool = False
     judges: bool = False
+    concerns: int = 0
+    serial: str = ""
+    order: str = ""
 
 
 class RunRecord:
@@ -69,6 +73,7 @@ class RunRecord:
         run: number of the run.
         package_id: the package.
         changed: called with the books after each change of a part.
+        concerned: called before the end of each action that concerned a part, with the values of PartStep.
         each_action: whether a checkpoint is stored before and after each action, or only of the start and the end.
         continues: whether the program continues where it was interrupted.
     """
@@ -79,11 +84,13 @@ class RunRecord:
         run: int,
         package_id: str,
         changed: Callable[[PartBooks], None],
+        concerned: Callable[[int, int, str, str, bool | None], None] = lambda *_: None,
         *,
         each_action: bool = True,
         continues: bool = False,
     ) -> None:
         self._directory, self._changed, self._each_action = directory, changed, each_action
+        self._concerned = concerned
         self._run = RunCheckpoint(run, package_id, "", now())
         self._lock = threading.Lock()
         self._file: CheckpointFile | None = None
@@ -259,9 +266,15 @@ class RunRecord:
     ) -> Step:
         flow, found = part_flow_of(bound), metadata_of(bound)
         judges = found is not None and found.verdict is True
-        if flow == PartFlow() and not judges:
-            return step
         own = self._own.get(step.done.action_id, "")
+        if flow.serial or flow.order:
+            given = inspect.signature(bound).bind(*arguments, **keywords).arguments
+            serial, order = (str(given.get(name, "")) if name else "" for name in (flow.serial, flow.order))
+            step = step._replace(serial=serial, order=order)
+        if not step.serial:  # the part in this device, or at the place of the action
+            step = step._replace(concerns=self._ledger.part_at(device.id) or self._ledger.part_at(own))
+        if flow._replace(serial="", order="") == PartFlow() and not judges:
+            return step
         if flow.takes_from or flow.puts_to:
             there = self._place_of(bound, flow.takes_from or flow.puts_to, arguments, keywords) or own
             if not there:
@@ -333,6 +346,13 @@ class RunRecord:
             self._store_later()
             if step.part is not None or step.place:
                 self._publish()
+            self._report(step, value if step.judges and isinstance(value, bool) else None)
+
+    def _report(self, step: Step, verdict: bool | None = None) -> None:
+        """Report that an action has concerned a part."""
+        part = step.part or self._ledger.part_at(step.place) or step.concerns
+        if self._keeps_books and (part or step.serial):
+            self._concerned(step.number, 0 if step.serial else part, step.serial, step.order, verdict)
 
     def fail(self, step: Step) -> None:
         """Record that an action has failed or was stopped: the part may be at its source or its target."""
@@ -344,6 +364,7 @@ class RunRecord:
             self._store_later()
             if step.part is not None:
                 self._publish(sense=True)
+            self._report(step)
 
     def require_arrived(self, step: Step | None) -> None:
         """Check that a movement may count as done by hand. Raises WrongPart if a person has confirmed otherwise."""

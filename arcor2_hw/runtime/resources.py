@@ -57,7 +57,7 @@ class Resources:
         self._directory = Path.cwd() if self._standalone is None else self._standalone.directory
         self.objects: dict[str, Any] = {}
         """Proxies of the devices by id of the scene object. Typed Any, because the script annotates each of them."""
-        data = PackageData(self._directory)
+        data = PackageData(self._directory, program.values)
         self._data = data
         self._points = WorldPoints(data.scene, data.project)
         program.load(data.project)

@@ -13,10 +13,15 @@ from arcor2_hw.runtime.continuing import set_variables
 from arcor2_hw.runtime.documents import read_document
 from arcor2_hw.runtime.package import put_on_path
 from arcor2_hw.runtime.program import Program, traceback_text
+from arcor2_hw.runtime.program_values import set_values
 
 
 def execute(directory: Path, program: Program) -> None:
-    """Run script.py as `__main__` in its directory."""
+    """Run script.py as `__main__` in its directory, with the values of the recipe.
+
+    Raises:
+        InvalidPackage: the values cannot be used in this script.
+    """
     put_on_path(directory)
     os.chdir(directory)
     script = directory / "script.py"
@@ -25,9 +30,13 @@ def execute(directory: Path, program: Program) -> None:
     module.__file__ = str(script)
     sys.modules["__main__"] = module
     source = ast.parse(script.read_bytes(), str(script))
-    if program.record is not None and program.record.continues:
-        scene_id = read_document(directory / "data" / "project.json", Project).scene_id
-        set_variables(source, program.record.former_variables(scene_id))
+    continues = program.record is not None and program.record.continues
+    if program.values or continues:
+        project = read_document(directory / "data" / "project.json", Project)
+        if program.values and project.has_logic:  # other scripts read values by `res.parameter`
+            set_values(source, project, program.values)
+        if program.record is not None and continues:  # what the interrupted program has assigned since
+            set_variables(source, program.record.former_variables(project.scene_id))
     code = compile(source, str(script), "exec")
     try:
         program.inside = False

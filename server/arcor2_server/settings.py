@@ -80,6 +80,8 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     drained_size: int = 32 * MIB
     log_off_after: float = 300.0
     """Time without activity after which a person is logged off at a shared device; 0: never."""
+    released_only: bool = False
+    """Whether operators may run only released recipes."""
     requests_in_flight: int = 256
     """Maximum number of concurrent requests of a client; more are not read from its connection."""
     outgoing_bytes: int = 40 * MIB
@@ -222,6 +224,7 @@ _VARIABLES: Final = {
     "ARCOR2_HW_HISTORY_LIMIT": "history_limit",
     "ARCOR2_HW_DEFAULT_ROLE": "default_role",
     "ARCOR2_HW_LOG_OFF_AFTER": "log_off_after",
+    "ARCOR2_HW_RELEASED_ONLY": "released_only",
     "ARCOR2_HW_OUTGOING_BYTES": "outgoing_bytes",
     "ARCOR2_HW_OUTGOING_AGE": "outgoing_age",
     "ARCOR2_HW_PING_INTERVAL": "ping_interval",

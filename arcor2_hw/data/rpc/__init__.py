@@ -18,9 +18,11 @@ from arcor2_hw.data.rpc.object_types import *
 from arcor2_hw.data.rpc.operation import *
 from arcor2_hw.data.rpc.persons import *
 from arcor2_hw.data.rpc.projects import *
+from arcor2_hw.data.rpc.recipes import *
 from arcor2_hw.data.rpc.robots import *
 from arcor2_hw.data.rpc.scenes import *
 from arcor2_hw.data.rpc.scripts import *
+from arcor2_hw.data.rpc.units import *
 
 _ALL: Final = (
     *ACTION_POINT_RPCS,
@@ -38,9 +40,11 @@ _ALL: Final = (
     *OPERATION_RPCS,
     *PERSON_RPCS,
     *PROJECT_RPCS,
+    *RECIPE_RPCS,
     *ROBOT_RPCS,
     *SCENE_RPCS,
     *SCRIPT_RPCS,
+    *UNIT_RPCS,
 )
 RPCS: Final = {rpc.name: rpc for rpc in sorted(_ALL, key=lambda rpc: rpc.name)}
 """Every request by name."""

@@ -7,6 +7,7 @@ from arcor2_hw.data.held import HeldData, HoldChoice, OnError
 from arcor2_hw.data.package import PackageSummary
 from arcor2_hw.data.parts import ConfirmedPart, PartBooks
 from arcor2_hw.data.position import ProgramPosition, ProgramStep
+from arcor2_hw.data.recipes import OrderId
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc.envelope import Rpc
 from arcor2_hw.data.rpc.general import IdArgs
@@ -44,7 +45,9 @@ class RunPackageArgs(IdArgs, frozen=True):
     shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
     on_error: what the program does when an action fails and no error exit applies. checkpoints: whether the state is
     stored before and after each action; default: true. continues: whether the program continues where it was
-    interrupted, which requires that it is held on errors.
+    interrupted, which requires that it is held on errors. recipe_id: the recipe, whose package this must be.
+    recipe_values: values of this run by name, JSON in a string, within the limits of the recipe. order: id of the order
+    that is stored with the produced units.
     """
 
     start_paused: bool = False
@@ -53,6 +56,9 @@ class RunPackageArgs(IdArgs, frozen=True):
     on_error: OnError | Unset = UNSET
     checkpoints: bool | Unset = UNSET
     continues: bool | Unset = UNSET
+    recipe_id: str | Unset = UNSET
+    recipe_values: dict[str, str] | Unset = UNSET
+    order: OrderId | Unset = UNSET
 
 
 class TemporaryPackageArgs(Data, frozen=True):

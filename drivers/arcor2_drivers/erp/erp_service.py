@@ -233,7 +233,7 @@ class ErpService(Connected, Generic):
         finally:
             self._requesting_order.release()
 
-    @action
+    @action(serial="serial", order="order_id")
     def report_result(self, order_id: str, serial: str, passed: bool, note: str = "", *, an: str | None = None) -> None:
         """Store the result of one piece; the service receives it exactly once.
 

@@ -166,7 +166,7 @@ class ZplPrinter(LineDevice, Printer):
             time.sleep(CONFIRM_PERIOD)
 
     # -------------------------------------------------------------------------------- actions
-    @action(deadline=DEADLINE)
+    @action(deadline=DEADLINE, serial="code")
     def print_label(self, title: str, text: str, code: str, *, an: str | None = None) -> str:
         """Print one label and return the id of the job when the printer has counted it.
 

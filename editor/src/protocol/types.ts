@@ -558,6 +558,32 @@ export interface ChangePersonArgs {
 /** Kind of change of the item in an event. */
 export type ChangeType = "add" | "update" | "remove" | "update_base";
 
+/** A file that differs between two packages. */
+export interface ChangedFile {
+  path: string;
+  change: FileChange;
+}
+
+/** A value that differs between two recipes, JSON in a string; omitted where it is missing. */
+export interface ChangedValue {
+  name: string;
+  before?: string;
+  after?: string;
+}
+
+/**
+ * What the cell produces: the recipe, and the one before, to which it can be rolled back.
+ *
+ * released_only: whether operators may run only released recipes. by, at: who changed over, and when.
+ */
+export interface Changeover {
+  released_only: boolean;
+  recipe_id?: string;
+  previous_id?: string;
+  by: string;
+  at?: string;
+}
+
 /**
  * Arguments of CheckCalibration: a record, a pose in its frame, and the limits of the difference (m, rad).
  *
@@ -612,6 +638,12 @@ export interface CollisionModels {
   spheres: Sphere[];
   cylinders: Cylinder[];
   meshes: Mesh[];
+}
+
+/** Arguments of CompareRecipes: ids of two recipes. */
+export interface CompareRecipesArgs {
+  before: string;
+  after: string;
 }
 
 /** Arguments of ConfirmParts: where a person has found parts. No parts: only that a program was interrupted. */
@@ -817,6 +849,19 @@ export interface EefPose {
   arm_id?: string;
 }
 
+/**
+ * Overall equipment effectiveness (ISO 22400-2): each 0 to 1, omitted where it cannot be computed.
+ *
+ * availability: time running / time of the period. performance: planned time of the produced units / time running,
+ * which is above 1 if the cell is faster than planned. quality: good / produced units. oee: their product.
+ */
+export interface Effectiveness {
+  availability?: number;
+  performance?: number;
+  quality?: number;
+  oee?: number;
+}
+
 /** A pose with its quality, 0 to 1. */
 export interface EstimatedPose {
   pose: Pose;
@@ -827,6 +872,9 @@ export interface EstimatedPose {
 export interface ExecuteActionArgs {
   action_id: string;
 }
+
+/** How a file of a package differs. */
+export type FileChange = "added" | "removed" | "changed";
 
 /**
  * Arguments of FindDevices: a type of devices, the setting whose values are searched, and the other settings.
@@ -964,6 +1012,12 @@ export interface GetHeldData {
   held?: HeldData;
 }
 
+/** Arguments of GetProduction: the period, by default the last 8 hours. */
+export interface GetProductionArgs {
+  since?: string;
+  until?: string;
+}
+
 /** Arguments of GetRobotArms. */
 export interface GetRobotArmsArgs {
   robot_id: string;
@@ -979,6 +1033,11 @@ export interface GetRobotJointsArgs {
 export interface GetSuctionsArgs {
   robot_id: string;
   arm_id?: string;
+}
+
+/** Arguments of GetUnit: number of the record. */
+export interface GetUnitArgs {
+  number: number;
 }
 
 /** Arguments of GetViewState; `user`: the user, by default the caller. */
@@ -1332,6 +1391,18 @@ export interface ListProjectsData {
   problem_messages?: Message[];
 }
 
+/** Arguments of ListRecipes: only those of a product, or in a state. */
+export interface ListRecipesArgs {
+  product?: string;
+  state?: RecipeState;
+}
+
+/** Answer to ListRecipes: recipes by product, newest revision first, and what the cell produces. */
+export interface ListRecipesData {
+  recipes: Recipe[];
+  changeover: Changeover;
+}
+
 /** Arguments of ListRuns: maximum number, number before which runs are listed, package or project. */
 export interface ListRunsArgs {
   limit?: number;
@@ -1354,6 +1425,29 @@ export interface ListScenesData {
   description?: string;
   problems?: string[];
   problem_messages?: Message[];
+}
+
+/**
+ * Arguments of ListUnits: which units, newest first.
+ *
+ * serial: the beginning of the serial number, in upper or lower case. order, product, run, state: all must match. since, until: of entering
+ * the cell. before: number of a record.
+ */
+export interface ListUnitsArgs {
+  serial?: string;
+  order?: string;
+  product?: string;
+  run?: number;
+  state?: UnitState;
+  since?: string;
+  until?: string;
+  before?: number;
+  limit?: number;
+}
+
+/** Answer to ListUnits: units without steps, newest first. */
+export interface ListUnitsData {
+  units: Unit[];
 }
 
 /** Data of the events ObjectsLocked and ObjectsUnlocked. */
@@ -1855,6 +1949,11 @@ export interface PackageMeta {
   executed?: string;
 }
 
+/** Answer to GetPackageParameters: constants and variables of the project of a package, whose values can be set. */
+export interface PackageParametersData {
+  parameters: ProjectParameter[];
+}
+
 /** Data of the event PackageState. */
 export interface PackageStateData {
   state: PackageStateEnum;
@@ -2038,6 +2137,15 @@ export interface ProcessStateData {
 /** Values of StateEnum in ProcessState. */
 export type ProcessStateEnum = "started" | "finished" | "failed";
 
+/** What the cell has produced in a period, and the time per activity, s. */
+export interface Production {
+  since: string;
+  until: string;
+  counts: UnitCounts;
+  seconds: Record<string, number>;
+  effectiveness: Effectiveness;
+}
+
 /**
  * The position of a program; without branches no action has been announced, or the run has ended.
  *
@@ -2167,6 +2275,20 @@ export interface PutInterlockData {
   id: string;
 }
 
+/**
+ * Arguments of PutRecipe: a new draft, or a draft to change.
+ *
+ * id: the draft; omitted for a new revision of the product.
+ */
+export interface PutRecipeArgs {
+  product: string;
+  package_id: string;
+  id?: string;
+  values?: RecipeValue[];
+  planned_rate?: number;
+  note?: string;
+}
+
 /** Reliability of a reading (good, uncertain, bad, as in OPC UA). */
 export type Quality = "good" | "uncertain" | "bad";
 
@@ -2226,6 +2348,57 @@ export interface ReadLockArgs {
 /** Arguments of ReadUnlock. */
 export interface ReadUnlockArgs {
   object_id: string;
+}
+
+/**
+ * A revision of a recipe.
+ *
+ * revision: counts the recipes of the product, from 1. package_id, package_hash: the package, and the SHA-256 of its
+ * files. values: values that replace those of the package. planned_rate: planned parts per hour. signatures: the first
+ * one is the oldest.
+ */
+export interface Recipe {
+  id: string;
+  product: string;
+  revision: number;
+  package_id: string;
+  package_hash: string;
+  state: RecipeState;
+  created: string;
+  created_by: string;
+  values: RecipeValue[];
+  planned_rate?: number;
+  note: string;
+  signatures: Signature[];
+}
+
+/**
+ * The differences of two recipes.
+ *
+ * script: unified diff of the scripts. problems: why a recipe cannot be used, such as a changed package.
+ */
+export interface RecipeComparison {
+  before: Recipe;
+  after: Recipe;
+  values: ChangedValue[];
+  files: ChangedFile[];
+  script: string;
+  problems: string[];
+}
+
+/** State of a recipe. Each state after the first one is reached by a signature. */
+export type RecipeState = "draft" | "tested" | "released" | "retired";
+
+/**
+ * The value of a constant or variable of the project, JSON in a string.
+ *
+ * min, max: limits within which the value of a single run may differ; without both, it may not.
+ */
+export interface RecipeValue {
+  name: string;
+  value: string;
+  min?: number;
+  max?: number;
 }
 
 /** Arguments of Redo: the undo of the caller, by default the latest one. */
@@ -2496,7 +2669,8 @@ export type RobotType = "articulated" | "cartesian" | "scara";
  * project_modified: modification time of the built project, which identifies its revision. temporary: run from the
  * editor; its package is deleted. started_by, stopped_by: name of a user or token. actions: number of started actions.
  * last_action: action that was active at the end. error: error that ended the run, with `key` and `values` as in
- * ProjectException. statistics: omitted until the devices are connected, and in runs of older servers.
+ * ProjectException. statistics: omitted until the devices are connected, and in runs of older servers. recipe: the
+ * recipe; omitted without one. order: id of the order that was given at the start.
  */
 export interface Run {
   number: number;
@@ -2517,6 +2691,8 @@ export interface Run {
   error?: string;
   error_type?: string;
   statistics?: RunStatistics;
+  recipe?: UsedRecipe;
+  order?: string;
   key?: string;
   values?: Record<string, string | Message>;
 }
@@ -2560,7 +2736,9 @@ export type RunEnd = "running" | "finished" | "stopped" | "failed" | "lost";
  * shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
  * on_error: what the program does when an action fails and no error exit applies. checkpoints: whether the state is
  * stored before and after each action; default: true. continues: whether the program continues where it was
- * interrupted, which requires that it is held on errors.
+ * interrupted, which requires that it is held on errors. recipe_id: the recipe, whose package this must be.
+ * recipe_values: values of this run by name, JSON in a string, within the limits of the recipe. order: id of the order
+ * that is stored with the produced units.
  */
 export interface RunPackageArgs {
   id: string;
@@ -2570,6 +2748,9 @@ export interface RunPackageArgs {
   on_error?: OnError;
   checkpoints?: boolean;
   continues?: boolean;
+  recipe_id?: string;
+  recipe_values?: Record<string, string>;
+  order?: string;
 }
 
 /**
@@ -2727,6 +2908,32 @@ export interface ShelveAlarmArgs {
 export interface ShowMainScreenData {
   what: MainScreen;
   highlight?: string;
+}
+
+/** Arguments of SignRecipe: the new state, and the person who signs, with their PIN. */
+export interface SignRecipeArgs {
+  id: string;
+  state: RecipeState;
+  person: string;
+  pin: string;
+  note?: string;
+}
+
+/**
+ * A signature of a person.
+ *
+ * state: the state that it sets. person, name, role: who signed. at: when. meaning: what the signature means. note: a
+ * remark of the person. digest: SHA-256 of the recipe, the signature before, and all other fields.
+ */
+export interface Signature {
+  state: RecipeState;
+  person: string;
+  name: string;
+  role: "operator" | "standard_user" | "advanced_user" | "technician" | "programmer";
+  at: string;
+  meaning: string;
+  note: string;
+  digest: string;
 }
 
 /**
@@ -2986,6 +3193,93 @@ export interface UndoData {
   revision: number;
 }
 
+/**
+ * A unit that the cell has worked on, without its steps.
+ *
+ * number: of the record. serial: serial number; empty if it was never read. scene_id, part: the scene, and the number
+ * of the part in its books. order: id of the order. entered, left: when it came into the cell and left it. verdict:
+ * result of its last test. runs: numbers of the runs that worked on it.
+ */
+export interface Unit {
+  number: number;
+  serial: string;
+  scene_id: string;
+  part: number;
+  state: UnitState;
+  entered: string;
+  left?: string;
+  verdict?: boolean;
+  order: string;
+  recipe?: UsedRecipe;
+  package_id: string;
+  package_name: string;
+  package_hash: string;
+  started_by: string;
+  runs: number[];
+}
+
+/** Units that left the cell, and units that are in it. */
+export interface UnitCounts {
+  good: number;
+  bad: number;
+  rejected: number;
+  unknown: number;
+  in_cell: number;
+}
+
+/**
+ * A unit with its steps, and the calibrations that were in force when it came into the cell.
+ *
+ * dropped: number of further steps that are not stored.
+ */
+export interface UnitRecord {
+  number: number;
+  serial: string;
+  scene_id: string;
+  part: number;
+  state: UnitState;
+  entered: string;
+  left?: string;
+  verdict?: boolean;
+  order: string;
+  recipe?: UsedRecipe;
+  package_id: string;
+  package_name: string;
+  package_hash: string;
+  started_by: string;
+  runs: number[];
+  steps: UnitStep[];
+  calibrations: UsedCalibration[];
+  dropped: number;
+}
+
+/**
+ * Where a unit is: in the cell, in a box for good, bad or rejected parts, or unknown.
+ *
+ * REJECTED includes parts that a person has taken out of the cell. UNKNOWN: it left while the server was off, and the
+ * books no longer contain its serial number.
+ */
+export type UnitState = "in_cell" | "good" | "bad" | "rejected" | "unknown";
+
+/**
+ * An action that concerned a unit.
+ *
+ * run, number: run, and number of the action in it. duration: s. parameters, results: each as JSON in a string. error:
+ * why it failed. attempt: number of the attempt, if not the first one.
+ */
+export interface UnitStep {
+  run: number;
+  number: number;
+  action_id: string;
+  name: string;
+  started: string;
+  duration?: number;
+  parameters?: string[];
+  results?: string[];
+  error?: string;
+  attempt?: number;
+}
+
 /** What an action does while a condition is not met: wait, then hold the program; or hold it at once. */
 export type Unmet = "wait" | "hold";
 
@@ -3143,6 +3437,30 @@ export interface UploadPackageArgs {
   data: string;
 }
 
+/** A calibration that was in force: its record, object, kind and date. */
+export interface UsedCalibration {
+  id: string;
+  object_id: string;
+  object_name: string;
+  kind: string;
+  date: string;
+}
+
+/**
+ * The recipe with which a program runs, or ran.
+ *
+ * values: all values of the recipe, JSON in a string, as used in this run. planned_rate: planned parts per hour.
+ */
+export interface UsedRecipe {
+  id: string;
+  product: string;
+  revision: number;
+  state: RecipeState;
+  package_hash: string;
+  values: Record<string, string>;
+  planned_rate?: number;
+}
+
 /** Data of the event UserPresence; without `presence` the client of the user has not reported any yet. */
 export interface UserPresenceData {
   user: string;
@@ -3224,12 +3542,14 @@ export interface Requests {
   CameraColorParameters: { args: CameraColorParametersArgs; data: CameraParameters };
   CancelAction: { args: undefined; data: undefined };
   CancelDryRun: { args: undefined; data: undefined };
+  ChangeOver: { args: IdArgs; data: Changeover };
   ChangePerson: { args: ChangePersonArgs; data: Person };
   CheckCalibration: { args: CheckCalibrationArgs; data: CalibrationCheck };
   CheckConnection: { args: CheckConnectionArgs; data: CheckConnectionData };
   CheckScript: { args: ScriptArgs; data: CheckScriptData };
   CloseProject: { args: CloseProjectArgs | undefined; data: undefined };
   CloseScene: { args: CloseSceneArgs | undefined; data: undefined };
+  CompareRecipes: { args: CompareRecipesArgs; data: RecipeComparison };
   ConfirmParts: { args: ConfirmPartsArgs; data: undefined };
   CopyActionPoint: { args: CopyActionPointArgs; data: undefined };
   CopyProject: { args: CopyProjectArgs; data: undefined };
@@ -3241,6 +3561,7 @@ export interface Requests {
   DeleteOverride: { args: DeleteOverrideArgs; data: undefined };
   DeletePackage: { args: IdArgs; data: undefined };
   DeleteProject: { args: IdArgs; data: undefined };
+  DeleteRecipe: { args: IdArgs; data: undefined };
   DeleteScene: { args: IdArgs; data: string[] };
   DissolveCall: { args: DissolveCallArgs; data: DissolveCallData };
   DissolveParallel: { args: DissolveParallelArgs; data: undefined };
@@ -3258,7 +3579,9 @@ export interface Requests {
   GetGrippers: { args: GetGrippersArgs; data: string[] };
   GetHeld: { args: undefined; data: GetHeldData };
   GetObjectTypes: { args: undefined; data: ObjectTypeMeta[] };
+  GetPackageParameters: { args: IdArgs; data: PackageParametersData };
   GetParts: { args: undefined; data: PartBooks[] };
+  GetProduction: { args: GetProductionArgs | undefined; data: Production };
   GetProgramPosition: { args: undefined; data: ProgramPosition };
   GetProject: { args: IdArgs; data: Project };
   GetRobotArms: { args: GetRobotArmsArgs; data: string[] };
@@ -3266,6 +3589,7 @@ export interface Requests {
   GetRobotMeta: { args: undefined; data: RobotMeta[] };
   GetScene: { args: IdArgs; data: Scene };
   GetSuctions: { args: GetSuctionsArgs; data: string[] };
+  GetUnit: { args: GetUnitArgs; data: UnitRecord };
   GetViewState: { args: GetViewStateArgs; data: ViewState };
   HandTeachingMode: { args: HandTeachingModeArgs; data: undefined };
   History: { args: HistoryArgs | undefined; data: HistoryData };
@@ -3282,8 +3606,10 @@ export interface Requests {
   ListPackages: { args: undefined; data: PackageSummary[] };
   ListPersons: { args: undefined; data: ListPersonsData };
   ListProjects: { args: undefined; data: ListProjectsData[] };
+  ListRecipes: { args: ListRecipesArgs | undefined; data: ListRecipesData };
   ListRuns: { args: ListRunsArgs | undefined; data: ListRunsData };
   ListScenes: { args: undefined; data: ListScenesData[] };
+  ListUnits: { args: ListUnitsArgs | undefined; data: ListUnitsData };
   LogOff: { args: undefined; data: undefined };
   LogOn: { args: LogOnArgs; data: LogOnData };
   MakeFunction: { args: MakeFunctionArgs; data: MakeFunctionData };
@@ -3307,6 +3633,7 @@ export interface Requests {
   ProjectScript: { args: undefined; data: ProjectScriptData };
   ProjectsWithScene: { args: IdArgs; data: string[] };
   PutInterlock: { args: PutInterlockArgs; data: PutInterlockData };
+  PutRecipe: { args: PutRecipeArgs; data: Recipe };
   Reachability: { args: ReachabilityArgs | undefined; data: ReachabilityData[] };
   ReadLock: { args: ReadLockArgs; data: undefined };
   ReadUnlock: { args: ReadUnlockArgs; data: undefined };
@@ -3344,6 +3671,7 @@ export interface Requests {
   SetEefPerpendicularToWorld: { args: SetEefPerpendicularToWorldArgs; data: undefined };
   SetViewState: { args: SetViewStateArgs; data: SetViewStateData };
   ShelveAlarm: { args: ShelveAlarmArgs; data: undefined };
+  SignRecipe: { args: SignRecipeArgs; data: Recipe };
   StartDryRun: { args: StartDryRunArgs | undefined; data: DryRunHead };
   StartScene: { args: undefined; data: undefined };
   StartSceneKeepGoing: { args: undefined; data: undefined };
@@ -3403,6 +3731,7 @@ export interface Events {
   AlarmChanged: AlarmRecord;
   BreakpointsChanged: ProjectBreakpoints;
   ChangedObjectTypes: ObjectTypeMeta[];
+  ChangeoverChanged: Changeover;
   DryRunChanged: DryRunHead;
   ExecutionTrace: TraceEntry;
   FunctionChanged: ProjectFunction;
@@ -3440,6 +3769,7 @@ export interface Events {
   ProjectParameterChanged: ProjectParameter;
   ProjectSaved: undefined;
   ReachabilityChanged: ReachabilityData;
+  RecipeChanged: Recipe;
   RobotEef: RobotEefData;
   RobotHold: RobotHoldData;
   RobotJoints: RobotJointsData;
@@ -3456,6 +3786,7 @@ export interface Events {
   SceneState: SceneStateData;
   ShowMainScreen: ShowMainScreenData;
   TaskState: TaskStateData;
+  UnitChanged: Unit;
   UserPresence: UserPresenceData;
   ViewStateChanged: ViewState;
 }
@@ -3510,12 +3841,14 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   CameraColorParameters: 1,
   CancelAction: 1,
   CancelDryRun: 2,
+  ChangeOver: 1,
   ChangePerson: 5,
   CheckCalibration: 1,
   CheckConnection: 4,
   CheckScript: 2,
   CloseProject: 2,
   CloseScene: 2,
+  CompareRecipes: 1,
   ConfirmParts: 1,
   CopyActionPoint: 2,
   CopyProject: 2,
@@ -3527,6 +3860,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   DeleteOverride: 3,
   DeletePackage: 3,
   DeleteProject: 2,
+  DeleteRecipe: 3,
   DeleteScene: 4,
   DissolveCall: 2,
   DissolveParallel: 2,
@@ -3544,7 +3878,9 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   GetGrippers: 1,
   GetHeld: 1,
   GetObjectTypes: 1,
+  GetPackageParameters: 1,
   GetParts: 1,
+  GetProduction: 1,
   GetProgramPosition: 1,
   GetProject: 1,
   GetRobotArms: 1,
@@ -3552,6 +3888,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   GetRobotMeta: 1,
   GetScene: 1,
   GetSuctions: 1,
+  GetUnit: 1,
   GetViewState: 1,
   HandTeachingMode: 2,
   History: 1,
@@ -3568,8 +3905,10 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   ListPackages: 1,
   ListPersons: 1,
   ListProjects: 1,
+  ListRecipes: 1,
   ListRuns: 1,
   ListScenes: 1,
+  ListUnits: 1,
   LogOff: 1,
   LogOn: 1,
   MakeFunction: 2,
@@ -3593,6 +3932,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   ProjectScript: 1,
   ProjectsWithScene: 1,
   PutInterlock: 4,
+  PutRecipe: 3,
   Reachability: 1,
   ReadLock: 1,
   ReadUnlock: 1,
@@ -3630,6 +3970,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   SetEefPerpendicularToWorld: 2,
   SetViewState: 1,
   ShelveAlarm: 4,
+  SignRecipe: 3,
   StartDryRun: 2,
   StartScene: 2,
   StartSceneKeepGoing: 2,
@@ -3681,6 +4022,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
 export const ADDITIONAL_EVENTS = [
   "AlarmChanged",
   "BreakpointsChanged",
+  "ChangeoverChanged",
   "DryRunChanged",
   "ExecutionTrace",
   "FunctionChanged",
@@ -3699,10 +4041,12 @@ export const ADDITIONAL_EVENTS = [
   "PersonChanged",
   "ProgramPosition",
   "ReachabilityChanged",
+  "RecipeChanged",
   "RobotHold",
   "RunChanged",
   "RunStatistics",
   "TaskState",
+  "UnitChanged",
   "UserPresence",
   "ViewStateChanged",
 ] as const satisfies (keyof Events)[];

@@ -19,6 +19,7 @@ from arcor2_server.rest.general import GeneralOperations
 from arcor2_server.rest.kinematics import KinematicsOperations
 from arcor2_server.rest.models import ModelOperations
 from arcor2_server.rest.object_types import ObjectTypeOperations
+from arcor2_server.rest.production import ProductionOperations
 from arcor2_server.rest.projects import ProjectOperations
 from arcor2_server.rest.runs import RunOperations
 from arcor2_server.rest.scene_service import SceneServiceOperations
@@ -52,6 +53,7 @@ from arcor2_server.rpc.parameters import ParameterRequests
 from arcor2_server.rpc.persons import PersonRequests
 from arcor2_server.rpc.project import ProjectRequests
 from arcor2_server.rpc.reachability import ReachabilityRequests
+from arcor2_server.rpc.recipes import RecipeRequests
 from arcor2_server.rpc.registry import Handlers
 from arcor2_server.rpc.robot import RobotRequests
 from arcor2_server.rpc.robot_motion import RobotMotionRequests
@@ -59,6 +61,7 @@ from arcor2_server.rpc.runs import RunRequests
 from arcor2_server.rpc.scene import SceneRequests
 from arcor2_server.rpc.scene_objects import SceneObjectRequests
 from arcor2_server.rpc.scripts import ScriptRequests
+from arcor2_server.rpc.units import UnitRequests
 
 
 def request_handlers(s: Server) -> Handlers:
@@ -114,10 +117,12 @@ def request_handlers(s: Server) -> Handlers:
         PersonRequests(s.access, s.persons, s.log_ons),
         ProjectRequests(s.hub, s.locks, s.storage, s.types, s.session, s.online, s.type_notifications, editing, scenes),
         ReachabilityRequests(s.reachability),
+        RecipeRequests(s.recipes, s.execution),
         RobotRequests(s.locks, s.types, s.session, s.online, s.robots, s.kinematics, s.motion),
         RobotMotionRequests(s.locks, s.types, s.session, s.online, s.robots, s.motion),
         RunRequests(s.runs),
         ScriptRequests(s.session, s.undo, s.script_editing, editing),
+        UnitRequests(s.units, s.cell_time),
         scenes,
         objects,
     )
@@ -144,6 +149,7 @@ def rest_groups(s: Server) -> list[object]:
         KinematicsOperations(s.online, s.robot_calibrations, s.robots),
         ModelOperations(s.storage, s.type_notifications),
         ObjectTypeOperations(s.storage, s.types, s.type_notifications),
+        ProductionOperations(s.recipes, s.units, s.cell_time),
         ProjectOperations(s.storage),
         RunOperations(s.runs),
         SceneServiceOperations(s.assets, s.online, s.compute, s.collisions, s.scene_collisions),

@@ -52,6 +52,9 @@ from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.online.scene_calibration import SceneCalibration
 from arcor2_server.online.scene_opening import SceneOpening
 from arcor2_server.online.undo import Undo
+from arcor2_server.production.cell_time import CellTime, activity_of
+from arcor2_server.production.recipes import Recipes
+from arcor2_server.production.units import Units
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage
 from arcor2_server.storage.alarms import AlarmStore
@@ -59,10 +62,12 @@ from arcor2_server.storage.calibrations import Calibrations
 from arcor2_server.storage.damage_notices import DataDamage
 from arcor2_server.storage.packages import Packages
 from arcor2_server.storage.persons import PersonStore
+from arcor2_server.storage.recipes import RecipeStore
 from arcor2_server.storage.secret_migration import migrate_secrets
 from arcor2_server.storage.secret_store import SecretStore
 from arcor2_server.storage.setting_secrets import SettingSecrets
 from arcor2_server.storage.shared_data import SharedData
+from arcor2_server.storage.units import UnitStore
 from arcor2_server.websocket.hub import Hub
 from arcor2_server.workspace.calibration import Calibration
 from arcor2_server.workspace.display_models import DisplayModels
@@ -196,6 +201,16 @@ class Server:
         execution = self.execution = closed(
             Execution(packages, program_host, online, settings, hub, types, runs, breakpoints, secrets, messages, books)
         )
+        recipes = self.recipes = Recipes(
+            hub, RecipeStore(storage), packages, persons, released_only=settings.released_only
+        )
+        await recipes.open()
+        unit_store = UnitStore(storage)
+        units = self.units = closed(Units(hub, unit_store, runs, packages, calibration_records))
+        await units.open(books.all)
+        cell_time = self.cell_time = closed(CellTime(unit_store, lambda: activity_of(execution)))
+        cell_time.start()
+        connect_production(recipes, units, cell_time, execution)
         alarms = self.alarms = Alarms(
             hub,
             AlarmStore(storage),
@@ -275,6 +290,17 @@ def connect_alarms(
     for notice in damage.notices:
         alarms.data_damaged(notice)
     damage.on_report.append(alarms.data_damaged)
+
+
+def connect_production(recipes: Recipes, units: Units, cell_time: CellTime, execution: Execution) -> None:
+    """Let recipes decide what runs, and let the records of units and the times of the cell follow the program."""
+    execution.before_run.append(recipes.prepare_run)
+    execution.before_replacing.append(recipes.require_unused)
+    execution.on_begin.append(units.begin_run)
+    execution.on_part_step.append(units.concern)
+    execution.on_action_end.append(units.action_ended)
+    execution.parts.on_change.append(units.follow)
+    execution.on_state.append(cell_time.changed)
 
 
 def connect_edits(edits: EditNotifications, previews: Previews, breakpoints: SharedBreakpoints) -> None:

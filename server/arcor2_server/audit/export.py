@@ -22,7 +22,7 @@ def csv_chunks(entries: Iterable[AuditEntry]) -> Iterator[bytes]:
     for number, entry in enumerate(entries, 1):
         fields = msgspec.structs.asdict(entry)
         fields["changes"] = msgspec.json.encode(entry.changes).decode() if entry.changes else ""
-        writer.writerow(_as_text(fields[name]) for name in COLUMNS)
+        writer.writerow(as_cell(fields[name]) for name in COLUMNS)
         if number % LINES_AT_ONCE == 0:
             yield text.getvalue().encode()
             text.seek(0)
@@ -30,7 +30,7 @@ def csv_chunks(entries: Iterable[AuditEntry]) -> Iterator[bytes]:
     yield text.getvalue().encode()
 
 
-def _as_text(value: object) -> str:
+def as_cell(value: object) -> str:
     """Return a value as text that a spreadsheet does not take for a formula."""
     text = str(value)
     return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text

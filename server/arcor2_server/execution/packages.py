@@ -2,6 +2,7 @@
 
 import abc
 import asyncio
+from collections.abc import Awaitable, Callable
 from typing import IO
 
 from arcor2_hw.data.events import ChangeType
@@ -15,11 +16,19 @@ class PackageLibrary(abc.ABC):
 
     def __init__(self, hub: EventHub, packages: Packages) -> None:
         self.packages = packages
+        self.before_replacing: list[Callable[[str], Awaitable[None]]] = []
+        """Called with the id of a package before it is deleted or replaced; may raise RequestRefused."""
         self._hub = hub
 
     @abc.abstractmethod
     def _require_not_used(self, package_id: str) -> None:
         """Raise RequestRefused if the package is running."""
+
+    async def _require_replaceable(self, package_id: str) -> None:
+        """Raise RequestRefused if the package is running or needed."""
+        self._require_not_used(package_id)
+        for check in self.before_replacing:
+            await check(package_id)
 
     async def list(self) -> list[PackageSummary]:
         """Return all packages."""
@@ -27,17 +36,17 @@ class PackageLibrary(abc.ABC):
 
     async def upload(self, package_id: str, data: str) -> PackageSummary:
         """Store a package from a zip archive in Base64. It replaces a package with the same id."""
-        self._require_not_used(package_id)
+        await self._require_replaceable(package_id)
         return await asyncio.to_thread(self.packages.upload, package_id, data)
 
     async def take(self, package_id: str, content: IO[bytes]) -> PackageSummary:
         """Store a package from a zip archive. It replaces a package with the same id."""
-        self._require_not_used(package_id)
+        await self._require_replaceable(package_id)
         return await asyncio.to_thread(self.packages.put_zip, package_id, content)
 
     async def delete(self, package_id: str) -> PackageSummary:
         """Delete a package."""
-        self._require_not_used(package_id)
+        await self._require_replaceable(package_id)
         return await asyncio.to_thread(self.packages.delete, package_id)
 
     async def rename(self, package_id: str, name: str) -> PackageSummary:

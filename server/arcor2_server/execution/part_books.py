@@ -1,6 +1,7 @@
 """The books of parts of all scenes: their publication, their state after an interruption, and corrections by people."""
 
 import asyncio
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -42,6 +43,8 @@ class AllPartBooks:
         self._scene_id = ""
         """The scene of the present run; empty if no program runs."""
         self._using_files = asyncio.Lock()
+        self.on_change: list[Callable[[PartBooks], None]] = []
+        """Called with books that have changed."""
 
     # -------------------------------------------------------------------------------- runs
     async def require_confirmed(self, package: Path) -> str:
@@ -65,8 +68,8 @@ class AllPartBooks:
             )
         return scene_id
 
-    async def require_continues(self, scene_id: str, package_id: str) -> None:
-        """Check that the last program of a scene was interrupted and can continue.
+    async def require_continues(self, scene_id: str, package_id: str) -> int:
+        """Check that the last program of a scene was interrupted and can continue. Return the number of its run.
 
         Raises:
             RequestRefused: it cannot. The message names the missing condition.
@@ -87,6 +90,7 @@ class AllPartBooks:
             raise RequestRefused(
                 "The program cannot continue, because its cycle is not stored. Start it from its beginning."
             )
+        return run.run
 
     def begin_run(self, scene_id: str) -> None:
         """Handle the start of a run. The cell host keeps the books of its scene."""
@@ -95,7 +99,7 @@ class AllPartBooks:
     def changed(self, books: PartBooks) -> None:
         """Handle the books from the cell host."""
         self._live = books
-        self._hub.broadcast(make_event(PARTS, books))
+        self._publish(books)
 
     def end_run(self) -> str:
         """Handle the end of the run, and return its scene."""
@@ -106,7 +110,12 @@ class AllPartBooks:
         """Publish the stored books of a scene."""
         books = await self._stored(scene_id) if scene_id else None
         if books is not None and (books.places or not isinstance(books.run, Unset)):
-            self._hub.broadcast(make_event(PARTS, _published(books)))
+            self._publish(_published(books))
+
+    def _publish(self, books: PartBooks) -> None:
+        self._hub.broadcast(make_event(PARTS, books))
+        for notify in self.on_change:
+            notify(books)
 
     # -------------------------------------------------------------------------------- people
     async def all(self) -> list[PartBooks]:
@@ -153,7 +162,7 @@ class AllPartBooks:
                 run = replace(books.run, interrupted=True, confirmed=not corrected.unconfirmed)
                 corrected = replace(corrected, run=run)
             await asyncio.to_thread(self._write, corrected)
-        self._hub.broadcast(make_event(PARTS, _published(corrected)))
+        self._publish(_published(corrected))
 
     # -------------------------------------------------------------------------------- files
     async def _stored(self, scene_id: str) -> PartBooks | None:

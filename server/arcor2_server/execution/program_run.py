@@ -58,7 +58,7 @@ class ProgramRun:
 
     def begin(self, how: How, *, temporary: bool) -> None:
         """Add the run to the history."""
-        self._number = self._runs.begin(self.package_id, by=how.by, temporary=temporary, start_paused=how.start_paused)
+        self._number = self._runs.begin(self.package_id, how, temporary=temporary)
 
     async def describe(self, packages: Packages) -> None:
         """Store the names of package and project with the run, and log differences of package versions."""

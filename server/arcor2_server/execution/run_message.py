@@ -44,6 +44,7 @@ class RunMessages:
             records=str(self._settings.checkpoints_dir),
             checkpoints=how.checkpoints,
             continues=how.continues,
+            values=dict(how.values),
         )
 
     async def complete(self, message: m.RunPackage, shared_of: str) -> m.RunPackage:

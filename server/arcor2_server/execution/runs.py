@@ -2,9 +2,10 @@
 
 import asyncio
 from collections import OrderedDict
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from datetime import UTC, datetime
 from itertools import islice
+from types import MappingProxyType
 from typing import Any, Final
 
 import msgspec
@@ -16,6 +17,8 @@ from arcor2_hw.data.base import Unset, now
 from arcor2_hw.data.editor import ActionOfRun, Run, RunEnd, RunStatistics, RunStatisticsData, TraceEntry
 from arcor2_hw.data.events import ActionStateAfterData, ActionStateBeforeData, PackageInfoData
 from arcor2_hw.data.held import ActionHold, OnError
+from arcor2_hw.data.recipes import UsedRecipe
+from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import ListRunsArgs
 from arcor2_hw.data.run_trace import RunTrace
 from arcor2_hw.exceptions import NotFound, StorageError
@@ -95,6 +98,12 @@ class How(Struct, frozen=True):
         on_error: what the program does when an action fails and no error exit applies.
         checkpoints: store the state before and after each action.
         continues: continue where the program was interrupted.
+        role: role of the user.
+        recipe_id: the recipe; empty for none.
+        recipe_values: values of this run by name, JSON in a string.
+        order: id of the order.
+        used: the checked recipe.
+        values: its values by the ids of constants and variables of the project, JSON in a string.
     """
 
     start_paused: bool = False
@@ -104,6 +113,12 @@ class How(Struct, frozen=True):
     on_error: OnError = OnError.END
     checkpoints: bool = True
     continues: bool = False
+    role: Role = Role.OPERATOR
+    recipe_id: str = ""
+    recipe_values: Mapping[str, str] = MappingProxyType({})
+    order: str = ""
+    used: UsedRecipe | None = None
+    values: Mapping[str, str] = MappingProxyType({})
 
 
 class Runs:
@@ -141,7 +156,7 @@ class Runs:
             await asyncio.gather(self._writing, return_exceptions=True)
 
     # -------------------------------------------------------------------------------- a run
-    def begin(self, package_id: str, *, by: str, temporary: bool, start_paused: bool) -> int:
+    def begin(self, package_id: str, how: How, *, temporary: bool) -> int:
         """Add a run that starts now; return its number."""
         number = next(reversed(self._runs), 0) + 1
         run = Run(
@@ -151,8 +166,10 @@ class Runs:
             now(),
             RunEnd.RUNNING,
             temporary=temporary,
-            start_paused=start_paused,
-            started_by=by or UNSET,
+            start_paused=how.start_paused,
+            started_by=how.by or UNSET,
+            recipe=how.used or UNSET,
+            order=how.order or UNSET,
         )
         self._trace.clear()
         self._trace_of = number
@@ -242,6 +259,15 @@ class Runs:
             self._hub.broadcast(make_event(TRACE, call.entry(self._trace_of)))
 
     # -------------------------------------------------------------------------------- queries
+    def get(self, number: int) -> Run | None:
+        """Return a run, None if the number is unknown."""
+        return self._runs.get(number)
+
+    def entry(self, number: int) -> TraceEntry | None:
+        """Return an action of the present or last run, None if it is unknown."""
+        call = self._trace.get(number)
+        return None if call is None else call.entry(self._trace_of)
+
     def starter(self, number: int) -> str:
         """Return who started a run; empty if it is unknown."""
         run = self._runs.get(number)

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, Final
 
 import msgspec
@@ -11,7 +11,7 @@ import structlog
 from msgspec.structs import replace
 
 from arcor2_hw.data import events as e
-from arcor2_hw.data.base import UNSET
+from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.events import Event, MainScreen, ProjectExceptionData
 from arcor2_hw.data.held import HoldDecidedData, OnError
 from arcor2_hw.data.package import PackageStateEnum
@@ -95,6 +95,16 @@ class Execution(PackageLibrary):
         """Called with the error that ends or holds a program, before its devices are gone, the run, and the action."""
         self.on_decided: list[Callable[[HoldDecidedData], None]] = []
         """Called with each decision about a held program."""
+        self.before_run: list[Callable[[str, How], Awaitable[How]]] = []
+        """Called with a package and the options of its run, which it may change; may raise RequestRefused."""
+        self.on_begin: list[Callable[[int, str, str, How], None]] = []
+        """Called with the number of a new run, its package, its scene, and its options."""
+        self.on_state: list[Callable[[], None]] = []
+        """Called after each change of `state` and `hold`."""
+        self.on_part_step: list[Callable[[m.PartStep], None]] = []
+        """Called with each report that an action has concerned a part."""
+        self.on_action_end: list[Callable[[int], None]] = []
+        """Called with the number of each action that has ended or failed."""
         self._over: asyncio.Future[None] | None = None
         self._killing: asyncio.TimerHandle | None = None
         self._background = BackgroundTasks()
@@ -173,6 +183,11 @@ class Execution(PackageLibrary):
         self.state = state
         log.info("package", id=self.program.package_id, state=state.value)
         self._hub.broadcast(self._state_event())
+        self._state_changed()
+
+    def _state_changed(self) -> None:
+        for notify in self.on_state:
+            notify()
 
     # -------------------------------------------------------------------------------- commands
     def _require_not_used(self, package_id: str) -> None:
@@ -213,7 +228,9 @@ class Execution(PackageLibrary):
         if how.continues:
             if how.on_error is not OnError.HOLD:
                 raise RequestRefused("A program can only continue if it is held on errors.")
-            await self.parts.require_continues(scene_id, package_id)
+            how = self._as_before(await self.parts.require_continues(scene_id, package_id), how)
+        for prepare in self.before_run:
+            how = await prepare(package_id, how)
         self._require_idle()
         self._online.last_stop.require_none_since(requested_at)
         self.program = program = ProgramRun(self._runs, package_id, project_id)
@@ -225,8 +242,21 @@ class Execution(PackageLibrary):
         program.begin(how, temporary=temporary)
         message = replace(message, run=program.number)
         self.parts.begin_run(scene_id)
+        for begin in self.on_begin:
+            begin(program.number, package_id, scene_id, how)
         self._background.spawn(self._begin(message), "program start")
         self._background.spawn(program.describe(self.packages), "description of the run")
+
+    def _as_before(self, run: int, how: How) -> How:
+        """Return the options of a run that continues an interrupted one: it keeps its recipe, values and order."""
+        former = self._runs.get(run)
+        if former is None:
+            return how
+        order = how.order if isinstance(former.order, Unset) else former.order
+        if isinstance(former.recipe, Unset):
+            return replace(how, order=order)
+        used = former.recipe
+        return replace(how, recipe_id=used.id, recipe_values=used.values, order=order)
 
     def reserve(self) -> None:
         """Refuse other runs, since a document is closed only for the time of a run, or a project is about to run."""
@@ -386,18 +416,28 @@ class Execution(PackageLibrary):
                         client.put(message.encoded)
                 else:
                     self._hub.broadcast_encoded(message.event, message.encoded)
+                if message.event == "ActionStateAfter":
+                    self._action_ended(message.number)
             case m.ActionFailed():
                 self._runs.ended(message)
+                self._action_ended(message.number)
                 if self.program.action_over(message.number):
                     self._publish_position()
             case m.ProgramHeld():
                 self._held(message)
             case m.PartsChanged():
                 self.parts.changed(message.books)
+            case m.PartStep():
+                for notify in self.on_part_step:
+                    notify(message)
             case m.ProgramChanged():
                 self._program_changed(host, message)
             case _:
                 pass
+
+    def _action_ended(self, number: int) -> None:
+        for notify in self.on_action_end:
+            notify(number)
 
     def _publish_position(self) -> None:
         if self._hub.subscribers(POSITION):
@@ -430,6 +470,7 @@ class Execution(PackageLibrary):
             self._enter(S.PAUSING)
         run = self.program.number
         self.hold.begin(run, message.held)
+        self._state_changed()
         if message.held.kind != ProgramInterrupted.code:  # the interruption has its own alarm
             for notify in self.on_error:
                 notify(message.error, run, message.held.action_name)
@@ -441,6 +482,7 @@ class Execution(PackageLibrary):
             for notify in self.on_decided:
                 notify(decided)
         self.program.handle_held(self.hold.seconds)
+        self._state_changed()
 
     def _program_changed(self, host: CellHost, message: m.ProgramChanged) -> None:
         if message.state == "stopped":

@@ -27,6 +27,7 @@ from arcor2_server.rest import (  # noqa: F401
     kinematics,
     models,
     object_types,
+    production,
     projects,
     runs,
     scene_service,

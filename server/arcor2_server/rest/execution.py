@@ -76,9 +76,11 @@ class BreakpointsQuery(Data, frozen=True):
 
 
 class StartQuery(Data, frozen=True, rename="camel"):
-    """What the program does when an action fails and no error exit applies."""
+    """What the program does when an action fails and no error exit applies, the recipe, and the order."""
 
     on_error: OnError = OnError.END
+    recipe_id: str = ""
+    order: str = ""
 
 
 class DebugQuery(StartQuery, frozen=True, rename="camel"):
@@ -177,7 +179,9 @@ class ExecutionOperations:
     @operation("PUT", "/packages/{id}/start", EXECUTION, Role.OPERATOR)
     async def start_package(self, id: str, query: StartQuery, person: str) -> None:  # noqa: A002
         """Run a package. A document left open by users who disconnected does not prevent it."""
-        await self._package_runs.run_package(id, How(by=person, on_error=query.on_error))
+        await self._package_runs.run_package(
+            id, How(by=person, on_error=query.on_error, recipe_id=query.recipe_id, order=query.order)
+        )
 
     @operation("PUT", "/packages/{id}/breakpoints", EXECUTION, Role.OPERATOR)
     async def put_breakpoints(self, id: str, query: BreakpointsQuery) -> None:  # noqa: A002
@@ -195,7 +199,14 @@ class ExecutionOperations:
     async def debug_package(self, id: str, query: DebugQuery, person: str) -> None:  # noqa: A002
         """Run a package with its breakpoints."""
         breakpoints = await ProjectTables(self._storage).breakpoints(id)
-        how = How(query.break_on_first_action, breakpoints, by=person, on_error=query.on_error)
+        how = How(
+            query.break_on_first_action,
+            breakpoints,
+            by=person,
+            on_error=query.on_error,
+            recipe_id=query.recipe_id,
+            order=query.order,
+        )
         await self._package_runs.run_package(id, how)
 
     @operation("PUT", "/packages/stop", EXECUTION, Role.OPERATOR, stops=True)

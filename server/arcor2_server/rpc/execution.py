@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from msgspec.structs import replace
+
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.events import ActionExecutionData, ChangeType
@@ -40,8 +42,18 @@ def _run_options(context: Context, args: RunPackageArgs | TemporaryPackageArgs) 
     breakpoints = frozenset[str]() if isinstance(args.breakpoints, Unset) else args.breakpoints
     on_error = OnError.END if isinstance(args.on_error, Unset) else args.on_error
     shared, checkpoints = args.shared_breakpoints is True, args.checkpoints is not False
-    continues = isinstance(args, RunPackageArgs) and args.continues is True
-    return How(args.start_paused, breakpoints, shared, context.client.name, on_error, checkpoints, continues)
+    how = How(
+        args.start_paused, breakpoints, shared, context.client.name, on_error, checkpoints, role=context.client.role
+    )
+    if isinstance(args, TemporaryPackageArgs):
+        return how
+    return replace(
+        how,
+        continues=args.continues is True,
+        recipe_id=args.recipe_id or "",
+        recipe_values=args.recipe_values or {},
+        order=args.order or "",
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -55,6 +55,18 @@ class Calibrations:
             row = await Storage.one(session, CalibrationRow, key, "calibration")
             return _decode(row.document)
 
+    async def latest(self) -> list[CalibrationRecord]:
+        """Return the latest record of each object and kind: the calibrations in force."""
+        newest = (
+            select(CalibrationRow.object_id, CalibrationRow.kind, func.max(CalibrationRow.date).label("date"))
+            .group_by(CalibrationRow.object_id, CalibrationRow.kind)
+            .subquery()
+        )
+        same = (CalibrationRow.object_id == newest.c.object_id) & (CalibrationRow.kind == newest.c.kind)
+        chosen = select(CalibrationRow.document).join(newest, same & (CalibrationRow.date == newest.c.date))
+        async with self._storage.reading() as session:
+            return [_decode(document) for document in await session.scalars(chosen)]
+
     async def find(self, args: ListCalibrationsArgs) -> list[CalibrationRecord]:
         """Return records, newest first."""
         chosen = select(CalibrationRow.document).order_by(CalibrationRow.date.desc()).limit(args.limit)

@@ -162,6 +162,59 @@ class CalibrationRow(Base):
     document: Mapped[bytes] = mapped_column(LargeBinary)
 
 
+class RecipeRow(Base):
+    """A revision of a recipe, as JSON."""
+
+    __tablename__ = "recipe"
+
+    id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    document: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class ChangeoverRow(Base):
+    """A changeover of the cell to a recipe, as JSON."""
+
+    __tablename__ = "changeover"
+
+    number: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=False)
+    document: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class UnitRow(Base):
+    """The record of a unit, as JSON compressed by zlib; columns contain the fields for look-ups."""
+
+    __tablename__ = "unit"
+
+    number: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=False)
+    serial: Mapped[str] = mapped_column(String(255), index=True)
+    order_id: Mapped[str] = mapped_column(String(255), index=True)
+    product: Mapped[str] = mapped_column(String(255))
+    state: Mapped[str] = mapped_column(String(20))
+    entered: Mapped[str] = mapped_column(String(40), index=True)
+    left: Mapped[str | None] = mapped_column(String(40), index=True)
+    planned_rate: Mapped[float | None] = mapped_column(Double)
+    document: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class UnitRunRow(Base):
+    """A run that worked on a unit."""
+
+    __tablename__ = "unit_run"
+
+    unit: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=False)
+    run: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=False, index=True)
+
+
+class CellTimeRow(Base):
+    """A time in which the cell did one thing; s since the epoch."""
+
+    __tablename__ = "cell_time"
+
+    start: Mapped[float] = mapped_column(Double, primary_key=True)
+    end: Mapped[float] = mapped_column(Double, index=True)
+    activity: Mapped[str] = mapped_column(String(20))
+
+
 class PersonRow(Base):
     """A person who logs on at shared devices, as JSON. PIN and card are hashes."""
 

@@ -2,6 +2,7 @@
 
 import base64
 import binascii
+import hashlib
 import re
 import shutil
 import stat
@@ -17,7 +18,7 @@ import structlog
 
 from arcor2_hw.data.base import UNSET, Unset, now
 from arcor2_hw.data.package import PackageMeta, PackageSummary, ProjectMeta
-from arcor2_hw.data.project import BareProject
+from arcor2_hw.data.project import BareProject, Project
 from arcor2_hw.exceptions import InvalidPackage, NotFound, StorageError
 from arcor2_hw.runtime.documents import decode_document
 from arcor2_server.files import replace_file
@@ -36,6 +37,8 @@ _TEMPORARY: Final = ".temporary-"
 """Prefix of the file that marks a temporary package; its content is the id of the project."""
 _UNFINISHED: Final = (".new-", ".old-", ".pkg_")
 """Prefixes of directories that are being written or deleted."""
+_TRANSIENT: Final = re.compile(r"traceback-[0-9T-]+\.txt|\.package\.json\.[0-9a-f]+")
+"""Files that the server and runs write: tracebacks, and package.json while it is replaced."""
 _NO_META: Final = PackageMeta("N/A", "1970-01-01T00:00:00+00:00")
 
 
@@ -102,6 +105,53 @@ class Packages:
         """Return the id of the project that a package was built from, empty if unknown."""
         project = _project_meta(self.directory(package_id) / "data" / "project.json")
         return "" if isinstance(project, Unset) else project.id
+
+    def file_digests(self, package_id: str) -> dict[str, str]:
+        """Return the SHA-256 of each file of a package by its path. Raise NotFound if there is no such package.
+
+        Name and last run do not belong to the content of package.json. Tracebacks of runs are not part of the package.
+        """
+        directory = self.directory(package_id)
+        found: dict[str, str] = {}
+        try:
+            for path in sorted(directory.rglob("*")):
+                relative = path.relative_to(directory)
+                if not path.is_file() or "__pycache__" in relative.parts or _TRANSIENT.fullmatch(str(relative)):
+                    continue
+                content = path.read_bytes()
+                if str(relative) == "package.json":
+                    content = _fixed_part(content)
+                found[relative.as_posix()] = hashlib.sha256(content).hexdigest()
+        except OSError as error:
+            raise StorageError(
+                "The package {package_id} cannot be read: {reason}.", package_id=package_id, reason=error.strerror
+            ) from error
+        return found
+
+    def digest(self, package_id: str) -> str:
+        """Return the SHA-256 of all files of a package. Raise NotFound if there is none."""
+        listed = "".join(f"{digest}  {path}\n" for path, digest in self.file_digests(package_id).items())
+        return hashlib.sha256(listed.encode()).hexdigest()
+
+    def script(self, package_id: str) -> str:
+        """Return the script of a package. Raise NotFound if there is none."""
+        try:
+            return (self.directory(package_id) / "script.py").read_text(errors="replace")
+        except OSError as error:
+            raise StorageError(
+                "The package {package_id} cannot be read: {reason}.", package_id=package_id, reason=error.strerror
+            ) from error
+
+    def project(self, package_id: str) -> Project:
+        """Return the project of a package. Raise NotFound if there is none, InvalidPackage if it cannot be read."""
+        try:
+            return decode_document((self.directory(package_id) / "data" / "project.json").read_bytes(), Project)
+        except (OSError, msgspec.MsgspecError, RecursionError) as error:
+            raise InvalidPackage(
+                "The project of the package {package_id} cannot be read: {reason}.",
+                package_id=package_id,
+                reason=error,
+            ) from error
 
     def _set(self, package_id: str, **values: str) -> None:
         path = self.directory(package_id) / "package.json"
@@ -262,6 +312,17 @@ def inside(entry: zipfile.ZipInfo) -> PurePosixPath:
     if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
         raise InvalidPackage("The package contains an entry that is not a file: {name!r}.", name=name[:80])
     return path
+
+
+def _fixed_part(content: bytes) -> bytes:
+    """Return the content of package.json without the fields that change while the package is used."""
+    try:
+        known: Any = msgspec.json.decode(content)
+    except msgspec.MsgspecError:
+        return content
+    if isinstance(known, dict):
+        known = {key: value for key, value in known.items() if key not in ("name", "executed")}
+    return msgspec.json.encode(known, order="sorted")
 
 
 def _project_meta(path: Path) -> ProjectMeta | Unset:

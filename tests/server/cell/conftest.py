@@ -67,6 +67,8 @@ class Recorder:
         self.name = user or ""
         self.number = 1
         self.role = Role.PROGRAMMER
+        self.device = "tablet"
+        self.person = None
         self.got: list[dict[str, Any]] = []
         self._news = asyncio.Event()
 

@@ -42,7 +42,9 @@ ADDED = {
     "RobotMoveToPose.Data": TRANSLATION,
     "SceneState.Data": TRANSLATION,
     "RemoveActionArgs": {"with_steps"},
-    "RunPackage.Request.Args": {"checkpoints", "continues", "on_error", "shared_breakpoints"},
+    "RunPackage.Request.Args": {
+        *("checkpoints", "continues", "on_error", "order", "recipe_id", "recipe_values", "shared_breakpoints"),
+    },
     "TemporaryPackage.Request.Args": {"checkpoints", "on_error", "shared_breakpoints"},
 }
 """Optional fields that we add to the protocol (docs/protocol.md), by the name of the type."""

@@ -1,0 +1,1 @@
+"""Recipes and their release, records of produced units, and what the cell does when."""

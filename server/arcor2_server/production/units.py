@@ -1,0 +1,279 @@
+"""Records of units: which steps each part has gone through, with which results, and where it went."""
+
+import asyncio
+from collections import Counter, OrderedDict
+from collections.abc import Awaitable, Callable
+from typing import Any, Final
+
+import structlog
+from msgspec.structs import replace
+
+from arcor2_hw.data.base import UNSET, Unset, now
+from arcor2_hw.data.editor import TraceEntry
+from arcor2_hw.data.parts import Part, PartBooks, PlaceKind
+from arcor2_hw.data.rpc import ListUnitsArgs
+from arcor2_hw.data.units import Unit, UnitRecord, UnitState, UnitStep, UsedCalibration
+from arcor2_hw.exceptions import Arcor2Error, StorageError
+from arcor2_hw.runtime.messages import PartStep
+from arcor2_server.background import BackgroundTasks
+from arcor2_server.events import EventHub, make_event
+from arcor2_server.execution.runs import How, Runs
+from arcor2_server.storage.calibrations import Calibrations
+from arcor2_server.storage.packages import Packages
+from arcor2_server.storage.units import UnitStore
+
+log = structlog.get_logger(__name__)
+
+MOST_STEPS: Final = 500
+"""Maximum number of stored steps of a unit."""
+RECENT: Final = 200
+"""Number of units that have left the cell and can still receive steps, such as a report to the planning service."""
+_BOXES: Final = {
+    PlaceKind.GOOD: UnitState.GOOD,
+    PlaceKind.BAD: UnitState.BAD,
+    PlaceKind.REJECTED: UnitState.REJECTED,
+}
+
+
+class Units:
+    """The records of units. They follow the books of parts. Queries may raise StorageError.
+
+    Args:
+        hub: publishes UnitChanged.
+        store: stores the records.
+        runs: the actions of the present run.
+        packages: names and digests of packages.
+        calibrations: the calibrations in force.
+    """
+
+    def __init__(
+        self, hub: EventHub, store: UnitStore, runs: Runs, packages: Packages, calibrations: Calibrations
+    ) -> None:
+        self._hub, self._store, self._runs = hub, store, runs
+        self._packages, self._calibrations = packages, calibrations
+        self._in_cell: dict[tuple[str, int], UnitRecord] = {}
+        """By scene and number of the part."""
+        self._recent: OrderedDict[int, UnitRecord] = OrderedDict()
+        """The last units that have left the cell, by number."""
+        self._next = 1
+        self._books: dict[str, PartBooks] = {}
+        """The last known books of each scene."""
+        self._run: dict[str, Any] = {}
+        """What new units get from the present run."""
+        self._run_number = 0
+        self._scene_id = ""
+        self._run_calibrations: list[UsedCalibration] = []
+        self._concerned: dict[int, PartStep] = {}
+        """Reports about actions whose end is not known yet, by the number of the action."""
+        self._unwritten: dict[int, UnitRecord] = {}
+        self._deleted: set[int] = set()
+        self._writing: asyncio.Task[None] | None = None
+        self._background = BackgroundTasks()
+
+    async def open(self, all_books: Callable[[], Awaitable[list[PartBooks]]]) -> None:
+        """Read the records of units in the cell, and compare them with the books of parts.
+
+        Raises:
+            StorageError: the records cannot be read.
+        """
+        self._in_cell = {(record.scene_id, record.part): record for record in await self._store.in_cell()}
+        self._next = await self._store.newest_number() + 1
+        for books in await all_books():
+            self.follow(books)
+
+    async def close(self) -> None:
+        """Store what is not stored yet."""
+        await self._background.cancel()
+        await self.flush()
+
+    async def flush(self) -> None:
+        """Wait until all records are stored."""
+        while self._writing is not None:
+            await asyncio.gather(self._writing, return_exceptions=True)
+
+    # -------------------------------------------------------------------------------- a run
+    def begin_run(self, number: int, package_id: str, scene_id: str, how: How) -> None:
+        """Handle the start of a run."""
+        self._run_number, self._scene_id = number, scene_id
+        self._concerned.clear()
+        self._run = {
+            "package_id": package_id,
+            "order": how.order,
+            "recipe": how.used or UNSET,
+            "started_by": how.by,
+            "package_hash": "" if how.used is None else how.used.package_hash,
+        }
+        self._run_calibrations = []
+        self._background.spawn(self._describe(number, package_id), "description of the units of a run")
+
+    async def _describe(self, number: int, package_id: str) -> None:
+        try:
+            summary = await asyncio.to_thread(self._packages.summary, package_id)
+            digest = await asyncio.to_thread(self._packages.digest, package_id)
+            latest = await self._calibrations.latest()
+        except Arcor2Error as error:
+            log.warning("units not described", run=number, reason=str(error))
+            return
+        if number != self._run_number:
+            return
+        self._run |= {"package_name": summary.package_meta.name, "package_hash": self._run["package_hash"] or digest}
+        self._run_calibrations = [
+            UsedCalibration(each.id, each.object_id, each.object_name, each.kind.value, each.date) for each in latest
+        ]
+        for record in list(self._in_cell.values()):  # those that entered in the meantime
+            if record.runs == [number] and not record.package_name:
+                self._put(replace(record, **self._described(record)))
+
+    def _described(self, record: UnitRecord | None = None) -> dict[str, Any]:
+        order = self._run.get("order", "") if record is None else record.order or self._run.get("order", "")
+        return self._run | {"order": order, "calibrations": self._run_calibrations}
+
+    def concern(self, step: PartStep) -> None:
+        """Handle that an action that ends now has concerned a part."""
+        self._concerned[step.action] = step
+
+    def action_ended(self, number: int) -> None:
+        """Add an action of the present run that has ended or failed to the record of its part."""
+        step = self._concerned.pop(number, None)
+        entry = None if step is None else self._runs.entry(number)
+        if step is None or entry is None or (record := self._find(step)) is None:
+            return
+        changes: dict[str, Any] = {}
+        if len(record.steps) < MOST_STEPS:
+            changes["steps"] = [*record.steps, _step(entry)]
+        else:
+            changes["dropped"] = record.dropped + 1
+        if step.order:
+            changes["order"] = step.order
+        if step.verdict is not None:
+            changes["verdict"] = step.verdict
+        if self._run_number not in record.runs:
+            changes["runs"] = [*record.runs, self._run_number]
+        self._put(replace(record, **changes))
+
+    def _find(self, step: PartStep) -> UnitRecord | None:
+        """Return the unit that an action has concerned: in the cell, or one of the last that have left it."""
+        scene = self._scene_id
+        if not step.serial and (record := self._in_cell.get((scene, step.part))) is not None:
+            return record
+        for each in (*self._in_cell.values(), *reversed(self._recent.values())):
+            if each.scene_id == scene and (each.serial == step.serial if step.serial else each.part == step.part):
+                return each
+        return None
+
+    # -------------------------------------------------------------------------------- books of parts
+    def follow(self, books: PartBooks) -> None:
+        """Handle the present books of a scene."""
+        scene = books.scene_id
+        present = {part.number: part for part in books.parts}
+        for (of, number), record in list(self._in_cell.items()):
+            if of == scene and number not in present:
+                self._leave(record, books)
+        for part in books.parts:
+            self._update(scene, part)
+        self._books[scene] = books
+
+    def _update(self, scene: str, part: Part) -> None:
+        record = self._in_cell.get((scene, part.number))
+        if record is None:
+            running = scene == self._scene_id and self._run_number
+            record = UnitRecord(
+                number=self._next,
+                serial=part.serial,
+                scene_id=scene,
+                part=part.number,
+                state=UnitState.IN_CELL,
+                entered=now(),
+                verdict=part.good,
+                **(self._described() | {"runs": [self._run_number]} if running else {}),
+            )
+            self._next += 1
+            self._put(record, publish=True)
+        elif (part.serial, part.good) != (record.serial, record.verdict):
+            self._put(replace(record, serial=part.serial, verdict=part.good), publish=True)
+
+    def _leave(self, record: UnitRecord, books: PartBooks) -> None:
+        """Handle that a part is no longer in the cell."""
+        before = self._books.get(record.scene_id)
+        shown = record.serial or f"#{record.part}"
+        state = UnitState.UNKNOWN
+        for place in books.places:
+            if place.kind.is_box and shown in Counter(place.parts) - Counter(_parts_in(before, place.id)):
+                state = _BOXES[place.kind]
+        if state is UnitState.UNKNOWN and before is not None:
+            # A person has taken it out; a part without a serial number may also never have existed.
+            if books.counts.rejected > before.counts.rejected or record.serial:
+                state = UnitState.REJECTED
+            elif books.counts.fed < before.counts.fed:
+                self._delete(record)
+                return
+        del self._in_cell[record.scene_id, record.part]
+        self._recent[record.number] = record
+        if len(self._recent) > RECENT:
+            self._recent.popitem(last=False)
+        self._put(replace(record, state=state, left=now()), publish=True)
+
+    def _delete(self, record: UnitRecord) -> None:
+        del self._in_cell[record.scene_id, record.part]
+        self._unwritten.pop(record.number, None)
+        self._deleted.add(record.number)
+        self._write_later()
+
+    # -------------------------------------------------------------------------------- queries
+    async def find(self, args: ListUnitsArgs) -> list[Unit]:
+        """Return units without their steps, newest first."""
+        await self.flush()
+        return await self._store.find(args)
+
+    async def get(self, number: int) -> UnitRecord:
+        """Return the record of a unit. Raise NotFound if there is none."""
+        await self.flush()
+        return await self._store.get(number)
+
+    # -------------------------------------------------------------------------------- storage
+    def _put(self, record: UnitRecord, *, publish: bool = False) -> None:
+        if record.state is UnitState.IN_CELL:
+            self._in_cell[record.scene_id, record.part] = record
+        else:
+            self._recent[record.number] = record
+        self._unwritten[record.number] = record
+        self._write_later()
+        if publish and self._hub.subscribers("UnitChanged"):
+            fields = {name: getattr(record, name) for name in Unit.__struct_fields__}
+            self._hub.broadcast(make_event("UnitChanged", Unit(**fields)))
+
+    def _write_later(self) -> None:
+        if self._writing is None:
+            self._writing = asyncio.create_task(self._write(), name="units")
+
+    async def _write(self) -> None:
+        """Store changed records until none is left. Only the newest state of a record is stored."""
+        try:
+            while self._unwritten or self._deleted:
+                records, self._unwritten = list(self._unwritten.values()), {}
+                deleted, self._deleted = self._deleted, set()
+                await self._store.put(records, deleted)
+        except StorageError as error:
+            log.warning("records of units not stored", reason=str(error))
+        finally:
+            self._writing = None
+
+
+def _parts_in(books: PartBooks | None, place_id: str) -> list[str]:
+    return [] if books is None else next((place.parts for place in books.places if place.id == place_id), [])
+
+
+def _step(entry: TraceEntry) -> UnitStep:
+    attempt: int | Unset = entry.attempt
+    return UnitStep(
+        entry.run,
+        entry.number,
+        entry.action_id,
+        entry.name,
+        entry.started,
+        entry.duration,
+        entry.parameters,
+        entry.results,
+        entry.error,
+        attempt,
+    )
