@@ -40,8 +40,8 @@ export async function run({ paused = false } = {}): Promise<boolean> {
   }
 }
 
-/** Run a package. `continues`: where it was interrupted, see `continues` of the books of parts. */
-export const runPackage = (id: string, paused = false, continues = false) =>
+/** Run a package. `recipe`: id of the recipe and the order. `continues`: where it was interrupted, see `continues` of the books of parts. */
+export const runPackage = (id: string, paused = false, continues = false, recipe: object = {}) =>
   ask(
     "RunPackage",
     {
@@ -50,6 +50,7 @@ export const runPackage = (id: string, paused = false, continues = false) =>
       ...(serves("SetBreakpoints") ? { shared_breakpoints: true } : {}),
       ...holding(),
       ...(continues && { continues }),
+      ...recipe,
     },
     { deadline: BUILT_WITHIN },
   );

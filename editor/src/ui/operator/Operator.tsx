@@ -10,7 +10,7 @@ import { storeGeneralState } from "../../commands/viewstate";
 import { ago } from "../../formats";
 import { shownMessage, splitAddress } from "../../program/messages";
 import { dismissal, lastRun, type Result, resultOf, undismissedRun } from "../../program/results";
-import type { AlarmRecord } from "../../protocol/types";
+import { type AlarmRecord, ROLES } from "../../protocol/types";
 import { serves } from "../../session/connection";
 import { theSession } from "../../session/session";
 import { usersOfDocument } from "../../store/absentUsers";
@@ -26,6 +26,7 @@ import { Button } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
 import { Notices } from "../notices/Notices";
 import { People } from "../people/People";
+import type { Chosen } from "../production/Product";
 import { endName, History } from "../run/History";
 import { ICONS } from "../run/Result";
 import { Held, phaseName, RunButtons } from "../run/RunBar";
@@ -37,6 +38,7 @@ import "../run/run.css";
 import "./operator.css";
 
 const PartsCard = lazyComponent(() => import("../parts/PartsCard"));
+const Product = lazyComponent(() => import("../production/Product"));
 const AlarmList = lazyComponent(() => import("../alarms/AlarmList"));
 
 const TONES: Record<Result["tone"], string> = { good: "done", bad: "broken", warn: "interrupted", "": "idle" };
@@ -68,13 +70,19 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   const runs = isRunning(state);
   const packages = [...(lists.packages ?? [])].sort((a, b) => b.package_meta.built.localeCompare(a.package_meta.built));
   const [chosen, setChosen] = useState("");
+  const [product, setProduct] = useState<Chosen | null>(null);
+  const [releasedOnly, setReleasedOnly] = useState(false);
   const [starting, setStarting] = useState(false);
   const [listing, setListing] = useState(false);
   const alarms = useAlarms("retained") ?? [];
+  // Until a package is chosen, Start produces the product.
+  const made = product && !packages.some((each) => each.id === chosen) ? product : null;
   const known =
-    packages.find((each) => each.id === chosen) ??
+    packages.find((each) => each.id === (made?.recipe.package_id ?? chosen)) ??
     packages.find((each) => each.id === program.packageId) ??
     packages[0];
+  const onlyReleased = releasedOnly && state.connection.role === ROLES.operator;
+  const shownPackages = onlyReleased ? [] : packages;
   const idle = !runs && !starting;
   const run = idle ? undismissedRun(state) : null;
   const result = resultOf(run ?? undefined);
@@ -89,15 +97,23 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   }, []);
   const opened = doc && !runs ? (doc.project?.name ?? doc.scene.name) : "";
   const users = usersOfDocument(state);
-  const why = !known
-    ? t`No packages yet. Build one in the editor.`
-    : opened && users.length > 0
-      ? t`${opened} is open in the editor (${users.join(", ")}). Ask them to close it.`
-      : whyUnavailable(state, "RunPackage");
+  const why =
+    onlyReleased && !made
+      ? t`Choose a product first.`
+      : !known
+        ? t`No packages yet. Build one in the editor.`
+        : opened && users.length > 0
+          ? t`${opened} is open in the editor (${users.join(", ")}). Ask them to close it.`
+          : whyUnavailable(state, "RunPackage");
   const start = async () => {
     if (!known) return;
     setStarting(true);
-    await commands.runPackage(known.id);
+    await commands.runPackage(
+      known.id,
+      false,
+      false,
+      made ? { recipe_id: made.recipe.id, ...(made.order && { order: made.order }) } : {},
+    );
     setStarting(false);
   };
   const message = runs ? shownMessage(state) : "";
@@ -174,13 +190,25 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
         ) : (
           <section className="operator-start" aria-label={t`Start`}>
             <div className="operator-packages" role="radiogroup" aria-label={t`Packages`}>
-              {packages.map((each) => (
-                <label key={each.id} className="operator-package" data-selected={each.id === known?.id}>
+              {serves("ListRecipes") && (
+                <Suspense fallback={null}>
+                  <Product
+                    selected={made !== null}
+                    onSelect={() => setChosen("")}
+                    onFound={(found, only) => {
+                      setProduct(found);
+                      setReleasedOnly(only);
+                    }}
+                  />
+                </Suspense>
+              )}
+              {shownPackages.map((each) => (
+                <label key={each.id} className="operator-package" data-selected={!made && each.id === known?.id}>
                   <input
                     type="radio"
                     className="hidden-but-read"
                     name="package"
-                    checked={each.id === known?.id}
+                    checked={!made && each.id === known?.id}
                     onChange={() => setChosen(each.id)}
                   />
                   <strong>{each.package_meta.name}</strong>

@@ -8,9 +8,10 @@ const OVERLAYS = {
   search: lazyComponent(() => import("./Palette")),
   about: lazyComponent(() => import("./About")),
   messages: lazyComponent(() => import("../notices/Messages")),
-  persons: lazyComponent(() => import("../persons/Persons")),
-  audit: lazyComponent(() => import("../audit/AuditTrail")),
-  interlocks: lazyComponent(() => import("../interlocks/Interlocks")),
+  persons: lazyComponent(() => import("./more").then((more) => more.persons())),
+  audit: lazyComponent(() => import("./more").then((more) => more.audit())),
+  interlocks: lazyComponent(() => import("./more").then((more) => more.interlocks())),
+  production: lazyComponent(() => import("./more").then((more) => more.production())),
 };
 
 export function Overlays() {

@@ -54,6 +54,7 @@ export default function SettingsMenu({ defaultOpen }: { defaultOpen: boolean }) 
     },
     { id: "messages", label: t`Messages`, icon: "list", act: () => openOverlay("messages") },
     { id: "interlocks", label: t`Interlocks and zones`, icon: "lock", act: () => openOverlay("interlocks") },
+    { id: "production", label: t`Recipes and units`, icon: "list", act: () => openOverlay("production") },
     { id: "audit", label: t`Who did what`, icon: "people", not: noAudit, act: () => openOverlay("audit") },
     { id: "persons", label: t`Persons`, icon: "people", not: noPersons, act: () => openOverlay("persons") },
     { id: "about", label: t`Invite others, about, keys ( ? )`, icon: "info", act: () => openOverlay("about") },
