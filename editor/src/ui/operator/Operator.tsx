@@ -170,7 +170,9 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
                 </p>
               )}
               {idle && !run && <LastRun />}
-              {idle && !result && !why && <p className="operator-advice">{t`Choose a package, then press Start.`}</p>}
+              {idle && !result && !why && !made && (
+                <p className="operator-advice">{t`Choose a package, then press Start.`}</p>
+              )}
             </div>
             {run && (
               <Button className="operator-dismiss" onPress={() => storeGeneralState(dismissal(run))}>
