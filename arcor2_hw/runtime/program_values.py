@@ -2,7 +2,7 @@
 
 import ast
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 from msgspec.structs import replace
@@ -63,7 +63,7 @@ def set_values(tree: ast.Module, project: Project, values: Mapping[str, str]) ->
                 "Build the package again.",
                 name=parameter.name,
             )
-        value = msgspec.json.decode(values[parameter.id], type=_LITERALS[parameter.type])
+        value: Any = msgspec.json.decode(values[parameter.id], type=_LITERALS[parameter.type])
         after = ast.parse(repr(value), mode="eval").body
         for node in ast.walk(after):
             ast.copy_location(node, before)

@@ -1430,8 +1430,8 @@ export interface ListScenesData {
 /**
  * Arguments of ListUnits: which units, newest first.
  *
- * serial: the beginning of the serial number, in upper or lower case. order, product, run, state: all must match. since, until: of entering
- * the cell. before: number of a record.
+ * serial: the beginning of the serial number, in upper or lower case. order, product, run, state: all must match.
+ * since, until: of entering the cell. before: number of a record.
  */
 export interface ListUnitsArgs {
   serial?: string;

@@ -67,7 +67,8 @@ class CellTime:
 
     async def close(self) -> None:
         """Store the time until now."""
-        await self._background.cancel()
+        async with self._writing:  # a write is not interrupted
+            await self._background.cancel()
         await self._store_present()
 
     def changed(self) -> None:

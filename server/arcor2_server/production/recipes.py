@@ -159,7 +159,7 @@ class Recipes:
     def _compare_packages(self, before: str, after: str) -> tuple[list[ChangedFile], str]:
         try:
             digests = self._packages.file_digests(before), self._packages.file_digests(after)
-            scripts = [self._packages.script(each).splitlines(keepends=True) for each in (before, after)]
+            former, present = (self._packages.script(each).splitlines(keepends=True) for each in (before, after))
         except Arcor2Error:
             return [], ""  # stated by the problems
         files = [
@@ -176,7 +176,7 @@ class Recipes:
         ]
         import difflib  # no start needs it
 
-        lines = difflib.unified_diff(*scripts, "script.py", "script.py")
+        lines = difflib.unified_diff(former, present, "script.py", "script.py")
         return files, "".join(islice(lines, _MAX_DIFF))
 
     # -------------------------------------------------------------------------------- drafts
@@ -438,7 +438,7 @@ def _check(parameter: ProjectParameter, text: str, limits: RecipeValue, *, fixed
     """
     kind = _TYPES[parameter.type]
     try:
-        value = msgspec.json.decode(text, type=kind)
+        value: Any = msgspec.json.decode(text, type=kind)
     except msgspec.MsgspecError as error:
         raise InvalidData(
             "{name} is of the type {type}: {reason}.", name=parameter.name, type=parameter.type, reason=error

@@ -69,6 +69,7 @@ class Units:
         self._deleted: set[int] = set()
         self._writing: asyncio.Task[None] | None = None
         self._background = BackgroundTasks()
+        self._describing = asyncio.Lock()
 
     async def open(self, all_books: Callable[[], Awaitable[list[PartBooks]]]) -> None:
         """Read the records of units in the cell, and compare them with the books of parts.
@@ -83,7 +84,8 @@ class Units:
 
     async def close(self) -> None:
         """Store what is not stored yet."""
-        await self._background.cancel()
+        async with self._describing:  # a query is not interrupted
+            await self._background.cancel()
         await self.flush()
 
     async def flush(self) -> None:
@@ -110,7 +112,8 @@ class Units:
         try:
             summary = await asyncio.to_thread(self._packages.summary, package_id)
             digest = await asyncio.to_thread(self._packages.digest, package_id)
-            latest = await self._calibrations.latest()
+            async with self._describing:
+                latest = await self._calibrations.latest()
         except Arcor2Error as error:
             log.warning("units not described", run=number, reason=str(error))
             return

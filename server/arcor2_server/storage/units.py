@@ -137,7 +137,7 @@ class UnitStore:
             return [(start, end, CellActivity(activity)) for start, end, activity in await session.execute(chosen)]
 
 
-def _chosen(args: ListUnitsArgs) -> Select[tuple[bytes]]:
+def _chosen(args: ListUnitsArgs) -> Select[Any]:
     chosen = select(UnitRow.document).order_by(UnitRow.number.desc()).limit(args.limit)
     if not isinstance(args.serial, Unset):
         chosen = chosen.where(UnitRow.serial.istartswith(args.serial, autoescape=True))
