@@ -10,13 +10,16 @@ from arcor2_drivers.abb_yumi.hands import ArmId
 from arcor2_drivers.bin_picking.bin import Bin
 from arcor2_drivers.erp.erp_service import ErpService
 from arcor2_drivers.erp.settings import ErpSettings
+from arcor2_drivers.functional_tester.functional_tester import FunctionalTester
 from arcor2_drivers.label_printer.settings import ZplPrinterSettings
 from arcor2_drivers.label_printer.zpl_printer import ZplPrinter
+from arcor2_drivers.robotiq_2f.robotiq_2f import Robotiq2F
 from arcor2_drivers.scale.mt_sics_scale import MtSicsScale
 from arcor2_drivers.scale.settings import MtSicsScaleSettings
-from arcor2_hw.objects import Generic
+from arcor2_hw.objects import Generic, MachineCommand, MachineState
 from arcor2_hw.objects.frame import PictureNote
 from arcor2_hw.testing.bench import Bench
+from arcor2_hw.testing.life import wait_until
 from tests.drivers.benches.abb_yumi_bench import YuMiBench
 from tests.drivers.benches.barcode_reader_bench import BarcodeReaderBench
 from tests.drivers.benches.bin_picking_bench import BinBench, BlisterBench, picture
@@ -106,6 +109,21 @@ def _release_control(device: Generic) -> None:
     device.release_control()
 
 
+def _await_owner(device: Any) -> None:
+    wait_until(lambda: device.control_owner() is not None, 5.0, "another client")
+
+
+def _start_test(tester: FunctionalTester) -> None:
+    tester.reset()
+    tester.command(MachineCommand.START)
+    tester.wait_for(MachineState.EXECUTE, 5.0)
+
+
+def _grip(gripper: Robotiq2F) -> None:
+    gripper.activate()
+    gripper.grip(0.0)
+
+
 def _report(service: ErpService) -> None:
     service.report_result("A-1", "S-1", True)
 
@@ -158,6 +176,7 @@ FAULTS: dict[type[Bench], list[Fault]] = {
     DobotMagicianBench: [
         Fault("alarm", {"code": 0x22}, "dobot_magician-1"),
         Fault("mute", {"number": 62}, LOST, lambda arm: arm.suck(True)),
+        Fault("drive", {"turn": 90.0}, "device-3", _take_control, _release_control, _await_owner),
     ],
     ImpatientErpBench: [
         Fault("fail", {"status": 503, "count": -1, "path": "/results"}, "erp-1", trigger=_report),
@@ -170,6 +189,7 @@ FAULTS: dict[type[Bench], list[Fault]] = {
         Fault("emergency_stop", {"pressed": True}, "functional_tester-6"),
         Fault("take_board", {}, "device-7", lambda tester: tester.test(), lambda tester: tester.open_door()),
         Fault("mode", {"mode": "maintenance"}, "device-3", lambda tester: tester.test()),
+        Fault("push_door", {"opening": True}, "functional_tester-2", before=_start_test),
     ],
     TalkingPrinterBench: [
         Fault("media", {"labels": 0}, "label_printer-1"),
@@ -202,11 +222,13 @@ FAULTS: dict[type[Bench], list[Fault]] = {
     RemoteIOBench: [
         Fault("diagnosis", {"supply_missing": True}, "remote_io-1"),
         Fault("diagnosis", {"overload": True}, "remote_io-2"),
+        Fault("set_analog", {"number": 0, "raw": -32768}, "remote_io-3", lambda block: block.read_analog("level")),
         Fault("watchdogs_start", {"on": False}, "remote_io-4", _take_control, _release_control),
     ],
     Robotiq2FBench: [
         Fault("fault", {"code": 14}, "robotiq_2f-1"),
         Fault("fault", {"code": 5}, "robotiq_2f-1"),
+        Fault("block", {}, "device-6", lambda gripper: gripper.release(), _grip),
     ],
     ImpatientScaleBench: [
         Fault("put", {"kg": 9.0}, "scale-1"),
@@ -227,6 +249,8 @@ FAULTS: dict[type[Bench], list[Fault]] = {
     ],
     TwoAxisRobotBench: [
         Fault("hardware_error", {"servo": 1}, "two_axis_robot-1"),
+        Fault("temperature", {"servo": 1, "celsius": 85}, "two_axis_robot-1"),
+        Fault("status_error", {"servo": 1, "error": 6}, "device-7", _take_control, _release_control),
         Fault("absent", {"servo": 1}, LOST),
     ],
     UR5eBench: [
@@ -241,6 +265,9 @@ FAULTS: dict[type[Bench], list[Fault]] = {
         # the other program moves the arm while the motion is planned, the motion is not sent.
         Fault("foreign_program", {}, "device-5 device-4 device-7", _turn(UR5eBench)),
         Fault("power", {"on": False}, "device-3", _turn(UR5eBench)),
+        Fault("boot", {}, "device-3", _turn(UR5eBench)),
+        Fault("obstacle", {"point": [0.0, 0.0, 2.0], "normal": [0.0, 0.0, 1.0]}, "device-20", _turn(UR5eBench)),
+        Fault("in_use", {"names": ["input_int_register_0"]}, "device-3", _take_control, _release_control),
         Fault("fieldbus", {}, "device-3", _take_control, _release_control),
     ],
 }
@@ -268,36 +295,56 @@ CONNECTION = {
 }
 """Faults of the wire, which are the same for all drivers. `test_lost_connection_is_exactly_one_alarm` injects the
 silence; the others either are the same loss or are handled by repeating the request."""
-NO_ALARM: dict[str, set[str]] = {
-    "abb_yumi": {"place", "renew", "speed_ratio", "stops"},
-    "barcode_reader": {"renew"},
-    "conveyor": {"cause_gone", "motion"},
-    "dobot_magician": {"drive", "pace", "renew", "stops"},
-    "erp": {"add_order", "forget", "lose_answers", "received", "work"},
-    "functional_tester": {"command", "push_door", "put_board", "renew"},
-    "label_printer": {"mute", "renew"},
-    "oak_d": {"camera", "move", "place", "remove", "scene"},
-    "opcua_plc": {"set"},
-    "remote_io": {"outputs", "renew", "set_analog", "set_inputs"},
-    "robotiq_2f": {"block", "pace", "put_part", "remove_part", "stops"},
-    "scale": {"press", "renew"},
-    "screwdriver": {"clear_alarm", "lose_acknowledgements", "plan", "pull", "renew", "tighten"},
-    "two_axis_robot": {"motion", "place", "status_error", "temperature", "sync_writes", "wrong_crc"},
+READ = "It only returns what the fake has done."
+RENEW = "It restores the delivered state."
+WORLD = "It changes the simulated world, which is no fault."
+PACE = "It changes the speed of the simulation."
+ENDS = "It ends a fault."
+RETRIED = "The driver repeats the request, so nothing has failed."
+ALLOWED = "The device works as before, in a way that a person may choose."
+NO_ALARM: dict[str, dict[str, str]] = {
+    "abb_yumi": {"place": WORLD, "renew": RENEW, "speed_ratio": ALLOWED, "stops": READ},
+    "barcode_reader": {"renew": RENEW},
+    "conveyor": {"cause_gone": ENDS, "motion": READ},
+    "dobot_magician": {"pace": PACE, "renew": RENEW, "stops": READ},
+    "erp": {"add_order": WORLD, "forget": RENEW, "lose_answers": RETRIED, "received": READ, "work": ENDS},
+    "functional_tester": {
+        "command": "Another master commands the tester, as it may.",
+        "put_board": WORLD,
+        "renew": RENEW,
+    },
+    "label_printer": {"mute": "It selects whether a printer without labels answers.", "renew": RENEW},
+    "oak_d": dict.fromkeys(("camera", "move", "place", "remove", "scene"), WORLD),
+    "opcua_plc": {"set": WORLD},
+    "remote_io": {"outputs": READ, "renew": RENEW, "set_inputs": WORLD},
+    "robotiq_2f": {"pace": PACE, "put_part": WORLD, "remove_part": WORLD, "stops": READ},
+    "scale": {"press": "A person tares the scale, as it may.", "renew": RENEW},
+    "screwdriver": {
+        "clear_alarm": ENDS,
+        "lose_acknowledgements": RETRIED,
+        "plan": WORLD,
+        "pull": "A person tightens a screw, as in normal operation.",
+        "renew": RENEW,
+        "tighten": WORLD,
+    },
+    "two_axis_robot": {"motion": READ, "place": WORLD, "sync_writes": READ, "wrong_crc": RETRIED},
     "ur": {
-        *(
-            "boot",
-            "brake_release",
-            "calibration",
-            "commands_taken",
-            "contact",
-            "guide",
-            "in_use",
-            "no_obstacle",
-            "not_found",
-            "obstacle",
-            "operational_mode",
-        ),
-        *("place", "popup", "pose", "reduced", "restart_safety", "set_input", "speed_slider", "stops"),
+        "brake_release": ENDS,
+        "calibration": WORLD,
+        "commands_taken": READ,
+        "contact": "It sets the flag that a motion until contact waits for. A collision is `obstacle`.",
+        "guide": "A person moves the arm in hand teaching mode.",
+        "no_obstacle": ENDS,
+        "not_found": "It simulates an older controller; the driver refuses to connect.",
+        "operational_mode": ALLOWED,
+        "place": WORLD,
+        "popup": READ,
+        "pose": READ,
+        "reduced": ALLOWED,
+        "restart_safety": ENDS,
+        "set_input": WORLD,
+        "speed_slider": "A person slows the arm down. At 0 a motion fails with device-5 after 20 times its duration.",
+        "stops": READ,
     },
 }
-"""Commands of fakes that give no alarm: they read, prepare or end a fault, or the driver handles the fault itself."""
+"""Why other commands of fakes give no alarm."""

@@ -38,6 +38,7 @@ FIELDS: Final = {
     "operating_mode": Field(11, 1, 3, 0, 16),
     "homing_offset": Field(20, 4, 0, -1024, 1024, signed=True),
     "moving_threshold": Field(24, 4, 10, 0, 1023),
+    "temperature_limit": Field(31, 1, 80, 0, 100),
     "current_limit": Field(38, 2, 1193, 0, 1193),
     "velocity_limit": Field(44, 4, 200, 0, 1023),
     "max_position": Field(48, 4, 4095, 0, 4095),
@@ -58,6 +59,7 @@ FIELDS: Final = {
     "temperature": Field(146, 1, 35),
 }
 GOALS: Final = ("goal",)
+OVERHEATED: Final = 0x04  # of hardware_error
 
 
 class Servo:
@@ -127,8 +129,10 @@ class Servo:
         self._speed = 0.0
 
     def warm(self, temperature: int) -> None:
-        """Set the temperature, °C."""
+        """Set the temperature, °C. Above its limit, the servo shuts down."""
         self._values["temperature"] = temperature
+        if temperature > self._values["temperature_limit"]:
+            self.fail(self._values["hardware_error"] | OVERHEATED)
 
     def reboot(self) -> None:
         """Reboot: reset the RAM half of the table."""
