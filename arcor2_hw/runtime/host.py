@@ -419,14 +419,17 @@ class Host:
 
     def _confirm_parts(self, message: m.ConfirmParts) -> None:
         """Record where a person has found parts."""
-        record = None if self.program is None else self.program.record
         try:
-            if record is None:
+            record = None if self.program is None else self.program.record
+            if self.program is None or record is None:
                 raise Conflict("The program keeps no books of parts.")
             record.confirm(message.parts)
         except Arcor2Error as error:
             self.link.post(m.CallFailed(message.id, error_data(error)))
         else:
+            recovery = self.program.recovery
+            if recovery is not None and (held := recovery.without_part()) is not None:
+                self.link.post(m.HeldChanged(held))
             self.link.post(m.CallDone(message.id))
 
     def _stopping(self, device: Device) -> None:

@@ -15,6 +15,10 @@ SERIALS: Final = 100
 """Number of serial numbers that are stored of each box; the newest."""
 
 
+class PartGone(WrongPart):
+    """A part has left the cell, so it cannot be brought to a place."""
+
+
 class Ledger:
     """The books of the parts of a scene. Every operation leaves fed = good + bad + rejected + in the cell.
 
@@ -161,7 +165,7 @@ class Ledger:
                 target=self.name_of(target),
             )
         if part is None and self._gone.get(number, target) != target:
-            raise WrongPart("The part is not at {target}: it has left the cell.", target=self.name_of(target))
+            raise PartGone("The part is not at {target}: it has left the cell.", target=self.name_of(target))
 
     def has_part(self, place_id: str) -> bool:
         """Return whether a part is at a place, or may be."""

@@ -402,6 +402,12 @@ class ProgramHeld(ToServer, frozen=True):
     error: ErrorData
 
 
+class HeldChanged(ToServer, frozen=True):
+    """Other choices are possible in the present hold."""
+
+    held: HeldData
+
+
 class PartsChanged(ToServer, frozen=True):
     """The books of parts have changed."""
 
@@ -503,6 +509,7 @@ ServerBound = (
     | ActionFailed
     | ProgramChanged
     | ProgramHeld
+    | HeldChanged
     | PartsChanged
     | PartStep
     | InterlocksChanged

@@ -22,12 +22,14 @@ from arcor2_hw.exceptions import (
     InvalidData,
     NotConnected,
     ProgramInterrupted,
+    WrongPart,
     message_of,
 )
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime.branches import Branch
 from arcor2_hw.runtime.cell import CONTROL_DEADLINE, Cell
 from arcor2_hw.runtime.device import Device, describe
+from arcor2_hw.runtime.ledger import PartGone
 from arcor2_hw.runtime.messages import DecideHeld
 from arcor2_hw.runtime.methods import overrides
 from arcor2_hw.runtime.pacing import Gate
@@ -49,13 +51,18 @@ class Decision(NamedTuple):
 
 
 class _Hold(NamedTuple):
-    """The present hold. hints: types of the results. check_done: raises an error if the action cannot count as done."""
+    """The present hold.
+
+    hints: types of the results. check_done: raises an error if the action cannot count as done. choices: all that the
+    action allows.
+    """
 
     data: HeldData
     device: Device
     error: BaseException
     hints: Sequence[Any]
     check_done: Callable[[], None] = lambda: None
+    choices: Sequence[HoldChoice] = ()
 
 
 class ActionCall(NamedTuple):
@@ -157,7 +164,7 @@ class Recovery:
             returns=known if choices[HoldChoice.RESULT] else UNSET,
             exits=[self._exit(item) for item in exits] or UNSET,
         )
-        return self._wait(branch, _Hold(data, device, error, hints, check_done))
+        return self._wait(branch, _Hold(data, device, error, hints, check_done, data.choices))
 
     def lost(self, device: Device, error: Arcor2Error) -> None:
         """Record a lost connection. It holds the program before the next action."""
@@ -197,7 +204,8 @@ class Recovery:
         try:
             self._gate.hold_program(branch, begin)
         finally:
-            if self._present is hold:  # the program or the branch was stopped
+            present = self._present
+            if present is not None and present.data.number == hold.data.number:  # the program or the branch was stopped
                 self._present = None
         decision = self._decisions.pop(hold.data.number)
         self._lost.pop(hold.device.id, None)
@@ -207,6 +215,23 @@ class Recovery:
         return decision
 
     # -------------------------------------------------------------------------------- decisions
+    def without_part(self) -> HeldData | None:
+        """Return the hold without the choices that need a part which has left the cell; None if nothing changes."""
+        hold = self._present
+        if hold is None:
+            return None
+        choices = list(hold.choices)
+        try:
+            hold.check_done()
+        except PartGone:
+            choices = [choice for choice in choices if choice not in (HoldChoice.SKIP, HoldChoice.RESULT)]
+        except WrongPart:  # it can be brought to its place
+            return None
+        if not hold.choices or choices == hold.data.choices:
+            return None
+        self._present = hold._replace(data=msgspec.structs.replace(hold.data, choices=choices))
+        return self._present.data
+
     def decide(self, message: DecideHeld) -> None:
         """Accept a decision about the held program. It continues after `release`.
 

@@ -57,6 +57,9 @@ class Operator:
         # A person takes longer. Alarms are listed and drives notice the loss of their master within a second.
         await asyncio.sleep(0.3 if tries == 1 else 1.0)
         await self.confirm(client)
+        shown = (await client.call("GetHeld")).held
+        if not isinstance(shown, Unset) and shown.number == held.number:
+            held = shown  # without what the books exclude now
         choice, results = await self._choose(client, held, tries)
         await self._checks.still(still, f"while held at {held.action_name}")
         deadline = time.monotonic() + DECIDED_WITHIN

@@ -238,11 +238,14 @@ def test_a_part_that_is_elsewhere_does_not_count_as_moved(cell: Cell) -> None:
     (cell.directory / "fault").touch()
     host = cell.start(ONE)
     found = held(host)
-    for where, reason in (("obj_nest", "A-1 is at nest, not at arm"), ("", "not at arm: it has left the cell")):
+    assert HoldChoice.SKIP in found.choices
+    for where, reason in (("obj_nest", "A-1 is at nest, not at arm"), ("", "skip is not possible here")):
         assert confirm(host, ConfirmedPart(1, where)) is None
         host._calls += 1
         host.send(m.DecideHeld(host._calls, found.number, HoldChoice.SKIP, []))
         assert reason in host.answer(host._calls).message.text
+    (changed,) = [each.held for each in host.seen if isinstance(each, m.HeldChanged)]
+    assert changed.choices == [HoldChoice.RETRY, HoldChoice.END]
     decide(host, found.number, HoldChoice.END)
     host.expect_state("stopped")
 

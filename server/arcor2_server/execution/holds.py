@@ -77,6 +77,12 @@ class ProgramHold:
         log.warning("program held", run=run, action=held.action_name, device=held.device, reason=held.text)
         self._hub.broadcast(make_event(HELD, self.present))
 
+    def change(self, held: HeldData) -> None:
+        """Handle that other choices are possible in the present hold."""
+        if self.present is not None and self.present.number == held.number:
+            self.present = replace(held, run=self.present.run)
+            self._hub.broadcast(make_event(HELD, self.present))
+
     def end(self) -> HoldDecidedData | None:
         """Handle that the program continues or is stopped. Return the decision; without one, it was stopped."""
         if self._record is None or self.present is None:

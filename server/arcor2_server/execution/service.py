@@ -425,6 +425,8 @@ class Execution(PackageLibrary):
                     self._publish_position()
             case m.ProgramHeld():
                 self._held(message)
+            case m.HeldChanged():
+                self.hold.change(message.held)
             case m.PartsChanged():
                 self.parts.changed(message.books)
             case m.PartStep():
