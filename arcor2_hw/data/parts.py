@@ -117,7 +117,8 @@ class RunCheckpoint(Data, frozen=True):
     cycle has done. variables: the values of the program's variables at its start, by name, in JSON. complete: whether
     `done` is complete. interrupted: whether the server has noticed that the run was interrupted. confirmed: whether a
     person has confirmed since where all parts are.
-    continues, continues_at: whether the program can continue, and at which actions (empty: after `last`).
+    continues, continues_at: whether the program can continue, and at which actions (empty: after `last`). missing: name
+    of the action because of which it cannot.
     """
 
     run: int
@@ -136,6 +137,7 @@ class RunCheckpoint(Data, frozen=True):
     confirmed: bool = False
     continues: bool = False
     continues_at: list[str] = field(default_factory=list)
+    missing: str = ""
 
     def split_done(self) -> tuple[list[DoneAction], list[DoneAction]]:
         """Return the actions whose results are used when the program continues, and those that are repeated.
@@ -166,8 +168,16 @@ class RunCheckpoint(Data, frozen=True):
         branches = {each.branch for each in repeated}
         at = [action.action_name for action in self.actions if action.branch not in branches]
         first = {each.branch: each.name for each in reversed(repeated)}
-        can = self.complete and self.cycle > 0 and not self.why_not()
-        return replace(self, done=[], variables={}, continues=can, continues_at=[*first.values(), *at] if can else [])
+        missing = self.why_not()
+        can = self.complete and self.cycle > 0 and not missing
+        return replace(
+            self,
+            done=[],
+            variables={},
+            continues=can,
+            continues_at=[*first.values(), *at] if can else [],
+            missing=missing,
+        )
 
 
 class PartBooks(Data, frozen=True):

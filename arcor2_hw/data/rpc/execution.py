@@ -104,10 +104,14 @@ class GetHeldData(Data, frozen=True):
 
 
 class ConfirmPartsArgs(Data, frozen=True):
-    """Arguments of ConfirmParts: where a person has found parts. No parts: only that a program was interrupted."""
+    """Arguments of ConfirmParts: where a person has found parts. No parts: only that a program was interrupted.
+
+    dismiss: the interrupted program does not continue; it starts from its beginning.
+    """
 
     scene_id: str
     parts: list[ConfirmedPart]
+    dismiss: bool = False
 
 
 class UploadPackageArgs(Data, frozen=True):

@@ -11,7 +11,8 @@ from msgspec import UNSET
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.parts import ConfirmedPart, PartBooks
+from arcor2_hw.data.parts import PartBooks
+from arcor2_hw.data.rpc import ConfirmPartsArgs
 from arcor2_hw.runtime.checkpoints import CheckpointFile, stored_scenes
 from arcor2_hw.runtime.ledger import Ledger
 from arcor2_server.errors import RequestRefused
@@ -128,13 +129,12 @@ class AllPartBooks:
             if books is not None and (books.places or not isinstance(books.run, Unset))
         ]
 
-    async def confirm(self, host: CellHost | None, scene_id: str, parts: list[ConfirmedPart], by: str) -> None:
+    async def confirm(self, host: CellHost | None, args: ConfirmPartsArgs, by: str) -> None:
         """Record where a person has found parts. Nothing moves.
 
         Args:
             host: runs the program; None if no program runs.
-            scene_id: the scene.
-            parts: the parts; none to confirm only that a program was interrupted.
+            args: the parts, and whether the interrupted program does not continue.
             by: name of the user.
 
         Raises:
@@ -142,23 +142,30 @@ class AllPartBooks:
             NotFound: there is no such part or place.
             Conflict: the parts contradict each other.
         """
+        scene_id, parts = args.scene_id, args.parts
         if scene_id == self._scene_id:
+            if args.dismiss:
+                raise RequestRefused("The program is running. Stop it instead.")
             if host is None:
                 raise RequestRefused("The program is starting or ending. Try again.")
             await host.confirm_parts(parts)
         else:
-            await self._confirm_stored(scene_id, parts)
+            await self._confirm_stored(args)
         log.info("parts confirmed", scene=scene_id, by=by, parts=[(part.number, part.place) for part in parts])
+        if args.dismiss:
+            log.info("interrupted program dismissed", scene=scene_id, by=by)
 
-    async def _confirm_stored(self, scene_id: str, parts: list[ConfirmedPart]) -> None:
+    async def _confirm_stored(self, args: ConfirmPartsArgs) -> None:
         async with self._using_files:
-            books = await asyncio.to_thread(self._read, scene_id)
+            books = await asyncio.to_thread(self._read, args.scene_id)
             if books is None:
-                raise RequestRefused("There are no books of parts of the scene {scene}.", scene=scene_id)
+                raise RequestRefused("There are no books of parts of the scene {scene}.", scene=args.scene_id)
             ledger = Ledger(books)
-            ledger.confirm(parts)
+            ledger.confirm(args.parts)
             corrected = ledger.books
-            if not isinstance(books.run, Unset):  # it can continue once all parts are confirmed
+            if args.dismiss:
+                corrected = replace(corrected, run=UNSET)
+            elif not isinstance(books.run, Unset):  # it can continue once all parts are confirmed
                 run = replace(books.run, interrupted=True, confirmed=not corrected.unconfirmed)
                 corrected = replace(corrected, run=run)
             await asyncio.to_thread(self._write, corrected)

@@ -349,7 +349,7 @@ class Execution(PackageLibrary):
 
     async def confirm_parts(self, args: ConfirmPartsArgs, by: str) -> None:
         """Record where a user has found parts."""
-        await self.parts.confirm(self._host.host, args.scene_id, args.parts, by)
+        await self.parts.confirm(self._host.host, args, by)
 
     def device_of_hold(self, object_id: str) -> SceneObject:
         """Return a device of the held program, on which a user may act. Raise RequestRefused unless it is held."""

@@ -9,7 +9,17 @@ import pytest
 from msgspec import UNSET
 
 from arcor2_hw.data.base import now
-from arcor2_hw.data.parts import ConfirmedPart, Part, PartBooks, PartCounts, Place, PlaceKind, RunCheckpoint
+from arcor2_hw.data.parts import (
+    ConfirmedPart,
+    DoneAction,
+    Part,
+    PartBooks,
+    PartCounts,
+    Place,
+    PlaceKind,
+    RunCheckpoint,
+)
+from arcor2_hw.data.rpc import ConfirmPartsArgs
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.runtime.checkpoints import CheckpointFile
 from arcor2_server.errors import RequestRefused
@@ -84,7 +94,18 @@ async def test_parts_are_confirmed_one_after_the_other(tmp_path: Path) -> None:
     file.write(PartBooks("scn_1", [Part(1, "nest"), Part(2, "arm")], places, PartCounts(2, in_cell=2), run))
     file.close()
     for part, left in ((ConfirmedPart(1, "nest"), [2]), (ConfirmedPart(2, "arm"), [])):
-        await books.confirm(None, "scn_1", [part], "ann")
+        await books.confirm(None, ConfirmPartsArgs("scn_1", [part]), "ann")
         (found,) = await books.all()
         assert [each.number for each in found.unconfirmed] == left
         assert found.run.confirmed is (not left)  # type: ignore[union-attr]
+    await books.confirm(None, ConfirmPartsArgs("scn_1", [], dismiss=True), "ann")
+    (found,) = await books.all()
+    assert (found.run, len(found.parts)) == (UNSET, 2)
+    with pytest.raises(RequestRefused, match="was not interrupted"):
+        await books.require_continues("scn_1", "pkg_1")
+
+
+def test_a_run_names_the_result_because_of_which_it_cannot_continue() -> None:
+    done = [DoneAction("main", "act_1", "picture", "obj_camera", stored=False)]
+    run = RunCheckpoint(1, "pkg_1", "", now(), cycle=1, complete=True, done=done)
+    assert (run.published().continues, run.published().missing) == (False, "picture")

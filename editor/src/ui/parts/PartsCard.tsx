@@ -7,6 +7,7 @@ import { runPackage } from "../../commands/run";
 import type { ConfirmedPart, Part, PartBooks, Place } from "../../protocol/types";
 import { call, serves } from "../../session/connection";
 import { whyUnavailable } from "../../store/permissions";
+import { isRunning } from "../../store/selectors";
 import { now, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
@@ -21,10 +22,6 @@ export function withBooks(known: readonly PartBooks[], changed: PartBooks): Part
 /** Return the parts about which the card asks: those that are not confirmed, or all of them. */
 export const askedParts = (books: PartBooks, all: boolean): Part[] =>
   books.parts.filter((part) => all || !part.confirmed);
-
-/** Return whether the card asks about the interrupted program: for a confirmation, or whether it is to continue. */
-export const asksAboutRun = ({ run }: PartBooks): boolean =>
-  run !== undefined && (!run.confirmed || run.continues === true);
 
 /** Return the places where a part may be, the likely ones first. */
 export function answersFor(part: Part, books: PartBooks): Place[] {
@@ -58,18 +55,36 @@ function useBooks(): [PartBooks[], (books: PartBooks[]) => void] {
 }
 
 /**
- * Show the first scene with a question. With `all`, all parts can be corrected, because the program is held. With
- * `folded`, the card is folded as long as all parts are confirmed.
+ * Show the first scene with a question; without one, the parts that a stopped program has left in the cell. With `all`,
+ * all parts can be corrected, because the program is held. With `folded`, the card is folded as long as all parts are
+ * confirmed.
  */
 export default function PartsCard({ all = false, folded = false }: { all?: boolean; folded?: boolean }) {
   const [books] = useBooks();
-  const open = books.find((each) => askedParts(each, all).length > 0 || asksAboutRun(each));
-  if (!open) return null;
-  if (!folded || askedParts(open, false).length > 0) return <Books books={open} all={all} />;
+  const runs = useEditor(isRunning);
+  const open = books.find((each) => askedParts(each, all).length > 0 || each.run !== undefined);
+  if (open) {
+    const asks = !folded || askedParts(open, false).length > 0;
+    return asks ? <Books books={open} all={all} /> : <Folded books={open} />;
+  }
+  if (runs) return null;
+  return books
+    .filter((each) => each.parts.length > 0)
+    .map((each) => (
+      <Folded
+        key={each.scene_id}
+        books={each}
+        note={t`A stopped program does not continue. It starts from its beginning.`}
+      />
+    ));
+}
+
+function Folded({ books, note }: { books: PartBooks; note?: string }) {
   return (
     <details>
       <summary>{t`Parts in the cell`}</summary>
-      <Books books={open} all={all} />
+      {note && <p>{note}</p>}
+      <Books books={books} all />
     </details>
   );
 }
@@ -81,11 +96,12 @@ function Books({ books, all }: { books: PartBooks; all: boolean }) {
   const parts = askedParts(books, all);
   const part = parts.find((each) => each.number === chosen) ?? (all ? undefined : parts[0]);
   const packages = useEditor((state) => state.lists.packages) ?? [];
-  const confirm = (found: ConfirmedPart[]) =>
-    ask("ConfirmParts", { scene_id: books.scene_id, parts: found }).then(() => setChosen(undefined));
+  const confirm = (found: ConfirmedPart[], dismiss = false) =>
+    ask("ConfirmParts", { scene_id: books.scene_id, parts: found, dismiss }).then(() => setChosen(undefined));
   const { run } = books;
   const found = packages.find((each) => each.id === run?.package_id);
   const program = found?.package_meta.name ?? t`The program`;
+  const continues = found !== undefined && run?.continues === true;
   const at = run?.continues_at?.join(", ");
   const running = run?.actions.map((each) => each.action_name).join(", ");
   return (
@@ -99,9 +115,11 @@ function Books({ books, all }: { books: PartBooks; all: boolean }) {
             {running ? t`${program} was at ${running}.` : t`${program} was between two actions.`}
           </p>
           <p>
-            {run.confirmed
-              ? t`It can continue there with its results, after your decision. Start starts it from its beginning.`
-              : t`Nothing moves by itself. Confirm where the parts are, then press Start.`}
+            {!run.confirmed
+              ? t`Nothing moves by itself. Confirm where the parts are, then press Start.`
+              : continues
+                ? t`It can continue there with its results, after your decision. Start starts it from its beginning.`
+                : whyNot(run.missing, found !== undefined)}
           </p>
         </div>
       )}
@@ -141,10 +159,15 @@ function Books({ books, all }: { books: PartBooks; all: boolean }) {
           </div>
         </>
       )}
-      {run?.confirmed && found && (
+      {run?.confirmed && (
         <div className="held-choices">
-          <Button look="primary" why={whyContinue} onPress={() => void runPackage(found.id, false, true)}>
-            {at ? t`Continue at ${at}` : t`Continue after the last action`}
+          {continues && (
+            <Button look="primary" why={whyContinue} onPress={() => void runPackage(found.id, false, true)}>
+              {at ? t`Continue at ${at}` : t`Continue after the last action`}
+            </Button>
+          )}
+          <Button why={why} onPress={() => void confirm([], true)}>
+            {continues ? t`Do not continue` : t`Dismiss`}
           </Button>
         </div>
       )}
@@ -157,6 +180,14 @@ function Books({ books, all }: { books: PartBooks; all: boolean }) {
       )}
     </section>
   );
+}
+
+/** Return why a program cannot continue. `missing`: without the result of which action; `present`: its package. */
+export function whyNot(missing: string, present: boolean): string {
+  const start = t`Press Start to start it from its beginning.`;
+  if (!present) return t`It cannot continue, because it was started from an open project, or its package was deleted.`;
+  if (missing) return `${t`It cannot continue: ${missing} would have to be repeated.`} ${start}`;
+  return `${t`It cannot continue: what it had done is not stored.`} ${start}`;
 }
 
 const shown = (part: Part): string => part.serial || `#${part.number}`;

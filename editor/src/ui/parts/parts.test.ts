@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 import type { Part, PartBooks, Place } from "../../protocol/types";
-import { answersFor, askedParts, asksAboutRun, withBooks } from "./PartsCard";
+import { answersFor, askedParts, whyNot, withBooks } from "./PartsCard";
 
 const place = (id: string, capacity = 1): Place => ({ id, name: id, kind: "holder", capacity, parts: [] });
 const part = (number: number, where: string, confirmed: boolean, moving_to?: string): Part => ({
@@ -34,18 +34,9 @@ describe("the question about a part", () => {
     expect(withBooks([], books)).toEqual([books]);
   });
 
-  test("is about the interrupted program until it is confirmed, and if it can continue", () => {
-    const run = {
-      run: 1,
-      package_id: "pkg_1",
-      package_hash: "",
-      since: "2026-01-01T00:00:00Z",
-      confirmed: false,
-      continues: false,
-    } as NonNullable<PartBooks["run"]>;
-    const asks = (confirmed: boolean, continues: boolean) =>
-      asksAboutRun({ ...books, run: { ...run, confirmed, continues } });
-    expect(asksAboutRun(books)).toBe(false);
-    expect([asks(false, false), asks(true, false), asks(true, true)]).toEqual([true, false, true]);
+  test("says why an interrupted program cannot continue", () => {
+    expect(whyNot("picture", true)).toContain("picture");
+    expect(whyNot("", false)).toContain("open project");
+    expect(whyNot("", true)).toContain("is not stored");
   });
 });

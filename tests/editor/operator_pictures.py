@@ -1,0 +1,153 @@
+"""Take the pictures of an operator who resolves faults of the demo cell.
+
+`python -m tests.editor.operator_pictures [DIRECTORY]` writes `recover-*.png` into docs/pictures or the directory.
+Every fault is resolved by the buttons of the screen, and by hand at the simulated cell.
+"""
+
+import asyncio
+import sys
+import tempfile
+from pathlib import Path
+from typing import Final
+
+from playwright.async_api import Locator, expect
+
+from arcor2_hw.client import Client
+from benchmarks.books.cell import Cell
+from tests.e2e.harness import until
+from tests.editor.screen import Screen, running_browser, screen_of
+
+BOARDS, SEED = 6, 3
+SLOW: Final = 120.0
+"""Time limit of each step, s."""
+
+
+class Operator:
+    """An operator at a tablet next to the simulated cell."""
+
+    def __init__(self, cell: Cell, client: Client, screen: Screen, to: Path) -> None:
+        self._cell, self._client, self._screen, self._to = cell, client, screen, to
+        self._names: dict[str, str] = {}
+        """The actions by their ids."""
+        self._held = screen.page.get_by_role("region", name="The program is held")
+
+    async def all(self) -> None:
+        """Run the program, with one fault after the other."""
+        await self._start()
+        await self._labels_out()
+        await self._protective_stop()
+        await self._door_open()
+        await self._nest_occupied()
+        await self._killed_in_mid_pick()
+
+    async def _labels_out(self) -> None:
+        await self._cell.command("printer", "media", labels=0)
+        await self._is_held()
+        await self._take("labels-out")
+        await self._cell.command("printer", "media", labels=100)
+        await self._try_again()
+
+    async def _protective_stop(self) -> None:
+        await self._at("insert")
+        await self._cell.command("robot", "protective_stop")
+        await self._is_held()
+        await expect(self._held.get_by_role("button", name="Acknowledge")).to_be_visible()
+        await self._take("protective-stop")
+        await self._acknowledge()
+        await self._try_again()
+
+    async def _door_open(self) -> None:
+        await self._at("test")
+        await self._state_of_tester("Execute")
+        await self._cell.command("tester", "push_door", opening=True)
+        await self._is_held()
+        await self._take("door-open")
+        await self._acknowledge()
+        await self._try_again()
+
+    async def _nest_occupied(self) -> None:
+        """Stop the program while a board is in the label printer, and start it again."""
+        await self._at("label")
+        await self._screen.press("Stop")
+        await self._start()
+        await self._is_held("occupied")
+        await self._take("nest-occupied")
+        (board,) = [each for each in await self._cell.boards() if each["place"] == "label"]
+        await self._cell.command("world", "remove_board", code=board["code"])
+        await self._held.get_by_role("button", name=f"Correct {board['code']}").click()
+        await self._held.get_by_role("button", name="I have taken it out of the cell").click()
+        await self._try_again()
+
+    async def _killed_in_mid_pick(self) -> None:
+        await self._at("pick")
+        await self._cell.kill("host")
+        parts = self._screen.page.get_by_role("region", name="Parts in the cell")
+        await expect(parts).to_contain_text("Where is part")
+        await self._take("killed")
+        await parts.get_by_role("button").first.click()
+        await expect(parts.get_by_role("button", name="Do not continue")).to_be_visible()
+
+    # -------------------------------------------------------------------------------- steps
+    async def _start(self) -> None:
+        await self._screen.press("Start")
+        await expect(self._screen.page.get_by_role("button", name="Stop", exact=True)).to_be_visible()
+
+    async def _at(self, action: str) -> None:
+        """Wait until the program starts an action."""
+        async with asyncio.timeout(SLOW):
+            while True:
+                event = await self._client.next_event(timeout=SLOW)
+                if event.event == "PackageInfo":
+                    self._names = {each.id: each.name for each in event.data.project.all_actions()}
+                if event.event == "ActionStateBefore" and self._names.get(event.data.action_id) == action:
+                    return
+
+    async def _state_of_tester(self, wanted: str) -> None:
+        async def reached() -> bool:
+            return bool((await self._cell.command("tester", "truth"))["state"] == wanted)
+
+        await until(reached, f"the tester to be in {wanted}", SLOW)
+
+    async def _is_held(self, text: str = "") -> None:
+        await expect(self._held).to_contain_text(text or "Held", timeout=SLOW * 1000)
+
+    async def _acknowledge(self) -> None:
+        for button in await self._held.get_by_role("button", name="Acknowledge").all():
+            await button.click()
+        await expect(self._held.get_by_role("button", name="Acknowledge")).to_have_count(0)
+
+    async def _try_again(self) -> None:
+        await self._held.get_by_role("button", name="Try again").click()
+        dialog: Locator = self._screen.page.get_by_role("dialog")
+        await self._screen.settle()
+        if await dialog.count():
+            await dialog.get_by_role("button", name="Try again").click()
+        await expect(self._held).to_have_count(0)
+
+    async def _take(self, name: str) -> None:
+        await self._screen.settle()
+        (self._to / f"recover-{name}.png").write_bytes(await self._screen.page.screenshot())
+
+
+async def main(to: Path) -> None:
+    """Start the cell, and take the pictures."""
+    to.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="arcor2-hw-pictures-") as name:
+        cell = Cell(Path(name), BOARDS, SEED)
+        await cell.start()
+        try:
+            async with (
+                running_browser(behind=True) as browser,
+                Client(cell.url, "Line", reconnect=False) as client,
+                screen_of(browser, cell.url, "ipad", touch=True, drawn=True) as screen,
+            ):
+                screen.page.set_default_timeout(SLOW * 1000)
+                await screen.join("Olga", "/?q=low#/operator?kiosk")
+                await Operator(cell, client, screen, to).all()
+        finally:
+            await cell.stop()
+
+
+if __name__ == "__main__":
+    pictures = Path(__file__).resolve().parents[2] / "docs" / "pictures"
+    asyncio.run(main(Path(sys.argv[1]) if len(sys.argv) > 1 else pictures))
