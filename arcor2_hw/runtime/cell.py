@@ -316,8 +316,8 @@ class Cell:
             time.sleep(0.005)
         return True
 
-    def take_control(self) -> None:
-        """Take control of every device that supports it, concurrently. Raises SceneFault if a device refuses."""
+    def take_control(self) -> list[tuple[Device, BaseException]]:
+        """Take control of every device that supports it, concurrently. Return the devices that refuse, and why."""
         jobs = []
         for device in self:
             if overrides(device.recipe.cls, "take_control"):
@@ -328,5 +328,4 @@ class Cell:
         for device, job in jobs:
             if not job.wait(until(deadline)):
                 device.lane.expire(job, CONTROL_DEADLINE)
-            if job.error is not None:
-                raise SceneFault(device.id, describe(device, job.error)) from job.error
+        return [(device, job.error) for device, job in jobs if job.error is not None]

@@ -36,7 +36,7 @@ from arcor2_hw.exceptions import (
 )
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime.branches import Action, Branches
-from arcor2_hw.runtime.cell import Cell
+from arcor2_hw.runtime.cell import Cell, SceneFault
 from arcor2_hw.runtime.channel import Channel
 from arcor2_hw.runtime.continuing import value_of
 from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe
@@ -148,6 +148,17 @@ class Program:
                 unknown=", ".join(sorted(unknown)),
             )
 
+    def take_control(self) -> None:
+        """Take control of all devices. If one refuses, the program is held before its first action.
+
+        Raises:
+            SceneFault: a device refuses, and the program is not held after failures.
+        """
+        for device, error in self.cell.take_control():
+            if self.recovery is None or not self.recovery.active:
+                raise SceneFault(device.id, describe(device, error)) from error
+            self.recovery.hold_before_next(device, error)
+
     def started(self, info: PackageInfoData) -> None:
         """Report that all devices are connected and the program starts."""
         self.channel.changed("running")
@@ -257,7 +268,7 @@ class Program:
         else:
             self.gate.before(branch, ids if action_id is None else ids | {action_id}, len(calls), is_call=is_call)
         if not is_call:
-            self._hold_if_lost(action, name or what)
+            self._hold_if_unusable(action, name or what)
         action.began = time.monotonic()
         action.waited = action.began - announced
         if is_call:
@@ -334,8 +345,8 @@ class Program:
             raise decision.error
         return decision
 
-    def _hold_if_lost(self, action: Action, name: str) -> None:
-        """Hold the program before an action while the connection of a device is lost."""
+    def _hold_if_unusable(self, action: Action, name: str) -> None:
+        """Hold the program before an action while a device cannot be used: lost, or without control."""
         branch = self.branches.current
         while self.recovery is not None and (found := self.recovery.before_action(branch, self._call_of(action, name))):
             if found.error is not None:
@@ -418,7 +429,7 @@ class Program:
         if self.recovery is not None and self.recovery.active:
             why = reason or Message.of("unknown reason")
             lost = ConnectionLost("{name}: the connection is lost: {reason}", name=device.name, reason=why)
-            self.recovery.lost(device, lost)
+            self.recovery.hold_before_next(device, lost)
             return False
         error = ConnectionLost(
             "{name}: the program was stopped, because the connection is lost: {reason}",

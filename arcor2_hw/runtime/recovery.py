@@ -101,7 +101,7 @@ class Recovery:
         self._actions: dict[str, Action] = {}
         self._exits: dict[str, list[LogicItem]] = {}
         self._used: set[str] = set()
-        self._lost: dict[str, tuple[Device, Arcor2Error]] = {}
+        self._unusable: dict[str, tuple[Device, BaseException]] = {}
         self._uncontrolled: set[str] = set()
         self._present: _Hold | None = None
         self._decisions: dict[int, Decision] = {}
@@ -166,13 +166,13 @@ class Recovery:
         )
         return self._wait(branch, _Hold(data, device, error, hints, check_done, data.choices))
 
-    def lost(self, device: Device, error: Arcor2Error) -> None:
-        """Record a lost connection. It holds the program before the next action."""
-        self._lost[device.id] = (device, error)
+    def hold_before_next(self, device: Device, error: BaseException) -> None:
+        """Hold the program before the next action, because a connection is lost or a device refuses control."""
+        self._unusable[device.id] = (device, error)
 
     def before_action(self, branch: Branch, call: ActionCall) -> Decision | None:
-        """Hold the program before an action if the connection of a device was lost; return the decision."""
-        for device, error in list(self._lost.values()):
+        """Hold the program before an action if a device cannot be used; return the decision."""
+        for device, error in list(self._unusable.values()):
             data = self._data(call, device, error, [HoldChoice.RETRY, HoldChoice.END])
             return self._wait(branch, _Hold(msgspec.structs.replace(data, before=True), device, error, ()))
         return None
@@ -208,7 +208,7 @@ class Recovery:
             if present is not None and present.data.number == hold.data.number:  # the program or the branch was stopped
                 self._present = None
         decision = self._decisions.pop(hold.data.number)
-        self._lost.pop(hold.device.id, None)
+        self._unusable.pop(hold.device.id, None)
         self._uncontrolled = {device.id for device in self._cell}
         if decision.error is not None:
             mark_decided(decision.error)

@@ -58,7 +58,7 @@ class Operator:
         await asyncio.sleep(0.3 if tries == 1 else 1.0)
         await self.confirm(client)
         shown = (await client.call("GetHeld")).held
-        if not isinstance(shown, Unset) and shown.number == held.number:
+        if not isinstance(shown, Unset) and shown.since == held.since:
             held = shown  # without what the books exclude now
         choice, results = await self._choose(client, held, tries)
         await self._checks.still(still, f"while held at {held.action_name}")

@@ -96,7 +96,7 @@ class Trial:
 
     async def _follow(self, client: Client) -> None:
         names: dict[str, str] = {}
-        held: tuple[int, int] | None = None
+        held = ""
         while True:
             event = await self._next(client)
             match event.event:
@@ -114,8 +114,8 @@ class Trial:
                     self._faults.maybe_inject(name)
                     if name == "order" and await self._cell.finished():
                         await client.call("StopPackage")
-                case "Held" if (event.data.run, event.data.number) != held:  # not only other choices
-                    held = event.data.run, event.data.number
+                case "Held" if event.data.since != held:  # not only other choices
+                    held = event.data.since
                     await self._operator.resolve(client, event.data)
                 case "ProjectException":
                     self._say(f"  ended: {event.data.message}")

@@ -12,6 +12,7 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
+from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.device import Connection
 from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.held import HeldData, HoldChoice, HoldExit, ResultType
@@ -51,6 +52,8 @@ class Tool(Generic):
 
     def control_owner(self): return self.owner
     def take_control(self):
+        if (self.directory / "stopped").exists():
+            raise SafetyStop("protective stop")
         self.owner = "us"
         self.note("control")
 
@@ -176,6 +179,27 @@ class Run:
 @pytest.fixture
 def run(host: HostProcess, package: Package, tmp_path: Path) -> Run:
     return Run(host, package, tmp_path)
+
+
+def test_device_that_refuses_control_at_the_start_holds_the_program(run: Run) -> None:
+    (run.directory / "stopped").touch()
+    run.start('tool.work(an="work")')
+    held = run.held()
+    assert (held.kind, held.action_name, held.before) == ("safety_stop", "work", True)
+    assert held.choices == [HoldChoice.RETRY, HoldChoice.END]
+    assert run.decide(held, HoldChoice.RETRY) is None
+    held = run.held()  # it still refuses
+    assert (held.kind, held.before) == ("safety_stop", UNSET)
+    (run.directory / "stopped").unlink()  # as a person acknowledges it
+    assert run.decide(held, HoldChoice.RETRY) is None
+    assert run.host.expect_state("stopped").finished
+    assert run.notes() == ["control", "work"]
+
+
+def test_device_that_refuses_control_ends_a_program_that_is_not_held(run: Run) -> None:
+    (run.directory / "stopped").touch()
+    run.start('tool.work(an="work")', hold=False)
+    assert "protective stop" in str(run.host.expect_state("stopped").error)
 
 
 def test_retry_repeats_the_action_until_it_succeeds(run: Run) -> None:
@@ -414,5 +438,5 @@ def test_another_hold_begins_before_the_decision_takes_effect() -> None:
     tool = SimpleNamespace(connection=Connection.ONLINE)
     recipe = SimpleNamespace(cls=SimpleNamespace, address="")
     device: Any = SimpleNamespace(id=OBJ, name="tool", instance=tool, require=lambda: tool, recipe=recipe)
-    recovery.lost(device, ConnectionLost("cable cut"))
+    recovery.hold_before_next(device, ConnectionLost("cable cut"))
     assert hold(1).choice is HoldChoice.RETRY

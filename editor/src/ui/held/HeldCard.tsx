@@ -18,6 +18,8 @@ import "./held.css";
 
 /** Errors that say that the cell and the books of parts do not agree. */
 const PART_ERRORS: readonly string[] = ["place_occupied", "place_empty", "wrong_part", "part_unconfirmed"];
+/** Errors after which a device has to be connected again. */
+const LOST: readonly string[] = ["connection_lost", "not_connected"];
 
 export default function HeldCard({ held }: { held: HeldData }) {
   const state = useEditor((each) => each);
@@ -127,7 +129,7 @@ function Retry({ held, why }: { held: HeldData; why: string }) {
         look="primary"
         text={held.before ? t`Continue` : t`Try again`}
         hint={
-          held.before
+          held.before && LOST.includes(held.kind)
             ? t`Possible as soon as ${device} is connected again.`
             : t`${action} starts at once. Keep clear of the devices.`
         }
