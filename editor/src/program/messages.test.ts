@@ -50,7 +50,9 @@ it("separates the addresses of a device from a message", () => {
   const refused = splitAddress("robot: No RTDE port at 127.120.197.184:30004.");
   expect(refused).toEqual({ text: "robot: No RTDE port.", address: "127.120.197.184:30004" });
   expect(splitAddress("Motory robotu r1 (10.0.0.5) byly vypnuty.").text).toBe("Motory robotu r1 byly vypnuty.");
-  expect(splitAddress("Control of robot (UR controller 127.0.0.9:30004) failed.").text).toBe("Control of robot failed.");
+  expect(splitAddress("Control of robot (UR controller 127.0.0.9:30004) failed.").text).toBe(
+    "Control of robot failed.",
+  );
   const unread = splitAddress("reader at /dev/pts/4: no code was read within 2 s");
   expect(unread).toEqual({ text: "reader: no code was read within 2 s", address: "/dev/pts/4" });
   for (const text of ["Ready.", "version 1.2.3 at 5.0 s", "use [a] or [b] here", "[host x]"])

@@ -158,11 +158,16 @@ function Remedies({ held }: { held: HeldData }) {
   const state = useEditor((each) => each);
   const why = whyUnavailable(state, "AcknowledgeStop");
   const [refused, setRefused] = useState("");
+  const [acknowledged, setAcknowledged] = useState("");
   const alarms = (state.live.health[held.device]?.alarms ?? []).map(translatedAlarm);
   const type = state.doc?.objects[held.device]?.type ?? "";
   const stops = state.types.robots[type]?.features?.acknowledge_stop === true;
   if (alarms.length === 0 && held.kind !== "safety_stop") return null;
-  const confirm = (code: string) => void acknowledge(held.device, stops ? "" : code).then(setRefused);
+  const confirm = (code: string) =>
+    void acknowledge(held.device, stops ? "" : code).then((reason) => {
+      setRefused(reason);
+      if (!reason) setAcknowledged(held.since);
+    });
   return (
     <div className="held-alarms">
       {alarms.map((alarm) => (
@@ -174,7 +179,7 @@ function Remedies({ held }: { held: HeldData }) {
           )}
         </Alarm>
       ))}
-      {stops && alarms.length === 0 && (
+      {stops && alarms.length === 0 && acknowledged !== held.since && (
         <Alarm text={t`Check the robot and its surroundings. Then acknowledge the stop.`}>
           <Button why={why} icon="check" onPress={() => confirm("")}>
             {t`Acknowledge`}
