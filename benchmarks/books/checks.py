@@ -54,7 +54,7 @@ class Checks:
             in_cell = truth["gripper"] + truth["tester"] + truth["label"] + known
             fed = in_cell + truth["good"] + truth["bad"] + truth["removed"]
             wanted = PartCounts(fed, truth["good"], truth["bad"], truth["removed"], in_cell)
-            if books.counts != wanted or truth["lost"] or known > truth["stop"]:
+            if books.counts != wanted or truth["lost"] or known > truth["stop"] + truth["belt"]:
                 self.found(self.result.unaccounted, f"books {books.counts}, cell {wanted}, lost {truth['lost']}")
 
     async def results(self) -> None:

@@ -140,10 +140,8 @@ class Operator:
         """Return that the movement counts as done if the books agree, otherwise end the program."""
         (books,) = await client.get_parts()
         there = {books.name_of(part.place) for part in books.parts}
-        if target in ("good", "bad"):  # the part that was moved has left the books
-            arrived = not there & {NAMES[place] for place in ("gripper", "label", "tester")}
-        else:
-            arrived = NAMES[target] in there
+        # A part that was moved into a box has left the books.
+        arrived = NAMES["gripper"] not in there if target in ("good", "bad") else NAMES[target] in there
         return (HoldChoice.SKIP if arrived and HoldChoice.SKIP in held.choices else HoldChoice.END), []
 
     async def _take_out(self, client: Client, code: str) -> None:

@@ -8,7 +8,7 @@ PLACES: Final = {
     "insert": "tester", "into_nest": "label", "into_good_box": "good", "into_bad_box": "bad", "reject_unread": "bad",
 }  # fmt: skip
 NAMES: Final = {
-    "stop": "feeder", "gripper": "robot", "tester": "tester", "label": "label_place",
+    "stop": "feeder", "belt": "feeder", "gripper": "robot", "tester": "tester", "label": "label_place",
     "good": "good_boards", "bad": "bad_boards",
 }  # fmt: skip
 """The place in the books for each physical place; all others are outside of the cell."""

@@ -11,7 +11,7 @@ from typing import Any, Final
 from arcor2_hw.client import Client, RequestFailed
 from arcor2_hw.data import rpc
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.held import OnError
+from arcor2_hw.data.held import HeldData, OnError
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.exceptions import Arcor2Error
 from benchmarks.books.cell import Cell, waiting
@@ -96,7 +96,8 @@ class Trial:
 
     async def _follow(self, client: Client) -> None:
         names: dict[str, str] = {}
-        held = ""
+        held: HeldData | None = None
+        since = ""
         while True:
             event = await self._next(client)
             match event.event:
@@ -114,9 +115,12 @@ class Trial:
                     self._faults.maybe_inject(name)
                     if name == "order" and await self._cell.finished():
                         await client.call("StopPackage")
-                case "Held" if event.data.since != held:  # not only other choices
-                    held = event.data.since
-                    await self._operator.resolve(client, event.data)
+                case "Held" if event.data.since != since:  # not only other choices
+                    held, since = event.data, event.data.since
+                case "PackageState" if event.data.state is PackageStateEnum.PAUSED and held is not None:
+                    # The actions of other branches have ended.
+                    await self._operator.resolve(client, held)
+                    held = None
                 case "ProjectException":
                     self._say(f"  ended: {event.data.message}")
                 case "PackageState" if event.data.state is PackageStateEnum.STOPPED:
