@@ -391,7 +391,9 @@ class Requests(ABC):
     async def compare_recipes(self, *, before: str, after: str, timeout: float | None = None) -> RecipeComparison:
         """CompareRecipes: ids of two recipes. Needs the role operator."""
 
-    async def confirm_parts(self, *, scene_id: str, parts: list[ConfirmedPart], timeout: float | None = None) -> None:
+    async def confirm_parts(
+        self, *, scene_id: str, parts: list[ConfirmedPart], dismiss: bool = False, timeout: float | None = None
+    ) -> None:
         """ConfirmParts: where a person has found parts. No parts: only that a program was interrupted.
 
         Needs the role operator.

@@ -40,7 +40,10 @@ export async function run({ paused = false } = {}): Promise<boolean> {
   }
 }
 
-/** Run a package. `recipe`: id of the recipe and the order. `continues`: where it was interrupted, see `continues` of the books of parts. */
+/**
+ * Run a package. `recipe`: id of the recipe and the order. `continues`: where it was interrupted, see `continues` of
+ * the books of parts.
+ */
 export const runPackage = (id: string, paused = false, continues = false, recipe: object = {}) =>
   ask(
     "RunPackage",

@@ -646,10 +646,15 @@ export interface CompareRecipesArgs {
   after: string;
 }
 
-/** Arguments of ConfirmParts: where a person has found parts. No parts: only that a program was interrupted. */
+/**
+ * Arguments of ConfirmParts: where a person has found parts. No parts: only that a program was interrupted.
+ *
+ * dismiss: the interrupted program does not continue; it starts from its beginning.
+ */
 export interface ConfirmPartsArgs {
   scene_id: string;
   parts: ConfirmedPart[];
+  dismiss?: boolean;
 }
 
 /**
@@ -2706,7 +2711,8 @@ export interface Run {
  * cycle has done. variables: the values of the program's variables at its start, by name, in JSON. complete: whether
  * `done` is complete. interrupted: whether the server has noticed that the run was interrupted. confirmed: whether a
  * person has confirmed since where all parts are.
- * continues, continues_at: whether the program can continue, and at which actions (empty: after `last`).
+ * continues, continues_at: whether the program can continue, and at which actions (empty: after `last`). missing: name
+ * of the action because of which it cannot.
  */
 export interface RunCheckpoint {
   run: number;
@@ -2725,6 +2731,7 @@ export interface RunCheckpoint {
   confirmed: boolean;
   continues: boolean;
   continues_at: string[];
+  missing: string;
 }
 
 /** How a run ended: completed, stopped by a user, by an error, or with the server or its host. */

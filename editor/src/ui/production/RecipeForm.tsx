@@ -117,11 +117,17 @@ export function RecipeForm({ recipe, onClose, onSaved }: Props) {
                 <th scope="row" data-name={name}>
                   {name}
                 </th>
-                {(["value", "min", "max"] as const).map((part) => (
+                {(
+                  [
+                    ["value", t`This recipe`],
+                    ["min", t`Lowest`],
+                    ["max", t`Highest`],
+                  ] as const
+                ).map(([part, title]) => (
                   <td key={part}>
                     {(part === "value" || NUMBERS.includes(type)) && (
                       <input
-                        aria-label={`${name}, ${part === "value" ? t`This recipe` : part === "min" ? t`Lowest` : t`Highest`}`}
+                        aria-label={`${name}, ${title}`}
                         placeholder={part === "value" ? String(JSON.parse(value)) : ""}
                         value={rows[name]?.[part] ?? ""}
                         onChange={(event) => change(name, { [part]: event.target.value })}
@@ -134,7 +140,9 @@ export function RecipeForm({ recipe, onClose, onSaved }: Props) {
           </tbody>
         </table>
       )}
-      <p className="quiet small">{t`Empty fields keep the value of the package. Without limits, a run cannot change the value.`}</p>
+      <p className="quiet small">
+        {t`Empty fields keep the value of the package. Without limits, a run cannot change the value.`}
+      </p>
       <RefusedText>{refused}</RefusedText>
       <div className="actions">
         <Button onPress={onClose}>{t`Cancel`}</Button>
