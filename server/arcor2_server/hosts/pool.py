@@ -43,11 +43,17 @@ class CellHosts:
     async def take(self, user: HostUser) -> CellHost:
         """Return the spare host, or a new one. Raise Arcor2Error if no host can be started."""
         while True:
+            new = self._spare is None
             self.prepare()
             if self._spare is None:
                 raise Arcor2Error("The server is ending.")
             spare, self._spare = self._spare, None
-            host = await spare
+            try:
+                host = await spare
+            except Arcor2Error:
+                if new:
+                    raise
+                continue  # it failed earlier, for example because it was killed while it was starting
             if host.alive:
                 break
             await host.wait_or_kill()

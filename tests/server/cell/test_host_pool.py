@@ -1,0 +1,58 @@
+"""The pool of cell hosts: a spare host that failed does not make the next run fail."""
+
+import asyncio
+import os
+import signal
+from collections.abc import Mapping
+from typing import cast
+
+import pytest
+
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.hosts import pool
+from arcor2_server.hosts.process import CellHost, HostUser
+
+USER = cast("HostUser", None)
+"""The hosts of these tests load no object types, so that they notify nobody."""
+
+
+@pytest.fixture
+def killed(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
+    """Kill started hosts before they are ready: those whose flag is true, which is removed; later ones run."""
+    kills: list[bool] = []
+
+    class Host(CellHost):
+        @classmethod
+        async def start(cls, environment: Mapping[str, str] = os.environ) -> CellHost:
+            host = await CellHost.start(environment)
+            if kills and kills.pop(0):
+                os.kill(host.pid, signal.SIGKILL)
+            return host
+
+    monkeypatch.setattr(pool, "CellHost", Host)
+    return kills
+
+
+@pytest.mark.parametrize("ended", [True, False], ids=["before", "meanwhile"])
+async def test_spare_host_killed_while_starting_is_replaced(killed: list[bool], ended: bool) -> None:
+    hosts = pool.CellHosts([])
+    killed += [True]
+    hosts.prepare()
+    assert hosts._spare is not None
+    if ended:
+        await asyncio.wait({hosts._spare})
+    try:
+        assert (await hosts.take(USER)).alive
+    finally:
+        await hosts.close()
+
+
+async def test_host_that_cannot_be_started_is_an_error(killed: list[bool]) -> None:
+    hosts = pool.CellHosts([])
+    killed += [True, True]
+    hosts.prepare()
+    try:
+        with pytest.raises(Arcor2Error, match="No cell host can be started"):
+            await hosts.take(USER)
+    finally:
+        await hosts.close()
