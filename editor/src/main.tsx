@@ -22,6 +22,7 @@ async function start(): Promise<void> {
   const name = remembered("name");
   // Load at the same time what is shown next: probably the view of an open document, or the form for the name.
   (name ? import("./engine/engine") : import("./ui/join/Join")).catch(() => {});
+  void persistently(() => import("./ui/kit/steadyPress")).then(({ keepPresses }) => keepPresses(document));
   const language = remembered("language");
   await persistently(() => loadCatalogue(isLanguage(language) ? language : preferredLanguage()));
   const token = remembered("token");

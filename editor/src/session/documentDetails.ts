@@ -20,20 +20,8 @@ export class DocumentDetails implements Follower {
     if (id === this.current) return;
     this.current = id;
     const isCurrent = () => this.current === id;
-    void loadGeneral(isCurrent);
     if (state.doc) void loadDetails(id, state.doc.scene.id, state.doc.project !== null, isCurrent);
   }
-}
-
-async function loadGeneral(isCurrent: () => boolean): Promise<void> {
-  if (!serves("GetViewState")) return;
-  const read = (scope: "user" | "shared") =>
-    call("GetViewState", { scope }).then(
-      ({ values }) => values,
-      () => ({}),
-    );
-  const [shared, own] = await Promise.all([read("shared"), read("user")]);
-  if (isCurrent()) store.setState((state) => ({ view: { ...state.view, general: { ...shared, ...own } } }));
 }
 
 async function loadDetails(document: string, scene: string, project: boolean, isCurrent: () => boolean): Promise<void> {

@@ -1,8 +1,9 @@
-/** Load the lists of the home screen, the object types and their actions. */
+/** Load the lists of the home screen, the general view state, the object types and their actions. */
 
+import type { ViewScope } from "../protocol/types";
 import { translatedAction, translatedType } from "../store/objectTypeTexts";
 import { now, store } from "../store/store";
-import { call } from "./connection";
+import { call, serves } from "./connection";
 
 export async function loadTypes(): Promise<void> {
   const [types, robots] = await Promise.all([call("GetObjectTypes"), call("GetRobotMeta")]);
@@ -25,6 +26,19 @@ export async function loadLists(): Promise<void> {
     store.setState((state) => ({ lists: { ...state.lists, [key]: items } }));
   };
   await Promise.all([load("scenes", "ListScenes"), load("projects", "ListProjects"), load("packages", "ListPackages")]);
+}
+
+/** Load the view state that belongs to no document: of all users, and of this user. */
+export async function loadGeneralState(): Promise<void> {
+  if (!serves("GetViewState")) return;
+  const scopes = ["shared", "user"] as const;
+  const read = (scope: ViewScope) =>
+    call("GetViewState", { scope }).then(
+      ({ values }) => values,
+      () => ({}),
+    );
+  const [shared, own] = await Promise.all(scopes.map(read));
+  store.setState((state) => ({ view: { ...state.view, general: { ...shared, ...own } } }));
 }
 
 /** Load the actions of a type, unless they are loaded. */

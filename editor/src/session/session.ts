@@ -23,7 +23,7 @@ import { call } from "./connection";
 import { DocumentDetails } from "./documentDetails";
 import type { Follower } from "./follower";
 import { LanguageFollower } from "./language";
-import { loadLists, loadTypes } from "./lists";
+import { loadGeneralState, loadLists, loadTypes } from "./lists";
 import { note } from "./log";
 import { PresenceReporter } from "./presence";
 import { ProgramDetails } from "./programDetails";
@@ -41,8 +41,8 @@ declare module "../store/runtime" {
     takeObservations?: ((data: ObjectObservationsData) => void) | undefined;
     /** Receive changed alarms, which bypass the store, while they are shown. */
     takeAlarm?: Set<(record: AlarmRecord) => void>;
-    /** Receives changed books of parts, which bypass the store, while they are shown. */
-    takeParts?: ((books: PartBooks) => void) | undefined;
+    /** Receive changed books of parts, which bypass the store, while they are shown. */
+    takeParts?: Set<(books: PartBooks) => void>;
     /** Receives changed interlocks and their states, which bypass the store, while they are shown. */
     takeInterlocks?:
       | ((event: Extract<ServerEvent, { event: "InterlockStates" | "InterlockChanged" }>) => void)
@@ -113,7 +113,7 @@ export class Session {
     else if (event.event === "RobotEef") telemetry.takeEef(event.data);
     else if (event.event === "ObjectObservations") now().runtime.takeObservations?.(event.data);
     else if (event.event === "AlarmChanged") for (const take of now().runtime.takeAlarm ?? []) take(event.data);
-    else if (event.event === "PartsChanged") now().runtime.takeParts?.(event.data);
+    else if (event.event === "PartsChanged") for (const take of now().runtime.takeParts ?? []) take(event.data);
     else if (event.event === "LogOnChanged")
       void import("./logOn").then(({ changed }) => changed(event.data, () => this.onState("open", "", 0)));
     else if (event.event === "InterlockStates" || event.event === "InterlockChanged")
@@ -205,7 +205,8 @@ export class Session {
       const server = await call("SystemInfo");
       if (!isCurrent()) return;
       setConnection({ server });
-      await Promise.all([subscribe(), loadTypes(), loadLists()]);
+      // Nothing that the user changes from now on may be replaced by an older answer.
+      await Promise.all([subscribe(), loadTypes(), loadLists(), loadGeneralState()]);
       if (!isCurrent()) return;
       await releaseOwnLocks();
       if (!isCurrent()) return;

@@ -58,7 +58,8 @@ export function AlarmCard({ alarms }: { alarms: readonly AlarmRecord[] }) {
           </p>
         </div>
         {first.picture && <Picture number={first.number} />}
-        {!first.acknowledged && <Acknowledge record={first} />}
+        {/* With a key, a press never acknowledges an alarm that took this place meanwhile. */}
+        {!first.acknowledged && <Acknowledge key={first.number} record={first} />}
       </div>
       {count > 0 && (
         <details className="alarm-others">
@@ -89,7 +90,10 @@ export function Acknowledge({ record }: { record: AlarmRecord }) {
   );
 }
 
-/** The picture of an alarm. It is loaded with the token of the user, which an address cannot contain. */
+/**
+ * The picture of an alarm. It is loaded with the token of the user, which an address cannot contain. Its space is
+ * reserved, so that the button next to it does not move.
+ */
 function Picture({ number }: { number: number }) {
   const [url, setUrl] = useState("");
   useEffect(() => {
@@ -103,5 +107,5 @@ function Picture({ number }: { number: number }) {
       .catch(() => {}); // the text says the same
     return () => URL.revokeObjectURL(made);
   }, [number]);
-  return url ? <img className="alarm-picture" src={url} alt="" /> : null;
+  return <div className="alarm-picture">{url && <img src={url} alt="" />}</div>;
 }

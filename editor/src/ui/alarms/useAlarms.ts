@@ -38,7 +38,7 @@ export function useAlarms(show: Show): AlarmRecord[] | null {
     listeners.add(take);
     call("ListAlarms", { show, limit: MOST }).then(
       (answer) => current && setAlarms(answer.alarms.map(translated)),
-      () => {}, // offline: loaded again after the reconnect
+      () => current && setAlarms((known) => known ?? []), // offline: loaded again after the reconnect
     );
     return () => {
       current = false;

@@ -28,6 +28,7 @@ export default function HeldCard({ held }: { held: HeldData }) {
   const { text, address } = splitAddress(withNames(state, translate(held)));
   const [entering, setEntering] = useState(false);
   const why = whyUnavailable(state, "DecideHeld");
+  const aboutParts = PART_ERRORS.includes(held.kind);
   const offers = (choice: Decision["choice"]) => held.choices.includes(choice);
   return (
     <section className="held" aria-label={t`The program is held`}>
@@ -44,7 +45,7 @@ export default function HeldCard({ held }: { held: HeldData }) {
         </details>
       )}
       <Remedies held={held} />
-      <PartsCard all folded={!PART_ERRORS.includes(held.kind)} />
+      {aboutParts && <PartsCard all />}
       <p>
         {t`Fix the cause first. The program starts nothing until you decide.`}{" "}
         {t`What is switched on stays on, such as a belt.`}
@@ -88,6 +89,7 @@ export default function HeldCard({ held }: { held: HeldData }) {
           />
         </div>
       )}
+      {!aboutParts && <PartsCard all folded />}
     </section>
   );
 }

@@ -4,7 +4,8 @@
  */
 
 import { t } from "@lingui/core/macro";
-import { type ComponentType, Suspense, useEffect, useState } from "react";
+import { type ComponentType, Suspense, useEffect, useRef, useState } from "react";
+import { shownRecipe } from "../../commands/production";
 import * as commands from "../../commands/run";
 import { storeGeneralState } from "../../commands/viewstate";
 import { ago } from "../../formats";
@@ -22,9 +23,10 @@ import { withNames } from "../../viewmodel/names";
 import { AlarmCard } from "../alarms/AlarmCard";
 import { useAlarms } from "../alarms/useAlarms";
 import { Icon, type IconName } from "../kit/icons";
-import { Button } from "../kit/kit";
+import { Button, Waiting } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
 import { Notices } from "../notices/Notices";
+import PartsCard, { useBooks } from "../parts/PartsCard";
 import { People } from "../people/People";
 import type { Chosen } from "../production/Product";
 import { endName, History } from "../run/History";
@@ -37,7 +39,6 @@ import { Production } from "./Production";
 import "../run/run.css";
 import "./operator.css";
 
-const PartsCard = lazyComponent(() => import("../parts/PartsCard"));
 const Product = lazyComponent(() => import("../production/Product"));
 const AlarmList = lazyComponent(() => import("../alarms/AlarmList"));
 
@@ -70,17 +71,24 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   const runs = isRunning(state);
   const packages = [...(lists.packages ?? [])].sort((a, b) => b.package_meta.built.localeCompare(a.package_meta.built));
   const [chosen, setChosen] = useState("");
-  const [product, setProduct] = useState<Chosen | null>(null);
+  /** The product to start, null if none was chosen, undefined until it is loaded. */
+  const [product, setProduct] = useState<Chosen | null | undefined>(serves("ListRecipes") ? undefined : null);
   const [releasedOnly, setReleasedOnly] = useState(false);
   const [starting, setStarting] = useState(false);
   const [listing, setListing] = useState(false);
-  const alarms = useAlarms("retained") ?? [];
+  const listed = useAlarms("retained");
+  const books = useBooks();
+  const alarms = listed ?? [];
+  // The cards are shown together with what is below them: buttons do not move when something is loaded.
+  const loaded = (listed || !serves("ListAlarms")) && (books || !serves("GetParts"));
   // Until a package is chosen, Start produces the product.
   const made = product && !packages.some((each) => each.id === chosen) ? product : null;
-  const known =
-    packages.find((each) => each.id === (made?.recipe.package_id ?? chosen)) ??
-    packages.find((each) => each.id === program.packageId) ??
-    packages[0];
+  const before = useRef("");
+  // A package that is built meanwhile does not replace the selected one.
+  const known = [made?.recipe.package_id ?? chosen, program.packageId, before.current, packages[0]?.id]
+    .map((id) => packages.find((each) => each.id === id))
+    .find((each) => each !== undefined);
+  before.current = known?.id ?? "";
   const onlyReleased = releasedOnly && state.connection.role === ROLES.operator;
   const shownPackages = onlyReleased ? [] : packages;
   const idle = !runs && !starting;
@@ -88,6 +96,8 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   const result = resultOf(run ?? undefined);
   // The card of an alarm says more than the error of the run.
   const explained = alarms.some((each) => !each.acknowledged && each.run === run?.number);
+  // The card about the parts says that the run was interrupted.
+  const asked = result?.tone === "warn" && books?.some((each) => each.run);
   useTicking();
   const { tone, word, icon } = shownState(state, starting, result);
   // The shown screen is not part of the state, so the session does not notice the change by itself.
@@ -143,15 +153,22 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
           </Suspense>
         </aside>
       )}
-      <main data-runs={runs} data-held={program.held !== null} hidden={listing}>
-        <Held />
-        {!program.held && (
-          <Suspense fallback={null}>
-            <PartsCard />
-          </Suspense>
+      {/* Above everything that comes and goes, so that these buttons keep their places. */}
+      <div className="operator-buttons">
+        {runs ? (
+          <RunButtons />
+        ) : (
+          <>
+            <Button look="primary" icon="play" why={why} isDisabled={starting || product === undefined} onPress={() => void start()}>
+              {t`Start`}
+            </Button>
+            {known && <p data-name>{made ? shownRecipe(made.recipe) : known.package_meta.name}</p>}
+          </>
         )}
-        {!runs && <Alarms alarms={alarms} />}
-        {!program.held && (
+      </div>
+      {!loaded && !listing && <Waiting>{t`Loading…`}</Waiting>}
+      <main data-runs={runs} data-held={program.held !== null} hidden={listing || !loaded}>
+        {!program.held && !asked && (
           <section className="operator-state" aria-label={t`State`} role="status">
             <Icon name={icon} size={56} />
             <div>
@@ -175,21 +192,17 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
               )}
             </div>
             {run && (
-              <Button className="operator-dismiss" onPress={() => storeGeneralState(dismissal(run))}>
+              <Button key={run.number} className="operator-dismiss" onPress={() => storeGeneralState(dismissal(run))}>
                 {t`Dismiss`}
               </Button>
             )}
           </section>
         )}
-        {runs ? (
-          <>
-            <div className="operator-buttons">
-              <RunButtons />
-            </div>
-            {program.held ? null : <Alarms alarms={alarms} />}
-            {doc && <Cell />}
-          </>
-        ) : (
+        <Held />
+        {!program.held && <PartsCard />}
+        {!program.held && <Alarms alarms={alarms} />}
+        {runs && doc && <Cell />}
+        {!runs && (
           <section className="operator-start" aria-label={t`Start`}>
             <div className="operator-packages" role="radiogroup" aria-label={t`Packages`}>
               {serves("ListRecipes") && (
@@ -221,16 +234,6 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
                 <p className="quiet">{t`No packages yet. Build one in the editor, under Run.`}</p>
               )}
             </div>
-            <Button
-              look="primary"
-              icon="play"
-              className="operator-go"
-              why={why}
-              isDisabled={starting}
-              onPress={() => void start()}
-            >
-              {t`Start`}
-            </Button>
             {opened && (
               <p className="quiet">
                 {users.length > 0

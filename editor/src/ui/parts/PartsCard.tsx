@@ -32,26 +32,37 @@ export function answersFor(part: Part, books: PartBooks): Place[] {
   return books.places.filter((place) => place.capacity === 0 || !taken.has(place.id)).sort((a, b) => rank(a) - rank(b));
 }
 
-function useBooks(): [PartBooks[], (books: PartBooks[]) => void] {
+declare module "../../store/runtime" {
+  interface Runtime {
+    /** The books as last shown: another card shows them at once, and moves nothing when they are loaded. */
+    parts?: PartBooks[];
+  }
+}
+
+/** Return the books of parts, null until they are loaded. */
+export function useBooks(): PartBooks[] | null {
   const ready = useEditor((state) => state.connection.status === "ready");
   const phase = useEditor((state) => state.program.state);
-  const [books, setBooks] = useState<PartBooks[]>([]);
+  const { runtime } = now();
+  const [books, setBooks] = useState<PartBooks[] | null>(runtime.parts ?? null);
+  if (books) runtime.parts = books;
   useEffect(() => {
     if (!ready || !serves("GetParts")) return;
     let current = true;
-    const { runtime } = now();
-    const take = (changed: PartBooks) => setBooks((known) => withBooks(known, changed));
-    runtime.takeParts = take;
+    runtime.takeParts ??= new Set();
+    const listeners = runtime.takeParts;
+    const take = (changed: PartBooks) => setBooks((known) => withBooks(known ?? [], changed));
+    listeners.add(take);
     call("GetParts").then(
       (answer) => current && setBooks(answer),
-      () => {}, // offline: loaded again after the reconnect
+      () => current && setBooks((known) => known ?? []), // offline: loaded again after the reconnect
     );
     return () => {
       current = false;
-      if (runtime.takeParts === take) runtime.takeParts = undefined;
+      listeners.delete(take);
     };
-  }, [ready, phase]);
-  return [books, setBooks];
+  }, [ready, phase, runtime]);
+  return books;
 }
 
 /**
@@ -60,7 +71,7 @@ function useBooks(): [PartBooks[], (books: PartBooks[]) => void] {
  * confirmed.
  */
 export default function PartsCard({ all = false, folded = false }: { all?: boolean; folded?: boolean }) {
-  const [books] = useBooks();
+  const books = useBooks() ?? [];
   const runs = useEditor(isRunning);
   const open = books.find((each) => askedParts(each, all).length > 0 || each.run !== undefined);
   if (open) {
@@ -136,7 +147,8 @@ function Books({ books, all }: { books: PartBooks; all: boolean }) {
       {part && (
         <>
           <h2>{t`Where is part ${shown(part)}?`}</h2>
-          <div className="held-choices">
+          {/* With a key, a press never answers for a part that took this place meanwhile. */}
+          <div key={part.number} className="held-choices">
             {answersFor(part, books).map((place) => (
               <Button
                 key={place.id}

@@ -21,14 +21,14 @@ export interface Chosen {
 interface Props {
   selected: boolean;
   onSelect: () => void;
-  /** Called with the product, null if none was chosen, and whether packages may be started without a recipe. */
+  /** Called with the product, null if none was chosen, and whether operators may start released packages only. */
   onFound: (chosen: Chosen | null, releasedOnly: boolean) => void;
 }
 
 export default function Product({ selected, onSelect, onFound }: Props) {
   const ready = useEditor((state) => state.connection.status === "ready");
   const overlay = useOverlay();
-  const [recipe, setRecipe] = useState<Recipe | null>(null);
+  const [recipe, setRecipe] = useState<Recipe | null>();
   const [releasedOnly, setReleasedOnly] = useState(false);
   const [order, setOrder] = useState("");
   useEffect(() => {
@@ -50,7 +50,9 @@ export default function Product({ selected, onSelect, onFound }: Props) {
       clearInterval(timer);
     };
   }, [ready, overlay]);
-  useEffect(() => onFound(recipe && { recipe, order: order.trim() }, releasedOnly), [recipe, order, releasedOnly]);
+  useEffect(() => {
+    if (recipe !== undefined) onFound(recipe && { recipe, order: order.trim() }, releasedOnly);
+  }, [recipe, order, releasedOnly]);
   if (!recipe && !releasedOnly) return null;
   return (
     <div className="product">
