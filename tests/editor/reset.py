@@ -32,7 +32,7 @@ async def reset(cell: Cell, browser: Browser) -> None:
         await _empty(cell)
     USERS.clear()
     await cell.command_fake("tester", "renew")
-    await cell.command_fake("reader", "heal")
+    await cell.command_fake("reader", "renew")  # its code, too
     await cell.command_fake("robot", "heal")
     if (await cell.command_fake("robot", "truth"))["safety"] != "NORMAL":
         await cell.renew_robot()

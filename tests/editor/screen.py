@@ -35,6 +35,8 @@ SEEN_WITHIN: Final = 30.0
 SMALLEST: Final = 44
 """Smallest side of a control, CSS pixels."""
 expect.set_options(timeout=SEEN_WITHIN * 1000)
+SERVER_GONE: Final = ("WebSocket connection to", "net::ERR_CONNECTION_", "net::ERR_CONTENT_LENGTH_MISMATCH")
+"""What Chromium logs when the server is killed while it is connected, loads a part of the page, or receives one."""
 USERS: Final = set[str]()
 """Names of the users who have joined since the workplace was reset."""
 

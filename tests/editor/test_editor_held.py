@@ -15,7 +15,7 @@ from arcor2_hw.data.events import SceneStateEnum
 from arcor2_hw.testing.own_time import own_time
 from tests.e2e.harness import Cell, scene_state
 from tests.editor import texts
-from tests.editor.screen import Screen, screen_of
+from tests.editor.screen import SERVER_GONE, Screen, screen_of
 
 pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.alone]
 
@@ -139,7 +139,7 @@ async def test_robot_stops_when_the_server_is_killed_and_stays_stopped(
     online: Client, cell: Cell, browser: Browser
 ) -> None:
     async with screen_of(browser, cell.url) as screen:
-        screen.expected_errors = ("WebSocket connection to", "net::ERR_CONNECTION_")
+        screen.expected_errors = SERVER_GONE
         await panel(screen)
         await hold(screen, cell)
         await cell.kill("server")

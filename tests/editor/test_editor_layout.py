@@ -14,7 +14,7 @@ from playwright.async_api import Browser
 from arcor2_hw.data.project import Project
 from tests.e2e.harness import Cell
 from tests.editor import texts
-from tests.editor.screen import FONTS, VIEWPORTS, Screen, screen_of
+from tests.editor.screen import FONTS, SERVER_GONE, VIEWPORTS, Screen, screen_of
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
@@ -211,7 +211,7 @@ async def test_reduced_motion_stops_animations(cell: Cell, project: Project, bro
 
 async def test_lost_server(cell: Cell, project: Project, browser: Browser) -> None:
     async with screen_of(browser, cell.url, touch=True) as screen:
-        screen.expected_errors = ("WebSocket connection to", "net::ERR_CONNECTION_")
+        screen.expected_errors = SERVER_GONE
         await at_the_project(screen, "Cecil", project)
         await screen.page.wait_for_load_state("networkidle")  # all lazily loaded parts are loaded
         await cell.kill("server")

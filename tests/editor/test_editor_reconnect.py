@@ -8,7 +8,7 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Box, Model3dType, ObjectModel
 from tests.e2e.harness import Cell
 from tests.editor import texts
-from tests.editor.screen import screen_of
+from tests.editor.screen import SERVER_GONE, screen_of
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
@@ -23,8 +23,7 @@ async def test_the_view_stays_while_the_server_is_gone_and_reconnects(browser: B
     )
     table = (await client.next_event("SceneObjectChanged")).data.id
     async with screen_of(browser, cell.url) as screen:
-        # The page may be loading a part when the server is killed.
-        screen.expected_errors = ("WebSocket connection to", "Failed to load resource: net::ERR_CONNECTION_")
+        screen.expected_errors = SERVER_GONE
         await screen.join("Eva")
         await screen.press(texts.OBJECTS)
         await screen.page.get_by_role("row", name="table").click()
