@@ -167,7 +167,13 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
         )}
       </div>
       {!loaded && !listing && <Waiting>{t`Loading…`}</Waiting>}
-      <main data-runs={runs} data-held={program.held !== null} hidden={listing || !loaded}>
+      <main
+        data-runs={runs}
+        data-held={program.held !== null}
+        hidden={listing || !loaded}
+        // It scrolls, and may contain nothing else that a keyboard reaches.
+        tabIndex={runs ? 0 : undefined}
+      >
         {!program.held && !asked && (
           <section className="operator-state" aria-label={t`State`} role="status">
             <Icon name={icon} size={56} />
