@@ -51,9 +51,21 @@ _LAYOUT: Final = Path(__file__).with_name("layout.js").read_text()
 _CLIPPED: Final = Path(__file__).with_name("clipped.js").read_text()
 _AXE: Final = _NODE_MODULES / "axe-core" / "axe.min.js"
 _UNDRAWN: Final = """
-for (const name of ["clear", "drawArrays", "drawArraysInstanced", "drawElements", "drawElementsInstanced"]) {
-  WebGL2RenderingContext.prototype[name] = () => {};
-}"""
+window.__drawn = { frame: -1, calls: 0, triangles: 0, most: { calls: 0, triangles: 0 } };
+const drawn = (mode, indices, instances = 1) => {
+  const tally = window.__drawn, frame = window.__engine?.frames ?? 0;
+  if (frame !== tally.frame) Object.assign(tally, { frame, calls: 0, triangles: 0 });
+  tally.calls += 1;
+  if (mode === WebGL2RenderingContext.TRIANGLES) tally.triangles += (indices / 3) * instances;
+  for (const key of ["calls", "triangles"]) tally.most[key] = Math.max(tally.most[key], tally[key]);
+};
+Object.assign(WebGL2RenderingContext.prototype, {
+  clear: () => {},
+  drawArrays: (mode, first, count) => drawn(mode, count),
+  drawArraysInstanced: (mode, first, count, instances) => drawn(mode, count, instances),
+  drawElements: (mode, count) => drawn(mode, count),
+  drawElementsInstanced: (mode, count, type, offset, instances) => drawn(mode, count, instances),
+});"""
 _RULES: Final = """async () => {
   const tags = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"];
   const { violations } = await axe.run(document, { runOnly: tags, resultTypes: ["violations"] });
@@ -158,6 +170,10 @@ class Screen:
         while await close.count():
             await close.first.click()
             await self.settle()
+
+    async def drawn(self) -> dict[str, int]:
+        """Return the largest number of draw calls and of triangles of a frame so far, with `drawn=False`."""
+        return dict(await self.page.evaluate("window.__drawn.most"))
 
     async def frames(self) -> int:
         return int(await self.page.evaluate("window.__engine.frames"))

@@ -201,9 +201,15 @@ async def test_camera_and_robot_are_calibrated_from_pictures(
         # The message bar and the panel show the server's reason.
         failed = bar.locator(".task[data-state=failed]")
         await failed.filter(has_text="No markers are configured").wait_for()
-        await panel.get_by_text("Failed: No markers are configured").wait_for()
+        reason = panel.get_by_text(re.compile(rf"^Failed {texts.AGO}: No markers are configured"))
+        await reason.wait_for()
         assert await bar.get_by_text("No markers are configured").count() == 1
         await configure_markers(cell)
+        # A panel that is opened again does not show what is over.
+        await screen.close_panels()
+        await _choose(screen, "eye")
+        await panel.get_by_role("button", name=texts.FIND_BY_MARKERS).wait_for()
+        await expect(reason).to_have_count(0)
         before = await _stands(screen, ids["eye"])
         # The failed attempt does not hide the running one.
         await asyncio.gather(panel.get_by_text("In progress: ").wait_for(), screen.press(texts.FIND_BY_MARKERS))

@@ -55,6 +55,8 @@ it("separates the addresses of a device from a message", () => {
   );
   const unread = splitAddress("reader at /dev/pts/4: no code was read within 2 s");
   expect(unread).toEqual({ text: "reader: no code was read within 2 s", address: "/dev/pts/4" });
+  const simulated = splitAddress("reader at /tmp/arcor2-fake-5omxc6d9/tty: no code was read within 2 s");
+  expect(simulated).toEqual({ ...unread, address: "/tmp/arcor2-fake-5omxc6d9/tty" });
   for (const text of ["Ready.", "version 1.2.3 at 5.0 s", "use [a] or [b] here", "[host x]"])
     expect(splitAddress(text)).toEqual({ text, address: "" });
 });

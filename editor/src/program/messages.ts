@@ -19,7 +19,7 @@ export function shownMessage({ doc, program }: Pick<State, "doc" | "program">): 
  */
 const LABEL = /(?<=\S) \[([^[\]]+)\]$/;
 const HOST =
-  / (?:\((?:[\p{L} ]+ )?|\p{Ll}{2,5} )?((?:socket:\/\/)?(?:\d{1,3}\.){3}\d{1,3}(?::\d+)?|\/dev\/[\w/-]+)\)?/gu;
+  / (?:\((?:[\p{L} ]+ )?|\p{Ll}{2,5} )?((?:socket:\/\/)?(?:\d{1,3}\.){3}\d{1,3}(?::\d+)?|\/(?:dev|tmp)\/[\w/-]+)\)?/gu;
 
 /** Split a message of a device into the text for operators, and the addresses in it, which are for technicians. */
 export function splitAddress(message: string): { text: string; address: string } {

@@ -1,19 +1,29 @@
-/** Calibrations of an object, newest first, and the running one. */
+/** Calibrations of an object, newest first, and the one that is running or has ended while they are shown. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { type CalibrationRecord, recordsOf, verdictOf } from "../../commands/calibrate";
-import { dateAndTime, fixed } from "../../formats";
-import { useEditor } from "../../store/store";
+import { ago, dateAndTime, fixed } from "../../formats";
+import type { State } from "../../store/state";
+import { now, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
+import { useTicking } from "../times";
 import { BeforeAfter } from "./BeforeAfter";
 import "./calibrate.css";
 
+const endedTasks = ({ tasks }: State): ReadonlySet<string> =>
+  new Set(Object.keys(tasks).filter((id) => tasks[id]?.state !== "running"));
+
 export function Records({ id }: { id: string }) {
   const name = useEditor((state) => nameOf(state, id));
+  // The cause of an earlier failure may have been removed meanwhile, for example by configuring markers.
+  const [before] = useState(() => endedTasks(now()));
   const task = useEditor((state) =>
-    Object.values(state.tasks).findLast((each) => each.kind === "calibration" && each.title.includes(name)),
+    Object.values(state.tasks).findLast(
+      (each) => each.kind === "calibration" && each.title.includes(name) && !before.has(each.id),
+    ),
   );
+  useTicking();
   const [records, setRecords] = useState<CalibrationRecord[]>([]);
   const state = task?.state ?? "";
   useEffect(() => {
@@ -33,7 +43,7 @@ export function Records({ id }: { id: string }) {
           {state === "running"
             ? t`In progress: ${task.message ?? ""}`
             : state === "failed"
-              ? t`Failed: ${task.message ?? ""}`
+              ? t`Failed ${ago(task.started)}: ${task.message ?? ""}`
               : task.message}
         </p>
       )}

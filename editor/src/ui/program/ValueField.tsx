@@ -5,11 +5,15 @@
 
 import { t } from "@lingui/core/macro";
 import type { ReactNode } from "react";
-import { useEffect, useId, useState } from "react";
+import { Suspense, useEffect, useId, useState } from "react";
 import { decimal } from "../../formats";
 import { words } from "../../program/naming";
 import { type Extra, rangeWords, read, shownUnit, textOf, withoutUnit } from "../../program/values";
+import { Button } from "../kit/kit";
+import { lazyComponent } from "../kit/lazy";
 import "./value.css";
+
+const ValuePad = lazyComponent(() => import("./ValuePad"));
 
 export interface Choice {
   /** JSON of the value. */
@@ -61,6 +65,7 @@ export function ValueField({
   const known = stored ? "" : textOf(type, json, extra);
   const [text, setText] = useState(known);
   const [problem, setProblem] = useState("");
+  const [padOpen, setPadOpen] = useState(false);
   const id = useId();
   // The value was changed by another user, or accepted. A text that means the same stays as it is typed.
   useEffect(() => {
@@ -81,6 +86,16 @@ export function ValueField({
     if ("problem" in found) setProblem(found.problem);
     else void set(found.json);
   };
+  const takeTyped = (typed: string) => {
+    setText(typed);
+    const found = onTyped && read(type, typed, extra);
+    if (found && "json" in found) onTyped(found.json);
+  };
+  const reset = () => {
+    setText(known);
+    setProblem("");
+  };
+  const isNumber = type === "integer" || type === "double";
   const range = rangeWords(type, extra);
   const [unit] = shownUnit(type, extra);
   const about = [hint && withoutUnit(hint, type, extra), range].filter(Boolean).join(" · ");
@@ -134,32 +149,56 @@ export function ValueField({
           ))}
         </select>
       ) : (
-        <span className="with-unit">
-          <input
-            {...described}
-            value={text}
-            inputMode={type === "integer" || type === "double" ? "decimal" : undefined}
-            type={secret ? "password" : undefined}
-            placeholder={stored ? t`Stored. Type to replace it.` : undefined}
-            autoComplete={secret ? "new-password" : "off"}
-            autoFocus={autoFocus}
-            onChange={(event) => {
-              setText(event.target.value);
-              const found = onTyped && read(type, event.target.value, extra);
-              if (found && "json" in found) onTyped(found.json);
-            }}
-            onBlur={leave}
-            onKeyDown={(event) => {
-              if (event.key === "Enter") leave();
-              if (event.key === "Escape" && text !== known) {
-                event.stopPropagation();
-                setText(known);
-                setProblem("");
-              }
-            }}
-          />
-          {unit && <span className="unit quiet">{unit}</span>}
-        </span>
+        <>
+          <span className="with-unit">
+            <input
+              {...described}
+              value={text}
+              inputMode={isNumber ? "decimal" : undefined}
+              type={secret ? "password" : undefined}
+              placeholder={stored ? t`Stored. Type to replace it.` : undefined}
+              autoComplete={secret ? "new-password" : "off"}
+              autoFocus={autoFocus}
+              onChange={(event) => takeTyped(event.target.value)}
+              onBlur={leave}
+              onKeyDown={(event) => {
+                if (event.key === "Enter") leave();
+                if (event.key === "Escape" && text !== known) {
+                  event.stopPropagation();
+                  reset();
+                }
+              }}
+            />
+            {unit && <span className="unit quiet">{unit}</span>}
+            {isNumber && !why && (
+              <Button
+                className="pad-open"
+                aria-label={t`Number pad for ${name}`}
+                aria-expanded={padOpen}
+                onPress={() => setPadOpen(!padOpen)}
+              >
+                123
+              </Button>
+            )}
+          </span>
+          {padOpen && (
+            <Suspense fallback={null}>
+              <ValuePad
+                label={name}
+                text={text}
+                onTyped={takeTyped}
+                onSet={() => {
+                  leave();
+                  setPadOpen(false);
+                }}
+                onCancel={() => {
+                  reset();
+                  setPadOpen(false);
+                }}
+              />
+            </Suspense>
+          )}
+        </>
       )}
       <span id={`${id}-about`} className="quiet small about-value">
         {problem ? (

@@ -2,9 +2,9 @@
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useId, useState } from "react";
-import { decimalPoint } from "../../formats";
 import { ANGLE_UNITS, amount, isAngle, LENGTH_UNITS, show, type Unit } from "../../transform/amounts";
 import { Button } from "../kit/kit";
+import { PadKeys } from "../kit/PadKeys";
 
 interface NumberPadProps {
   label: string;
@@ -20,8 +20,6 @@ interface NumberPadProps {
   onDone: (value: number) => void;
   onClose: () => void;
 }
-
-const KEYS = ["7", "8", "9", "4", "5", "6", "1", "2", "3", "0", ".", "−"] as const;
 
 export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy, onDone, onClose }: NumberPadProps) {
   const id = useId();
@@ -62,18 +60,7 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
           ⌫
         </Button>
       </div>
-      <div className="pad-keys">
-        {KEYS.map((key) => (
-          <Button
-            key={key}
-            className="pad-key"
-            excludeFromTabOrder
-            aria-label={key === "−" ? t`minus` : key === "." ? t`decimal point` : key}
-            onPress={() => setText(text + (key === "−" ? "-" : key === "." ? decimalPoint() : key))}
-          >
-            {key === "." ? decimalPoint() : key}
-          </Button>
-        ))}
+      <PadKeys onKey={(key) => setText(text + key)}>
         <Button className="pad-key" excludeFromTabOrder aria-label={t`plus`} onPress={() => setText(`${text}+`)}>
           +
         </Button>
@@ -89,7 +76,7 @@ export function NumberPad({ label, value, unit, by, onlyBy = false, onUnit, onBy
             {each}
           </Button>
         ))}
-      </div>
+      </PadKeys>
       <div className="actions">
         {!onlyBy && (
           <Button aria-pressed={change} onPress={() => onBy(!by)}>
