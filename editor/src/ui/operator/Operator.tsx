@@ -159,7 +159,13 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
           <RunButtons />
         ) : (
           <>
-            <Button look="primary" icon="play" why={why} isDisabled={starting || product === undefined} onPress={() => void start()}>
+            <Button
+              look="primary"
+              icon="play"
+              why={why}
+              isDisabled={starting || product === undefined}
+              onPress={() => void start()}
+            >
               {t`Start`}
             </Button>
             {known && <p data-name>{made ? shownRecipe(made.recipe) : known.package_meta.name}</p>}
