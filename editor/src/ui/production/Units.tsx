@@ -187,9 +187,9 @@ function Details({ unit, onBack }: { unit: UnitRecord; onBack: () => void }) {
       </dl>
       <div className="units" tabIndex={0} role="group" aria-label={t`Steps`}>
         <ol>
-          {unit.steps.map((step) => (
+          {unit.steps.map(({ name, started, ...step }) => (
             <li key={`${step.run}-${step.number}`}>
-              <strong data-name>{step.name}</strong> <span className="quiet small">{dateAndTime(step.started)}</span>{" "}
+              <strong data-name>{name}</strong> <span className="quiet small">{dateAndTime(started)}</span>{" "}
               {step.duration !== undefined && <span className="quiet small">{duration(step.duration)}</span>}{" "}
               {step.results && <span data-name>{step.results.join(", ")}</span>}
               {step.error && <span className="error small">{step.error}</span>}
