@@ -181,7 +181,7 @@ class Screen:
     async def faults(self) -> list[str]:
         """Return which controls are too small, off the screen, covered or overlapping."""
         found = list(await self.page.evaluate(_LAYOUT, SMALLEST))
-        if any(fault.startswith("labels ") for fault in found):  # labels in the view move one frame after the layout
+        if found:  # labels and clusters of the view move one frame after the layout
             await self.settle()
             found = list(await self.page.evaluate(_LAYOUT, SMALLEST))
         return found

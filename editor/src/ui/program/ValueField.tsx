@@ -13,6 +13,8 @@ import { Button } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
 import "./value.css";
 
+/** Nine keys, as dots. */
+const KEYPAD = "M5 5h0M12 5h0M19 5h0M5 12h0M12 12h0M19 12h0M5 19h0M12 19h0M19 19h0";
 const ValuePad = lazyComponent(() => import("./ValuePad"));
 
 export interface Choice {
@@ -177,7 +179,9 @@ export function ValueField({
                 aria-expanded={padOpen}
                 onPress={() => setPadOpen(!padOpen)}
               >
-                123
+                <svg viewBox="0 0 24 24" width="20" aria-hidden="true">
+                  <path d={KEYPAD} stroke="currentColor" strokeWidth="4" strokeLinecap="round" />
+                </svg>
               </Button>
             )}
           </span>
