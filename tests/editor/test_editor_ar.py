@@ -18,7 +18,7 @@ from arcor2_hw.data.object_type import Box, Model3dType, ObjectModel
 from tests.editor import texts
 from tests.editor.ar_probe import overlay_errors
 from tests.editor.camera_video import CAMERA, MARKERS, MIDDLE, Shot, marker_table, write_video
-from tests.editor.screen import VIEWPORTS, Screen, running_browser, screen_of
+from tests.editor.screen import SMALLEST, VIEWPORTS, Screen, running_browser, screen_of
 from tests.server.core.serving import ServerProcess, running, talking
 
 Point = tuple[float, float, float]
@@ -54,7 +54,7 @@ DARKEN = """() => {
 
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def server(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -> AsyncIterator[ServerProcess]:
-    """A server with two markers and an open scene: a box between the markers."""
+    """A server with two markers and a scene that is online: a box between the markers."""
     directory = tmp_path_factory.mktemp("ar")
     (directory / "markers.yaml").write_text(json.dumps(marker_table()))  # YAML contains JSON
     box = ObjectModel(Model3dType.BOX, box=Box("box", 0.1, 0.06, 0.04))
@@ -65,12 +65,31 @@ async def server(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -
             await talker.granted(
                 "AddVirtualCollisionObjectToScene", to_builtins({"name": "box", "pose": at, "model": box})
             )
+            await talker.granted("StartScene", {})
         yield process
 
 
 async def start_ar(screen: Screen) -> None:
     await screen.page.get_by_role("button", name="AR", exact=True).click()
     await screen.press("Start AR")
+
+
+async def check_stop(screen: Screen) -> None:
+    """Check that Stop motion is large enough and that nothing covers it."""
+    await screen.settle()
+    button = screen.page.get_by_role("button", name=texts.STOP_MOTION)
+    box = await button.bounding_box()
+    assert box is not None
+    assert min(box["width"], box["height"]) >= SMALLEST
+    covered = await button.evaluate(
+        """(button) => {
+            const { left, right, top, bottom } = button.getBoundingClientRect();
+            const points = [0.1, 0.5, 0.9].flatMap((across) => [0.1, 0.5, 0.9].map((down) => (
+                [left + across * (right - left), top + down * (bottom - top)])));
+            return points.filter(([x, y]) => !button.contains(document.elementFromPoint(x, y)));
+        }"""
+    )
+    assert covered == []
 
 
 async def until_fitting(
@@ -113,6 +132,7 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         await screen.picture("ar start")
         await screen.press("Start AR")
         await until_fitting(screen, shots, [MIDDLE], MAX_NEAR)
+        await check_stop(screen)
         # The focal length is found while the camera moves.
         quality = page.get_by_role("group", name="Quality of AR")
         await expect(quality).to_have_text(re.compile(r"Good ±\d+ mm, 2 markers, now"))
@@ -156,11 +176,14 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         await page.mouse.click(canvas["x"] + at["x"], canvas["y"] + at["y"])
         await page.get_by_role("complementary").get_by_role("heading", name="box").wait_for()
         await screen.picture("ar selected")
-        await screen.close_panels()
+        await check_stop(screen)
         await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
+        await check_stop(screen)
+        await screen.close_panels()
         await screen.press("Continue")
         await until_fitting(screen, shots, [MIDDLE], MAX_NEAR)
         assert await screen.faults() == []
+        await check_stop(screen)
         await screen.picture("ar phone")
         await page.set_viewport_size(VIEWPORTS["ipad"])  # type: ignore[arg-type]
         # Leaving stops the camera and restores the view.

@@ -10,6 +10,7 @@ import { remember, remembered } from "../session/localStorage";
 import { rest } from "../session/rest";
 import { now, setUi } from "../store/store";
 import type { Ar } from "../store/ui";
+import { endHolds } from "./holdToRun";
 
 declare module "../store/runtime" {
   interface Runtime {
@@ -63,9 +64,11 @@ export async function startAr(layout: Layout, onEnd: (obstacle: Obstacle) => voi
   });
 }
 
-/** Leave AR and stop the camera. `stay`: continue in the 3D view from the same viewpoint. */
+/** Leave AR, stop the camera and end a held motion. `stay`: continue in the 3D view from the same viewpoint. */
 export function leaveAr(stay = false): void {
-  now().runtime.ar?.stop(stay);
+  const { ar } = now().runtime;
+  if (ar) endHolds();
+  ar?.stop(stay);
   use(undefined);
   if (now().ui.ar) setUi({ ar: null });
 }
@@ -85,7 +88,9 @@ export const showMarkers = (markers: boolean): void => report({ markers });
 
 function report(change: Partial<Ar>): void {
   const { ar } = now().ui;
-  if (ar) setUi({ ar: { ...ar, ...change } });
+  if (!ar) return;
+  if (change.phase === "lost" && ar.phase !== "lost") endHolds();
+  setUi({ ar: { ...ar, ...change } });
 }
 
 function initialAr(): Ar {
