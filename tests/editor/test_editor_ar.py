@@ -92,6 +92,48 @@ async def check_stop(screen: Screen) -> None:
     assert covered == []
 
 
+async def check_placing_by_hand(screen: Screen) -> None:
+    """Place the workplace by hand with a drag and with buttons, on a tablet and on a phone."""
+    page = screen.page
+    quality = page.get_by_role("group", name="Quality of AR")
+    await expect(quality).to_have_text(re.compile("Not placed"))
+    await screen.press("Place")
+    await expect(quality).to_have_text(re.compile("Placed by hand"))
+    placing = page.get_by_role("group", name="Place the workplace")
+    box = await page.evaluate("window.__engine.ids().find((id) => __engine.item(id).name === 'box')")
+    canvas = await page.locator(".view canvas").bounding_box()
+    assert canvas is not None
+    # The box is 2 cm above the floor, so it moves a little more than the finger.
+    before = (await screen.item(box))["screen"]
+    x, y = canvas["x"] + 600, canvas["y"] + 400
+    await page.mouse.move(x, y)
+    await page.mouse.down()
+    await page.mouse.move(x + 80, y, steps=4)
+    await page.mouse.up()
+    after = (await screen.item(box))["screen"]
+    assert after["x"] - before["x"] == pytest.approx(80, rel=0.2)
+    for name in ("Up", "Turn left", "Camera down"):
+        await placing.get_by_role("button", name=name, exact=True).click()
+    await screen.settle()
+    assert await screen.faults() == []
+    assert await screen.barriers() == []
+    await screen.picture("ar by hand")
+    await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
+    await check_stop(screen)
+    assert await screen.faults() == []
+    await screen.picture("ar by hand phone")
+    await page.set_viewport_size(VIEWPORTS["ipad"])  # type: ignore[arg-type]
+    # The device stores the place, until it is reset.
+    placed = await page.evaluate("__ar.shown.view.shift")
+    await screen.press("Leave AR")
+    await start_ar(screen)
+    await screen.press("Place")
+    await expect(quality).to_have_text(re.compile("Placed by hand"))
+    assert await page.evaluate("__ar.shown.view.shift") == pytest.approx(placed, abs=0.02)
+    await placing.get_by_role("button", name="Reset").click()
+    await expect(quality).to_have_text(re.compile("Not placed"))
+
+
 async def until_fitting(
     screen: Screen, shots: list[Shot], points: list[tuple[float, float, float]], most: float
 ) -> None:
@@ -119,13 +161,14 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         await screen.join("Eva")
         await screen.until("() => window.__engine?.ids().length > 0")
         before = await page.evaluate("window.__engine.view.viewpoint")
-        # Without markers, the reason and the next step are shown.
+        # Without markers, the reason and the next step are shown, and the workplace is placed by hand.
         await page.route("**/api/calibration/markers", lambda route: route.fulfill(body='{"markers": []}'))
         await page.get_by_role("button", name="AR", exact=True).click()
         await screen.sees("No markers are configured.")
-        assert await page.get_by_role("button", name="Start AR").count() == 0
-        await page.get_by_role("dialog").get_by_role("button", name="Close").click()
+        await screen.press("Start AR")
+        await check_placing_by_hand(screen)
         await page.unroute("**/api/calibration/markers")
+        await screen.press("Leave AR")
         await page.get_by_role("button", name="AR", exact=True).click()
         await screen.sees("Pictures stay on this device.")
         assert await screen.barriers() == []
@@ -136,6 +179,15 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         # The focal length is found while the camera moves.
         quality = page.get_by_role("group", name="Quality of AR")
         await expect(quality).to_have_text(re.compile(r"Good ±\d+ mm, 2 markers, now"))
+        await until_fitting(screen, shots, ASIDE, MAX_ASIDE)
+        # A correction of the registration is shown as such, and can be reset.
+        placing = page.get_by_role("group", name="Place the workplace")
+        await screen.press("Place")
+        await placing.get_by_role("button", name="Right", exact=True).click()
+        await expect(quality).to_have_text(re.compile(r"Moved by hand 10 mm, 0°, 2 markers, now"))
+        await screen.picture("ar nudged")
+        await placing.get_by_role("button", name="Reset").click()
+        await screen.press("Place")
         await until_fitting(screen, shots, ASIDE, MAX_ASIDE)
         outlines = page.get_by_role("button", name="Markers")
         await outlines.click()

@@ -2,13 +2,28 @@
 
 import type { Engine } from "../engine/engine";
 import type { Ar } from "../store/ui";
-import { Backdrop } from "./backdrop";
-import { type Mat3, mean, type Vec3 } from "./geometry";
+import { Backdrop, pictured } from "./backdrop";
+import { type Mat3, mean, norm, type Point, sub, type Vec3 } from "./geometry";
 import { Gyro, turnedView } from "./gyro";
 import { type FocalLength, KNOWN, lensOf } from "./lens";
 import type { Layout } from "./places";
+import {
+  combined,
+  type Direction,
+  dragged,
+  type Movement,
+  movedPoint,
+  movedView,
+  type Placement,
+  sightOf,
+  stepTowards,
+  tilted,
+  UNMOVED,
+  viewFrom,
+} from "./placing";
 import type { Lens, View } from "./pose";
 import { JUMP, jumpBetween } from "./registration";
+import { Sharing } from "./sharing";
 import { ArProblem, obstacleOfError } from "./support";
 import type { Found } from "./tracker";
 import type { FromWorker, ToWorker } from "./worker";
@@ -27,6 +42,7 @@ const VEILS: Readonly<Record<Ar["phase"], number>> = {
   registered: 0,
   bridging: 0.2,
   lost: 0.65,
+  hand: 0,
 };
 const WANTED: MediaTrackConstraints = {
   facingMode: { ideal: "environment" },
@@ -53,6 +69,9 @@ interface Options {
   /** The known focal length of a camera by its name; null if it is not known. */
   stored: (camera: string) => FocalLength | null;
   store: (camera: string, focal: FocalLength | null) => void;
+  /** What was placed by hand with a camera. */
+  placement: (camera: string) => Placement;
+  storePlacement: (camera: string, placement: Placement) => void;
   report: (state: Partial<Ar>) => void;
   /** Called when the camera ends without our doing. */
   ended: () => void;
@@ -98,6 +117,15 @@ export class ArSession {
   /** Orientation of the camera in the waiting picture, and in the last one with markers. */
   private orientation: Mat3 | null = null;
   private anchor: { view: View; orientation: Mat3 | null; at: number } | null = null;
+  /** Orientation of the camera in the shown picture. */
+  private shownOrientation: Mat3 | null = null;
+  /** Whether the anchor was placed by hand. */
+  private byHand = false;
+  /** Whether to place by hand as soon as there is a picture. */
+  private placeLater = false;
+  /** Correction of the views from markers by the user. */
+  private nudge: Movement;
+  private readonly sharing: Sharing;
   private phase: Ar["phase"] = "looking";
   private reportedAt = 0;
   private correction = { size: 0, at: 0 };
@@ -112,6 +140,8 @@ export class ArSession {
     const { width = 0, height = 0 } = track?.getSettings() ?? {};
     this.camera = `${track?.label} ${Math.max(width, height)} × ${Math.min(width, height)}`;
     this.middles = [...options.layout.places.values()].map(({ corners }) => mean(corners));
+    this.nudge = options.placement(this.camera).nudge ?? UNMOVED;
+    this.sharing = new Sharing((camera) => options.report({ camera }));
     if (track) track.onended = () => this.ended || options.ended();
     this.video.muted = true;
     this.video.playsInline = true;
@@ -148,10 +178,93 @@ export class ArSession {
     this.options.store(this.camera, null);
     this.worker?.terminate();
     this.anchor = null;
+    this.byHand = false;
     this.busy = false;
     this.beginWorker(null);
     this.enter("looking", {});
     this.freeze(false);
+  }
+
+  /** Place the workplace by hand until markers register it, unless they do so now. */
+  placeByHand(): void {
+    const { shown, byHand, phase, options } = this;
+    this.placeLater = !shown;
+    if (!shown || byHand || phase === "registered") return;
+    const sight = options.placement(this.camera).sight ?? options.engine.view.viewpoint;
+    this.byHand = true;
+    this.change(shown.view ?? viewFrom(sight, this.shownOrientation), "hand");
+  }
+
+  /** Move the workplace with the fingers from points of the 3D view to others, pixels. */
+  drag(from: readonly Point[], to: readonly Point[]): void {
+    const { shown } = this;
+    if (!shown?.view) return;
+    const size = this.options.engine.shown();
+    const inPicture = (point: Point) => pictured(point, shown.found, size);
+    const movement = dragged(from.map(inPicture), to.map(inPicture), shown.view, shown.lens);
+    if (movement) this.move(movement);
+  }
+
+  /** Move the workplace by a distance, m, or an angle, rad. */
+  step(direction: Direction, size: { distance: number; angle: number }): void {
+    if (this.shown?.view) this.move(stepTowards(direction, size, this.shown.view));
+  }
+
+  /** Tilt the camera of a view that was placed by hand upwards, rad. */
+  tilt(angle: number): void {
+    if (this.byHand && this.shown?.view) this.change(tilted(this.shown.view, angle));
+  }
+
+  /** Store what was placed by hand on this device. */
+  keepPlacement(): void {
+    const { nudge, byHand, shown } = this;
+    const sight = byHand && shown?.view ? sightOf(shown.view) : this.options.placement(this.camera).sight;
+    this.options.storePlacement(this.camera, { ...(sight && { sight }), ...(nudge !== UNMOVED && { nudge }) });
+  }
+
+  /** Forget what was placed by hand. */
+  resetPlacement(): void {
+    this.nudge = UNMOVED;
+    this.options.storePlacement(this.camera, {});
+    this.options.report({ nudge: null });
+    if (this.byHand) {
+      this.byHand = false;
+      this.anchor = null;
+      this.enter("looking", {});
+      this.freeze(false);
+    } else {
+      const view = this.predicted(this.shownOrientation);
+      if (view) this.change(view);
+    }
+  }
+
+  private move(by: Movement): void {
+    if (this.phase === "lost") this.placeByHand();
+    if (!this.shown?.view) return;
+    if (!this.byHand) {
+      this.nudge = combined(this.nudge, by);
+      this.options.report({ nudge: this.nudgeSize() });
+    }
+    this.change(movedView(this.shown.view, by));
+  }
+
+  /** Show another view, also over a frozen picture. */
+  private change(view: View, phase = this.phase): void {
+    const { shown } = this;
+    if (!shown) return;
+    this.shown = { ...shown, view };
+    if (this.byHand) this.anchor = { view, orientation: this.shownOrientation, at: performance.now() };
+    this.backdrop?.show(view, shown.lens, VEILS[phase]);
+    this.enter(phase, {});
+    this.onPicture();
+  }
+
+  /** Return how far the user moved the overlay at the markers, m, and by which angle, rad; null if not at all. */
+  private nudgeSize(): Ar["nudge"] {
+    const { nudge, middles } = this;
+    if (nudge === UNMOVED || middles.length === 0) return null;
+    const middle = mean(middles);
+    return { distance: norm(sub(movedPoint(middle, nudge), middle)), angle: nudge.angle };
   }
 
   private beginWorker(focal: FocalLength | null): void {
@@ -208,15 +321,17 @@ export class ArSession {
     const { width, height, registration, focal, checked } = found;
     const now = performance.now();
     const lens = lensOf(focal, width, height);
-    const before = this.predicted();
+    const before = this.predicted(this.orientation);
+    this.shownOrientation = this.orientation;
     const age = this.anchor ? now - this.anchor.at : Number.POSITIVE_INFINITY;
     let view = before;
     if (registration) {
-      view = registration.view;
-      const wasLost = this.phase === "bridging" || this.phase === "lost";
+      view = movedView(registration.view, this.nudge);
+      const wasLost = ["bridging", "lost", "hand"].includes(this.phase);
       const jump = before && wasLost ? jumpBetween(before, view, this.middles) : 0;
       if (jump > JUMP) this.correction = { size: jump, at: now };
-      this.anchor = { view, orientation: this.orientation, at: now };
+      this.anchor = { view: registration.view, orientation: this.orientation, at: now };
+      this.byHand = false;
       if (focal.deviation <= KNOWN) this.options.store(this.camera, focal);
     }
     if (this.canvas.width !== width || this.canvas.height !== height) {
@@ -227,11 +342,22 @@ export class ArSession {
     this.context?.drawImage(this.waiting, 0, 0);
     this.backdrop ??= new Backdrop(this.options.engine, this.canvas);
     const bridged = age <= (this.anchor?.orientation && this.orientation ? BRIDGE : BLINK);
-    const phase = registration ? "registered" : !this.anchor ? "looking" : bridged ? "bridging" : "lost";
+    const phase = this.byHand
+      ? "hand"
+      : registration
+        ? "registered"
+        : !this.anchor
+          ? "looking"
+          : bridged
+            ? "bridging"
+            : "lost";
     this.backdrop.show(view, lens, VEILS[phase]);
     const count = (this.shown?.count ?? 0) + 1;
     this.shown = { found, view, lens, latency: now - this.taken, ms, count };
+    this.sharing.take(phase === "lost" ? null : view, now);
     this.enter(phase, {
+      nudge: this.nudgeSize(),
+      sensor: this.orientation !== null,
       checked,
       loss: found.loss ?? "unseen",
       corrected: now - this.correction.at < CORRECTION ? this.correction.size : 0,
@@ -244,14 +370,16 @@ export class ArSession {
         seenAt: Date.now(),
       }),
     });
+    if (this.placeLater) this.placeByHand();
     this.onPicture();
   }
 
-  /** Return the view of the waiting picture without its markers: the last one, turned as the device was. */
-  private predicted(): View | null {
+  /** Return the view of a picture without its markers: the last one, turned as the device was. */
+  private predicted(orientation: Mat3 | null): View | null {
     if (!this.anchor) return null;
-    const { view, orientation } = this.anchor;
-    return orientation && this.orientation ? turnedView(view, orientation, this.orientation) : view;
+    const { orientation: before } = this.anchor;
+    const view = this.byHand ? this.anchor.view : movedView(this.anchor.view, this.nudge);
+    return before && orientation ? turnedView(view, before, orientation) : view;
   }
 
   private enter(phase: Ar["phase"], state: Partial<Ar>): void {

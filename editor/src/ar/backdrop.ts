@@ -11,6 +11,7 @@ import {
   SRGBColorSpace,
 } from "three";
 import type { Engine } from "../engine/engine";
+import type { Point } from "./geometry";
 import { eyeOf, type Lens, type View } from "./pose";
 
 /** Depth of the picture in the view: behind everything. */
@@ -31,6 +32,19 @@ export interface Placement {
 export function placed(picture: { width: number; height: number }, view: { width: number; height: number }): Placement {
   const scale = Math.max(view.width / picture.width, view.height / picture.height);
   return { scale, width: picture.width * scale, height: picture.height * scale };
+}
+
+/** Return the point of a picture, pixels, at a point of the view that it fills. */
+export function pictured(
+  [x, y]: Point,
+  picture: { width: number; height: number },
+  view: { width: number; height: number },
+): Point {
+  const { scale } = placed(picture, view);
+  return [
+    (x - view.width / 2) / scale + picture.width / 2 - 0.5,
+    (y - view.height / 2) / scale + picture.height / 2 - 0.5,
+  ];
 }
 
 export class Backdrop {

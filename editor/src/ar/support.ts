@@ -3,8 +3,9 @@
 import type { Layout } from "./places";
 
 /**
- * Why AR cannot start. `insecure`: the page is not trusted; `browser`: it lacks a function; `markers`: none is
- * configured; `dictionary`: AR does not detect the configured markers; the others are about the camera.
+ * Why AR cannot start. `insecure`: the page is not trusted; `browser`: it lacks a function; the others are about the
+ * camera. With two of them, AR starts, and the user places the workplace by hand: `markers`: none is configured;
+ * `dictionary`: AR does not detect the configured markers.
  */
 export type Obstacle = "insecure" | "browser" | "markers" | "dictionary" | "refused" | "missing" | "busy" | "ended";
 
@@ -30,7 +31,7 @@ export function abilitiesOf(scope: typeof globalThis): Abilities {
   };
 }
 
-/** Return what prevents AR; null if nothing is known to. */
+/** Return what prevents AR or registration; null if nothing is known to. */
 export function obstacleOf({ secure, camera, workers }: Abilities, layout: Layout | null): Obstacle | null {
   if (!secure) return "insecure"; // without it, browsers hide the camera
   if (!camera || !workers) return "browser";

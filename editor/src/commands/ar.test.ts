@@ -24,7 +24,7 @@ vi.mock("../ar/arSession", () => ({
 const { leaveAr, startAr } = await import("./ar");
 
 async function started(): Promise<Options> {
-  await startAr({} as never, () => {});
+  await startAr({ places: new Map() } as never, () => {});
   endHolds.mockClear();
   return sessions.at(-1) as Options;
 }

@@ -4,6 +4,7 @@ import { ArSession, openCamera, releaseCamera } from "../ar/arSession";
 import { askForMotion } from "../ar/gyro";
 import type { FocalLength } from "../ar/lens";
 import { type Layout, layoutOf, type MarkerTable } from "../ar/places";
+import type { Placement } from "../ar/placing";
 import { ArProblem, type Obstacle } from "../ar/support";
 import { theEngine } from "../session/engine";
 import { remember, remembered } from "../session/localStorage";
@@ -48,8 +49,11 @@ export async function startAr(layout: Layout, onEnd: (obstacle: Obstacle) => voi
   const session = new ArSession(stream, {
     engine,
     layout,
-    stored: (camera) => lenses()[camera] ?? null,
+    stored: (camera) => recordOf<FocalLength>("lenses")[camera] ?? null,
     store: storeLens,
+    placement: (camera) => recordOf<Placement>("placements")[camera] ?? {},
+    storePlacement: (camera, placement) =>
+      remember("placements", JSON.stringify({ ...recordOf<Placement>("placements"), [camera]: placement })),
     report,
     ended: () => {
       leaveAr();
@@ -57,7 +61,7 @@ export async function startAr(layout: Layout, onEnd: (obstacle: Obstacle) => voi
     },
   });
   use(session);
-  setUi({ ar: initialAr() });
+  setUi({ ar: initialAr(layout.places.size) });
   await session.start().catch(() => {
     leaveAr();
     throw new ArProblem("busy");
@@ -84,6 +88,18 @@ export function recalibrateAr(): void {
   now().runtime.ar?.recalibrate();
 }
 
+/** Open or close the controls for placing; without a registration, the workplace is placed by hand from now on. */
+export function openPlacing(placing: boolean): void {
+  if (placing) now().runtime.ar?.placeByHand();
+  report({ placing });
+}
+
+/** Forget what was placed by hand. */
+export function resetPlacing(): void {
+  now().runtime.ar?.resetPlacement();
+  report({ placing: now().ui.ar?.phase === "registered" });
+}
+
 export const showMarkers = (markers: boolean): void => report({ markers });
 
 function report(change: Partial<Ar>): void {
@@ -93,7 +109,7 @@ function report(change: Partial<Ar>): void {
   setUi({ ar: { ...ar, ...change } });
 }
 
-function initialAr(): Ar {
+function initialAr(configured: number): Ar {
   return {
     phase: "starting",
     frozen: false,
@@ -107,21 +123,26 @@ function initialAr(): Ar {
     seenAt: 0,
     loss: "unseen",
     corrected: 0,
+    configured,
+    sensor: false,
+    nudge: null,
+    placing: false,
+    camera: null,
     startedAt: Date.now(),
   };
 }
 
-/** Return the focal lengths of the cameras of this device. */
-function lenses(): Record<string, FocalLength> {
+/** Return what this device stores for each of its cameras. */
+function recordOf<T>(key: "lenses" | "placements"): Record<string, T> {
   try {
-    return (JSON.parse(remembered("lenses") || "{}") as Record<string, FocalLength> | null) ?? {};
+    return (JSON.parse(remembered(key) || "{}") as Record<string, T> | null) ?? {};
   } catch {
     return {};
   }
 }
 
 function storeLens(camera: string, focal: FocalLength | null): void {
-  const known = lenses();
+  const known = recordOf<FocalLength>("lenses");
   const before = known[camera];
   if (before?.relative === focal?.relative) return;
   const { [camera]: _, ...others } = known;

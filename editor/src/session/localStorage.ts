@@ -9,6 +9,8 @@ const KEYS = {
   language: "arcor2-hw.language",
   /** Focal lengths of the cameras of this device. */
   lenses: "arcor2-hw.lenses",
+  /** Where users placed the workplace by hand in AR, by camera. */
+  placements: "arcor2-hw.placements",
 };
 
 export function remembered(key: keyof typeof KEYS): string {

@@ -114,8 +114,11 @@ export interface ScriptDraft {
 
 /** Augmented reality: the picture of the camera behind the 3D view. */
 export interface Ar {
-  /** `looking`: no marker was seen yet; `bridging`: the orientation sensor replaces the markers for a moment. */
-  phase: "starting" | "looking" | "registered" | "bridging" | "lost";
+  /**
+   * `looking`: no marker was seen yet; `bridging`: the orientation sensor replaces the markers for a moment; `hand`:
+   * the user placed the workplace by hand.
+   */
+  phase: "starting" | "looking" | "registered" | "bridging" | "lost" | "hand";
   /** Picture and pose are frozen. */
   frozen: boolean;
   /** Whether the outlines of the markers are shown. */
@@ -136,6 +139,16 @@ export interface Ar {
   loss: "dark" | "blurred" | "unseen";
   /** How far the last correction moved the overlay, m, if it was visible; 0 otherwise. */
   corrected: number;
+  /** Number of configured markers. */
+  configured: number;
+  /** Whether the device has an orientation sensor. */
+  sensor: boolean;
+  /** How far the user moved the overlay away from where markers put it, m and rad. */
+  nudge: { distance: number; angle: number } | null;
+  /** Whether the controls for placing are open. */
+  placing: boolean;
+  /** The pose of the camera that other users see; null while it is unknown. */
+  camera: Pose | null;
   startedAt: number;
 }
 

@@ -2,12 +2,13 @@
 
 import { t } from "@lingui/core/macro";
 import { useLayoutEffect } from "react";
-import { freezeAr, leaveAr, recalibrateAr, showMarkers } from "../../commands/ar";
+import { freezeAr, leaveAr, openPlacing, recalibrateAr, showMarkers } from "../../commands/ar";
 import type { Engine } from "../../engine/engine";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { useTicking } from "../times";
 import { MarkerOutlines } from "./MarkerOutlines";
+import { PlaceByHand } from "./PlaceByHand";
 import { adviceOf, gradeOf, qualityOf } from "./words";
 import "./ar.css";
 
@@ -28,7 +29,7 @@ export default function ArView({ engine }: { engine: Engine }) {
   useLayoutEffect(() => () => leaveAr(), []);
   if (!ar) return null;
   const { word, shape, look } = gradeOf(ar);
-  const registered = ar.seenAt > 0;
+  const registered = ar.seenAt > 0 && ar.phase !== "hand";
   const stale = ar.phase === "bridging" && Date.now() - ar.seenAt < NOTICED;
   const advice = stale || ar.frozen ? "" : adviceOf(ar);
   return (
@@ -47,19 +48,27 @@ export default function ArView({ engine }: { engine: Engine }) {
         <Button icon="zoom" onPress={() => showMarkers(!ar.markers)} aria-pressed={ar.markers}>
           <Word>{t`Markers`}</Word>
         </Button>
+        <Button icon="box" onPress={() => openPlacing(!ar.placing)} aria-pressed={ar.placing}>
+          <Word>{t`Place`}</Word>
+        </Button>
         <Button icon="redo" onPress={recalibrateAr}>
           <Word>{t`Recalibrate`}</Word>
         </Button>
       </div>
-      <div className={`ar-status ${look}`} data-phase={ar.phase} role="group" aria-label={t`Quality of AR`}>
-        <p>
-          <span aria-hidden="true">{shape}</span> <strong role="status">{word}</strong>{" "}
-          {registered && <span className="ar-quality">{qualityOf(ar)}</span>}
-        </p>
-        {advice && <p className="small">{advice}</p>}
-        {Date.now() - ar.startedAt > REST && (
-          <p className="small">{t`You have used AR for half an hour. Seat view continues here without the camera.`}</p>
-        )}
+      <div className="ar-corner">
+        {ar.placing && <PlaceByHand engine={engine} ar={ar} />}
+        <div className={`ar-status ${look}`} data-phase={ar.phase} role="group" aria-label={t`Quality of AR`}>
+          <p>
+            <span aria-hidden="true">{shape}</span> <strong role="status">{word}</strong>{" "}
+            {registered && <span className="ar-quality">{qualityOf(ar)}</span>}
+          </p>
+          {advice && <p className="small">{advice}</p>}
+          {Date.now() - ar.startedAt > REST && (
+            <p className="small">
+              {t`You have used AR for half an hour. Seat view continues here without the camera.`}
+            </p>
+          )}
+        </div>
       </div>
     </>
   );

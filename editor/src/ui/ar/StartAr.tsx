@@ -66,7 +66,8 @@ export default function StartAr({ onClose }: { onClose: () => void }) {
         setObstacle(error instanceof ArProblem ? error.obstacle : "missing");
       });
   };
-  const permanent = obstacle && ["insecure", "browser", "markers", "dictionary"].includes(obstacle);
+  const permanent = obstacle === "insecure" || obstacle === "browser";
+  const byHand = obstacle === "markers" || obstacle === "dictionary";
   const count = layout?.places.size ?? 0;
   return (
     <Window title={t`Augmented reality`} onClose={onClose}>
@@ -82,10 +83,11 @@ export default function StartAr({ onClose }: { onClose: () => void }) {
         </>
       )}
       {(obstacle || failure) && (
-        <p role="alert" className="notice-line bad">
+        <p role="alert" className={byHand ? "" : "notice-line bad"}>
           {obstacle ? reasonOf(obstacle, layout?.dictionary ?? "") : failure}
         </p>
       )}
+      {byHand && <p>{t`Without markers, you place the workplace in the picture by hand.`}</p>}
       {!layout && !failure && !obstacle && <Waiting>{t`Loading…`}</Waiting>}
       {count > 0 && !permanent && (
         <p className="quiet small">

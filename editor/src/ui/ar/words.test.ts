@@ -15,6 +15,11 @@ const GOOD: Ar = {
   seenAt: 100_000,
   loss: "unseen",
   corrected: 0,
+  configured: 3,
+  sensor: false,
+  nudge: null,
+  placing: false,
+  camera: null,
   startedAt: 0,
 };
 
@@ -22,6 +27,9 @@ test("the quality has error, markers and age", () => {
   expect(qualityOf(GOOD, 112_000)).toBe("±4 mm, 3 markers, 12 s ago");
   expect(qualityOf({ ...GOOD, used: [10], error: 0.0003 }, 100_400)).toBe("±1 mm, 1 marker, now");
   expect(qualityOf({ ...GOOD, checked: false, error: 0.0502 }, 100_000)).toBe("±50 mm, unchecked, 3 markers, now");
+  // After a correction by hand, no error is known.
+  const nudge = { distance: 0.012, angle: -0.0175 };
+  expect(qualityOf({ ...GOOD, nudge }, 100_000)).toBe("12 mm, 1°, 3 markers, now");
 });
 
 test("every grade has a word and a shape", () => {
@@ -32,6 +40,8 @@ test("every grade has a word and a shape", () => {
     { phase: "lost" },
     { phase: "looking" },
     { frozen: true },
+    { phase: "hand" },
+    { nudge: { distance: 0.012, angle: 0 } },
   ];
   const grades = states.map((each) => gradeOf({ ...GOOD, ...each }));
   expect(new Set(grades.map(({ word }) => word)).size).toBe(states.length);
@@ -40,6 +50,9 @@ test("every grade has a word and a shape", () => {
 
 test.each([
   [{}, ""],
+  [{ phase: "looking", configured: 0 }, "Press Place to place the workplace by hand."],
+  [{ phase: "hand" }, "The overlay does not follow the camera. Hold the device still."],
+  [{ phase: "hand", sensor: true }, "The overlay turns with the device. After a step, place it again."],
   [{ phase: "looking" }, "Point the camera at a marker."],
   [{ phase: "lost", loss: "dark" }, "It is too dark for the camera. Switch on the light."],
   [{ phase: "lost", loss: "blurred" }, "The picture is blurred. Move more slowly."],

@@ -5,20 +5,29 @@ import { decimal } from "../../formats";
 import type { Ar } from "../../store/ui";
 
 /** Return the quality in words: expected error, number of markers, age. */
-export function qualityOf({ error, used, seenAt, checked }: Ar, present = Date.now()): string {
+export function qualityOf({ error, used, seenAt, checked, nudge }: Ar, present = Date.now()): string {
   const age = Math.round((present - seenAt) / 1000);
   const size = decimal(Math.max(1, error * 1000), 0);
   const markers = plural(used.length, { one: "# marker", other: "# markers" });
   const when = age < 1 ? t`now` : t`${age} s ago`;
+  if (nudge) return t`${movementOf(nudge)}, ${markers}, ${when}`;
   return checked ? t`±${size} mm, ${markers}, ${when}` : t`±${size} mm, unchecked, ${markers}, ${when}`;
+}
+
+/** Return a movement by hand in mm and degrees. */
+function movementOf({ distance, angle }: NonNullable<Ar["nudge"]>): string {
+  return `${decimal(distance * 1000, 0)} mm, ${decimal((Math.abs(angle) * 180) / Math.PI, 1)}°`;
 }
 
 /** Return the grade as a word, a shape and a look. */
 export function gradeOf(ar: Ar): { word: string; shape: string; look: string } {
   if (ar.frozen) return { word: t`Frozen`, shape: "❚❚", look: "fair" };
-  if (ar.phase === "starting" || ar.phase === "looking")
-    return { word: t`Looking for markers`, shape: "○", look: "rough" };
+  if (ar.phase === "starting" || ar.phase === "looking") {
+    return { word: ar.configured ? t`Looking for markers` : t`Not placed`, shape: "○", look: "rough" };
+  }
+  if (ar.phase === "hand") return { word: t`Placed by hand`, shape: "▢", look: "fair" };
   if (ar.phase !== "registered") return { word: t`No marker in sight`, shape: "◇", look: "rough" };
+  if (ar.nudge) return { word: t`Moved by hand`, shape: "◆", look: "fair" };
   if (ar.grade === "good") return { word: t`Good`, shape: "●", look: "good" };
   if (ar.grade === "fair") return { word: t`Fair`, shape: "◐", look: "fair" };
   return { word: t`Rough`, shape: "△", look: "rough" };
@@ -26,7 +35,13 @@ export function gradeOf(ar: Ar): { word: string; shape: string; look: string } {
 
 /** Return what the user can do for a better registration, most important first; an empty string if it is good. */
 export function adviceOf(ar: Ar): string {
-  const { phase, loss, used, contradicting, undecided, checked, corrected, grade } = ar;
+  const { phase, loss, used, contradicting, undecided, checked, corrected, grade, configured, sensor } = ar;
+  if (phase === "hand") {
+    return sensor
+      ? t`The overlay turns with the device. After a step, place it again.`
+      : t`The overlay does not follow the camera. Hold the device still.`;
+  }
+  if (phase === "looking" && configured === 0) return t`Press Place to place the workplace by hand.`;
   if (phase === "lost" || phase === "looking") {
     if (loss === "dark") return t`It is too dark for the camera. Switch on the light.`;
     if (loss === "blurred") return t`The picture is blurred. Move more slowly.`;
