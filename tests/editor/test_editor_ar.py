@@ -10,10 +10,13 @@ import cv2
 import numpy as np
 import pytest
 import pytest_asyncio
-from msgspec import to_builtins
+from msgspec import UNSET, to_builtins
 from playwright.async_api import expect
 
-from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.client import Client
+from arcor2_hw.data import rpc
+from arcor2_hw.data.editor import Presence
+from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box, Model3dType, ObjectModel
 from tests.editor import texts
 from tests.editor.ar_probe import overlay_errors
@@ -72,6 +75,15 @@ async def server(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -
 async def start_ar(screen: Screen) -> None:
     await screen.page.get_by_role("button", name="AR", exact=True).click()
     await screen.press("Start AR")
+
+
+async def presence(client: Client, user: str) -> Presence:
+    """Return the next presence of a user."""
+    while True:
+        data = (await client.next_event("UserPresence")).data
+        if data.user == user and data.presence is not UNSET:
+            assert isinstance(data.presence, Presence)
+            return data.presence
 
 
 async def check_stop(screen: Screen) -> None:
@@ -238,11 +250,28 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         await check_stop(screen)
         await screen.picture("ar phone")
         await page.set_viewport_size(VIEWPORTS["ipad"])  # type: ignore[arg-type]
-        # Leaving stops the camera and restores the view.
-        await screen.press("Leave AR")
-        await screen.until("() => window.__tracks.every((track) => track.readyState === 'ended')")
-        after = await page.evaluate("window.__engine.view.viewpoint")
-        assert after["position"] + after["target"] == pytest.approx(before["position"] + before["target"])
+        # Leaving stops the camera and restores the view, and other users no longer see the camera.
+        async with Client(server.url, "Adam", reconnect=False) as adam:
+            await adam.call("SubscribeEvents", rpc.SubscribeEventsArgs({"UserPresence"}))
+            while (seen := await presence(adam, "Eva")).camera is UNSET:
+                pass
+            assert seen.view == "ar"
+            await screen.press("Leave AR")
+            while (await presence(adam, "Eva")).camera is not UNSET:
+                pass
+            await screen.until("() => window.__tracks.every((track) => track.readyState === 'ended')")
+            after = await page.evaluate("window.__engine.view.viewpoint")
+            assert after["position"] + after["target"] == pytest.approx(before["position"] + before["target"])
+            await page.evaluate("window.__engine.view.set([1, -1, 0.8], [0.2, 0.1, 0.15])")
+            camera = Pose(Position(0.2, -0.35, 0.4), Orientation(-0.87, 0, 0, 0.5))
+            await adam.call("UpdatePresence", Presence(document=seen.document, view="ar", camera=camera))
+            await expect(page.get_by_text("Adam in AR")).to_be_visible()
+            await screen.settle()
+            await screen.picture("ar other user")
+            frames = await screen.frames()
+            await screen.settle()
+            assert await screen.frames() == frames
+        await expect(page.get_by_text("Adam in AR")).to_have_count(0)
         # The focal length is stored for this camera, so the next registration is good at once.
         await start_ar(screen)
         await until_fitting(screen, shots, ASIDE, MAX_ASIDE)

@@ -24,6 +24,7 @@ export function presenceOf(state: State): Presence {
     ...(aimed ? { aimed } : {}),
     ...(state.ui.draft ? { editing: state.ui.draft.id } : {}),
     view: state.ui.ar ? "ar" : state.doc ? "3d" : "home",
+    ...(state.ui.ar?.camera && { camera: state.ui.ar.camera }),
   };
 }
 

@@ -10,6 +10,7 @@ import type { Engine } from "../../engine/engine";
 import { calledBy } from "../../program/operands";
 import { aimsAlways } from "../../session/aiming";
 import { now, useEditor } from "../../store/store";
+import { viewersOf } from "../../viewmodel/viewers";
 import { Aim } from "../aim/Aim";
 import { OffScreen } from "../aim/OffScreen";
 import { Button } from "../kit/kit";
@@ -25,6 +26,7 @@ import "./view.css";
 
 const StartAr = lazyComponent(() => import("../ar/StartAr"));
 const ArView = lazyComponent(() => import("../ar/ArView"));
+const ArUsers = lazyComponent(() => import("../ar/ArUsers"));
 
 const PuckValues = lazyComponent(() => import("../program/PuckValues"));
 
@@ -60,6 +62,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
   const listed = useEditor((state) => state.ui.crosshair.listed);
   const ar = useEditor((state) => state.ui.ar !== null);
   const called = useEditor(({ doc, ui }) => doc !== null && calledBy(doc, doc.actions[ui.selection?.id ?? ""]) != null);
+  const others = useEditor((state) => viewersOf(state).length > 0);
   const [starting, setStarting] = useState(false);
   useCrosshairKey();
   useEffect(followItemRequests, []);
@@ -121,6 +124,7 @@ export default function ViewControls({ engine }: { engine: Engine }) {
         {called && <PuckValues engine={engine} />}
         {starting && <StartAr onClose={() => setStarting(false)} />}
         {ar && <ArView engine={engine} />}
+        {others && <ArUsers engine={engine} />}
       </Suspense>
       {(always || listed || ar) && <Aim engine={engine} />}
       <OffScreen engine={engine} />
