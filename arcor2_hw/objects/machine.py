@@ -1,33 +1,13 @@
 """Machine: a mixin for units that follow PackML (ISA-TR88.00.02)."""
 
 import abc
-import enum
 from typing import ClassVar
 
 from arcor2_hw.actions import StrEnum
+from arcor2_hw.data.packml import ALLOWED, MachineCommand, MachineState, UnitMode
 from arcor2_hw.exceptions import Arcor2NotImplemented
 
-
-class MachineState(enum.IntEnum):
-    """States of PackML with their numbers."""
-
-    CLEARING = 1
-    STOPPED = 2
-    STARTING = 3
-    IDLE = 4
-    SUSPENDED = 5
-    EXECUTE = 6
-    STOPPING = 7
-    ABORTING = 8
-    ABORTED = 9
-    HOLDING = 10
-    HELD = 11
-    UNHOLDING = 12
-    SUSPENDING = 13
-    UNSUSPENDING = 14
-    RESETTING = 15
-    COMPLETING = 16
-    COMPLETE = 17
+__all__ = ["ALLOWED", "Machine", "MachineCommand", "MachineState", "MachineStateName", "UnitMode"]
 
 
 class MachineStateName(StrEnum):
@@ -50,47 +30,6 @@ class MachineStateName(StrEnum):
     RESETTING = "resetting"
     COMPLETING = "completing"
     COMPLETE = "complete"
-
-
-class MachineCommand(enum.IntEnum):
-    """Commands of PackML with their numbers (CntrlCmd)."""
-
-    RESET = 1
-    START = 2
-    STOP = 3
-    HOLD = 4
-    UNHOLD = 5
-    SUSPEND = 6
-    UNSUSPEND = 7
-    ABORT = 8
-    CLEAR = 9
-    COMPLETE = 10
-
-
-class UnitMode(enum.IntEnum):
-    """Unit modes of PackML with their numbers."""
-
-    PRODUCE = 1
-    MAINTENANCE = 2
-    MANUAL = 3
-
-
-_S = MachineState
-_ACTIVE = frozenset(_S) - {_S.STOPPED, _S.STOPPING, _S.ABORTED, _S.ABORTING, _S.CLEARING}
-
-ALLOWED: dict[MachineCommand, frozenset[MachineState]] = {
-    MachineCommand.RESET: frozenset({_S.STOPPED, _S.COMPLETE}),
-    MachineCommand.START: frozenset({_S.IDLE}),
-    MachineCommand.STOP: _ACTIVE,
-    MachineCommand.HOLD: frozenset({_S.EXECUTE}),
-    MachineCommand.UNHOLD: frozenset({_S.HELD}),
-    MachineCommand.SUSPEND: frozenset({_S.EXECUTE}),
-    MachineCommand.UNSUSPEND: frozenset({_S.SUSPENDED}),
-    MachineCommand.ABORT: frozenset(_S) - {_S.ABORTED, _S.ABORTING},
-    MachineCommand.CLEAR: frozenset({_S.ABORTED}),
-    MachineCommand.COMPLETE: frozenset({_S.EXECUTE}),
-}
-"""States in which PackML allows each command."""
 
 
 class Machine(abc.ABC):
