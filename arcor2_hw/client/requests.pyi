@@ -11,6 +11,7 @@ from arcor2_hw.data.alarms import AlarmFilter, AlarmRecord
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.calibration import CalibrationCheck, CalibrationKind
 from arcor2_hw.data.camera import CameraParameters, EstimatedPose, MarkerCorners
+from arcor2_hw.data.cell_state import CellAuthority, CellJob, CellMode, CellStatus
 from arcor2_hw.data.dry_run import DryRunHead
 from arcor2_hw.data.editor import (
     HistoryChangedData,
@@ -509,6 +510,9 @@ class Requests(ABC):
         self, *, camera_parameters: CameraParameters, image: str, inverse: bool = False, timeout: float | None = None
     ) -> EstimatedPose:
         """GetCameraPose. Needs the role technician."""
+
+    async def get_cell(self, *, timeout: float | None = None) -> CellStatus:
+        """GetCell. Needs the role operator."""
 
     async def get_dry_run(self, *, number: int | Unset = UNSET, timeout: float | None = None) -> GetDryRunData:
         """GetDryRun: the number of a dry run; default: the newest one of the open project. Needs the role operator."""
@@ -1105,6 +1109,15 @@ class Requests(ABC):
         Needs the role standard user.
         """
 
+    async def set_cell_authority(self, authority: CellAuthority, *, timeout: float | None = None) -> CellStatus:
+        """SetCellAuthority. Needs the role technician."""
+
+    async def set_cell_jobs(self, jobs: list[CellJob], *, timeout: float | None = None) -> CellStatus:
+        """SetCellJobs: all jobs. Needs the role technician."""
+
+    async def set_cell_mode(self, mode: CellMode, *, timeout: float | None = None) -> CellStatus:
+        """SetCellMode. Needs the role technician."""
+
     async def set_eef_perpendicular_to_world(
         self,
         *,
@@ -1451,6 +1464,8 @@ class Requests(ABC):
     def follow(
         self, name: Literal["BreakpointsChanged"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[ProjectBreakpoints]]: ...
+    @overload
+    def follow(self, name: Literal["CellChanged"], /, *, limit: int = LIMIT) -> EventStream[TypedEvent[CellStatus]]: ...
     @overload
     def follow(
         self, name: Literal["ChangedObjectTypes"], /, *, limit: int = LIMIT

@@ -7,6 +7,7 @@ from msgspec import Struct, field
 
 from arcor2_hw.data.alarms import AlarmRecord
 from arcor2_hw.data.base import UNSET, Data, TranslatableData, Unset
+from arcor2_hw.data.cell_state import CellStatus
 from arcor2_hw.data.device import Connection, Observation
 from arcor2_hw.data.dry_run import DryRunHead
 from arcor2_hw.data.editor import (
@@ -372,6 +373,7 @@ EVENTS: Final = {
         EventType("RobotHold", RobotHoldData, Role.OPERATOR, additional=True),
         EventType("AlarmChanged", AlarmRecord, Role.OPERATOR, additional=True),
         EventType("BreakpointsChanged", ProjectBreakpoints, Role.OPERATOR, additional=True),
+        EventType("CellChanged", CellStatus, Role.OPERATOR, additional=True),
         EventType("DryRunChanged", DryRunHead, Role.OPERATOR, additional=True),
         EventType("ExecutionTrace", TraceEntry, Role.OPERATOR, additional=True),
         EventType("FunctionChanged", ProjectFunction, Role.OPERATOR, additional=True),

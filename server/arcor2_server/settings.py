@@ -19,6 +19,8 @@ VERSION: Final = "1.4.0"
 API_VERSION: Final = "1.1.0"
 """Version of the protocol. Existing clients refuse another major version."""
 MIB: Final = 1024 * 1024
+LONGEST_LIFE_TIMEOUT: Final = 60.0
+"""Longest time limit of the PLC's life counter, s."""
 DEVICE_FILES_NAME: Final = "device-files"
 """Folder of the data directory with the files that settings of devices may name."""
 
@@ -33,6 +35,13 @@ class LegacyListener(msgspec.Struct, frozen=True):
     def __post_init__(self) -> None:
         if self.role >= Role.PROGRAMMER:
             raise ValueError("clients without a token cannot have the role programmer")
+
+
+class PlcListener(msgspec.Struct, frozen=True):
+    """The address of the Modbus block for a PLC."""
+
+    host: str
+    port: int
 
 
 class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
@@ -51,6 +60,10 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     """Additional ports by the name of the ARCOR2 service; empty: everything is on one port."""
     legacy: "LegacyListener | None" = None
     """Port for clients without tokens and TLS."""
+    plc: PlcListener | None = None
+    """Address of the Modbus block for a PLC; None: no block."""
+    plc_life_timeout: float = 2.0
+    """Time after which a life counter of the PLC that does not change holds its program, s."""
     device_files: tuple[str, ...] = ()
     """Directories with files that settings of devices may name, in addition to those in the data directory."""
     database_url: str = ""
@@ -126,6 +139,11 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return self.data_dir / "audit.sqlite"
 
     @property
+    def cell_state_file(self) -> Path:
+        """The file of mode, authority and jobs of the cell."""
+        return self.data_dir / "cell-state.json"
+
+    @property
     def history_dir(self) -> Path:
         """The directory of the histories of closed documents."""
         return self.data_dir / "history"
@@ -198,6 +216,10 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
             except msgspec.ValidationError as error:
                 raise InvalidData("{variable}={text!r}: {reason}", variable=variable, text=text, reason=error) from None
         values.update((name, value) for name, value in given.items() if value is not None)
+        if not 0 < values.get("plc_life_timeout", 1) <= LONGEST_LIFE_TIMEOUT:
+            raise InvalidData(
+                "ARCOR2_HW_PLC_LIFE_TIMEOUT is not in the range above 0 to {longest} s.", longest=LONGEST_LIFE_TIMEOUT
+            )
         if values.get("streaming_period", 1) <= 0:
             values["streaming_period"] = 0.1
         if "data_dir" not in values:
@@ -225,6 +247,7 @@ _VARIABLES: Final = {
     "ARCOR2_HW_DEFAULT_ROLE": "default_role",
     "ARCOR2_HW_LOG_OFF_AFTER": "log_off_after",
     "ARCOR2_HW_RELEASED_ONLY": "released_only",
+    "ARCOR2_HW_PLC_LIFE_TIMEOUT": "plc_life_timeout",
     "ARCOR2_HW_OUTGOING_BYTES": "outgoing_bytes",
     "ARCOR2_HW_OUTGOING_AGE": "outgoing_age",
     "ARCOR2_HW_PING_INTERVAL": "ping_interval",

@@ -5,6 +5,7 @@ from typing import Final
 from arcor2_hw.data.rpc.action_points import *
 from arcor2_hw.data.rpc.alarms import *
 from arcor2_hw.data.rpc.calibrations import *
+from arcor2_hw.data.rpc.cell import *
 from arcor2_hw.data.rpc.dry_runs import *
 from arcor2_hw.data.rpc.editor import *
 from arcor2_hw.data.rpc.envelope import *
@@ -28,6 +29,7 @@ _ALL: Final = (
     *ACTION_POINT_RPCS,
     *ALARM_RPCS,
     *CALIBRATION_RPCS,
+    *CELL_RPCS,
     *DRY_RUN_RPCS,
     *EDITOR_RPCS,
     *EXECUTION_RPCS,

@@ -545,6 +545,37 @@ export interface CarriedPart {
   model?: ObjectModel;
 }
 
+/** Who may start programs: clients of the server, the PLC, or nobody. */
+export type CellAuthority = "nobody" | "hub" | "plc";
+
+/** A job: the number by which the PLC requests it, and the package that it runs. */
+export interface CellJob {
+  number: number;
+  package_id: string;
+}
+
+/** The modes of the cell; arcor2_hw.data.packml.UnitMode has their numbers. */
+export type CellMode = "produce" | "maintenance" | "manual" | "changeover";
+
+/** The states of PackML that the cell has; arcor2_hw.data.packml.MachineState has their numbers. */
+export type CellStateName = "stopped" | "starting" | "idle" | "execute" | "stopping" | "aborting" | "aborted" | "holding" | "held" | "unholding" | "complete";
+
+/**
+ * The cell.
+ *
+ * jobs: by number. job: number of the job that the PLC has started and that has not ended. held_by_plc: whether the
+ * PLC has commanded the hold. plc: left out if the server has no Modbus block.
+ */
+export interface CellStatus {
+  state: CellStateName;
+  mode: CellMode;
+  authority: CellAuthority;
+  jobs: CellJob[];
+  held_by_plc: boolean;
+  job?: number;
+  plc?: PlcLink;
+}
+
 /** Arguments of ChangePerson: what changes. An empty `pin` or `card` is removed; `unlock` ends all lock-outs. */
 export interface ChangePersonArgs {
   id: string;
@@ -2085,6 +2116,18 @@ export interface Place {
  */
 export type PlaceKind = "feeder" | "holder" | "good" | "bad" | "rejected";
 
+/**
+ * The connection of the PLC.
+ *
+ * listening: address of the Modbus block. peer: address of the PLC that wrote last. alive: whether its life counter
+ * changes.
+ */
+export interface PlcLink {
+  listening: string;
+  alive: boolean;
+  peer?: string;
+}
+
 /** Position and orientation of a frame in its parent frame. */
 export interface Pose {
   position: Position;
@@ -2879,6 +2922,21 @@ export interface SetBreakpointsArgs {
   project_id?: string;
 }
 
+/** Arguments of SetCellAuthority. */
+export interface SetCellAuthorityArgs {
+  authority: CellAuthority;
+}
+
+/** Arguments of SetCellJobs: all jobs. */
+export interface SetCellJobsArgs {
+  jobs: CellJob[];
+}
+
+/** Arguments of SetCellMode. */
+export interface SetCellModeArgs {
+  mode: CellMode;
+}
+
 /** Arguments of SetEefPerpendicularToWorld. */
 export interface SetEefPerpendicularToWorldArgs {
   robot_id: string;
@@ -3579,6 +3637,7 @@ export interface Requests {
   GetActions: { args: TypeArgs; data: ObjectAction[] };
   GetBreakpoints: { args: GetBreakpointsArgs | undefined; data: ProjectBreakpoints };
   GetCameraPose: { args: GetCameraPoseArgs; data: EstimatedPose };
+  GetCell: { args: undefined; data: CellStatus };
   GetDryRun: { args: GetDryRunArgs | undefined; data: GetDryRunData };
   GetEndEffectorPose: { args: GetEndEffectorPoseArgs; data: Pose };
   GetEndEffectors: { args: GetEndEffectorsArgs; data: string[] };
@@ -3675,6 +3734,9 @@ export interface Requests {
   SaveScene: { args: undefined; data: undefined };
   SceneObjectUsage: { args: IdArgs; data: string[] };
   SetBreakpoints: { args: SetBreakpointsArgs; data: ProjectBreakpoints };
+  SetCellAuthority: { args: SetCellAuthorityArgs; data: CellStatus };
+  SetCellJobs: { args: SetCellJobsArgs; data: CellStatus };
+  SetCellMode: { args: SetCellModeArgs; data: CellStatus };
   SetEefPerpendicularToWorld: { args: SetEefPerpendicularToWorldArgs; data: undefined };
   SetViewState: { args: SetViewStateArgs; data: SetViewStateData };
   ShelveAlarm: { args: ShelveAlarmArgs; data: undefined };
@@ -3737,6 +3799,7 @@ export interface Events {
   ActionStateBefore: ActionStateBeforeData;
   AlarmChanged: AlarmRecord;
   BreakpointsChanged: ProjectBreakpoints;
+  CellChanged: CellStatus;
   ChangedObjectTypes: ObjectTypeMeta[];
   ChangeoverChanged: Changeover;
   DryRunChanged: DryRunHead;
@@ -3878,6 +3941,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   GetActions: 1,
   GetBreakpoints: 1,
   GetCameraPose: 4,
+  GetCell: 1,
   GetDryRun: 1,
   GetEndEffectorPose: 1,
   GetEndEffectors: 1,
@@ -3974,6 +4038,9 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   SaveScene: 4,
   SceneObjectUsage: 1,
   SetBreakpoints: 2,
+  SetCellAuthority: 4,
+  SetCellJobs: 4,
+  SetCellMode: 4,
   SetEefPerpendicularToWorld: 2,
   SetViewState: 1,
   ShelveAlarm: 4,
@@ -4029,6 +4096,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
 export const ADDITIONAL_EVENTS = [
   "AlarmChanged",
   "BreakpointsChanged",
+  "CellChanged",
   "ChangeoverChanged",
   "DryRunChanged",
   "ExecutionTrace",

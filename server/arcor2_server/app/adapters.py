@@ -32,6 +32,7 @@ from arcor2_server.rpc.build import BuildRequests
 from arcor2_server.rpc.calibration import CalibrationRequests
 from arcor2_server.rpc.calibration_records import CalibrationRecordRequests
 from arcor2_server.rpc.cameras import CameraRequests
+from arcor2_server.rpc.cell import CellRequests
 from arcor2_server.rpc.copying import CopyRequests
 from arcor2_server.rpc.dry_runs import DryRunRequests
 from arcor2_server.rpc.editing import Editing
@@ -80,6 +81,7 @@ def request_handlers(s: Server) -> Handlers:
         CalibrationRequests(s.session, s.online, s.calibration, s.scene_calibration),
         CalibrationRecordRequests(s.session, s.calibration_records),
         CameraRequests(s.session, s.online, editing, s.cameras),
+        CellRequests(s.cell),
         CopyRequests(s.locks, s.session, editing),
         SharedStateRequests(s.locks, s.session, s.previews, s.view_states, s.breakpoints, s.presence),
         DryRunRequests(s.dry_runs),

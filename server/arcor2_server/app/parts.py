@@ -52,6 +52,9 @@ from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.online.scene_calibration import SceneCalibration
 from arcor2_server.online.scene_opening import SceneOpening
 from arcor2_server.online.undo import Undo
+from arcor2_server.packml.cell import PackmlCell
+from arcor2_server.packml.plc import Plc
+from arcor2_server.packml.record import CellFile
 from arcor2_server.production.cell_time import CellTime, activity_of
 from arcor2_server.production.recipes import Recipes
 from arcor2_server.production.units import Units
@@ -230,9 +233,14 @@ class Server:
             )
         )
         system_alarms.start()
-        self.stop_all = StopAll(session, online, execution)
+        stop_all = self.stop_all = StopAll(session, online, execution)
         storage.on_deleted += [view_states.forget, breakpoints.forget, session.forget_history]
-        self.package_runs = PackageRuns(hub, users, locks, session, online, execution, presence, lock_takeover)
+        package_runs = PackageRuns(hub, users, locks, session, online, execution, presence, lock_takeover)
+        self.package_runs = package_runs
+        cell_file = CellFile(settings.cell_state_file)
+        cell_file.load(damage)
+        cell = self.cell = PackmlCell(hub, execution, runs, online, stop_all, cell_file)
+        self.plc = closed(Plc(cell, cell_file, package_runs, alarms, audit, settings.plc_life_timeout))
         temporary_runs = self.temporary_runs = TemporaryRuns(
             hub, locks, storage, types, session, online, execution, build, tasks
         )

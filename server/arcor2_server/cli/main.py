@@ -46,6 +46,7 @@ app.command(
 app.command("arcor2_server.cli.token:app", name="token", help="Manage the access tokens of a server.")
 app.command("arcor2_server.cli.person:app", name="person", help="Manage the persons who log on at shared devices.")
 app.command("arcor2_server.cli.alarms:app", name="alarms", help="List, acknowledge and shelve alarms; statistics.")
+app.command("arcor2_server.cli.cell:app", name="cell", help="Mode and authority of the cell, and jobs of its PLC.")
 app.command("arcor2_server.cli.audit:app", name="audit", help="Check and export who changed or commanded what.")
 app.command("arcor2_server.cli.device:app", name="device", help="List, find and check devices; create a driver.")
 app.command(

@@ -36,7 +36,7 @@ from arcor2_server.access.tokens import TokenFile
 from arcor2_server.audit.command_line import note_command
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.log import setup as server_logging
-from arcor2_server.settings import DEVICE_FILES_NAME, LegacyListener, ServerSettings
+from arcor2_server.settings import DEVICE_FILES_NAME, LegacyListener, PlcListener, ServerSettings
 from arcor2_server.websocket.classic_ports import ports_from_environment
 
 if TYPE_CHECKING:
@@ -80,6 +80,7 @@ def serve(
     insecure: bool = False,
     legacy_listen: str | None = None,
     legacy_role: LegacyRole = "operator",
+    plc_modbus: str | None = None,
     classic_ports: Annotated[bool, Parameter(negative="")] = False,
     openapi: Annotated[bool, Parameter(negative="")] = False,
     log_level: str = "info",
@@ -110,6 +111,9 @@ def serve(
         A second HOST:PORT without TLS for clients that cannot send a token.
     legacy_role
         Role of these clients.
+    plc_modbus
+        HOST:PORT of a Modbus TCP block through which a PLC starts and stops programs. The PLC needs the authority,
+        which a technician gives it.
     classic_ports
         Also listen on the ports of the services of the original ARCOR2, as set by its ARCOR2_* variables.
     openapi
@@ -130,7 +134,11 @@ def serve(
         status = ExitStatus.NOT_FOUND if isinstance(error, NotFound) else ExitStatus.CELL_UNUSABLE
         return fail("serve", " ".join(str(error).split()), status)
     try:
-        legacy = None if legacy_listen is None else _legacy(legacy_listen, legacy_role)
+        legacy = (
+            None
+            if legacy_listen is None
+            else LegacyListener(*_address("--legacy-listen", legacy_listen), Role[legacy_role.upper()])
+        )
         settings = ServerSettings.from_environment(
             host=host,
             port=port,
@@ -139,6 +147,7 @@ def serve(
             markers=seen,
             insecure=insecure or None,
             legacy=legacy,
+            plc=None if plc_modbus is None else PlcListener(*_address("--plc-modbus", plc_modbus)),
             classic_ports=ports_from_environment() if classic_ports else None,
         )
         server_logging.set_up(log_level)
@@ -153,9 +162,12 @@ def serve(
             settings, classic_listeners = _bind_classic(settings, sockets)
             settings, legacy_listener = _bind_legacy(settings, sockets)
             settings, certificate = _certificate(settings, tls, self_signed)
+            plc = None
+            if settings.plc is not None:
+                plc = sockets.enter_context(contextlib.closing(listen(settings.plc.host, settings.plc.port)))
             welcome(settings, listener.getsockname()[1])
             with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-                runner.run(run(settings, [listener, *classic_listeners], legacy_listener, certificate))
+                runner.run(run(settings, [listener, *classic_listeners], legacy_listener, certificate, plc))
     except CannotServe as error:
         return fail("serve", error, error.status)
     except StorageError as error:
@@ -196,11 +208,11 @@ def welcome(settings: ServerSettings, port: int) -> None:
     sys.stderr.write(f"arcor2-hw serve: first start. Add an administrator at {here[0]}/?{PARAMETER}={secret}\n")
 
 
-def _legacy(address: str, role: LegacyRole) -> LegacyListener:
+def _address(option: str, address: str) -> tuple[str, int]:
     host, _, port = address.rpartition(":")
     if not host or not port.isdigit() or int(port) > 0xFFFF:
-        raise InvalidData("--legacy-listen {address!r} is not HOST:PORT", address=address)
-    return LegacyListener(host.strip("[]"), int(port), Role[role.upper()])
+        raise InvalidData("{option} {address!r} is not HOST:PORT", option=option, address=address)
+    return host.strip("[]"), int(port)
 
 
 def _print_openapi() -> int:
@@ -288,8 +300,9 @@ async def run(
     listeners: list[socket.socket],
     legacy: socket.socket | None = None,
     certificate: tuple[Path, Path] | None = None,
+    plc: socket.socket | None = None,
 ) -> None:
-    """Run the server on bound sockets. With a certificate it uses TLS on all sockets except `legacy`.
+    """Run the server on bound sockets. With a certificate it uses TLS on all sockets except `legacy` and `plc`.
 
     Raises:
         CannotServe: another program has taken the port.
@@ -313,6 +326,8 @@ async def run(
             running.hosts.prepare()
             loop.run_in_executor(None, importlib.import_module, "transforms3d.quaternions")
 
+        if plc is not None:
+            await running.plc.serve(plc)
         loop = asyncio.get_running_loop()
         config = configuration(create_app(running), settings, certificate)
         renewal = trust_page = None

@@ -49,6 +49,7 @@ class PackageRuns:
         changes. Its devices go offline and stay offline. Disconnected users lose their locks and are notified when they
         return.
         """
+        self._execution.require_permitted(how)
         if not self.is_left_open():
             await self._execution.run(package_id, how)
             return

@@ -99,6 +99,7 @@ class How(Struct, frozen=True):
         checkpoints: store the state before and after each action.
         continues: continue where the program was interrupted.
         role: role of the user.
+        by_plc: whether the PLC above the cell starts it.
         recipe_id: the recipe; empty for none.
         recipe_values: values of this run by name, JSON in a string.
         order: id of the order.
@@ -119,6 +120,7 @@ class How(Struct, frozen=True):
     order: str = ""
     used: UsedRecipe | None = None
     values: Mapping[str, str] = MappingProxyType({})
+    by_plc: bool = False
 
 
 class Runs:

@@ -95,6 +95,10 @@ class Execution(PackageLibrary):
         """Called with the error that ends or holds a program, before its devices are gone, the run, and the action."""
         self.on_decided: list[Callable[[HoldDecidedData], None]] = []
         """Called with each decision about a held program."""
+        self.before_start: list[Callable[[How], None]] = []
+        """Called before a program is started, and again when it starts; each may raise RequestRefused."""
+        self.before_resume: list[Callable[[], None]] = []
+        """Called before a paused program is resumed or stepped; each may raise RequestRefused."""
         self.before_run: list[Callable[[str, How], Awaitable[How]]] = []
         """Called with a package and the options of its run, which it may change; may raise RequestRefused."""
         self.on_begin: list[Callable[[int, str, str, How], None]] = []
@@ -137,6 +141,11 @@ class Execution(PackageLibrary):
     def streams(self) -> RobotStreams:
         """The subscriptions to joints and end effector poses."""
         return self._host.streams
+
+    def require_permitted(self, how: How) -> None:
+        """Raise RequestRefused if no program may be started in this way now."""
+        for check in self.before_start:
+            check(how)
 
     def require_no_program(self) -> None:
         """Raise RequestRefused while a program runs."""
@@ -220,6 +229,7 @@ class Execution(PackageLibrary):
             self._over = None
 
     async def _run(self, package_id: str, how: How, *, temporary: bool = False) -> None:
+        self.require_permitted(how)
         self._require_idle()
         requested_at = time.monotonic()
         directory = await asyncio.to_thread(self.packages.directory, package_id)
@@ -231,6 +241,7 @@ class Execution(PackageLibrary):
             how = self._as_before(await self.parts.require_continues(scene_id, package_id), how)
         for prepare in self.before_run:
             how = await prepare(package_id, how)
+        self.require_permitted(how)
         self._require_idle()
         self._online.last_stop.require_none_since(requested_at)
         self.program = program = ProgramRun(self._runs, package_id, project_id)
@@ -323,6 +334,7 @@ class Execution(PackageLibrary):
         """Resume a paused program."""
         self.hold.require_none()
         host = self._require({S.PAUSED}, "resumed")
+        self._require_may_resume()
         self._enter(S.RESUMING)
         host.send(m.Resume())
 
@@ -340,8 +352,13 @@ class Execution(PackageLibrary):
         host = self._require({S.PAUSED}, "stepped")
         if branch and branch not in (one.id for one in self.program.position.branches):
             raise RequestRefused("The program has no branch {branch}.", branch=branch)
+        self._require_may_resume()
         self._enter(S.RESUMING)
         host.send(m.Step(mode, branch))
+
+    def _require_may_resume(self) -> None:
+        for check in self.before_resume:
+            check()
 
     async def decide(self, args: DecideHeldArgs, by: str) -> None:
         """Continue the held program as a user has decided."""

@@ -98,6 +98,7 @@ class _Run:
                 await asyncio.to_thread(self._runs.execution.packages.delete_temporary, self._package)
 
     async def _build(self) -> Project:
+        self._runs.execution.require_permitted(self._how)
         project = self._runs.session.require_project()
         if self._runs.session.has_changes:
             raise RequestRefused("{name} has unsaved changes. Save it first.", name=project.name)
