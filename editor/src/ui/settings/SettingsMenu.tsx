@@ -16,8 +16,8 @@ import { openOverlay } from "../search/overlay";
 
 const THEMES: Record<Ui["theme"], MessageDescriptor> = {
   system: msg`System theme`,
-  light: msg`Light`,
-  dark: msg`Dark`,
+  light: msg`Light theme`,
+  dark: msg`Dark theme`,
 };
 
 export default function SettingsMenu({ defaultOpen }: { defaultOpen: boolean }) {
@@ -29,15 +29,16 @@ export default function SettingsMenu({ defaultOpen }: { defaultOpen: boolean }) 
   const noAudit = useEditor((state) => whyUnavailable(state, "SaveScene"));
   const choices: Choice[] = [
     { id: "find", label: t`Find a command or an object ( / )`, icon: "search", act: () => openOverlay("search") },
-    ...(Object.keys(THEMES) as Ui["theme"][]).map((each) => ({
-      id: each,
-      label: i18n._(THEMES[each]),
-      icon: each === theme ? ("check" as const) : undefined,
-      act: () => {
-        setUi({ theme: each });
-        remember("theme", each === "system" ? "" : each);
-      },
-    })),
+    ...(Object.keys(THEMES) as Ui["theme"][])
+      .filter((each) => each !== theme)
+      .map((each) => ({
+        id: each,
+        label: i18n._(THEMES[each]),
+        act: () => {
+          setUi({ theme: each });
+          remember("theme", each === "system" ? "" : each);
+        },
+      })),
     ...(Object.keys(LANGUAGES) as Language[]).map((each) => ({
       id: each,
       label: LANGUAGES[each],
