@@ -1,5 +1,6 @@
 """Writing a program: actions, parameters, steps and branches, faults, code."""
 
+import asyncio
 import math
 import re
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -8,7 +9,7 @@ from typing import Any
 import msgspec
 import pytest
 import pytest_asyncio
-from playwright.async_api import Browser, expect
+from playwright.async_api import Browser, Locator, expect
 
 from arcor2_hw.data import rpc
 from arcor2_hw.data.base import UNSET
@@ -268,6 +269,17 @@ async def _is(found: Awaitable[list[str]], wanted: list[str]) -> bool:
     return await found == wanted
 
 
+async def at_rest(shown: Locator) -> None:
+    """Wait until an element has not moved for longer than the graph takes to move to another view."""
+
+    async def rests() -> bool:
+        before = await shown.bounding_box()
+        await asyncio.sleep(0.3)
+        return await shown.bounding_box() == before
+
+    await until(rests, "the graph is at rest")
+
+
 async def test_graph_does_not_move_under_a_tap(work: Work) -> None:
     """Additions of other users are laid out after the release."""
     screen, page = work.screen, work.screen.page
@@ -277,6 +289,7 @@ async def test_graph_does_not_move_under_a_tap(work: Work) -> None:
     graph = page.get_by_role("region", name=texts.GRAPH)
     await graph.get_by_role("button", name=texts.WHOLE_PROGRAM).click()
     way = graph.get_by_role("button", name="surely: yes", exact=True)
+    await at_rest(way)
     await way.hover()
     await page.mouse.down()
     at = await way.bounding_box()
