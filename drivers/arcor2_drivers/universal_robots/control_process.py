@@ -51,6 +51,10 @@ RESUMED_WITHIN: Final = 3.0
 """Time for the control program to play again, s; it takes 0.1 s."""
 KICKS_PER_PERIOD: Final = 8.0
 """Watchdog signals within one period of the watchdog."""
+NEARLY_TOO_SLOW: Final = 0.8
+"""Part of the period of the watchdog after which it may have tripped."""
+LATE_FOR: Final = 2.0
+"""Time for which a late signal may be the reason for a stopped program, s."""
 NICENESS: Final = -10
 """Requested niceness; most computers refuse it."""
 LAST_STOP: Final = 0.15
@@ -126,6 +130,7 @@ class ControlProgram:
         self._own = False
         self._jog_ends = math.inf
         self._written = time.monotonic()
+        self._late = -math.inf
         self._period = 1.0 / (KICKS_PER_PERIOD * watchdog)
         control = self._control
         self._commands: dict[str, Callable[..., Any]] = {
@@ -134,7 +139,7 @@ class ControlProgram:
             **{name: self._speed(getattr(control, name)) for name in SPEEDS},
             "own": self._begin_own,
             "control": self._end_own,
-            "respond": lambda: True,
+            "was_late": self._was_late,
             "resume": self._resume,
             "stop": self._stop,
         }
@@ -172,8 +177,15 @@ class ControlProgram:
 
     def _exit_if_too_slow(self) -> None:
         """Exit if the watchdog has tripped: the library would deny commands without telling why."""
-        if time.monotonic() - self._written > 1.0 / self._frequency:
+        now = time.monotonic()
+        if now - self._written > 1.0 / self._frequency:
             os._exit(TOO_SLOW)
+        if now - self._written > NEARLY_TOO_SLOW / self._frequency:
+            self._late = now
+
+    def _was_late(self) -> bool:
+        """Return whether the watchdog may have tripped recently: when it received a signal is not known exactly."""
+        return time.monotonic() - self._late < LATE_FOR
 
     def last_stop(self) -> None:
         """Stop the program: the host has ended."""

@@ -372,9 +372,11 @@ class ControlSession:
     def program_gone(self) -> DeviceError:
         """Return why our program is not playing, after the control process had time to report a reason of its own."""
         assert self._process is not None
-        response = self._process.request("respond", ())
+        response = self._process.request("was_late", ())
         if not once_within(self._ending.is_set, timing.PROCESS_ENDS, timing.GUARD_PERIOD) and not response.done():
             return self._too_slow("the control process did not respond")
+        if response.done() and response.exception() is None and response.result():
+            return self._too_slow("the control process was late")
         return NotInControl(
             "{device} left remote control. Check the pendant, then retry.",
             "the program was stopped at the controller",
