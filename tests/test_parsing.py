@@ -21,11 +21,14 @@ def nested() -> Iterator[list[str]]:
             parsed.append(phase)
             ast.parse("1")
 
-    threshold = gc.get_threshold()
+    threshold, enabled = gc.get_threshold(), gc.isenabled()
     gc.collect()
     gc.callbacks.append(finalize)
     gc.set_threshold(500)
+    gc.enable()  # a test of a start that fails may have left it disabled
     yield parsed
+    if not enabled:
+        gc.disable()
     gc.set_threshold(*threshold)
     gc.callbacks.remove(finalize)
 

@@ -57,8 +57,9 @@ async function loadThumbnail(document: string): Promise<void> {
   const [own, taken] = [picture, thumbnail].map((each) =>
     typeof each === "string" && each.startsWith("data:image/") ? each : "",
   );
-  // After a quick close, the thumbnail of the save may be taken and stored while this answer is under way.
-  if (!own && !taken && now().thumbnails[document] !== before) return;
+  const known = now().thumbnails[document];
+  // After a quick close, the thumbnail of the save may be taken, or be under way to the server, before this answer.
+  if (!own && !taken && (known !== before || (known && !known.own))) return;
   setThumbnail(document, { picture: own || taken || "", own: !!own });
 }
 
