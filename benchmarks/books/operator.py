@@ -41,8 +41,8 @@ class Operator:
         """Names of the devices by their ids."""
         self.parallel = False
         """Whether the program tests a board while it fetches the next one."""
-        self._anonymous: set[str] = set()
-        """Boards that have left the books without a serial number."""
+        self._gone: set[str] = set()
+        """Boards that have left the books by hand, or without a serial number."""
 
     async def resolve(self, client: Client, held: HeldData) -> None:
         """Remove the cause, look at the cell, correct the books, acknowledge, and decide."""
@@ -147,6 +147,7 @@ class Operator:
     async def _take_out(self, client: Client, code: str) -> None:
         """Take a board out of the cell, and tell the books."""
         await self._remove(code)
+        self._gone.add(code)
         for books in await client.get_parts():
             if found := [ConfirmedPart(part.number, "") for part in books.parts if part.serial == code]:
                 await self._send_confirmation(client, books.scene_id, found)
@@ -198,8 +199,8 @@ class Operator:
         place = "" if board is None else ids.get(NAMES.get(board["place"], ""), "")
         if part.confirmed and isinstance(part.moving_to, Unset) and part.place == place:
             return None
-        if board is not None and not part.serial and place in ("", ids["bad_boards"]):
-            self._anonymous.add(board["code"])
+        if board is not None and place in ("", ids["bad_boards"]):
+            self._gone.add(board["code"])
         return ConfirmedPart(part.number, place, exists=board is not None)
 
     def _board_of(self, part: Part, books: PartBooks, boards: list[dict[str, Any]]) -> dict[str, Any] | None:
@@ -207,6 +208,6 @@ class Operator:
         if part.serial:
             return next(board for board in boards if board["code"] == part.serial)
         known = {one.serial for one in books.parts} | {code for place in books.places for code in place.parts}
-        rest = [board for board in boards if board["code"] not in known | self._anonymous]
+        rest = [board for board in boards if board["code"] not in known | self._gone]
         moved = [board for board in rest if board["place"] not in ("stop", "belt", "feeder")]
         return next(iter(moved or [board for board in rest if board["place"] == "stop"]), None)
