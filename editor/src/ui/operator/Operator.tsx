@@ -61,6 +61,7 @@ function shownState(state: State, starting: boolean, result: Result | null): Sho
   if (result) return { tone: TONES[result.tone], word: result.title, icon: ICONS[result.tone] };
   if (state.live.state === "started" && usersOfDocument(state).length > 0)
     return { tone: "idle", word: t`Devices are in use by the editor`, icon: "plug" };
+  if (state.lists.packages?.length === 0) return { tone: "idle", word: t`No program yet`, icon: "info" };
   return { tone: "idle", word: t`Ready`, icon: "check" };
 }
 
@@ -246,7 +247,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
                 <p className="quiet">{t`No packages yet. Build one in the editor, under Run.`}</p>
               )}
             </div>
-            {opened && (
+            {opened && known && (
               <p className="quiet">
                 {users.length > 0
                   ? why
