@@ -128,7 +128,7 @@ def test_invariants_hold_for_random_events(steps: list[tuple[tuple[str, int], fl
                 except Refusal:
                     assert station.board == had
                 else:
-                    assert station.door == "open"
+                    assert station.door_open
                     assert (station.board is None) == (what == "take")
             case "push":
                 station.push_door(opening=bool(value))
