@@ -83,7 +83,6 @@
       faults.push(`${name(element)}: off the screen`);
       continue;
     }
-    if (element.matches(".view-cluster")) continue; // it is where its objects are, which may be below a control
     const top = document.elementFromPoint(box.left + box.width / 2, box.top + box.height / 2);
     if (top && !element.contains(top) && !top.contains(element)) {
       faults.push(`${name(element)}: covered by ${name(top)}`);

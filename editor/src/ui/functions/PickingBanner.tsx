@@ -7,6 +7,7 @@ import { makeParallel, parallelName, whyNotParallel } from "../../commands/paral
 import { functionNames, suggestedName } from "../../program/functions";
 import { actionNames } from "../../program/naming";
 import { calledBy } from "../../program/operands";
+import { theEngine } from "../../session/engine";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { AskName } from "../kit/lazyControls";
@@ -33,6 +34,8 @@ export default function PickingBanner() {
     window.addEventListener("keydown", onKey);
     return () => window.removeEventListener("keydown", onKey);
   }, [asking]);
+  // The labels of the view make room for the banner, whose size has changed.
+  useEffect(() => theEngine()?.invalidate());
   if (!picked || !doc) return null;
   const calls = ids.length > 1 && ids.every((id) => calledBy(doc, doc.actions[id]));
   const shown = calls ? notAtOnce : why;
