@@ -1,12 +1,10 @@
 /** The centre: 3D view, program graph, both, or code. The 3D view stays behind the others. */
 
-import { i18n, type MessageDescriptor } from "@lingui/core";
-import { msg, t } from "@lingui/core/macro";
+import { t } from "@lingui/core/macro";
 import { Suspense } from "react";
-import { ToggleButton, ToggleButtonGroup } from "react-aria-components";
 import { useLanguage } from "../../i18n/catalogue";
 import { isRunning } from "../../store/selectors";
-import { setUi, useEditor } from "../../store/store";
+import { useEditor } from "../../store/store";
 import type { Mode } from "../../store/ui";
 import { Waiting } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
@@ -14,6 +12,7 @@ import { View3D } from "./View3D";
 import "../run/run.css";
 import "./centre.css";
 
+const ModeSwitch = lazyComponent(() => import("./ModeSwitch"));
 const RobotChip = lazyComponent(() => import("../robot/RobotChip"));
 const FlowView = lazyComponent(() => import("../flow/FlowView"));
 const ConnectingBanner = lazyComponent(() => import("../program/ConnectingBanner"));
@@ -21,7 +20,6 @@ const PickingBanner = lazyComponent(() => import("../functions/PickingBanner"));
 const ScopeBar = lazyComponent(() => import("../functions/ScopeBar"));
 const RunBar = lazyComponent(() => import("../run/RunBar"));
 const CodeView = lazyComponent(() => import("../code/CodeView"));
-const WORDS: Record<Mode, MessageDescriptor> = { "3d": msg`3D`, flow: msg`Flow`, split: msg`Split`, code: msg`Code` };
 
 export function Centre() {
   const language = useLanguage();
@@ -47,22 +45,7 @@ export function Centre() {
         </Suspense>
       )}
       <div className="centre-top">
-        {project && (
-          <ToggleButtonGroup
-            className="modes"
-            aria-label={t`View mode`}
-            selectionMode="single"
-            disallowEmptySelection
-            selectedKeys={[mode]}
-            onSelectionChange={(keys) => setUi({ mode: [...keys][0] as Mode })}
-          >
-            {modes.map((each) => (
-              <ToggleButton key={each} id={each} className="button mode">
-                {i18n._(WORDS[each])}
-              </ToggleButton>
-            ))}
-          </ToggleButtonGroup>
-        )}
+        <Suspense fallback={null}>{project && <ModeSwitch mode={mode} modes={modes} />}</Suspense>
         <Suspense fallback={null}>
           <RobotChip />
         </Suspense>

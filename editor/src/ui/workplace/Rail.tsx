@@ -2,7 +2,7 @@
 
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
-import { ToggleButton } from "react-aria-components";
+import { Button } from "react-aria-components";
 import { notify, setUi, useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { TOOLS } from "./tools";
@@ -15,19 +15,19 @@ export function Rail() {
       {TOOLS.filter((tool) => tool.shown?.(state) ?? true).map((tool) => {
         const why = tool.whyUnavailable?.(state) ?? "";
         return (
-          <ToggleButton
+          <Button
             key={tool.id}
             className="rail-tool"
-            isSelected={open === tool.id}
+            aria-pressed={open === tool.id}
             aria-disabled={why !== "" || undefined}
-            onChange={(on) => {
+            onPress={() => {
               if (why) notify("info", `${i18n._(tool.label)}: ${why}`);
-              else setUi({ tool: on ? tool.id : "" });
+              else setUi({ tool: open === tool.id ? "" : tool.id });
             }}
           >
             <Icon name={tool.icon} size={24} />
             {i18n._(tool.label)}
-          </ToggleButton>
+          </Button>
         );
       })}
     </nav>
