@@ -132,7 +132,7 @@ class Screen:
 
     async def until(self, expression: str, argument: Any = None) -> Any:
         """Wait until a JavaScript expression or function returns a true value, and return it."""
-        handle = await self.page.wait_for_function(expression, arg=argument, timeout=SEEN_WITHIN * 1000)
+        handle = await self.page.wait_for_function(expression, arg=argument, timeout=SEEN_WITHIN * 1000, polling=50)
         return await handle.json_value()
 
     async def item(self, item_id: str) -> dict[str, Any]:
