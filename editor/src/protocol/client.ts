@@ -113,6 +113,13 @@ export class ProtocolClient {
     this.connect();
   }
 
+  /** Give up the present connection, and open another one after a pause. */
+  reconnect(reason: string): void {
+    const socket = this.detach();
+    this.lost(1006, reason);
+    socket?.close();
+  }
+
   /**
    * Send a request. Reject with Refused, ConnectionLost, DeadlineExceeded, or the signal's reason; never send it twice.
    */
@@ -200,9 +207,7 @@ export class ProtocolClient {
       if (this.state !== "open") return;
       this.call("SystemInfo", undefined, { deadline: this.liveness.answer }).catch((error: unknown) => {
         if (!(error instanceof DeadlineExceeded)) return;
-        const socket = this.detach();
-        this.lost(1006, t`The server does not answer.`);
-        socket?.close();
+        this.reconnect(t`The server does not answer.`);
       });
     }, this.liveness.quiet * 1000);
   }

@@ -1,4 +1,5 @@
 import { beforeEach, expect, test, vi } from "vitest";
+import { DeadlineExceeded } from "../protocol/errors";
 
 const call = vi.fn();
 vi.mock("./connection", () => ({ call, serves: (request: string) => request === "GetViewState" }));
@@ -11,16 +12,34 @@ beforeEach(() => {
   vi.stubGlobal("document", new EventTarget());
 });
 
+/** Create a session, and open its connection as a user. */
+function enter(user: string) {
+  const client = { stop: vi.fn(), start: vi.fn(), reconnect: vi.fn(), onState: (..._: [string, string, number]) => {} };
+  new Session(client as never);
+  setConnection({ user });
+  client.onState("open", "", 0);
+  return client;
+}
+
+test("a server that does not answer in time while a user joins is asked again", async () => {
+  call.mockImplementation((request: string) =>
+    request === "SubscribeEvents"
+      ? Promise.reject(new DeadlineExceeded(request, 15))
+      : Promise.resolve(request === "SystemInfo" ? { supported_rpc_requests: [] } : []),
+  );
+  const client = enter("Olga");
+  await vi.waitFor(() => expect(client.reconnect).toHaveBeenCalledOnce());
+  expect(client.reconnect.mock.calls[0]?.[0]).toContain("SubscribeEvents");
+  expect(client.stop, "the user has not been refused").not.toHaveBeenCalled();
+});
+
 test("what a user sees and changes is never replaced by the stored view state", async () => {
   const answers: ((values: object) => void)[] = [];
   call.mockImplementation((request: string) => {
     if (request === "GetViewState") return new Promise((resolve) => answers.push((values) => resolve({ values })));
     return Promise.resolve(request === "SystemInfo" ? { supported_rpc_requests: [] } : []);
   });
-  const client = { stop: vi.fn(), start: vi.fn(), reconnectNow: vi.fn() };
-  new Session(client as never);
-  setConnection({ user: "Olga" });
-  (client as never as { onState: (state: string, reason: string, code: number) => void }).onState("open", "", 0);
+  enter("Olga");
   await vi.waitFor(() => expect(answers).toHaveLength(2));
   await new Promise((resolve) => setTimeout(resolve));
   expect(now().connection.status).toBe("joining");

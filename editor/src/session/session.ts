@@ -16,7 +16,7 @@ import {
 } from "../protocol/types";
 import { isRunning } from "../store/selectors";
 import { OFFLINE, type State } from "../store/state";
-import { applyEvent, notify, now, setConnection, store } from "../store/store";
+import { applyEvent, now, setConnection, store } from "../store/store";
 import { telemetry } from "../store/telemetry";
 import { RobotArms } from "./arms";
 import { call } from "./connection";
@@ -219,7 +219,8 @@ export class Session {
         const reason = error.code === TOKEN_NEEDED ? t`A token is needed.` : error.message;
         setConnection({ status: "refused", reason, needsToken });
       } else {
-        notify("error", error instanceof Error ? error.message : String(error));
+        // For example an answer that took too long: without another attempt, the page would wait for ever.
+        this.client.reconnect(error instanceof Error ? error.message : String(error));
       }
     }
   }
