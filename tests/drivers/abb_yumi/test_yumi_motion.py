@@ -57,6 +57,7 @@ def test_a_line_is_straight(fake: FakeYumi, ready: YuMi) -> None:
     direction = Position(0.12, 0.05, 0.04)
     length = math.hypot(*direction)
     while fake.moving("left"):
+        time.sleep(0.01)  # without a pause, this thread would keep the driver's from feeding the watchdog
         way = Position(*fake.arm("left")["position"]) - first
         along = sum(a * b for a, b in zip(way, direction, strict=True)) / length
         off.append(math.sqrt(max(sum(a * a for a in way) - along * along, 0.0)))
@@ -94,6 +95,7 @@ def test_a_path_passes_its_waypoints(fake: FakeYumi, ready: YuMi) -> None:
     seen = []
     under_way(fake, "left")
     while fake.moving("left"):
+        time.sleep(0.01)  # without a pause, this thread would keep the driver's from feeding the watchdog
         seen.append(Position(*fake.arm("left")["position"]))
     done = moving.result()
     assert done.end is MoveEnd.DONE

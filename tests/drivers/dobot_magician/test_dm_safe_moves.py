@@ -1,5 +1,6 @@
 """Safe moves of the Dobot around obstacles of the scene, and refused ones."""
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -94,6 +95,7 @@ def test_a_stop_ends_a_safe_move(arm: DobotMagician, around: BoxSurroundings, fa
     doing = BackgroundCall(arm.move_to_joints, joints(RIGHT), 0.2)
     start = values(arm)
     while values(arm) == pytest.approx(start, abs=0.01):
+        time.sleep(0.005)
         assert not doing.ended_at
     arm.stop()
     with pytest.raises(Cancelled):
@@ -109,6 +111,7 @@ def test_the_arm_stops_before_an_obstacle_that_enters_its_path(arm: DobotMagicia
     doing = BackgroundCall(arm.move_to_joints, joints(RIGHT), 0.05)  # slow: it must not reach the box before it appears
     start = values(arm)
     while values(arm) == pytest.approx(start, abs=0.01):
+        time.sleep(0.005)
         assert not doing.ended_at
     around.boxes["box"] = box
     with pytest.raises(PathBlocked, match="box came into its path"):

@@ -95,6 +95,7 @@ def test_the_arm_stops_before_an_obstacle_that_enters_its_path(arm: TwoAxisRobot
     doing = BackgroundCall(arm.move_to_joints, joints(RIGHT), 0.05)  # slow: it must not reach the pin before it appears
     start = values(arm)
     while values(arm) == pytest.approx(start, abs=0.02):
+        time.sleep(0.005)
         assert not doing.ended_at
     around.boxes["pin"] = pin
     with pytest.raises(PathBlocked, match="pin came into its path"):
