@@ -61,6 +61,7 @@ from arcor2_hw.data.package import PackageSummary
 from arcor2_hw.data.parameter import IdValue, Parameter
 from arcor2_hw.data.parts import ConfirmedPart, PartBooks
 from arcor2_hw.data.persons import LogOnChangedData, Person
+from arcor2_hw.data.points import ForcesChangedData, ObjectPointsData
 from arcor2_hw.data.position import ProgramPosition, ProgramStep
 from arcor2_hw.data.project import (
     ActionParameter,
@@ -100,6 +101,7 @@ from arcor2_hw.data.rpc.locks import LockHolder, LockType, TakeOverLocksData
 from arcor2_hw.data.rpc.object_types import DeleteObjectTypesData, ObjectAimingAddPointData
 from arcor2_hw.data.rpc.operation import JogFrame, JogRobotData, StopAllData
 from arcor2_hw.data.rpc.persons import ListPersonsData, LogOnData
+from arcor2_hw.data.rpc.points import ForcePointData
 from arcor2_hw.data.rpc.projects import ListProjectsData
 from arcor2_hw.data.rpc.recipes import ListRecipesData, PackageParametersData
 from arcor2_hw.data.rpc.robots import RobotEventKind, StepAxis, StepMode, StepWhat
@@ -467,6 +469,9 @@ class Requests(ABC):
         Needs the role standard user.
         """
 
+    async def end_force(self, id: str, *, timeout: float | None = None) -> None:
+        """EndForce: a force of any client. Needs the role operator."""
+
     async def execute_action(self, action_id: str, *, dry_run: bool = False, timeout: float | None = None) -> None:
         """ExecuteAction. Needs the role standard user."""
 
@@ -486,6 +491,11 @@ class Requests(ABC):
 
         Needs the role technician.
         """
+
+    async def force_point(
+        self, *, object_id: str, point: str, value: bool | float, valid_ms: int, timeout: float | None = None
+    ) -> ForcePointData:
+        """ForcePoint. Needs the role technician."""
 
     async def forward_kinematics(
         self,
@@ -1056,6 +1066,12 @@ class Requests(ABC):
     ) -> None:
         """RenameScene. Needs the role technician."""
 
+    async def renew_forces(self, *, ids: list[str], valid_ms: int, timeout: float | None = None) -> None:
+        """RenewForces: forces of this client, and their duration from now unless they are renewed again.
+
+        Needs the role technician.
+        """
+
     async def restore_revision(
         self, revision: int, *, dry_run: bool = False, timeout: float | None = None
     ) -> RestoreRevisionData:
@@ -1203,6 +1219,11 @@ class Requests(ABC):
 
         Needs the role operator.
         """
+
+    async def stream_points(
+        self, object_id: str, *, rate: float = 2.0, send: bool = True, timeout: float | None = None
+    ) -> None:
+        """StreamPoints: ObjectPoints of a device, 0.2 to 5 times per second, or off. Needs the role operator."""
 
     async def stream_robot(
         self,
@@ -1484,6 +1505,10 @@ class Requests(ABC):
     ) -> EventStream[TypedEvent[TraceEntry]]: ...
     @overload
     def follow(
+        self, name: Literal["ForcesChanged"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[ForcesChangedData]]: ...
+    @overload
+    def follow(
         self, name: Literal["FunctionChanged"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[ProjectFunction]]: ...
     @overload
@@ -1536,6 +1561,10 @@ class Requests(ABC):
     def follow(
         self, name: Literal["ObjectObservations"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[ObjectObservationsData]]: ...
+    @overload
+    def follow(
+        self, name: Literal["ObjectPoints"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[ObjectPointsData]]: ...
     @overload
     def follow(
         self, name: Literal["ObjectState"], /, *, limit: int = LIMIT

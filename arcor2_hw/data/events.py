@@ -31,6 +31,7 @@ from arcor2_hw.data.package import CollisionModels, PackageStateEnum, PackageSum
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.parts import PartBooks
 from arcor2_hw.data.persons import LogOnChangedData, Person
+from arcor2_hw.data.points import ForcesChangedData, ObjectPointsData
 from arcor2_hw.data.position import ProgramPosition
 from arcor2_hw.data.project import (
     BareAction,
@@ -369,6 +370,7 @@ EVENTS: Final = {
         EventType("ObjectState", ObjectStateData, Role.OPERATOR, additional=True),
         EventType("ObjectHealth", ObjectHealthData, Role.OPERATOR, additional=True),
         EventType("ObjectObservations", ObjectObservationsData, Role.OPERATOR, additional=True),
+        EventType("ObjectPoints", ObjectPointsData, Role.OPERATOR, additional=True),
         EventType("ObjectValues", ObjectValuesData, Role.OPERATOR, additional=True),
         EventType("RobotHold", RobotHoldData, Role.OPERATOR, additional=True),
         EventType("AlarmChanged", AlarmRecord, Role.OPERATOR, additional=True),
@@ -376,6 +378,7 @@ EVENTS: Final = {
         EventType("CellChanged", CellStatus, Role.OPERATOR, additional=True),
         EventType("DryRunChanged", DryRunHead, Role.OPERATOR, additional=True),
         EventType("ExecutionTrace", TraceEntry, Role.OPERATOR, additional=True),
+        EventType("ForcesChanged", ForcesChangedData, Role.OPERATOR, additional=True),
         EventType("FunctionChanged", ProjectFunction, Role.OPERATOR, additional=True),
         EventType("Held", HeldData, Role.OPERATOR, additional=True),
         EventType("HistoryChanged", HistoryChangedData, Role.OPERATOR, additional=True),

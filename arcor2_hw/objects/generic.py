@@ -9,6 +9,7 @@ from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReact
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Models
 from arcor2_hw.data.parts import PlaceKind
+from arcor2_hw.data.points import LivePoint
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2NotImplemented, NotFound
 from arcor2_hw.messages import Message
@@ -191,6 +192,30 @@ class Generic(abc.ABC):
             DeviceError: No value is known.
         """
         return []
+
+    def live_points(self) -> list[LivePoint]:
+        """Return the inputs, outputs and registers of the device with their newest values.
+
+        It is called like `observations`, while a user watches the points. Signals need not be in the list: the values
+        of `observations` and of methods marked with `@observation` are added.
+        """
+        return []
+
+    def force_point(self, name: str, value: bool | float) -> None:
+        """Write an output and refuse all other writes to it, until `release_point` is called.
+
+        The cell host takes control before. Only outputs that the device itself switches to a defined state when the
+        connection is lost may be forced (`force` of LivePoint), so that no force outlives this process.
+
+        Raises:
+            Refused: The point cannot be forced.
+            OutOfRange: The value is not allowed.
+        """
+        raise Arcor2NotImplemented("force_point")
+
+    def release_point(self, name: str, value: bool | float) -> None:
+        """End a force: permit other writes, and write the value from before. Another thread may run an action."""
+        raise Arcor2NotImplemented("release_point")
 
     def acknowledge(self, code: str) -> None:
         """Acknowledge the alarm `code`.

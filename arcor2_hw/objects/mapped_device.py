@@ -10,8 +10,10 @@ from functools import partial
 from typing import Any, ClassVar, Final, TypeAlias
 
 from arcor2_hw.actions import observation
+from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.device import Identity, Observation, Reading
 from arcor2_hw.data.modbus_point import Point, Table, Value
+from arcor2_hw.data.points import LivePoint, PointQuality, PointUse
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused
 from arcor2_hw.messages import Phrase
 from arcor2_hw.objects.edges import Debounced
@@ -19,6 +21,7 @@ from arcor2_hw.objects.modbus_device import ModbusDevice
 from arcor2_hw.objects.modbus_link import ModbusLink
 from arcor2_hw.objects.modbus_settings import ModbusSettings
 from arcor2_hw.objects.observing import GoOn
+from arcor2_hw.objects.small import quality_of
 from arcor2_hw.objects.state_observer import Snapshot
 
 Values: TypeAlias = Mapping[str, Value]
@@ -34,6 +37,8 @@ LONGEST_READ: Final[Mapping[Table, int]] = {
     "input_register": 125,
 }
 """Maximum number of items of one request (Modbus application protocol 1.1b3, section 6)."""
+
+_USES: Final[Mapping[Table, PointUse]] = {"coil": PointUse.OUTPUT, "discrete_input": PointUse.INPUT}
 
 
 class MappedDevice(ModbusDevice[dict[str, Any]]):
@@ -124,6 +129,22 @@ class MappedDevice(ModbusDevice[dict[str, Any]]):
             Observation(name, value, self.POINTS[name].unit)
             for name, value in values.items()
             if isinstance(value, bool | int | float)
+        ]
+
+    def live_points(self) -> list[LivePoint]:
+        """Return all points that can be read, with their newest values."""
+        values: Mapping[str, Any] = {}
+        age: float | Unset = UNSET
+        quality = PointQuality.GOOD
+        try:
+            values, asked, _ = self._polled.current()
+            age = round(time.monotonic() - asked, 3)
+        except DeviceError as error:
+            quality = quality_of(error)
+        return [
+            LivePoint(name, _USES.get(point.table, PointUse.REGISTER), values.get(name), point.unit, quality, age)
+            for name, point in self.POINTS.items()
+            if point.readable
         ]
 
     def wait_for_value(self, name: str, value: Value, timeout: float) -> None:

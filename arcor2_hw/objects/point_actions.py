@@ -6,11 +6,12 @@ from typing import ClassVar, Final
 
 from arcor2_hw.actions import action
 from arcor2_hw.data.device import Quality, Reading
+from arcor2_hw.data.points import LivePoint
 from arcor2_hw.exceptions import DeviceFault, OutOfRange, Refused
 from arcor2_hw.messages import Message
 from arcor2_hw.objects.edges import Edge, EdgeListeners
 from arcor2_hw.objects.settings import within
-from arcor2_hw.objects.small import IOPoint, PointDirection, PointKind
+from arcor2_hw.objects.small import IOPoint, PointDirection, PointKind, live_point
 
 LONGEST_WAIT: Final = 600.0
 """Longest time a program may wait for a point in one call, s."""
@@ -22,13 +23,15 @@ class PointActions(abc.ABC):
     """Read, write and observe points by name.
 
     A driver sets `io_points` and `edge_listeners` in `__init__`, and implements `read`, `raw_value`, `write_raw` and
-    `await_point`.
+    `await_point`; and `newest_value`, if `read` asks the device.
     """
 
     DYNAMIC_PARAMS: ClassVar[dict[str, tuple[str, set[str]]]] = {"name": ("point_names", set())}
     who: str | Message
     io_points: Mapping[str, IOPoint]
     edge_listeners: EdgeListeners
+    forced: frozenset[str] = frozenset()
+    """Names of the outputs that a person forces."""
 
     def points(self) -> list[IOPoint]:
         """Return the points."""
@@ -65,8 +68,54 @@ class PointActions(abc.ABC):
     def read(self, name: str) -> Reading[bool | float]:
         """Read a point."""
 
+    def newest_value(self, name: str) -> Reading[bool | float]:
+        """Return the newest value of a point without asking the device, if that is possible. Raises like `read`."""
+        return self.read(name)
+
+    def live_points(self) -> list[LivePoint]:
+        """Return the points with their newest values."""
+        return [live_point(point, self.newest_value, can_force=True) for point in self.points()]
+
+    def force_point(self, name: str, value: bool | float) -> None:
+        """Write an output and refuse all other writes to it. Raises Refused, OutOfRange, and as `write_raw`."""
+        point = self.require_output(name)
+        if not point.forcible:
+            raise Refused(
+                "{device}: {name} cannot be forced, because it keeps its value when the connection is lost",
+                device=self.who,
+                name=name,
+            )
+        before, self.forced = self.forced, self.forced | {name}
+        try:
+            self._write(name, value)
+        except BaseException:
+            self.forced = before
+            raise
+
+    def release_point(self, name: str, value: bool | float) -> None:
+        """End a force, and write the value from before it. Raises as `write_raw`."""
+        try:
+            self._write(name, value)
+        finally:
+            self.forced -= {name}
+
+    def require_not_forced(self, name: str) -> None:
+        """Raise Refused while a person forces an output."""
+        if name in self.forced:
+            raise Refused("{device}: {name} is forced. End the force first.", device=self.who, name=name)
+
     def write(self, name: str, value: bool | float) -> None:
-        """Write an output, in its unit. Raises Refused for an input, OutOfRange with the range, and as `write_raw`."""
+        """Write an output, in its unit.
+
+        Raises:
+            Refused: It is an input, or a person forces it.
+            OutOfRange: The value is not in its range.
+            NotInControl, ConnectionLost, DeviceTimeout: As `write_raw`.
+        """
+        self.require_not_forced(name)
+        self._write(name, value)
+
+    def _write(self, name: str, value: bool | float) -> None:
         point = self.require_output(name)
         raw: bool | float = bool(value)
         if point.kind is PointKind.ANALOG:

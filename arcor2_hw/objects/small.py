@@ -2,12 +2,24 @@
 
 import abc
 import enum
+from collections.abc import Callable
 from typing import ClassVar, Final, Literal, NamedTuple, Protocol, runtime_checkable
+
+from msgspec.structs import replace
 
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.device import LossReaction, Observation, Quality, Reading
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.exceptions import Arcor2NotImplemented, DeviceFault, Refused, Stale
+from arcor2_hw.data.points import ForceKind, LivePoint, PointQuality, PointUse
+from arcor2_hw.exceptions import (
+    Arcor2NotImplemented,
+    ConnectionLost,
+    DeviceError,
+    DeviceFault,
+    NotConnected,
+    Refused,
+    Stale,
+)
 from arcor2_hw.messages import translatable
 from arcor2_hw.objects.generic import Generic
 from arcor2_hw.objects.gripping import HoldsParts
@@ -138,6 +150,42 @@ class IOPoint(Data, frozen=True):
     debounce: float = 0.0
     on_loss: OnLoss | Unset = UNSET
 
+    @property
+    def forcible(self) -> bool:
+        """Whether it may be forced: an output whose force ends at the device if this computer fails."""
+        return self.direction is PointDirection.OUTPUT and self.on_loss in (OnLoss.OFF, OnLoss.ON)
+
+
+def live_point(point: IOPoint, read: Callable[[str], Reading[bool | float]], *, can_force: bool = False) -> LivePoint:
+    """Return a point with its value.
+
+    Args:
+        point: The point.
+        read: Returns the newest value of a point.
+        can_force: Whether the device implements `force_point`.
+    """
+    found = LivePoint(point.name, PointUse(point.direction.value), unit=point.unit)
+    if can_force and point.forcible:
+        found = replace(found, force=ForceKind(point.kind.value))
+    try:
+        reading = read(point.name)
+    except DeviceError as error:
+        return replace(found, quality=quality_of(error))
+    bad = reading.quality is Quality.BAD
+    return replace(
+        found,
+        value=None if bad else reading.value,
+        quality=PointQuality(reading.quality.value),
+        age=round(reading.age, 3),
+    )
+
+
+def quality_of(error: Exception) -> PointQuality:
+    """Return the quality of a point that could not be read."""
+    if isinstance(error, Stale):
+        return PointQuality.STALE
+    return PointQuality.NOT_CONNECTED if isinstance(error, NotConnected | ConnectionLost) else PointQuality.BAD
+
 
 @runtime_checkable
 class HasPoints(Protocol):
@@ -187,6 +235,14 @@ class IOBlock(Generic):
     def observations(self) -> list[Observation]:
         """Return the first MOST_POINTS points. A point that cannot be read has bad quality."""
         return [self._observation(point) for point in self.points()[:MOST_POINTS]]
+
+    def newest_value(self, name: str) -> Reading[bool | float]:
+        """Return the newest value of a point without asking the device, if that is possible. Raises like `read`."""
+        return self.read(name)
+
+    def live_points(self) -> list[LivePoint]:
+        """Return the points with their newest values."""
+        return [live_point(point, self.newest_value) for point in self.points()]
 
     def _observation(self, point: IOPoint) -> Observation:
         try:

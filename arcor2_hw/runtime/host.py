@@ -35,6 +35,7 @@ from arcor2_hw.runtime.cell import Cell, SceneFault, scene_recipes
 from arcor2_hw.runtime.clock import Clock
 from arcor2_hw.runtime.creation import write_sources
 from arcor2_hw.runtime.device import Device
+from arcor2_hw.runtime.forcing import CHECK_PERIOD, Forces
 from arcor2_hw.runtime.holding import Holds
 from arcor2_hw.runtime.interlocks import Interlocks
 from arcor2_hw.runtime.link import Link
@@ -54,6 +55,8 @@ SCRIPT_END_TIMEOUT: Final = 5.0
 """Time that a script has to end after the connection of a device is lost, s."""
 EVENT_WAIT: Final = 1.0
 """Longest time that an event of the program waits for a slow server, s."""
+FORCES_END_WITHIN: Final = 0.5
+"""Time to switch forced outputs back before their devices are disconnected, s."""
 NICENESS: Final = -5
 """Niceness of this process: devices have priority over user interfaces."""
 FLUSH_TIMEOUT: Final = 0.3
@@ -90,6 +93,7 @@ class Host:
         self._holds = Holds(
             lambda: self._cell, self.link.post, self.clock, self._calls, self._teaching, self._interlocks
         )
+        self._forces = Forces(lambda: self._cell, self.link.post, self.clock)
         self._streams = Streams(self.link.post_stream)
         self._rated = RatedStreams(lambda: self._cell, self.clock, self._streams)
         self._watch = Watch(self._cell, self.link.post, self._device_lost)
@@ -113,6 +117,7 @@ class Host:
         self.clock.every(INTERRUPT_PERIOD, self._interrupt_script)
         self.clock.every(TEACHING_PERIOD, self._teaching.check_all)
         self.clock.every(OBSERVE_PERIOD, self._publish_interlocks)
+        self.clock.every(CHECK_PERIOD, self._forces.check_all)
         self.clock.start()
         self.link.post(m.Ready(os.getpid()))
         threading.Thread(target=self._read, name="from server", daemon=True).start()
@@ -234,6 +239,7 @@ class Host:
             or any(device.lane.busy_with or device.moving for device in self._cell)
         )
         self._interlocks.close()
+        self._forces.end_all(FORCES_END_WITHIN)
         stopped = wait_stopped(self._cell.stop_all(), 0.5) if active else None
         problem = self._cell.close() or stopped
         self.link.post(m.SceneClosed(None if problem is None else error_data(problem)))
@@ -368,6 +374,12 @@ class Host:
             case m.StopAll():
                 self._calls.stop_all(message, self.program)  # first, because a program that ends waits for this answer
                 self._stop_program()
+            case m.ForcePoint():
+                self._forces.start(message)
+            case m.RenewForces():
+                self._forces.renew(message)
+            case m.EndForce():
+                self._forces.end(message)
             case m.Lease():
                 self._holds.lease(message)
             case m.RetryObject():

@@ -194,12 +194,41 @@ class Subscribe(ToHost, frozen=True):
 
 
 class Stream(ToHost, frozen=True):
-    """Set the rates, Hz, at which joints, end effector poses and observations are sent with timestamps."""
+    """Set the rates, Hz, at which joints, end effector poses, observations and points are sent with timestamps."""
 
     object_id: str
     joints: list[float]
     eef: list[float]
     observations: list[float] = field(default_factory=list)
+    points: list[float] = field(default_factory=list)
+
+
+class ForcePoint(ToHost, frozen=True):
+    """Force an output until a time of the monotonic clock, s. Answer: CallDone with ForceStarted, or CallFailed.
+
+    force: number of the force. ForceEnded reports its end.
+    """
+
+    id: int
+    object_id: str
+    point: str
+    force: int
+    value: bool | float
+    until: float
+
+
+class RenewForces(ToHost, frozen=True):
+    """Extend forces until a time of the monotonic clock, s. Those that have ended are ignored."""
+
+    forces: list[int]
+    until: float
+
+
+class EndForce(ToHost, frozen=True):
+    """End a force. Answer: CallDone or CallFailed with this id when the output has its value from before."""
+
+    id: int
+    force: int
 
 
 class Lease(ToHost, frozen=True):
@@ -327,9 +356,9 @@ class CallFailed(ToServer, frozen=True):
 
 
 class StreamEvent(ToServer, frozen=True):
-    """An encoded RobotJoints, RobotEef or ObjectObservations event.
+    """An encoded RobotJoints, RobotEef, ObjectObservations or ObjectPoints event.
 
-    The first two are for subscribers, or for all clients while a program runs, the last one is for subscribers.
+    The first two are for subscribers, or for all clients while a program runs, the others are for subscribers.
 
     rate: of the Stream to which it belongs, Hz; 0 for the streaming period.
     """
@@ -345,6 +374,20 @@ class HoldEnded(ToServer, frozen=True):
 
     object_id: str
     hold: int
+    error: ErrorData | None = None
+
+
+class ForceStarted(Struct, frozen=True):
+    """The value of CallDone for ForcePoint. before: value of the output before. unit: of both values."""
+
+    before: bool | float
+    unit: str
+
+
+class ForceEnded(ToServer, frozen=True):
+    """A force has ended without EndForce, or as it requested. `error`: why, or why the output was not switched back."""
+
+    force: int
     error: ErrorData | None = None
 
 
@@ -483,6 +526,9 @@ HostBound = (
     | StopAll
     | Subscribe
     | Stream
+    | ForcePoint
+    | RenewForces
+    | EndForce
     | Lease
     | Pause
     | Resume
@@ -504,6 +550,7 @@ ServerBound = (
     | CallFailed
     | StreamEvent
     | HoldEnded
+    | ForceEnded
     | HandTeachingEnded
     | ProgramEvent
     | ActionFailed

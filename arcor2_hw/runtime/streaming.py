@@ -1,15 +1,16 @@
-"""Streaming of robot joints, end effector poses and observations, at the streaming period and at other rates."""
+"""Streaming of joints, end effector poses, observations and points, at the streaming period and at other rates."""
 
 import contextlib
 import threading
 import time
 from collections.abc import Callable
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import msgspec
 
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.events import Event, ObjectObservationsData, RobotEefData, RobotJointsData
+from arcor2_hw.data.points import ObjectPointsData
 from arcor2_hw.data.robot import EefPose
 from arcor2_hw.exceptions import Arcor2Error, message_of
 from arcor2_hw.objects import Generic, MultiArmRobot, Robot
@@ -18,10 +19,13 @@ from arcor2_hw.runtime.clock import Clock
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.messages import Stream, StreamEvent
+from arcor2_hw.runtime.points import PointReader
 
 OBSERVATIONS: Final = "ObjectObservations"
 """The event with the observations of a device."""
-_Kind = Literal["joints", "eef", "observations"]
+POINTS: Final = "ObjectPoints"
+"""The event with the points of a device."""
+_Kind = Literal["joints", "eef", "observations", "points"]
 _encode = msgspec.json.Encoder().encode
 
 
@@ -46,13 +50,17 @@ def _eef(robot: Robot, time_ms: float | Unset) -> bytes:
     return _encode(Event("RobotEef", data=RobotEefData(robot.id, poses, time_ms)))
 
 
-def _observations(instance: Generic, time_ms: float) -> bytes:
+def _encoded(
+    event: str, kind: type[ObjectObservationsData | ObjectPointsData], object_id: str, read: Callable[[], list[Any]]
+) -> bytes:
+    """Return the event with the values of a device, or with the reason why they are not known."""
+    time_ms = round(time.monotonic() * 1e3, 3)
     try:
-        data = ObjectObservationsData(instance.id, time_ms, instance.observations())
+        data = kind(object_id, time_ms, read())
     except Exception as error:  # noqa: BLE001 - a driver may raise anything
         why = message_of(error)
-        data = ObjectObservationsData(instance.id, time_ms, reason=why.text, **why.translation())
-    return _encode(Event(OBSERVATIONS, data=data))
+        data = kind(object_id, time_ms, reason=why.text, **why.translation())
+    return _encode(Event(event, data=data))
 
 
 class Streams:
@@ -60,12 +68,18 @@ class Streams:
 
     def __init__(self, send: Send) -> None:
         self._send = send
-        self._pending: dict[tuple[str, bool, bool, float], Job] = {}
+        self._pending: dict[tuple[str, str, float], Job] = {}
+        self._points = PointReader()
 
     def send_observations(self, device: Device, rate: float) -> None:
         """Start to read and send the observations of a device. `rate`: of the stream, Hz."""
         if (instance := device.instance) is not None and not device.closing:
-            self._begin(device, (device.id, False, False, rate), self._observe, instance, rate)
+            self._begin(device, OBSERVATIONS, rate, self._observe, instance, rate)
+
+    def send_points(self, device: Device, rate: float) -> None:
+        """Start to read and send the points of a device. `rate`: of the stream, Hz."""
+        if device.instance is not None and not device.closing:
+            self._begin(device, POINTS, rate, self._read_points, device, rate)
 
     def send(self, device: Device, *, joints: bool, eef: bool, rate: float = 0.0) -> None:
         """Start to read and send joints or end effector poses of a robot. Other devices are ignored.
@@ -75,11 +89,10 @@ class Streams:
         robot = device.instance
         if not isinstance(robot, Robot) or device.closing:
             return
-        self._begin(device, (device.id, joints, eef, rate), self._read_and_send, robot, joints, eef, rate)
+        self._begin(device, f"{joints=} {eef=}", rate, self._read_and_send, robot, joints, eef, rate)
 
-    def _begin(
-        self, device: Device, key: tuple[str, bool, bool, float], function: Callable[..., None], *arguments: object
-    ) -> None:
+    def _begin(self, device: Device, what: str, rate: float, function: Callable[..., None], *arguments: object) -> None:
+        key = (device.id, what, rate)
         before = self._pending.get(key)
         if before is not None and not before.ended:
             return
@@ -87,8 +100,12 @@ class Streams:
         device.watch_lane.submit_or_fail(job)
 
     def _observe(self, instance: Generic, rate: float) -> None:
-        encoded = _observations(instance, round(time.monotonic() * 1e3, 3))
+        encoded = _encoded(OBSERVATIONS, ObjectObservationsData, instance.id, instance.observations)
         self._send(StreamEvent(OBSERVATIONS, instance.id, encoded, rate))
+
+    def _read_points(self, device: Device, rate: float) -> None:
+        encoded = _encoded(POINTS, ObjectPointsData, device.id, lambda: self._points.read(device))
+        self._send(StreamEvent(POINTS, device.id, encoded, rate))
 
     def _read_and_send(self, robot: Robot, joints: bool, eef: bool, rate: float) -> None:
         # A read error sends no event: clients see the age of the last one.
@@ -116,6 +133,7 @@ class RatedStreams:
             ("joints", message.joints),
             ("eef", message.eef),
             ("observations", message.observations),
+            ("points", message.points),
         )
         for kind, rates in wanted:
             with self._lock:
@@ -134,6 +152,8 @@ class RatedStreams:
             device = self._cell()[object_id]
             if kind == "observations":
                 self._streams.send_observations(device, rate)
+            elif kind == "points":
+                self._streams.send_points(device, rate)
             else:
                 self._streams.send(device, joints=kind == "joints", eef=kind == "eef", rate=rate)
         now = time.monotonic()

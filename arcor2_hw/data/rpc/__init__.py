@@ -18,6 +18,7 @@ from arcor2_hw.data.rpc.locks import *
 from arcor2_hw.data.rpc.object_types import *
 from arcor2_hw.data.rpc.operation import *
 from arcor2_hw.data.rpc.persons import *
+from arcor2_hw.data.rpc.points import *
 from arcor2_hw.data.rpc.projects import *
 from arcor2_hw.data.rpc.recipes import *
 from arcor2_hw.data.rpc.robots import *
@@ -41,6 +42,7 @@ _ALL: Final = (
     *OBJECT_TYPE_RPCS,
     *OPERATION_RPCS,
     *PERSON_RPCS,
+    *POINT_RPCS,
     *PROJECT_RPCS,
     *RECIPE_RPCS,
     *ROBOT_RPCS,

@@ -7,7 +7,7 @@ from asyncua import ua
 
 from arcor2_hw.actions import action
 from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction, Quality, Reading, Severity
-from arcor2_hw.exceptions import DeviceFault
+from arcor2_hw.exceptions import DeviceFault, Stale
 from arcor2_hw.messages import Message, translatable
 from arcor2_hw.objects import IOBlock
 from arcor2_hw.objects.connected import AlarmText
@@ -77,10 +77,24 @@ class OpcUaPlc(PointActions, Plc, IOBlock):
         program of the PLC is stopped, NotConnected, ConnectionLost, DeviceTimeout.
         """
         asked = Reading.of(None)
-        found = self._value(name)
+        return self._reading(name, self._value(name), asked.monotonic)
+
+    def newest_value(self, name: str) -> Reading[bool | float]:
+        """Return the value of a point that the PLC reported last. It is valid since then while the PLC answers.
+
+        Raises Stale, also while the program of the PLC is stopped, NotConnected, ConnectionLost.
+        """
+        _, asked, _ = self._polled.current()
+        self.check_program()
+        found = self.newest_values.get(name)
+        if found is None or content(found) is None:
+            raise Stale("{device}: the value of {name} is not known yet", device=self.who, name=name)
+        return self._reading(name, found, asked)
+
+    def _reading(self, name: str, found: ua.DataValue, asked: float) -> Reading[bool | float]:
         point = self.plc_points[name]
         value = bool(content(found)) if point.digital else float(content(found)) * point.io.scale
-        return Reading[bool | float](value, stamp(found), asked.monotonic, quality(found))
+        return Reading[bool | float](value, stamp(found), asked, quality(found))
 
     def _value(self, name: str) -> ua.DataValue:
         self.require_point(name)

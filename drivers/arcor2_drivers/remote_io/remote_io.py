@@ -76,6 +76,14 @@ class RemoteIO(PointActions, Block, IOBlock):
         quality = Quality.BAD if point.kind == "AI" and raw == BROKEN_WIRE else Quality.GOOD
         return Reading(point.physical(raw), stamp, asked, quality)
 
+    def newest_value(self, name: str) -> Reading[bool | float]:
+        """Return the newest value of a point. Raises Stale, NotConnected, ConnectionLost."""
+        if self.io_points[name].kind is PointKind.ANALOG:
+            reading = self.analog_point(name)
+            return Reading[bool | float](reading.value, reading.stamp, reading.monotonic, reading.quality)
+        _, asked, stamp = self._polled.current()
+        return Reading[bool | float](self.digital(name), stamp, asked)
+
     def bad_reading(self, name: str) -> DeviceFault:
         """Return the error for an input with a broken wire."""
         point = f"{name} ({self.point_label(name)})"
@@ -112,4 +120,5 @@ class RemoteIO(PointActions, Block, IOBlock):
 
         self.require_point(name, PointKind.DIGITAL)
         self.require_output(name)
+        self.require_not_forced(name)
         self.pulse_output(name, duration)

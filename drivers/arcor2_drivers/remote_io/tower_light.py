@@ -8,10 +8,13 @@ from functools import partial
 from typing import ClassVar
 
 from arcor2_hw.actions import action
-from arcor2_hw.exceptions import NotInControl, OutOfRange
+from arcor2_hw.data.device import Reading
+from arcor2_hw.data.points import LivePoint
+from arcor2_hw.exceptions import NotInControl, OutOfRange, Refused
 from arcor2_hw.objects import Generic
 from arcor2_hw.objects.machine import MachineStateName
 from arcor2_hw.objects.point_actions import MARGIN
+from arcor2_hw.objects.small import live_point
 
 from .block import Block
 from .registers import LONGEST_PULSE
@@ -36,6 +39,8 @@ class TowerLight(Block, Generic):
         self._pattern: Pattern = {}
         self._lit: dict[str, bool] = {}
         self._since = 0.0
+        self._forced: frozenset[str] = frozenset()
+        """Names of the outputs that a person forces."""
         self.use_block(settings, settings.points())
 
     def arm(self) -> None:
@@ -54,6 +59,29 @@ class TowerLight(Block, Generic):
         """Return for each lamp whether it is lit."""
         states = {color: self.digital_points.value(color) for color in self._lamps}
         return {color: float(lit) for color, lit in states.items() if lit is not None}
+
+    # -------------------------------------------------------------------------------- points
+    def live_points(self) -> list[LivePoint]:
+        """Return the lamps and the buzzer with their newest states."""
+        return [live_point(point.io, self._newest, can_force=True) for point in self.block_points.values()]
+
+    def _newest(self, name: str) -> Reading[bool | float]:
+        _, asked, stamp = self._polled.current()
+        return Reading[bool | float](self.digital(name), stamp, asked)
+
+    def force_point(self, name: str, value: bool | float) -> None:
+        """Switch a lamp or the buzzer, and do not switch it otherwise until `release_point`."""
+        if name not in self.block_points:
+            raise OutOfRange("{device} has no lamp {name!r}", device=self.who, name=name)
+        with self._showing:
+            self.switch(name, bool(value))
+            self._forced |= {name}
+
+    def release_point(self, name: str, value: bool | float) -> None:
+        """End a force. A lamp shows again what it should, otherwise it gets the state from before."""
+        with self._showing:
+            self._forced -= {name}
+            self.switch(name, self._lit.get(name, bool(value)))
 
     # -------------------------------------------------------------------------------- actions
     @action
@@ -95,6 +123,8 @@ class TowerLight(Block, Generic):
 
         if "buzzer" not in self.block_points:
             raise OutOfRange("{device} has no buzzer. Set buzzer to its output.", device=self.who)
+        if "buzzer" in self._forced:
+            raise Refused("{device}: {name} is forced. End the force first.", device=self.who, name="buzzer")
         self.pulse_output("buzzer", duration)
 
     # -------------------------------------------------------------------------------- lamps
@@ -116,5 +146,6 @@ class TowerLight(Block, Generic):
         # First off, then on: two colours at the same time may have another meaning.
         for color, on in sorted(wanted.items(), key=lambda lamp: lamp[1]):
             if self._lit.get(color) is not on:
-                self.retry_once(partial(self.switch, color, on))
+                if color not in self._forced:
+                    self.retry_once(partial(self.switch, color, on))
                 self._lit[color] = on

@@ -5,10 +5,11 @@ from typing import Final
 from arcor2_hw.actions import action
 from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Reading
+from arcor2_hw.data.points import LivePoint
 from arcor2_hw.exceptions import DeviceFault, DeviceTimeout, OutOfRange, Refused
 from arcor2_hw.keep_alive import once_within
 from arcor2_hw.messages import Message
-from arcor2_hw.objects.small import IOPoint, OnLoss, PointDirection, PointKind
+from arcor2_hw.objects.small import IOPoint, OnLoss, PointDirection, PointKind, live_point
 
 from .control import Control
 from .observer import Observer
@@ -93,6 +94,10 @@ class DigitalIO:
         point, sample = self._point(name), self._observer.sample()
         bits = sample.inputs if point.direction is PointDirection.INPUT else sample.outputs
         return Reading[bool | float](bool(bits >> NUMBERS[name] & 1), now(), sample.monotonic)
+
+    def live_points(self) -> list[LivePoint]:
+        """Return the inputs and outputs with their newest values."""
+        return [live_point(point, self.read) for point in POINTS.values()]
 
     def write(self, name: str, value: bool | float) -> None:
         """Switch an output, from any thread, also during a motion. Raise OutOfRange, Refused or NotInControl."""

@@ -898,6 +898,11 @@ export interface Effectiveness {
   oee?: number;
 }
 
+/** Arguments of EndForce: a force of any client. */
+export interface EndForceArgs {
+  id: string;
+}
+
 /** A pose with its quality, 0 to 1. */
 export interface EstimatedPose {
   pose: Pose;
@@ -936,6 +941,49 @@ export interface Flow {
 
 /** Kinds of flow that leave an action. */
 export type FlowTypes = "default";
+
+/** The kind of value to which an output can be forced. */
+export type ForceKind = "digital" | "analog";
+
+/**
+ * Arguments of ForcePoint.
+ *
+ * point: name of the output. value: a boolean for a digital output, a number in its unit for an analogue one.
+ * valid_ms: 500 to 10000, duration of the force unless it is renewed.
+ */
+export interface ForcePointArgs {
+  object_id: string;
+  point: string;
+  value: boolean | number;
+  valid_ms: number;
+}
+
+/** Answer to ForcePoint: the id of the force. */
+export interface ForcePointData {
+  id: string;
+}
+
+/**
+ * An output that a person forces.
+ *
+ * object, point: names of the device and of its output. unit: of the value. user: who forces it. since: start of the
+ * force.
+ */
+export interface ForcedPoint {
+  id: string;
+  object_id: string;
+  object: string;
+  point: string;
+  value: boolean | number;
+  unit: string;
+  user: string;
+  since: string;
+}
+
+/** Data of the event ForcesChanged: all forced outputs. */
+export interface ForcesChangedData {
+  forces: ForcedPoint[];
+}
 
 /** Arguments of ForwardKinematics. */
 export interface ForwardKinematicsArgs {
@@ -1486,6 +1534,23 @@ export interface ListUnitsData {
   units: Unit[];
 }
 
+/**
+ * A point of a device with its newest known value.
+ *
+ * name: the user's name of an input or output; of a signal, the name of its method or English words. age: of the
+ * value, s; omitted if it is not known. force: the kind of value to which the point can be forced; omitted if it
+ * cannot be forced.
+ */
+export interface LivePoint {
+  name: string;
+  use: PointUse;
+  value: boolean | number | string | null;
+  unit: string;
+  quality: PointQuality;
+  age?: number;
+  force?: ForceKind;
+}
+
 /** Data of the events ObjectsLocked and ObjectsUnlocked. */
 export interface LockData {
   object_ids: string[];
@@ -1856,6 +1921,20 @@ export interface ObjectObservationsData {
 }
 
 /**
+ * Data of the event ObjectPoints: all points of a device.
+ *
+ * time_ms: time of reading on the steady clock of the cell. reason: why the points are not known.
+ */
+export interface ObjectPointsData {
+  object_id: string;
+  time_ms: number;
+  points: LivePoint[];
+  reason?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
+}
+
+/**
  * Data of the event ObjectState: the connection of an object of the online scene or the running program.
  *
  * reason: why it is lost or failed, or why all connections ended. overlaid: settings from the server's cell file.
@@ -2127,6 +2206,12 @@ export interface PlcLink {
   alive: boolean;
   peer?: string;
 }
+
+/** How far the value of a point can be trusted. */
+export type PointQuality = "good" | "uncertain" | "stale" | "bad" | "not_connected";
+
+/** What a point is: an input or output of the device, one of its registers, or another value that it reports. */
+export type PointUse = "input" | "output" | "register" | "signal";
 
 /** Position and orientation of a frame in its parent frame. */
 export interface Pose {
@@ -2561,6 +2646,12 @@ export interface RenamePackageArgs {
 export interface RenameProjectArgs {
   project_id: string;
   new_name: string;
+}
+
+/** Arguments of RenewForces: forces of this client, and their duration from now unless they are renewed again. */
+export interface RenewForcesArgs {
+  ids: string[];
+  valid_ms: number;
 }
 
 /** Arguments of RestoreRevision: the number of the edit after which the document is restored. */
@@ -3110,6 +3201,13 @@ export interface StreamObservationsArgs {
   send?: boolean;
 }
 
+/** Arguments of StreamPoints: ObjectPoints of a device, 0.2 to 5 times per second, or off. */
+export interface StreamPointsArgs {
+  object_id: string;
+  rate?: number;
+  send?: boolean;
+}
+
 /** Arguments of StreamRobot: RobotJoints or RobotEef of a robot, 1 to 30 times per second, or off. */
 export interface StreamRobotArgs {
   robot_id: string;
@@ -3630,9 +3728,11 @@ export interface Requests {
   DeleteScene: { args: IdArgs; data: string[] };
   DissolveCall: { args: DissolveCallArgs; data: DissolveCallData };
   DissolveParallel: { args: DissolveParallelArgs; data: undefined };
+  EndForce: { args: EndForceArgs; data: undefined };
   ExecuteAction: { args: ExecuteActionArgs; data: undefined };
   ExportFunction: { args: IdArgs; data: FunctionExport };
   FindDevices: { args: FindDevicesArgs; data: FoundDevice[] };
+  ForcePoint: { args: ForcePointArgs; data: ForcePointData };
   ForwardKinematics: { args: ForwardKinematicsArgs; data: Pose };
   GetActions: { args: TypeArgs; data: ObjectAction[] };
   GetBreakpoints: { args: GetBreakpointsArgs | undefined; data: ProjectBreakpoints };
@@ -3726,6 +3826,7 @@ export interface Requests {
   RenamePackage: { args: RenamePackageArgs; data: undefined };
   RenameProject: { args: RenameProjectArgs; data: undefined };
   RenameScene: { args: RenameArgs; data: undefined };
+  RenewForces: { args: RenewForcesArgs; data: undefined };
   RestoreRevision: { args: RestoreRevisionArgs; data: RestoreRevisionData };
   ResumePackage: { args: undefined; data: undefined };
   RetryObject: { args: RetryObjectArgs; data: undefined };
@@ -3751,6 +3852,7 @@ export interface Requests {
   StopRobot: { args: StopRobotArgs; data: undefined };
   StopScene: { args: undefined; data: undefined };
   StreamObservations: { args: StreamObservationsArgs; data: undefined };
+  StreamPoints: { args: StreamPointsArgs; data: undefined };
   StreamRobot: { args: StreamRobotArgs; data: undefined };
   SubscribeEvents: { args: SubscribeEventsArgs; data: undefined };
   SystemInfo: { args: undefined; data: SystemInfoData };
@@ -3804,6 +3906,7 @@ export interface Events {
   ChangeoverChanged: Changeover;
   DryRunChanged: DryRunHead;
   ExecutionTrace: TraceEntry;
+  ForcesChanged: ForcesChangedData;
   FunctionChanged: ProjectFunction;
   HandTeachingMode: HandTeachingModeData;
   Held: HeldData;
@@ -3818,6 +3921,7 @@ export interface Events {
   Notification: NotificationData;
   ObjectHealth: ObjectHealthData;
   ObjectObservations: ObjectObservationsData;
+  ObjectPoints: ObjectPointsData;
   ObjectState: ObjectStateData;
   ObjectValues: ObjectValuesData;
   ObjectsLocked: LockData;
@@ -3934,9 +4038,11 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   DeleteScene: 4,
   DissolveCall: 2,
   DissolveParallel: 2,
+  EndForce: 1,
   ExecuteAction: 2,
   ExportFunction: 1,
   FindDevices: 4,
+  ForcePoint: 4,
   ForwardKinematics: 2,
   GetActions: 1,
   GetBreakpoints: 1,
@@ -4030,6 +4136,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   RenamePackage: 3,
   RenameProject: 2,
   RenameScene: 4,
+  RenewForces: 4,
   RestoreRevision: 2,
   ResumePackage: 1,
   RetryObject: 2,
@@ -4055,6 +4162,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   StopRobot: 1,
   StopScene: 2,
   StreamObservations: 1,
+  StreamPoints: 1,
   StreamRobot: 1,
   SubscribeEvents: 1,
   SystemInfo: 1,
@@ -4100,6 +4208,7 @@ export const ADDITIONAL_EVENTS = [
   "ChangeoverChanged",
   "DryRunChanged",
   "ExecutionTrace",
+  "ForcesChanged",
   "FunctionChanged",
   "Held",
   "HistoryChanged",
@@ -4110,6 +4219,7 @@ export const ADDITIONAL_EVENTS = [
   "MovePreview",
   "ObjectHealth",
   "ObjectObservations",
+  "ObjectPoints",
   "ObjectState",
   "ObjectValues",
   "PartsChanged",

@@ -38,6 +38,7 @@ from arcor2_server.rpc.dry_runs import DryRunRequests
 from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.editor import SharedStateRequests
 from arcor2_server.rpc.execution import ExecutionRequests
+from arcor2_server.rpc.forces import ForceRequests
 from arcor2_server.rpc.functions import FunctionRequests
 from arcor2_server.rpc.general import GeneralRequests
 from arcor2_server.rpc.history import HistoryRequests
@@ -88,6 +89,7 @@ def request_handlers(s: Server) -> Handlers:
         ExecutionRequests(
             s.locks, s.types, s.session, s.online, s.execution, s.tasks, s.package_runs, s.temporary_runs
         ),
+        ForceRequests(s.online, s.execution),
         FunctionRequests(s.types, s.session, s.undo, editing),
         GeneralRequests(
             s.access,

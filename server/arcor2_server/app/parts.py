@@ -4,7 +4,9 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Protocol, TypeVar
 
+from arcor2_hw.data.audit import AuditOutcome
 from arcor2_hw.data.events import Event
+from arcor2_hw.messages import Message
 from arcor2_server.access.admission import Access
 from arcor2_server.alarms.kinds import AlarmKinds
 from arcor2_server.alarms.service import Alarms
@@ -47,6 +49,7 @@ from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.cameras import Cameras
 from arcor2_server.online.connection_check import ConnectionCheck
+from arcor2_server.online.forces import Force
 from arcor2_server.online.motion import RobotMotion
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.online.scene_calibration import SceneCalibration
@@ -180,7 +183,8 @@ class Server:
         online = self.online = closed(
             OnlineScene(scene_host, opening, hub, locks, session, robots, tasks, robot_calibrations)
         )
-        log_ons.on_end.append(online.held.logged_off)
+        log_ons.on_end += [online.held.logged_off, online.forces.logged_off]
+        online.forces.on_end.append(audit_end_of_force(audit))
         self.undo = Undo(locks, storage, types, session, online, dependents)
         motion = self.motion = RobotMotion(hub, types, session, online, robots, kinematics)
         cameras = self.cameras = Cameras(types, session, online)
@@ -204,6 +208,7 @@ class Server:
         execution = self.execution = closed(
             Execution(packages, program_host, online, settings, hub, types, runs, breakpoints, secrets, messages, books)
         )
+        execution.before_start.append(lambda _: online.forces.require_none())
         recipes = self.recipes = Recipes(
             hub, RecipeStore(storage), packages, persons, released_only=settings.released_only
         )
@@ -298,6 +303,24 @@ def connect_alarms(
     for notice in damage.notices:
         alarms.data_damaged(notice)
     damage.on_report.append(alarms.data_damaged)
+
+
+def audit_end_of_force(audit: AuditTrail) -> Callable[[Force, Message], None]:
+    """Return a function that notes the end of a force without a request."""
+
+    def note(force: Force, reason: Message) -> None:
+        audit.note(
+            AuditOutcome.DONE,
+            "EndForce",
+            target=force.output,
+            user=force.point.user,
+            role=force.client.role,
+            address=force.client.address,
+            reason=str(reason),
+            changes=[force.change(force.point.value, force.before)],
+        )
+
+    return note
 
 
 def connect_production(recipes: Recipes, units: Units, cell_time: CellTime, execution: Execution) -> None:

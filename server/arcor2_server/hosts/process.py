@@ -231,6 +231,31 @@ class CellHost:
         limit = HOLD_TIMEOUT + ANSWER_TIMEOUT
         return await self._request(m.Lease, object_id, hold, kind, until, limit=limit, **motion)
 
+    async def force(self, object_id: str, point: str, force: int, value: bool | float, until: float) -> bytes:
+        """Force an output.
+
+        Args:
+            object_id: the device.
+            point: name of the output.
+            force: number of the force.
+            value: the value.
+            until: time of the monotonic clock at which it ends, s.
+
+        Returns:
+            ForceStarted as JSON.
+
+        Raises:
+            CellError: the output cannot be forced.
+            ConnectionLost: the host ended.
+            DeviceTimeout: the host did not answer in time.
+        """
+        limit = HOLD_TIMEOUT + ANSWER_TIMEOUT
+        return await self._request(m.ForcePoint, object_id, point, force, value, until, limit=limit)
+
+    async def end_force(self, force: int) -> None:
+        """End a force. Raise CellError if the output could not be switched back, ConnectionLost, DeviceTimeout."""
+        await self._request(m.EndForce, force, limit=HOLD_TIMEOUT + ANSWER_TIMEOUT)
+
     async def decide(self, number: int, choice: HoldChoice, results: Sequence[str], exit_id: str) -> None:
         """Continue a held program.
 

@@ -1,4 +1,4 @@
-"""Subscriptions to joints, end effector poses and observations, at the streaming period or at a rate of the client."""
+"""Subscriptions to joints, end effector poses, observations and points, at the streaming period or another rate."""
 
 from collections.abc import Callable
 from typing import Final
@@ -10,10 +10,13 @@ from arcor2_server.events import Connection, EventHub
 
 OBSERVATIONS: Final = "observations"
 """The kind of the streams of observations, next to those of RobotEventKind."""
+POINTS: Final = "points"
+"""The kind of the streams of points."""
 _KINDS: Final[dict[str, str]] = {
     "RobotJoints": RobotEventKind.JOINTS,
     "RobotEef": RobotEventKind.EEF_POSE,
     "ObjectObservations": OBSERVATIONS,
+    "ObjectPoints": POINTS,
 }
 
 
@@ -90,7 +93,5 @@ class RobotStreams:
         self._send(m.Subscribe(robot_id, wanted[RobotEventKind.JOINTS], wanted[RobotEventKind.EEF_POSE]))
 
     def _update_host_rates(self, robot_id: str) -> None:
-        joints, eef, observations = (
-            sorted(set(self._rates.get((robot_id, what), {}).values())) for what in _KINDS.values()
-        )
-        self._send(m.Stream(robot_id, joints, eef, observations))
+        rates = [sorted(set(self._rates.get((robot_id, what), {}).values())) for what in _KINDS.values()]
+        self._send(m.Stream(robot_id, *rates))

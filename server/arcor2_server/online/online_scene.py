@@ -27,6 +27,7 @@ from arcor2_server.hosts.process import CellHost
 from arcor2_server.hosts.session import READ_TIMEOUT, HostSession
 from arcor2_server.hosts.streams import RobotStreams
 from arcor2_server.online.actions import LastStop, RunningAction
+from arcor2_server.online.forces import Forces
 from arcor2_server.online.hold_to_run import HoldToRun
 from arcor2_server.online.progress import SceneTask
 from arcor2_server.online.scene_opening import SceneOpening
@@ -72,6 +73,8 @@ class OnlineScene:
         self.background = BackgroundTasks()
         """Tasks that are cancelled when the server ends."""
         self.held = HoldToRun(host, hub, locks, robots, self.moving, self.background)
+        self.forces = Forces(host, hub, self.background)
+        """The outputs that persons force."""
         self.host = host
         """The devices. Its calls raise RequestRefused while the scene is offline."""
         self._opening = opening
@@ -88,7 +91,7 @@ class OnlineScene:
         self._preparing = asyncio.get_running_loop().call_later(SPARE_AFTER, host.prepare)
         host.observe(self._handle, self._host_ended)
         host.board.on_connection.append(self._connection_changed)
-        hub.on_leave.append(self.held.forget)
+        hub.on_leave += [self.held.forget, self.forces.forget]
         session.on_change.append(self._edited)
 
     # -------------------------------------------------------------------------------- state
@@ -225,6 +228,7 @@ class OnlineScene:
         self.board.clear(message)
         self.results.clear()
         self.held.offline(message)
+        self.forces.offline(message)
         self.moving.clear()
         self.streams.clear()
         self._done(SceneStateEnum.STOPPED, message)
@@ -305,6 +309,8 @@ class OnlineScene:
         match message:
             case m.HoldEnded():
                 self.held.ended(message)
+            case m.ForceEnded():
+                self.forces.ended(message)
             case m.HandTeachingEnded():
                 self.held.teaching_ended(message)
             case m.SceneOpened():

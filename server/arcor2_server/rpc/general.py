@@ -158,6 +158,8 @@ class GeneralRequests:
             events.append(make_event("InterlockStates", InterlockStates(known)))
         if "RobotHold" in args.events:
             events += [make_event("RobotHold", hold) for hold in self._online.held.states()]
+        if "ForcesChanged" in args.events:
+            events.append(make_event("ForcesChanged", self._online.forces.states()))
         if "UserPresence" in args.events:
             events += self._presence.all_events()
         if "TaskState" in args.events:

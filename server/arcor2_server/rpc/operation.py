@@ -23,15 +23,17 @@ from arcor2_hw.data.rpc import (
     StopAllData,
     StopKind,
     StreamObservationsArgs,
+    StreamPointsArgs,
     StreamRobotArgs,
 )
 from arcor2_hw.data.rpc.operation import FASTEST_OBSERVATIONS, FASTEST_STREAM, SLOWEST_OBSERVATIONS
+from arcor2_hw.data.rpc.points import FASTEST_POINTS
 from arcor2_server.documents import Session
 from arcor2_server.errors import RequestRefused
 from arcor2_server.execution.service import Execution
 from arcor2_server.execution.stop_all import StopAll
 from arcor2_server.hosts.session import READ_TIMEOUT
-from arcor2_server.hosts.streams import OBSERVATIONS
+from arcor2_server.hosts.streams import OBSERVATIONS, POINTS
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.motion import RobotMotion
 from arcor2_server.online.online_scene import OnlineScene
@@ -172,6 +174,19 @@ class OperationRequests:
 
         The device belongs to the online scene or to the running program.
         """
+        self._stream_values(context, args, OBSERVATIONS, FASTEST_OBSERVATIONS)
+
+    @rpc("StreamPoints")
+    async def stream_points(self, context: Context, args: StreamPointsArgs) -> None:
+        """Start or stop sending the points of a device to this client at a given rate.
+
+        The device belongs to the online scene or to the running program.
+        """
+        self._stream_values(context, args, POINTS, FASTEST_POINTS)
+
+    def _stream_values(
+        self, context: Context, args: StreamObservationsArgs | StreamPointsArgs, what: str, fastest: float
+    ) -> None:
         if self._execution.busy:
             streams = self._execution.streams_of_object(args.object_id)
         else:
@@ -179,14 +194,14 @@ class OperationRequests:
             self._online.require_online()
             self._session.document.scene_object(args.object_id)
             streams = self._online.host.streams
-        if args.send and not SLOWEST_OBSERVATIONS <= args.rate <= FASTEST_OBSERVATIONS:
+        if args.send and not SLOWEST_OBSERVATIONS <= args.rate <= fastest:
             raise RequestRefused(
                 "The rate must be {slowest:g} to {fastest:g} Hz, not {rate:g}.",
                 slowest=SLOWEST_OBSERVATIONS,
-                fastest=FASTEST_OBSERVATIONS,
+                fastest=fastest,
                 rate=args.rate,
             )
-        streams.at_rate(context.client, args.object_id, OBSERVATIONS, args.rate, args.send)
+        streams.at_rate(context.client, args.object_id, what, args.rate, args.send)
 
     # ------------------------------------------------------------------------------------------------ devices
     @rpc("RetryObject")
