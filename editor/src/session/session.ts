@@ -10,6 +10,7 @@ import {
   ADDITIONAL_EVENTS,
   type AlarmRecord,
   type ObjectObservationsData,
+  type ObjectPointsData,
   type PartBooks,
   ROLES,
   type ServerEvent,
@@ -39,6 +40,8 @@ declare module "../store/runtime" {
     session?: Session;
     /** Receives the observations of devices, which bypass the store, while trends are shown. */
     takeObservations?: ((data: ObjectObservationsData) => void) | undefined;
+    /** Receives the points of devices while the page with them is open. */
+    takePoints?: ((data: ObjectPointsData) => void) | undefined;
     /** Receive changed alarms, which bypass the store, while they are shown. */
     takeAlarm?: Set<(record: AlarmRecord) => void>;
     /** Receive changed books of parts, which bypass the store, while they are shown. */
@@ -112,6 +115,7 @@ export class Session {
     if (event.event === "RobotJoints") telemetry.takeJoints(event.data);
     else if (event.event === "RobotEef") telemetry.takeEef(event.data);
     else if (event.event === "ObjectObservations") now().runtime.takeObservations?.(event.data);
+    else if (event.event === "ObjectPoints") now().runtime.takePoints?.(event.data);
     else if (event.event === "AlarmChanged") for (const take of now().runtime.takeAlarm ?? []) take(event.data);
     else if (event.event === "PartsChanged") for (const take of now().runtime.takeParts ?? []) take(event.data);
     else if (event.event === "LogOnChanged")

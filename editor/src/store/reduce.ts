@@ -114,6 +114,8 @@ export function reduce(state: State, event: ServerEvent, time: number): Partial<
     }
     case "ViewStateChanged":
       return viewState(state, event.data);
+    case "ForcesChanged":
+      return { forces: event.data.forces };
     case "Notification": {
       const level = event.data.level === "Info" ? "info" : event.data.level === "Warn" ? "warn" : "error";
       return notice(state, level, event.data.message, time);

@@ -10,6 +10,7 @@ import type {
   BareActionPoint,
   BareProject,
   BareScene,
+  ForcedPoint,
   GetDryRunData,
   HeldData,
   HistoryChangedData,
@@ -216,6 +217,8 @@ export interface State {
   dynamicValues: Record<string, string[]>;
   /** Results of actions that were run alone, newest last. */
   tried: Tried[];
+  /** Outputs that persons force, on any device. */
+  forces: readonly ForcedPoint[];
   tasks: Record<string, TaskStateData>;
   notices: Notice[];
   /** All messages since the page was opened, including dismissed ones and finished tasks; newest last. */
@@ -281,6 +284,7 @@ export function initialState(): State {
     live: OFFLINE,
     program: NO_PROGRAM,
     tried: [],
+    forces: [],
     tasks: {},
     notices: [],
     messageLog: [],

@@ -27,9 +27,11 @@ const Home = lazyComponent(() => import("./home/Home").then((module) => ({ defau
 const Operator = lazyComponent(() => import("./operator/Operator"));
 const ControlBanner = lazyComponent(() => import("./workplace/ControlBanner"));
 const Tour = lazyComponent(() => import("./tour/Tour"));
+const ForceBanner = lazyComponent(() => import("./io/ForceBanner"));
+const Points = lazyComponent(() => import("./io/Points"));
 const ResultBanner = lazyComponent(() => import("./run/ResultBanner"));
 
-/** The hash of the address, which selects the editor or the operator screen. */
+/** The hash of the address, which selects the editor, the operator screen, or the page of inputs and outputs. */
 function useHash(): string {
   return useSyncExternalStore(
     (changed) => {
@@ -48,6 +50,7 @@ export function App() {
   const open = useEditor((state) => state.doc !== null);
   const live = useEditor(isLive);
   const touring = useEditor((state) => state.ui.tour !== null && state.doc !== null);
+  const forced = useEditor((state) => state.forces.length > 0);
   const limited = useEditor((state) => uncontrolledOnline(state).length > 0);
   const document = useEditor((state) =>
     state.connection.status === "ready" && !isRunning(state) ? openId(state) : "",
@@ -80,9 +83,15 @@ export function App() {
     );
   }
   const operator = hash.startsWith("#/operator");
+  const io = hash.startsWith("#/io");
   return (
     <>
       <LostConnection />
+      {forced && (
+        <Suspense fallback={null}>
+          <ForceBanner />
+        </Suspense>
+      )}
       {!operator && (
         <Suspense fallback={null}>
           {limited && <ControlBanner />}
@@ -94,6 +103,10 @@ export function App() {
         {operator ? (
           <Suspense fallback={<Waiting>{t`Loading…`}</Waiting>}>
             <Operator key={language} kiosk={hash.includes("kiosk")} Cell={CellView} />
+          </Suspense>
+        ) : io ? (
+          <Suspense fallback={<Waiting>{t`Loading…`}</Waiting>}>
+            <Points key={language} />
           </Suspense>
         ) : open ? (
           <Workplace />

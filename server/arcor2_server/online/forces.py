@@ -21,7 +21,7 @@ from arcor2_hw.runtime import messages as m
 from arcor2_server.audit.changes import record
 from arcor2_server.background import BackgroundTasks
 from arcor2_server.errors import RequestRefused
-from arcor2_server.events import Connection, EventHub, make_event
+from arcor2_server.events import Connection, EventHub, encode, make_event
 from arcor2_server.hosts.session import HostSession
 
 log = structlog.get_logger(__name__)
@@ -227,13 +227,17 @@ class Forces:
             self._changed(NotificationLevel.INFO, Message.of("{object}: {point} is no longer forced.", **names))
             return
         why = Message.of("{object}: {point} is no longer forced: {reason}", **names, reason=reason)
-        self._changed(NotificationLevel.WARN, why)
+        self._changed(NotificationLevel.WARN, why, surprising=True)
         for notify in self.on_end:
             notify(force, reason)
 
-    def _changed(self, level: NotificationLevel, message: Message) -> None:
-        self._hub.broadcast(make_event(CHANGED, self.states()))
-        self._hub.broadcast(make_event("Notification", NotificationData(message.text, level, **message.translation())))
+    def _changed(self, level: NotificationLevel, message: Message, *, surprising: bool = False) -> None:
+        """Publish the forces, and a message to clients that do not show them; to all if it is surprising."""
+        hub = self._hub
+        hub.broadcast(make_event(CHANGED, self.states()))
+        event = make_event("Notification", NotificationData(message.text, level, **message.translation()))
+        others = None if surprising else set(hub.clients) - set(hub.subscribers(CHANGED))
+        hub.stream(event.event, f"force/{next(self._numbers)}", encode(event), others)
 
     def forget(self, client: Connection) -> None:
         """End the forces of a client that disconnected."""

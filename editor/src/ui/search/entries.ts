@@ -84,6 +84,7 @@ function ofWorkplace(state: State): Entry[] {
           cannotSwitch || (live.state === "stopped" ? "" : t`Wait until the change of state is complete.`),
           goOnline,
         ),
+    entry("io", t`Inputs and outputs`, "", () => (location.hash = "#/io"), t`page`),
     ...(state.doc?.project ? [entry("dry-run", t`Dry run`, notPredictable(state), predict)] : []),
     entry("cross", aimsAlways(state) ? t`Close the crosshair` : t`Select with crosshair`, "", () =>
       storeGeneralState({ aiming: !aimsAlways(state) || null }),

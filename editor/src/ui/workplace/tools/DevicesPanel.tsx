@@ -86,6 +86,9 @@ export default function Panel() {
           );
         })}
       </ul>
+      {doc && serves("StreamPoints") && (
+        <Button onPress={() => (location.hash = "#/io")}>{t`Inputs and outputs`}</Button>
+      )}
       {doc && serves("ListInterlocks") && (
         <Button onPress={() => openOverlay("interlocks")}>{t`Interlocks and zones`}</Button>
       )}
