@@ -33,7 +33,7 @@ export default function ForceBanner() {
           return (
             <li key={each.id}>
               <p data-name={output}>
-                <strong>{t`Forced ${value}: ${output}`}</strong> <span className="small">{user}</span>
+                <strong>{t`Forced: ${output} = ${value}`}</strong> <span className="small">{user}</span>
               </p>
               <EndForce force={each} />
             </li>

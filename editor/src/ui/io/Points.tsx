@@ -88,6 +88,9 @@ export default function Points() {
           </div>
         )}
         {!live && <p className="quiet">{t`Go online to see the inputs and outputs of the devices.`}</p>}
+        {live && all.length > 0 && (
+          <p className="quiet small">{t`Values without a remark are good and less than one second old.`}</p>
+        )}
         {live && all.length === 0 && <Waiting>{t`Waiting for values…`}</Waiting>}
         {live && all.length > 0 && found.length === 0 && <p className="quiet">{t`No point matches.`}</p>}
         {live &&
