@@ -1,9 +1,12 @@
 """Test cases of declarations: metadata, capabilities, types."""
 
+from arcor2_hw.data.base import Unset
+from arcor2_hw.data.points import PointUse
 from arcor2_hw.exceptions import InvalidData, KinematicsError, NotFound, OutOfRange, Refused
+from arcor2_hw.objects.small import HasPoints
 from arcor2_hw.testing import capabilities, declarations
 from arcor2_hw.testing.bench import Bench, needs
-from arcor2_hw.testing.life import raised
+from arcor2_hw.testing.life import raised, timed
 
 
 class WrittenCases:
@@ -55,6 +58,22 @@ class WrittenCases:
                 continue  # it needs another state or arguments
             except Exception as error:
                 raise AssertionError(f"{name}() raised {type(error).__name__}: {error}") from error
+
+    def test_points_declared(self, arcor2_bench: Bench) -> None:
+        """Points have distinct names and are returned at once, and forces are offered only where a crash ends them."""
+        device = arcor2_bench.connected()
+        points = timed(device.live_points, 1.0, "live_points")
+        names = [point.name for point in points]
+        assert len(names) == len(set(names)), "live_points returns a name twice"
+        forcible = [point.name for point in points if not isinstance(point.force, Unset)]
+        lasting = [point.name for point in points if point.use is not PointUse.OUTPUT and point.name in forcible]
+        assert not lasting, f"only outputs can be forced, not {', '.join(lasting)}"
+        if isinstance(device, HasPoints):
+            kept = {point.name for point in device.points() if not point.forcible} & set(forcible)
+            assert not kept, f"{', '.join(sorted(kept))} would stay forced after a crash of the host"
+        if forcible:
+            missing = {"force_point", "release_point"} - capabilities.declared(arcor2_bench.object_type)
+            assert not missing, f"points can be forced, but {', '.join(sorted(missing))} is missing"
 
     @needs("works", for_silver=True)
     def test_capabilities_work(self, arcor2_bench: Bench) -> None:

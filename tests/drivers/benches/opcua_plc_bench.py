@@ -5,8 +5,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import pytest
+
 from arcor2_drivers.opcua_plc.opcua_plc import OpcUaPlc
 from arcor2_drivers.opcua_plc.settings import OpcUaPlcSettings
+from arcor2_hw.exceptions import Refused
 from arcor2_hw.objects import Generic
 from arcor2_hw.testing.bench import Check
 from tests.drivers.fake_bench import FakeBench
@@ -93,7 +96,22 @@ class OpcUaPlcBench(FakeBench):
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, OpcUaPlc)
-        return {"wait_for": lambda: device.wait_for("part", False, 1.0)}
+
+        def forced() -> None:
+            device.force_point("lamp", True)
+            with pytest.raises(Refused, match="lamp is forced"):
+                device.write_digital("lamp", False)
+            assert device.read("lamp").value is True
+
+        def released() -> None:
+            device.release_point("lamp", False)
+            assert device.read("lamp").value is False
+
+        return {
+            "wait_for": lambda: device.wait_for("part", False, 1.0),
+            "force_point": forced,
+            "release_point": released,
+        }
 
     def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, OpcUaPlc)

@@ -5,9 +5,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, ClassVar
 
+import pytest
+
 from arcor2_drivers.remote_io.remote_io import RemoteIO
 from arcor2_drivers.remote_io.settings import RemoteIOSettings, TowerLightSettings
 from arcor2_drivers.remote_io.tower_light import LampColor, TowerLight
+from arcor2_hw.exceptions import Refused
 from arcor2_hw.objects import Generic
 from arcor2_hw.objects.machine import MachineStateName
 from arcor2_hw.testing.bench import Check
@@ -138,7 +141,18 @@ class RemoteIOBench(WiredBench):
             self.do("set_input", number=0, on=True)
             device.wait_for("part", True, 30.0)
 
-        return {"pulse": pulsed, "wait_for": waited}
+        def forced() -> None:
+            device.force_point("lamp", True)
+            assert self.fake.truth()["outputs"][0] is True
+            with pytest.raises(Refused, match="lamp is forced"):
+                device.write_digital("lamp", False)
+
+        def released() -> None:
+            device.release_point("lamp", False)
+            assert self.fake.truth()["outputs"][0] is False
+            device.write_digital("lamp", False)
+
+        return {"pulse": pulsed, "wait_for": waited, "force_point": forced, "release_point": released}
 
 
 class TowerLightBench(RemoteIOBench):
@@ -189,4 +203,15 @@ class TowerLightBench(RemoteIOBench):
         }
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
-        return {}  # it has no optional method that acts
+        assert isinstance(device, TowerLight)
+
+        def forced() -> None:
+            device.force_point("green", True)
+            device.off()
+            assert self.fake.truth()["outputs"][0] is True
+
+        def released() -> None:
+            device.release_point("green", True)  # the lamps are off since then
+            assert self.fake.truth()["outputs"][0] is False
+
+        return {"force_point": forced, "release_point": released}
