@@ -19,7 +19,7 @@ export function EndForce({ force }: { force: ForcedPoint }) {
     <>
       <Button
         why={why}
-        aria-label={t`End the force of ${output}`}
+        aria-label={t`End force: ${output}`}
         onPress={() => (isOwn(force) ? end() : setAsking(true))}
       >
         {t`End force`}
