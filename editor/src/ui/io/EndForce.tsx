@@ -17,11 +17,7 @@ export function EndForce({ force }: { force: ForcedPoint }) {
   const end = () => void endForce(force.id);
   return (
     <>
-      <Button
-        why={why}
-        aria-label={t`End force: ${output}`}
-        onPress={() => (isOwn(force) ? end() : setAsking(true))}
-      >
+      <Button why={why} aria-label={t`End force: ${output}`} onPress={() => (isOwn(force) ? end() : setAsking(true))}>
         {t`End force`}
       </Button>
       {asking && (
