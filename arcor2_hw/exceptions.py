@@ -81,6 +81,12 @@ class NotInControl(Refused):
     code = "not_in_control"
 
 
+class DifferentDevice(Refused):
+    """Another device than the confirmed one is connected. A technician has to confirm it."""
+
+    code = "different_device"
+
+
 class WatchdogTripped(ConnectionLost, NotInControl):
     """This computer was too slow for the watchdog of the device, which has stopped."""
 
@@ -176,7 +182,10 @@ ERROR_KINDS: Final[Mapping[str, type[Arcor2Error]]] = MappingProxyType(
 )
 """The kinds of errors that an error exit of an action can name, in the order in which exits apply; `error` is any."""
 
-ENDS_PROGRAM: Final = (NotConnected, ConnectionLost, NotInControl, SafetyStop, Cancelled, ProgramInterrupted)
+ENDS_PROGRAM: Final = (
+    *(NotConnected, ConnectionLost, NotInControl, DifferentDevice),
+    *(SafetyStop, Cancelled, ProgramInterrupted),
+)
 """Errors that no error exit of an action catches: they end the program."""
 
 

@@ -68,6 +68,11 @@ class Identity(Data, frozen=True):
     serial: str = ""
     firmware: str = ""
 
+    def differences(self, other: "Identity") -> list[str]:
+        """Return the names of the fields that both devices report, with different values."""
+        pairs = ((name, getattr(self, name), getattr(other, name)) for name in self.__struct_fields__)
+        return [name for name, mine, theirs in pairs if mine and theirs and mine != theirs]
+
 
 class Connection(enum.StrEnum):
     """State of a connection."""

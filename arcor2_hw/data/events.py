@@ -25,6 +25,7 @@ from arcor2_hw.data.editor import (
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.held import HeldData, HoldDecidedData
 from arcor2_hw.data.interlocks import Interlock, InterlockStates
+from arcor2_hw.data.maintenance import DeviceCard
 from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHoldData
 from arcor2_hw.data.package import CollisionModels, PackageStateEnum, PackageSummary
@@ -380,6 +381,7 @@ EVENTS: Final = {
         EventType("ExecutionTrace", TraceEntry, Role.OPERATOR, additional=True),
         EventType("ForcesChanged", ForcesChangedData, Role.OPERATOR, additional=True),
         EventType("FunctionChanged", ProjectFunction, Role.OPERATOR, additional=True),
+        EventType("DeviceCardChanged", DeviceCard, Role.OPERATOR, additional=True),
         EventType("Held", HeldData, Role.OPERATOR, additional=True),
         EventType("HistoryChanged", HistoryChangedData, Role.OPERATOR, additional=True),
         EventType("HoldDecided", HoldDecidedData, Role.OPERATOR, additional=True),

@@ -7,6 +7,7 @@ from typing import ClassVar
 from arcor2_hw.actions import action
 from arcor2_hw.data.device import Alarm, Connection, Health, Identity, LossReaction, Observation, Severity
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.maintenance import DeviceParameter, ParameterFailure
 from arcor2_hw.data.object_type import Models
 from arcor2_hw.data.parts import PlaceKind
 from arcor2_hw.data.points import LivePoint
@@ -148,8 +149,30 @@ class Generic(abc.ABC):
         return None
 
     def identify(self) -> Identity:
-        """Read the identity of the device."""
+        """Read the identity of the device. It is called after each connection and acts on nothing."""
         raise Arcor2NotImplemented("identify")
+
+    def parameters_dump(self) -> list[DeviceParameter]:
+        """Read the parameters that the device stores, for a backup. It acts on nothing.
+
+        Include what a technician has set up and another device of this model needs. Leave out the identity, the
+        address, values that the driver writes from its settings, and values that change by themselves.
+
+        Raises:
+            DeviceError: The parameters cannot be read.
+        """
+        raise Arcor2NotImplemented("parameters_dump")
+
+    def parameters_restore(self, parameters: list[DeviceParameter]) -> list[ParameterFailure]:
+        """Write parameters of a backup that this model has. Return those that could not be written, with the reason.
+
+        It moves and enables nothing. A parameter that is unknown or rejected does not prevent the others.
+
+        Raises:
+            Refused: No parameter can be written in the present state.
+            DeviceError: The connection was lost; some parameters may have been written.
+        """
+        raise Arcor2NotImplemented("parameters_restore")
 
     def alarms(self) -> list[Alarm]:
         """Return the active alarms. By default they are the conditions reported by `set_condition`."""

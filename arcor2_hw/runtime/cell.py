@@ -9,7 +9,7 @@ from typing import Final
 
 from msgspec.structs import replace
 
-from arcor2_hw.data.device import Connection
+from arcor2_hw.data.device import Connection, Identity
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
 from arcor2_hw.data.secret import ObjectSecrets
@@ -17,6 +17,7 @@ from arcor2_hw.exceptions import Arcor2Error, NotConnected, NotFound, ProgramSto
 from arcor2_hw.objects import Camera, Generic, Robot
 from arcor2_hw.runtime.creation import Recipe, load_type, recipe
 from arcor2_hw.runtime.device import CLOSE_DEADLINE, Device, describe, until
+from arcor2_hw.runtime.identification import Identification, Reported
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.messages import OpenScene
 from arcor2_hw.runtime.methods import overrides
@@ -26,6 +27,8 @@ from arcor2_hw.runtime.world_updates import WorldUpdates
 
 CONTROL_DEADLINE: Final = 10.0
 """Time limit for taking control, s. A controller may have to load and start its control program."""
+IDENTIFY_DEADLINE: Final = 5.0
+"""Time limit for reading the identities before a program starts, s."""
 CALL_END_WAIT: Final = 0.4
 """Time that running calls have to return before their device is closed, s."""
 
@@ -144,6 +147,10 @@ class Cell:
         """Called when the connection of a device changes, on the thread that observes it."""
         self.conditions_changed: Callable[[Device], None] = lambda _: None
         """Called when a device has reported a condition, on any thread."""
+        self.identities: Mapping[str, Identity] = {}
+        """The confirmed identities by object id."""
+        self.identified: Callable[[Device, Reported], None] | None = None
+        """Called with the identity of a device after it connected, on any thread; None: identities are not read."""
 
     def __iter__(self) -> Iterator[Device]:
         return iter(list(self._devices.values()))
@@ -225,10 +232,40 @@ class Cell:
 
     def _make(self, how: Recipe) -> Device:
         surroundings = SceneSurroundings(how.scene_object.id, self, self.assets, self.updates)
-        device = Device(how, lambda device: self.changed(device), self.find, surroundings, self.find_robot)
+        device = Device(
+            how,
+            lambda device: self.changed(device),
+            self.find,
+            surroundings,
+            self.find_robot,
+            self._identification(how),
+        )
         device.conditions_changed = lambda: self.conditions_changed(device)
         self._devices[device.id] = device
         return device
+
+    def _identification(self, how: Recipe) -> Identification | None:
+        """Return what recognises a device, None if its type has no identity."""
+        object_id = how.scene_object.id
+        identified = self.identified
+        if identified is None or not overrides(how.cls, "identify"):
+            return None
+        return Identification(
+            how.scene_object.name,
+            self.identities.get(object_id),
+            lambda reported: identified(self._devices[object_id], reported),
+            lambda: self.conditions_changed(self._devices[object_id]),
+        )
+
+    def require_confirmed(self) -> None:
+        """Wait until the identities are read. Raises SceneFault for the first device that is not the confirmed one."""
+        jobs = [(device, job) for device in self if (job := device.begin_identify()) is not None]
+        deadline = time.monotonic() + IDENTIFY_DEADLINE
+        for device, job in jobs:
+            if not job.wait(until(deadline)):
+                device.lane.expire(job, IDENTIFY_DEADLINE)
+            if isinstance(job.error, Refused):  # other errors occur again with the first command
+                raise SceneFault(device.id, job.error) from job.error
 
     def mark_absent(self, fault: SceneFault) -> None:
         """Record that an object has no device. Access to it raises the error of the fault."""

@@ -24,6 +24,7 @@ from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.observing import Observing, listening
 from arcor2_hw.objects.surroundings import Surroundings
 from arcor2_hw.runtime.creation import Recipe, shown_name
+from arcor2_hw.runtime.identification import Identification
 from arcor2_hw.runtime.lane import Job, Lane
 from arcor2_hw.runtime.methods import OBSERVING, STOP_RACE_TIME, overrides, stop_of
 from arcor2_hw.runtime.own_process.process import START_TIMEOUT, DeviceProcess
@@ -55,6 +56,7 @@ class Device:
         find: Returns the instance of another object of the scene by name or id.
         surroundings: Obstacles and other robots, for a robot.
         find_robot: Returns the robot that carries a gripper.
+        identification: Recognises the device; None if another device is not noticed.
     """
 
     def __init__(
@@ -64,8 +66,10 @@ class Device:
         find: Callable[[str], Generic] | None = None,
         surroundings: Surroundings | None = None,
         find_robot: Callable[[str], Robot] | None = None,
+        identification: Identification | None = None,
     ) -> None:
         self.recipe = recipe
+        self.identification = identification
         self._find_robot = find_robot
         self._surroundings = surroundings
         self._find = find
@@ -96,7 +100,28 @@ class Device:
         deadline += START_TIMEOUT if cls.own_process else 0.0
         job = self._opening = Job("connect", self._open, notify=notify)
         self.lane.submit(job)
+        self.begin_identify()
         return job, deadline
+
+    def begin_identify(self) -> Job | None:
+        """Start to read the identity, before the calls that follow. Return the call, None if there is nothing to read.
+
+        It ends with an error if the device is not the confirmed one.
+        """
+        if self.identification is None:
+            return None
+        job = Job("identify", self._require_confirmed)
+        return job if self.lane.submit_or_fail(job) else None
+
+    def require_confirmed(self, lane: Lane) -> None:
+        """Raise DifferentDevice or Refused unless the device may be commanded. It reads after a connection loss."""
+        if self.identification is not None and not self.identification.confirmed:
+            lane.call("identify", self._require_confirmed)
+
+    def _require_confirmed(self) -> None:
+        """Raise DifferentDevice or Refused unless the device may be commanded. Call it on the lane."""
+        if self.identification is not None and self.instance is not None and not self.closing:
+            self.identification.require_confirmed(self.instance)
 
     @property
     def up(self) -> bool:
@@ -139,6 +164,10 @@ class Device:
     def _connection_changed(self, life: Observing) -> None:
         if life not in self._connections:
             self._connections.append(life)
+        if self.identification is not None and life.state is Connection.LOST:
+            self.identification.forget()  # the cable may be plugged into another device
+        elif life.state is Connection.BACK and self.up:
+            self.begin_identify()
         self._changed(self)
 
     def connection_reason(self) -> Message | None:
@@ -214,8 +243,13 @@ class Device:
         return self.instance
 
     def take_control(self) -> None:
-        """Take control unless this process has it. Call it on the lane."""
+        """Take control unless this process has it. Call it on the lane.
+
+        Raises:
+            DifferentDevice: The device is not the confirmed one.
+        """
         instance = self.require()
+        self._require_confirmed()
         if instance.control_owner() != "us":
             instance.take_control()
 

@@ -15,7 +15,7 @@ import socket
 import sys
 import threading
 import types
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Final
@@ -23,7 +23,7 @@ from typing import Final
 import msgspec
 from msgspec.structs import replace
 
-from arcor2_hw.data.device import Connection
+from arcor2_hw.data.device import Connection, Identity
 from arcor2_hw.data.held import HeldData
 from arcor2_hw.data.interlocks import InterlockState
 from arcor2_hw.data.position import MAIN_BRANCH, Frame
@@ -37,8 +37,10 @@ from arcor2_hw.runtime.creation import write_sources
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.forcing import CHECK_PERIOD, Forces
 from arcor2_hw.runtime.holding import Holds
+from arcor2_hw.runtime.identification import Reported
 from arcor2_hw.runtime.interlocks import Interlocks
 from arcor2_hw.runtime.link import Link
+from arcor2_hw.runtime.methods import overrides
 from arcor2_hw.runtime.program import Program, set_current, traceback_text
 from arcor2_hw.runtime.record import RunRecord
 from arcor2_hw.runtime.script import execute, save_traceback
@@ -144,6 +146,7 @@ class Host:
         fault: SceneFault | None = None
         self._scene = message
         self._cell.assets = message.assets
+        self._recognise(message.identities)
         failed = self._skip_object if message.keep_going else None
         try:
             write_sources(message.types)
@@ -168,6 +171,25 @@ class Host:
         self.link.post(m.SceneOpened())
         self.clock.every(message.streaming_period if message.streaming_period > 0 else 0.1, self._stream_subscribed)
         return True
+
+    def _recognise(self, identities: Mapping[str, Identity]) -> None:
+        """Let the devices that will be connected be compared with the confirmed identities."""
+        self._cell.identities, self._cell.identified = identities, self._identified
+
+    def _identified(self, device: Device, reported: Reported) -> None:
+        cls = device.recipe.cls
+        restores = overrides(cls, "parameters_restore")
+        self.link.post(
+            m.DeviceIdentified(
+                device.id, device.name, cls.__name__, *reported, overrides(cls, "parameters_dump"), restores
+            )
+        )
+
+    def _confirm_identity(self, message: m.ConfirmIdentity) -> None:
+        self._cell.identities = {**self._cell.identities, message.object_id: message.identity}
+        with contextlib.suppress(Arcor2Error):  # the object was removed
+            if (identification := self._cell[message.object_id].identification) is not None:
+                identification.confirm(message.identity)
 
     def _skip_object(self, fault: SceneFault) -> None:
         """Continue without an object that could not be created or connected."""
@@ -231,6 +253,7 @@ class Host:
             overrides=[*scene.overrides, *(each for each in opening.overrides if each.id in added)],
             secrets=scene.secrets | opening.secrets,
         )
+        self._recognise({**self._cell.identities, **opening.identities})
 
     def _close_scene(self) -> None:
         active = (
@@ -260,6 +283,7 @@ class Host:
         )
         self._cell = program.cell
         self._cell.assets, self._cell.updates = message.assets, self._updates
+        self._recognise(message.identities)
         self._watch = Watch(program.cell, self.link.post, self._device_lost)
         program.inside = True
         self.program = program
@@ -401,6 +425,8 @@ class Host:
                 self.program.set_shared_breakpoints(frozenset(message.shared_breakpoints))
             case m.SetInterlocks():
                 self._interlocks.configure(message.interlocks)
+            case m.ConfirmIdentity():
+                self._confirm_identity(message)
             case m.DecideHeld():
                 self._decide(message)
             case m.ConfirmParts():

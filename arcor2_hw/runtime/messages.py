@@ -10,7 +10,7 @@ from msgspec import Struct, field
 
 from arcor2_hw import framing
 from arcor2_hw.data.cell import Cell
-from arcor2_hw.data.device import Alarm, Connection, Health
+from arcor2_hw.data.device import Alarm, Connection, Health, Identity
 from arcor2_hw.data.held import HeldData, HoldChoice
 from arcor2_hw.data.interlocks import Interlock, InterlockState
 from arcor2_hw.data.object_type import ObjectModel
@@ -77,6 +77,7 @@ class OpenScene(ToHost, frozen=True):
     keep_going: whether the scene opens without objects that cannot be created or connected; DeviceChanged reports them.
     assets: files of uploaded meshes and robot models, by id. bodies: obstacles that are not objects of the scene.
     calibrations: kinematics read from robot controllers, by object id. secrets: secret settings, by object id.
+    identities: the confirmed identities, by object id; another device is not commanded.
     """
 
     scene: Scene
@@ -90,6 +91,7 @@ class OpenScene(ToHost, frozen=True):
     bodies: list[AddedBody] = field(default_factory=list)
     calibrations: dict[str, KinematicCalibration] = field(default_factory=dict)
     secrets: dict[str, ObjectSecrets] = field(default_factory=dict)
+    identities: dict[str, Identity] = field(default_factory=dict)
 
 
 class RetryObject(ToHost, frozen=True):
@@ -111,11 +113,11 @@ class RunPackage(ToHost, frozen=True):
 
     cell: settings of devices in this cell, which override those of the package. breakpoints: ids of action points and
     actions, all of which must exist. shared_breakpoints: further ids; those that the project lacks are ignored. assets,
-    bodies, calibrations, secrets: as in OpenScene. hold_on_error: whether a failed action holds the program, see
-    ProgramHeld. run: number of the run. records: directory of the books of parts and of checkpoints; empty to store
-    nothing. checkpoints: whether the state is stored before and after each action. continues: whether the program
-    continues where it was interrupted. values: values of constants and variables of the project by their ids, JSON in
-    a string, which replace those of the package.
+    bodies, calibrations, secrets, identities: as in OpenScene. hold_on_error: whether a failed action holds the
+    program, see ProgramHeld. run: number of the run. records: directory of the books of parts and of checkpoints; empty
+    to store nothing. checkpoints: whether the state is stored before and after each action. continues: whether the
+    program continues where it was interrupted. values: values of constants and variables of the project by their ids,
+    JSON in a string, which replace those of the package.
     """
 
     package_id: str
@@ -135,6 +137,7 @@ class RunPackage(ToHost, frozen=True):
     checkpoints: bool = True
     continues: bool = False
     values: dict[str, str] = field(default_factory=dict)
+    identities: dict[str, Identity] = field(default_factory=dict)
 
 
 class AddBody(ToHost, frozen=True):
@@ -294,6 +297,13 @@ class ConfirmParts(ToHost, frozen=True):
 
     id: int
     parts: list[ConfirmedPart]
+
+
+class ConfirmIdentity(ToHost, frozen=True):
+    """Accept an identity of a device from now on."""
+
+    object_id: str
+    identity: Identity
 
 
 class SetInterlocks(ToHost, frozen=True):
@@ -505,6 +515,22 @@ class DeviceChanged(ToServer, frozen=True):
     raised: dict[str, float] = field(default_factory=dict)
 
 
+class DeviceIdentified(ToServer, frozen=True):
+    """The identity of a device was read after it connected.
+
+    name, object_type: of the object. identity: None if it cannot be read; problem: why. parameters, restores: whether
+    the type can read its parameters, and write them.
+    """
+
+    object_id: str
+    name: str
+    object_type: str
+    identity: Identity | None = None
+    problem: Message | None = None
+    parameters: bool = False
+    restores: bool = False
+
+
 class LogLine(ToServer, frozen=True):
     """A line that the script or a driver printed or logged."""
 
@@ -537,6 +563,7 @@ HostBound = (
     | DecideHeld
     | ConfirmParts
     | SetInterlocks
+    | ConfirmIdentity
     | StopProgram
     | CloseScene
 )
@@ -561,6 +588,7 @@ ServerBound = (
     | PartStep
     | InterlocksChanged
     | DeviceChanged
+    | DeviceIdentified
     | LogLine
 )
 

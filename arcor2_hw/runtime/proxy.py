@@ -79,6 +79,7 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
                     error, interruption = interruption, None
                     raise error
                 with program.interlocks.guarded(device, name, shown, program.wait_to_start):
+                    device.require_confirmed(lane)
                     if program.recovery is not None:
                         program.recovery.take_control(device)
                     if record is not None:

@@ -172,6 +172,7 @@ class Resources:
             program.cell.open(recipes(data.scene, classes, data.models, overridden, secrets=program.secrets))
             program.interlocks.configure(data.scene.interlocks)
             program.check()
+            program.cell.require_confirmed()
             program.take_control()
         except SceneFault as fault:
             with contextlib.suppress(Arcor2Error):  # the object has no instance

@@ -14,6 +14,7 @@ from arcor2_hw.objects import CollisionObject, Generic, Robot
 from arcor2_hw.objects.conditions import conditions_of
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import Device
+from arcor2_hw.runtime.identification import ALARM
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.messages import DeviceChanged, HeldPart
 from arcor2_hw.runtime.methods import overrides
@@ -99,6 +100,7 @@ class Watch:
         if moment - self._queried_at.get(device.id, -INQUIRY_PERIOD) >= INQUIRY_PERIOD:
             self._queried_at[device.id] = moment
             alarms = _with_first_times(_value_or(instance.alarms, alarms), alarms)
+            alarms = _with_identification(alarms, device)
             owner = _plain(_value_or(instance.control_owner, owner))
         health = _value_or(lambda: instance.health, Health.FAILURE)
         self._compare(device, instance, (health, alarms, owner))
@@ -129,6 +131,12 @@ class Watch:
             self._post(found)
         if connection is not was and (connection is Connection.LOST or (connection is Connection.FAILED and device.up)):
             self._lost(device, why)
+
+
+def _with_identification(alarms: list[Alarm], device: Device) -> list[Alarm]:
+    """Return alarms with that of a device that is not the confirmed one."""
+    alarm = None if device.identification is None else device.identification.alarm
+    return [*(each for each in alarms if each.code != ALARM), *([] if alarm is None else [alarm])]
 
 
 def _plain(owner: str | None) -> str | None:

@@ -17,7 +17,18 @@ STOPPABLE_FROM: Final = 1.0
 """Duration above which an action has to be stoppable, s."""
 READS: Final = frozenset(
     {
-        *("alarms", "counters", "identify", "machine_state", "permissives", "points", "state", "status", "stop_reason"),
+        *(
+            "alarms",
+            "counters",
+            "identify",
+            "machine_state",
+            "parameters_dump",
+            "permissives",
+            "points",
+            "state",
+            "status",
+            "stop_reason",
+        ),
         *("unit_mode", "vacuum", "wrench", "joint_limits", "max_tcp_speed", "is_referenced", "kinematic_calibration"),
         *("get_arm_ids", "get_end_effectors_ids", "get_hand_teaching_mode"),
     }
@@ -62,7 +73,7 @@ def _required(function: Any) -> int:
 def to_be_shown(kind: type[Generic]) -> frozenset[str]:
     """Return the declared optional methods that act, so that the bench has to show that they work."""
     said = declared(kind)
-    return (said & set(hooks(kind))) - set(readable(kind, said))
+    return (said & set(hooks(kind))) - set(readable(kind, said)) - {"parameters_restore"}  # MaintenanceCases show it
 
 
 @lru_cache(maxsize=64)

@@ -13,11 +13,12 @@ from arcor2_hw.testing.acting_cases import ActingCases
 from arcor2_hw.testing.bench import Bench
 from arcor2_hw.testing.connecting_cases import ConnectingCases
 from arcor2_hw.testing.loss_cases import LossCases
+from arcor2_hw.testing.maintenance_cases import MaintenanceCases
 from arcor2_hw.testing.outcomes import LEVEL_CASE, Verdict
 from arcor2_hw.testing.written_cases import WrittenCases
 
 
-class Conformance(ActingCases, LossCases, ConnectingCases, WrittenCases):
+class Conformance(ActingCases, LossCases, MaintenanceCases, ConnectingCases, WrittenCases):
     """The test cases. A subclass named Test... sets `benches`; each case needs the hooks in its mark."""
 
     benches: ClassVar[Iterable[type[Bench]]] = ()

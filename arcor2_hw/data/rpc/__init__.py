@@ -15,6 +15,7 @@ from arcor2_hw.data.rpc.general import *
 from arcor2_hw.data.rpc.history import *
 from arcor2_hw.data.rpc.interlocks import *
 from arcor2_hw.data.rpc.locks import *
+from arcor2_hw.data.rpc.maintenance import *
 from arcor2_hw.data.rpc.object_types import *
 from arcor2_hw.data.rpc.operation import *
 from arcor2_hw.data.rpc.persons import *
@@ -39,6 +40,7 @@ _ALL: Final = (
     *HISTORY_RPCS,
     *INTERLOCK_RPCS,
     *LOCK_RPCS,
+    *MAINTENANCE_RPCS,
     *OBJECT_TYPE_RPCS,
     *OPERATION_RPCS,
     *PERSON_RPCS,

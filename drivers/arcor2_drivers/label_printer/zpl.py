@@ -1,6 +1,6 @@
 """ZPL on the side of the host: builds and checks labels, parses answers. Pure functions.
 
-Source: ZPL II programming guide, ~HS (host status return), ~HI (host identification), ^FH, ^BC, and SGD getvar;
+Source: ZPL II programming guide, ~HS (host status return), ~HI (host identification), ^FH, ^BC, and SGD getvar and setvar;
 docs/devices/label-printer.md lists what is used.
 """
 
@@ -14,6 +14,19 @@ HOST_STATUS: Final = b"~HS"
 IDENTIFY: Final = b"~HI"
 COUNTER: Final = "odometer.total_label_count"
 UNIQUE_ID: Final = "device.unique_id"
+PARAMETERS: Final = {
+    "print.tone": "",
+    "media.speed": "in/s",
+    "ezpl.print_width": "dot",
+    "ezpl.media_type": "",
+    "ezpl.print_method": "",
+    "ezpl.tear_off": "dot",
+    "ezpl.power_up_action": "",
+    "ezpl.head_close_action": "",
+}
+"""Settings of the printer that a technician adjusts, by their names of SGD, with their units."""
+UNKNOWN: Final = "?"
+"""Answer to getvar for a name that the printer does not have."""
 FIELDS: Final = ("title", "text", "code")
 DEFAULT_TEMPLATE: Final = (
     "^XA^CI28^PW400^LL240^FO20,20^A0N,40,40{title}^FO20,70^A0N,28,28{text}^FO20,110^BY2^BCN,80,Y,N,N{code}^XZ"
@@ -77,6 +90,13 @@ def identity(data: bytes) -> tuple[str, str] | None:
 def getvar(name: str) -> bytes:
     """Return the question for a variable of the printer."""
     return f'! U1 getvar "{name}"\r\n'.encode("ascii")
+
+
+def setvar(name: str, value: str) -> bytes:
+    """Return the command that sets a variable; the printer does not answer it. Raises ValueError."""
+    if not re.fullmatch(r"[\x20-\x21\x23-\x7e]{1,80}", value):
+        raise ValueError(value)
+    return f'! U1 setvar "{name}" "{value}"\r\n'.encode("ascii")
 
 
 def variable(data: bytes) -> str | None:

@@ -7,7 +7,9 @@ from typing import ClassVar, Final
 
 from arcor2_hw.actions import action
 from arcor2_hw.data.device import Health, Identity, LossReaction
+from arcor2_hw.data.maintenance import DeviceParameter, ParameterFailure
 from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused
+from arcor2_hw.messages import Message
 from arcor2_hw.objects import Printer
 from arcor2_hw.objects.connected import AlarmText
 from arcor2_hw.objects.line_device import LineDevice
@@ -75,6 +77,43 @@ class ZplPrinter(LineDevice, Printer):
             model, firmware = self.ask(zpl.IDENTIFY, zpl.identity, "~HI")
             serial = self.ask(zpl.getvar(zpl.UNIQUE_ID), zpl.variable, f"getvar {zpl.UNIQUE_ID}")
         return Identity("", model, serial, firmware)
+
+    # -------------------------------------------------------------------------------- parameters
+    def parameters_dump(self) -> list[DeviceParameter]:
+        """Read the settings of the printer by SGD; those that the model does not have are left out."""
+        with self.held():
+            values = {name: self._getvar(name) for name in zpl.PARAMETERS}
+        units = zpl.PARAMETERS
+        return [DeviceParameter(name, value, units[name]) for name, value in values.items() if value != zpl.UNKNOWN]
+
+    def parameters_restore(self, parameters: list[DeviceParameter]) -> list[ParameterFailure]:
+        """Write settings by SGD, and read each one again. Raises Refused while labels are being printed."""
+        failures = []
+        with self.held():
+            if not self._ask_status().idle:
+                raise Refused("{device} is printing. Try again when it has finished.", device=self.who)
+            for each in parameters:
+                if (reason := self._setvar(each)) is not None:
+                    failures.append(ParameterFailure(each.name, reason.text, **reason.translation()))
+        return failures
+
+    def _getvar(self, name: str) -> str:
+        return self.ask(zpl.getvar(name), zpl.variable, f"getvar {name}")
+
+    def _setvar(self, parameter: DeviceParameter) -> Message | None:
+        """Write a setting; return why the printer does not use it, None if it does."""
+        name, value = parameter.name, str(parameter.value)
+        if name not in zpl.PARAMETERS or self._getvar(name) == zpl.UNKNOWN:
+            return Message.of("The printer has no setting {parameter}.", parameter=name)
+        try:
+            command = zpl.setvar(name, value)
+        except ValueError:
+            return Message.of("{value} cannot be sent to the printer.", value=value)
+        self.line.send(command)
+        stored = self._getvar(name)
+        if stored == value:
+            return None
+        return Message.of("The printer did not accept {value} and keeps {stored}.", value=value, stored=stored)
 
     # -------------------------------------------------------------------------------- state
     def status(self) -> str:

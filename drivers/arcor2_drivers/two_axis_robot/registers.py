@@ -48,9 +48,38 @@ PRESENT_POSITION: Final = Register(132, 4)
 VOLTAGE: Final = Register(144, 2)
 TEMPERATURE: Final = Register(146, 1)
 
+PARAMETERS: Final = {
+    "drive mode": Register(10, 1),
+    "operating mode": OPERATING_MODE,
+    "moving threshold": Register(24, 4),
+    "temperature limit": Register(31, 1),
+    "max voltage limit": Register(32, 2),
+    "min voltage limit": Register(34, 2),
+    "PWM limit": Register(36, 2),
+    "velocity limit": Register(44, 4),
+    "max position limit": MAX_POSITION,
+    "min position limit": MIN_POSITION,
+    "shutdown": Register(63, 1),
+}
+"""Registers of the EEPROM area that a technician sets up, by their name in the manual.
+
+The driver writes homing offset and current limit from its settings. Identifier and baud rate address the servo.
+"""
+PARAMETER_UNITS: Final = {
+    "moving threshold": "0.229 rpm",
+    "temperature limit": "°C",
+    "max voltage limit": "0.1 V",
+    "min voltage limit": "0.1 V",
+    "PWM limit": "0.113 %",
+    "velocity limit": "0.229 rpm",
+    "max position limit": "0.088°",
+    "min position limit": "0.088°",
+}
+"""Units of these registers."""
+
 STATE: Final = Register(64, 83)
 """All registers that change, read at once."""
-EEPROM: Final = Register(0, 56)
+EEPROM: Final = Register(0, 64)
 """All registers of the setup."""
 
 HARDWARE_ERRORS: Final = translatable(

@@ -5,6 +5,7 @@ from typing import ClassVar, Final, Literal
 from arcor2_hw.actions import action
 from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.maintenance import DeviceParameter, ParameterFailure
 from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.data.robot import Control as ControlMode
 from arcor2_hw.data.robot import Joint, Mode, Power, ProgramState, RobotState, RobotType, Safety
@@ -17,6 +18,7 @@ from arcor2_hw.objects.single_arm import SingleArm
 from .control import Control
 from .motion import JOINTS, Motion
 from .observer import Observer
+from .parameters import Parameters
 from .settings import LONGEST_WATCHDOG, TwoAxisRobotSettings
 
 MODELS: Final = {1020: "XM430-W350", 1030: "XM430-W210", 1120: "XM540-W270", 1130: "XM540-W150"}
@@ -37,6 +39,7 @@ class TwoAxisRobot(SingleArm):
         self._axes = settings
         self._observer = Observer(name, settings)
         self._control = Control(name, self._observer, settings)
+        self._parameters = Parameters(name, self._observer, settings.ids)
         self._motion = Motion(self, self._observer, self._control, settings, self._move_lock)
         self._observer.on_lost = self.on_lost  # type: ignore[method-assign]
         self.safe_moves, self.motions = self._motion.safe, self._motion.log
@@ -68,6 +71,14 @@ class TwoAxisRobot(SingleArm):
         setups = self._observer.setups
         model = " + ".join(MODELS.get(setup.model, f"model {setup.model}") for setup in setups)
         return Identity("ROBOTIS", model, "", " + ".join(str(setup.firmware) for setup in setups))
+
+    def parameters_dump(self) -> list[DeviceParameter]:
+        """Read the setup of both servos in their EEPROM areas, in the units of the servos."""
+        return self._parameters.dump()
+
+    def parameters_restore(self, parameters: list[DeviceParameter]) -> list[ParameterFailure]:
+        """Write to the EEPROM areas of the servos. Raise Refused under torque, which locks them."""
+        return self._parameters.restore(parameters)
 
     def alarms(self) -> list[Alarm]:
         """Return the active hardware errors, by servo and bit."""

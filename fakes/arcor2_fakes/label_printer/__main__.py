@@ -10,7 +10,7 @@ import msgspec
 from cyclopts import Parameter, validators
 
 from arcor2_fakes.control import within
-from arcor2_fakes.label_printer.printer import LabelPrinter
+from arcor2_fakes.label_printer.printer import FIRMWARE, SERIAL_NUMBER, LabelPrinter
 from arcor2_fakes.program import program
 from arcor2_fakes.serial_line import Line, line_at
 from arcor2_fakes.serving import Fake
@@ -64,6 +64,8 @@ async def main(
     duration: Annotated[float, Parameter(validator=validators.Number(gt=0))] = 0.3,
     labels: Annotated[int, Parameter(validator=validators.Number(gte=0, lte=FULL_ROLL))] = FULL_ROLL,
     mute: bool = True,
+    serial_number: str = SERIAL_NUMBER,
+    firmware: str = FIRMWARE,
 ) -> None:
     """Start the fake; it prints one line `ready {json}` with its port and ends on SIGTERM.
 
@@ -73,6 +75,8 @@ async def main(
         duration: printing time of a label, s.
         labels: number of labels on the roll.
         mute: do not answer while out of media or with the head open; otherwise report it in the flags of ~HS.
+        serial_number: serial number of the printer.
+        firmware: version of its firmware.
     """
     printer = LabelPrinter(
         lambda frame: line.send(frame),
@@ -80,6 +84,8 @@ async def main(
         duration=duration,
         mute=mute,
         labels=labels,
+        serial_number=serial_number,
+        firmware=firmware,
     )
     line = line_at(printer.feed, link, tcp)
     register_commands(fake, printer)

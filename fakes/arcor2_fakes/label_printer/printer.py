@@ -11,8 +11,32 @@ import msgspec
 
 from arcor2_fakes.label_printer.zpl import Format, Stream
 
+MODEL: Final = "ZT411-203dpi"
+FIRMWARE: Final = "V92.21.39Z"
+SERIAL_NUMBER: Final = "99J204200001"
 BUFFER: Final = 8
 """Largest number of queued formats; more are discarded, as by a printer whose host ignores the buffer-full flag."""
+
+
+SETTINGS: Final[dict[str, tuple[str, Callable[[str], bool]]]] = {
+    "print.tone": ("10.0", lambda text: _is_number(text) and 0.0 <= float(text) <= 30.0),
+    "media.speed": ("4.0", lambda text: _is_number(text) and 2.0 <= float(text) <= 14.0),
+    "ezpl.print_width": ("832", lambda text: text.isdigit() and 2 <= int(text) <= 832),
+    "ezpl.media_type": ("gap/notch", ("continuous", "gap/notch", "mark").__contains__),
+    "ezpl.print_method": ("thermal trans", ("thermal trans", "direct thermal").__contains__),
+    "ezpl.tear_off": ("0", lambda text: _is_number(text) and abs(float(text)) <= 120.0),
+    "ezpl.power_up_action": ("calibrate", ("feed", "calibrate", "length", "no motion").__contains__),
+    "ezpl.head_close_action": ("feed", ("feed", "calibrate", "length", "no motion").__contains__),
+}
+"""Settings by SGD name: default, and whether a value is acceptable."""
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 class Label(msgspec.Struct, frozen=True):
@@ -33,12 +57,20 @@ class LabelPrinter:
         mute: Whether the printer does not answer while it has no media or its head is open.
     """
 
-    identity = ("ZT411-203dpi", "V92.21.39Z", 8, 65536)
-    unique_id = "99J204200001"
-
     def __init__(
-        self, send: Callable[[bytes], None], printed: Callable[[], None], *, duration: float, mute: bool, labels: int
+        self,
+        send: Callable[[bytes], None],
+        printed: Callable[[], None],
+        *,
+        duration: float,
+        mute: bool,
+        labels: int,
+        serial_number: str = SERIAL_NUMBER,
+        firmware: str = FIRMWARE,
     ) -> None:
+        self.identity = (MODEL, firmware, 8, 65536)
+        self.unique_id = serial_number
+        self.settings = {name: default for name, (default, _) in SETTINGS.items()}
         self._send, self._printed = send, printed
         self._duration = duration
         self._loop = asyncio.get_running_loop()
@@ -97,7 +129,13 @@ class LabelPrinter:
             self.pause(True)
         elif command.startswith("getvar "):
             values = {"odometer.total_label_count": str(self.counter), "device.unique_id": self.unique_id}
+            values |= self.settings
             self._send(f'"{values.get(command.removeprefix("getvar "), "?")}"'.encode("ascii"))
+
+        elif command.startswith("setvar "):
+            name, _, value = command.removeprefix("setvar ").partition("=")
+            if name in SETTINGS and SETTINGS[name][1](value):
+                self.settings[name] = value
 
     def _host_status(self) -> bytes:
         waiting = len(self._queue)

@@ -1,6 +1,6 @@
 """ZPL on the side of the printer: split bytes into commands, and a format into its fields.
 
-Source: ZPL II programming guide: ^XA, ^XZ, ^FO, ^FH, ^FD, ^FS, ^BC, ^PQ, ~HS, ~HI, and SGD getvar.
+Source: ZPL II programming guide: ^XA, ^XZ, ^FO, ^FH, ^FD, ^FS, ^BC, ^PQ, ~HS, ~HI, and SGD getvar and setvar.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import msgspec
 LONGEST_FORMAT: Final = 65536
 _COMMAND: Final = re.compile(r"\^(A[0-9@A-Z]|[A-Z][A-Z0-9])([^\^]*)")
 _GETVAR: Final = re.compile(rb'! U1 getvar "([a-z0-9._]{1,64})"\r\n')
+_SETVAR: Final = re.compile(rb'! U1 setvar "([a-z0-9._]{1,64})" "([\x20-\x21\x23-\x7e]{1,80})"\r\n')
 _HEX: Final = 2
 
 
@@ -34,7 +35,7 @@ class Format(msgspec.Struct, frozen=True):
 
 
 class Stream:
-    """Splits received bytes into ``~HS``, ``~HI``, ``getvar NAME`` and formats."""
+    """Splits received bytes into ``~HS``, ``~HI``, ``getvar NAME``, ``setvar NAME=VALUE`` and formats."""
 
     def __init__(self) -> None:
         self._format: bytearray | None = None
@@ -72,9 +73,11 @@ class Stream:
                 self._format = bytearray()
                 rest.clear()
             elif rest.endswith(b"\r\n"):
-                match = _GETVAR.search(bytes(rest))
+                query, change = _GETVAR.search(bytes(rest)), _SETVAR.search(bytes(rest))
                 rest.clear()
-                return f"getvar {match[1].decode()}" if match else None
+                if change:
+                    return f"setvar {change[1].decode()}={change[2].decode()}"
+                return f"getvar {query[1].decode()}" if query else None
             elif len(rest) > 256:
                 del rest[:-3]  # noise between formats is ignored
         elif rest.endswith(b"^XZ"):

@@ -80,6 +80,7 @@ async def main(
     link: Path | None = None,
     ids: tuple[int, ...] = (1, 2),
     time_scale: Annotated[float, Parameter(validator=validators.Number(gt=0, lte=20))] = 1.0,
+    firmware: Annotated[int, Parameter(validator=validators.Number(gte=1, lte=255))] = 45,
 ) -> None:
     """Start the fake; it prints one line `ready {json}` with its port and exits on SIGTERM.
 
@@ -87,6 +88,7 @@ async def main(
         link: Symbolic link to the pty; without it, one in a temporary directory.
         ids: Ids of the servos on the bus.
         time_scale: Speed of the servos; 1 is real time. Their watchdogs always run in real time.
+        firmware: Version of the firmware of the servos.
     """
     if len(set(ids)) != len(ids) or not all(0 <= number <= 252 for number in ids):
         raise ValueError("ids are 0 to 252, each once")
@@ -96,7 +98,8 @@ async def main(
     def clock() -> float:
         return own() * time_scale
 
-    bus = Bus([Servo(number, clock, time_scale=time_scale) for number in ids], lambda frame: line.send(frame))
+    servos = [Servo(number, clock, time_scale=time_scale, firmware=firmware) for number in ids]
+    bus = Bus(servos, lambda frame: line.send(frame))
     line = PtyLine(bus.feed, link)
     register_commands(fake, bus)
     fake.line(line, bus.clear, checked=True)

@@ -35,14 +35,19 @@ FIELDS: Final = {
     "firmware": Field(6, 1, 45),
     "id": Field(7, 1, 1),
     "baud_rate": Field(8, 1, 3, 0, 7),
+    "drive_mode": Field(10, 1, 0, 0, 5),
     "operating_mode": Field(11, 1, 3, 0, 16),
     "homing_offset": Field(20, 4, 0, -1024, 1024, signed=True),
     "moving_threshold": Field(24, 4, 10, 0, 1023),
     "temperature_limit": Field(31, 1, 80, 0, 100),
+    "max_voltage_limit": Field(32, 2, 160, 95, 160),
+    "min_voltage_limit": Field(34, 2, 95, 95, 160),
+    "pwm_limit": Field(36, 2, 885, 0, 885),
     "current_limit": Field(38, 2, 1193, 0, 1193),
     "velocity_limit": Field(44, 4, 200, 0, 1023),
     "max_position": Field(48, 4, 4095, 0, 4095),
     "min_position": Field(52, 4, 0, 0, 4095),
+    "shutdown": Field(63, 1, 0x34, 0, 255),
     "torque": Field(64, 1, 0, 0, 1),
     "led": Field(65, 1, 0, 0, 1),
     "hardware_error": Field(70, 1),
@@ -69,13 +74,19 @@ class Servo:
     """
 
     def __init__(
-        self, number: int, clock: Callable[[], float], position: float = 2048.0, time_scale: float = 1.0
+        self,
+        number: int,
+        clock: Callable[[], float],
+        position: float = 2048.0,
+        time_scale: float = 1.0,
+        firmware: int = FIELDS["firmware"].default,
     ) -> None:
         self.number = number
         self._time_scale = time_scale
         self._clock = clock
         self._values = {name: field.default for name, field in FIELDS.items()}
         self._values["id"] = number
+        self._values["firmware"] = firmware
         self._now = self._instructed_at = self._booted_at = clock()
         self._rebooting_until = -math.inf
         self._shaft = position

@@ -15,7 +15,7 @@ from cyclopts import Parameter, validators
 from arcor2_fakes.program import program
 from arcor2_fakes.serving import Fake, Wire
 from arcor2_fakes.ur.controller import Controller
-from arcor2_fakes.ur.dashboard import Dashboard
+from arcor2_fakes.ur.dashboard import SERIAL_NUMBER, Dashboard
 from arcor2_fakes.ur.kinematics import MODELS
 from arcor2_fakes.ur.primary import StatePorts
 from arcor2_fakes.ur.realtime import RealTimeStream
@@ -44,6 +44,11 @@ def _check_version(_type: object, version: str) -> None:
 def _check_model(_type: object, model: str) -> None:
     if model not in MODELS:
         raise ValueError(f"{model!r} is not one of {', '.join(MODELS)}")
+
+
+def _check_serial_number(_type: object, number: str) -> None:
+    if not re.fullmatch(r"\d{10,12}", number):
+        raise ValueError(f"{number!r} is not a serial number such as {SERIAL_NUMBER}")
 
 
 class _Cycles:
@@ -88,6 +93,7 @@ async def main(
     frequency: Positive = 500.0,
     time_scale: Positive = 1.0,
     powered_off: bool = False,
+    serial_number: Annotated[str, Parameter(validator=_check_serial_number)] = SERIAL_NUMBER,
 ) -> None:
     """Start the fake; it prints one line `ready {json}` with its addresses, and exits on SIGTERM.
 
@@ -103,6 +109,7 @@ async def main(
         frequency: Control cycles and RTDE samples per second.
         time_scale: Factor on the times of booting, power-on, brake release and unlocking.
         powered_off: Start without power on the arm.
+        serial_number: Serial number of the robot.
     """
     version = (*map(int, controller_version.split(".")), 0, 0)[:4]
 
@@ -110,7 +117,7 @@ async def main(
     controller.load_program = lambda name: ForeignProgram(controller, name)
     if powered_off:
         controller.power_off()
-    rtde, script, dashboard = RtdeServer(controller), ScriptPort(controller), Dashboard(controller)
+    rtde, script, dashboard = RtdeServer(controller), ScriptPort(controller), Dashboard(controller, serial_number)
     states = StatePorts(controller, MODELS[model])
 
     def opened(connection: Connection) -> None:

@@ -46,7 +46,7 @@ _REMOTE_ONLY = frozenset(
 class Dashboard:
     """The commands, for all clients."""
 
-    def __init__(self, controller: Controller) -> None:
+    def __init__(self, controller: Controller, serial_number: str = SERIAL_NUMBER) -> None:
         self.controller = controller
         self.popup: str | None = None
         c = controller
@@ -59,7 +59,7 @@ class Dashboard:
             "get loaded program": lambda _: f"Loaded program: {c.loaded}" if c.loaded else "No program loaded",
             "isProgramSaved": lambda _: f"true {self._program_name()}",
             "is in remote control": lambda _: str(c.remote).lower(),
-            "get serial number": lambda _: SERIAL_NUMBER,
+            "get serial number": lambda _: serial_number,
             "get robot model": lambda _: c.model.upper().removesuffix("E"),
             "PolyscopeVersion": lambda _: f"URSoftware {self._version()} (Nov 21 2025)",
             "version": lambda _: self._version(),

@@ -47,6 +47,7 @@ from arcor2_server.rpc.joints import JointsRequests
 from arcor2_server.rpc.lists import ListRequests
 from arcor2_server.rpc.locking import LockRequests
 from arcor2_server.rpc.logic import LogicRequests
+from arcor2_server.rpc.maintenance import MaintenanceRequests
 from arcor2_server.rpc.object_aiming import ObjectAimingRequests
 from arcor2_server.rpc.object_types import ObjectTypeRequests
 from arcor2_server.rpc.operation import OperationRequests
@@ -113,6 +114,7 @@ def request_handlers(s: Server) -> Handlers:
         ListRequests(s.storage, s.types, s.type_notifications, answers, s.saved_problems),
         LockRequests(s.users, s.locks, s.lock_takeover),
         LogicRequests(s.locks, s.types, s.session, editing),
+        MaintenanceRequests(s.devices, s.parameters),
         ObjectAimingRequests(s.types, s.session, s.online, s.object_aiming, editing, objects),
         ObjectTypeRequests(s.locks, s.storage, s.assets, s.types, s.session, s.online, answers),
         OperationRequests(s.types, s.session, s.online, s.execution, s.motion, s.stop_all),

@@ -7,6 +7,7 @@ from typing import Protocol, TypeVar
 from arcor2_hw.data.audit import AuditOutcome
 from arcor2_hw.data.events import Event
 from arcor2_hw.messages import Message
+from arcor2_hw.runtime.messages import ToHost
 from arcor2_server.access.admission import Access
 from arcor2_server.alarms.kinds import AlarmKinds
 from arcor2_server.alarms.service import Alarms
@@ -43,6 +44,8 @@ from arcor2_server.files import tighten
 from arcor2_server.hosts.pool import CellHosts
 from arcor2_server.hosts.session import HostSession
 from arcor2_server.log.redaction import REDACTION
+from arcor2_server.maintenance.devices import Devices
+from arcor2_server.maintenance.parameters import Parameters
 from arcor2_server.object_types.catalog import KnownTypes
 from arcor2_server.object_types.installations import InstallationWatch
 from arcor2_server.object_types.notifications import TypeNotifications
@@ -66,6 +69,7 @@ from arcor2_server.storage import AssetStore, Storage
 from arcor2_server.storage.alarms import AlarmStore
 from arcor2_server.storage.calibrations import Calibrations
 from arcor2_server.storage.damage_notices import DataDamage
+from arcor2_server.storage.maintenance import MaintenanceStore
 from arcor2_server.storage.packages import Packages
 from arcor2_server.storage.persons import PersonStore
 from arcor2_server.storage.recipes import RecipeStore
@@ -178,7 +182,11 @@ class Server:
         self.display_models = closed(DisplayModels(assets, compute, tasks, settings.prepared_dir))
 
         # ------------------------------------------------------------------------------------ services
-        opening = SceneOpening(settings, types, session, secrets, host_world)
+        maintenance_store = MaintenanceStore(storage)
+        devices = self.devices = Devices(hub, maintenance_store, to_both(scene_host, program_host))
+        await devices.open()
+        closed(devices)
+        opening = SceneOpening(settings, types, session, secrets, host_world, devices.identities)
         self.connection_check = ConnectionCheck(hosts, opening)
         online = self.online = closed(
             OnlineScene(scene_host, opening, hub, locks, session, robots, tasks, robot_calibrations)
@@ -203,7 +211,7 @@ class Server:
         self.dry_runs = closed(DryRuns(hub, types, session, tasks, compute, robots, scene_collisions, runs))
         breakpoints = self.breakpoints = SharedBreakpoints(hub, storage, session, shared)
         connect_edits(edit_notifications, previews, breakpoints)
-        messages = RunMessages(settings, secrets, breakpoints, host_world)
+        messages = RunMessages(settings, secrets, breakpoints, host_world, devices.identities)
         books = AllPartBooks(hub, settings.checkpoints_dir)
         execution = self.execution = closed(
             Execution(packages, program_host, online, settings, hub, types, runs, breakpoints, secrets, messages, books)
@@ -228,6 +236,9 @@ class Server:
         await alarms.open()
         closed(alarms)
         connect_alarms(alarms, scene_host, program_host, execution, damage)
+        connect_devices(devices, scene_host, program_host, online, execution)
+        devices.start()
+        self.parameters = Parameters(devices, maintenance_store, online, execution)
         system_alarms = closed(
             SystemAlarms(
                 alarms,
@@ -321,6 +332,26 @@ def audit_end_of_force(audit: AuditTrail) -> Callable[[Force, Message], None]:
         )
 
     return note
+
+
+def to_both(scene_host: HostSession, program_host: HostSession) -> Callable[[ToHost], None]:
+    """Return a function that sends a message to the host of the scene and to that of the program."""
+
+    def send(message: ToHost) -> None:
+        scene_host.send(message)
+        program_host.send(message)
+
+    return send
+
+
+def connect_devices(
+    devices: Devices, scene_host: HostSession, program_host: HostSession, online: OnlineScene, execution: Execution
+) -> None:
+    """Let the device cards follow what the hosts report, and count the actions of devices."""
+    for host, what in ((scene_host, "scene"), (program_host, "program")):
+        devices.watch(host.board, what)
+    online.on_device_action.append(devices.acted)
+    execution.on_device_action.append(devices.acted)
 
 
 def connect_production(recipes: Recipes, units: Units, cell_time: CellTime, execution: Execution) -> None:

@@ -14,6 +14,7 @@ READING: Final = frozenset(
         "CameraColorParameters",
         "CheckCalibration",
         "CheckScript",
+        "CompareParameters",
         "ExportFunction",
         "ForwardKinematics",
         "History",

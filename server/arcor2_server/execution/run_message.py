@@ -1,11 +1,13 @@
 """Creates the message that runs a package in a cell host."""
 
 import asyncio
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from msgspec.structs import replace
 
+from arcor2_hw.data.device import Identity
 from arcor2_hw.data.held import OnError
 from arcor2_hw.runtime import messages as m
 from arcor2_server.execution.breakpoints import SharedBreakpoints
@@ -23,6 +25,7 @@ class RunMessages:
     _secrets: SettingSecrets
     _breakpoints: SharedBreakpoints
     _host_world: HostWorld
+    _identities: Callable[[], dict[str, Identity]]
 
     def prepare(self, package_id: str, directory: Path, how: How) -> m.RunPackage:
         """Return the message without the parts that may change until the host is ready.
@@ -63,5 +66,6 @@ class RunMessages:
         if shared_of:  # read last: later changes are sent to the program
             shared = await self._breakpoints.ids(shared_of)
             message = replace(message, shared_breakpoints=sorted(shared))
+        message = replace(message, identities=self._identities())
         calibrations = await self._host_world.calibrations_of_package(directory)
         return self._host_world.with_world(message, calibrations)

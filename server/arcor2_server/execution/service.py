@@ -109,6 +109,8 @@ class Execution(PackageLibrary):
         """Called with each report that an action has concerned a part."""
         self.on_action_end: list[Callable[[int], None]] = []
         """Called with the number of each action that has ended or failed."""
+        self.on_device_action: list[Callable[[str], None]] = []
+        """Called with the id of the object of each action that starts."""
         self._over: asyncio.Future[None] | None = None
         self._killing: asyncio.TimerHandle | None = None
         self._background = BackgroundTasks()
@@ -424,6 +426,9 @@ class Execution(PackageLibrary):
         match message:
             case m.ProgramEvent():
                 self.program.handle_event(message)
+                if message.event == "ActionStateBefore":
+                    for notify_device in self.on_device_action:
+                        notify_device(message.device)
                 if message.event == "PackageInfo":
                     self._show_devices(message.encoded)
                 if message.frames or message.event == "ActionStateAfter":

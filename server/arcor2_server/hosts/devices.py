@@ -16,7 +16,7 @@ from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.data.secret import HIDDEN
 from arcor2_hw.exceptions import NotFound
 from arcor2_hw.messages import Message
-from arcor2_hw.runtime.messages import DeviceChanged, HeldPart
+from arcor2_hw.runtime.messages import DeviceChanged, DeviceIdentified, HeldPart
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
 
@@ -89,6 +89,8 @@ class DeviceBoard:
         """Called with each report of a device, and with the last reports again when the objects are known."""
         self.on_clear: list[Callable[[list[str]], None]] = []
         """Called with the ids of the objects that are no longer observed."""
+        self.on_identified: list[Callable[[DeviceIdentified], None]] = []
+        """Called with the identity of a device, each time after it connected."""
         self._hub = hub
         self._overlaid: Mapping[str, list[str]] = {}
         self._objects: dict[str, SceneObject] = {}
@@ -169,6 +171,11 @@ class DeviceBoard:
         if _obstacles(before) != _obstacles(message):
             self._notify_obstacles()
         self._notify_report(message)
+
+    def identified(self, message: DeviceIdentified) -> None:
+        """Handle the identity of a device."""
+        for notify in self.on_identified:
+            notify(message)
 
     def interlocks_changed(self, states: list[InterlockState]) -> None:
         """Handle the states of the interlocks from the cell host."""

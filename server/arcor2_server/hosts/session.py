@@ -94,6 +94,8 @@ class HostSession:
                     alarms=[alarm.text for alarm in message.alarms],
                     control=message.control_owner,
                 )
+            case m.DeviceIdentified():
+                self.board.identified(message)
             case m.InterlocksChanged():
                 self.board.interlocks_changed(message.states)
             case m.LogLine():

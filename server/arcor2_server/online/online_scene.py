@@ -70,6 +70,8 @@ class OnlineScene:
         """Ids of the robots that are moving on request."""
         self.before_start: list[Callable[[], None]] = []
         """Called before the scene goes online; may raise RequestRefused."""
+        self.on_device_action: list[Callable[[str], None]] = []
+        """Called with the id of the object of each action that has ended."""
         self.background = BackgroundTasks()
         """Tasks that are cancelled when the server ends."""
         self.held = HoldToRun(host, hub, locks, robots, self.moving, self.background)
@@ -387,6 +389,8 @@ class OnlineScene:
     def action_ended(self, action: RunningAction, results: list[str] | None, error: Message | None) -> None:
         """Store the results of the running action, and publish its end unless it was cancelled."""
         self.running_action = None
+        for notify in self.on_device_action:
+            notify(action.object_id)
         if results is not None and self.online:
             self.results[action.action_id] = results
         if not action.cancelled:

@@ -1,8 +1,10 @@
 """Creates the message that opens a scene in a cell host."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from arcor2_hw.data.base import Unset
+from arcor2_hw.data.device import Identity
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.runtime import messages as m
@@ -23,6 +25,7 @@ class SceneOpening:
     _session: Session
     _secrets: SettingSecrets
     _host_world: HostWorld
+    _identities: Callable[[], dict[str, Identity]]
 
     async def prepare(self, scene: Scene, keep_going: bool) -> tuple[m.OpenScene, dict[str, list[str]]]:
         """Return the message without the workspace, and the names of overridden settings by id of the object.
@@ -54,6 +57,7 @@ class SceneOpening:
             keep_going=keep_going,
             assets=self._host_world.shape_files(),
             secrets=self._secrets.values_for(scene, overrides),
+            identities=self._identities(),
         )
         await self._secrets.store.flush()
         return message, overlaid

@@ -236,3 +236,23 @@ class PersonLockOutRow(Base):
     device: Mapped[str] = mapped_column(String(255), primary_key=True)
     wrong: Mapped[int] = mapped_column(Integer)
     until: Mapped[float] = mapped_column(Double)
+
+
+class DeviceRow(Base):
+    """What is known about a device of the workplace, as JSON."""
+
+    __tablename__ = "device"
+
+    object_id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    document: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class ParameterBackupRow(Base):
+    """A backup of the parameters of a device: `info` without, `document` with the parameters, both as JSON."""
+
+    __tablename__ = "parameter_backup"
+
+    id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    object_id: Mapped[str] = mapped_column(String(255), index=True)
+    info: Mapped[bytes] = mapped_column(LargeBinary)
+    document: Mapped[bytes] = mapped_column(LargeBinary)
