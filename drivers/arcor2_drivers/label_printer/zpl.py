@@ -1,7 +1,7 @@
 """ZPL on the side of the host: builds and checks labels, parses answers. Pure functions.
 
-Source: ZPL II programming guide, ~HS (host status return), ~HI (host identification), ^FH, ^BC, and SGD getvar and setvar;
-docs/devices/label-printer.md lists what is used.
+Source: ZPL II programming guide, ~HS (host status return), ~HI (host identification), ^FH, ^BC, and SGD getvar and
+setvar; docs/devices/label-printer.md lists what is used.
 """
 
 import dataclasses

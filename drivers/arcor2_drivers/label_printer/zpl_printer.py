@@ -88,14 +88,15 @@ class ZplPrinter(LineDevice, Printer):
 
     def parameters_restore(self, parameters: list[DeviceParameter]) -> list[ParameterFailure]:
         """Write settings by SGD, and read each one again. Raises Refused while labels are being printed."""
-        failures = []
         with self.held():
             if not self._ask_status().idle:
                 raise Refused("{device} is printing. Try again when it has finished.", device=self.who)
-            for each in parameters:
-                if (reason := self._setvar(each)) is not None:
-                    failures.append(ParameterFailure(each.name, reason.text, **reason.translation()))
-        return failures
+            reasons = {each.name: self._setvar(each) for each in parameters}
+        return [
+            ParameterFailure(name, reason.text, **reason.translation())
+            for name, reason in reasons.items()
+            if reason is not None
+        ]
 
     def _getvar(self, name: str) -> str:
         return self.ask(zpl.getvar(name), zpl.variable, f"getvar {name}")

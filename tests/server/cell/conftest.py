@@ -186,12 +186,12 @@ async def running_server(data_dir: Path) -> AsyncIterator[Server]:
         assets, known, session, compute, collisions, robots, models, scene_host, program_host
     )
     world = HostWorld(collisions, calibrations, assets, scene_host, program_host)
-    opening = SceneOpening(settings, known, session, secrets, world, dict)
+    opening = SceneOpening(settings, known, session, secrets, world, lambda: (parts.identities or dict)())
     online = OnlineScene(scene_host, opening, hub, locks, session, robots, tasks, calibrations)
     runs = Runs(hub)
     breakpoints = SharedBreakpoints(hub, none, session, none)
     packages = Packages(settings.packages_dir, secrets.hide_in_package)
-    messages = RunMessages(settings, secrets, breakpoints, world, dict)
+    messages = RunMessages(settings, secrets, breakpoints, world, lambda: (parts.identities or dict)())
     books = AllPartBooks(hub, settings.checkpoints_dir)
     execution = Execution(
         packages, program_host, online, settings, hub, known, runs, breakpoints, secrets, messages, books

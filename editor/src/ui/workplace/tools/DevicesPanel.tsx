@@ -16,6 +16,7 @@ import { stateName, TONE } from "../sections/about";
 import { uncontrolledOnline } from "../uncontrolled";
 import "../../alarms/alarms.css";
 
+const DeviceCards = lazy(() => import("../../maintenance/DeviceCards"));
 const AlarmList = lazy(() => import("../../alarms/AlarmList"));
 
 export default function Panel() {
@@ -34,6 +35,7 @@ export default function Panel() {
     (each) => isFaulty(each.id) || !inert.split(",").includes(each.id),
   );
   const limited = useEditor(uncontrolledOnline);
+  const [card, setCard] = useState<string | null>(null);
   // Faulty devices first.
   const objects = devices.sort((a, b) => Number(isFaulty(b.id)) - Number(isFaulty(a.id)) || byName(a, b));
   return (
@@ -73,6 +75,9 @@ export default function Panel() {
                   {alarm.remedy && <span className="quiet"> {alarm.remedy}</span>}
                 </p>
               ))}
+              {health?.alarms.some((each) => each.code === "different_device") && (
+                <Button onPress={() => setCard(object.id)}>{t`Open the device card`}</Button>
+              )}
               {failed && live.state === "started" && serves("RetryObject") && (
                 <Button
                   isDisabled={cannot !== ""}
@@ -88,6 +93,12 @@ export default function Panel() {
       </ul>
       {doc && serves("StreamPoints") && (
         <Button onPress={() => (location.hash = "#/io")}>{t`Inputs and outputs`}</Button>
+      )}
+      {serves("ListDeviceCards") && <Button onPress={() => setCard("")}>{t`Device cards`}</Button>}
+      {card !== null && (
+        <Suspense fallback={null}>
+          <DeviceCards first={card} onClose={() => setCard(null)} />
+        </Suspense>
       )}
       {doc && serves("ListInterlocks") && (
         <Button onPress={() => openOverlay("interlocks")}>{t`Interlocks and zones`}</Button>
