@@ -18,6 +18,7 @@ from arcor2_hw.data.maintenance import (
 )
 from arcor2_hw.data.rpc import CompareParametersData, RestoreParametersData
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
+from arcor2_hw.messages import Message
 from arcor2_server.audit import changes as audit
 from arcor2_server.errors import RequestRefused
 from arcor2_server.execution.service import Execution
@@ -132,8 +133,9 @@ class Parameters:
         failures = msgspec.json.decode(raw or b"[]", type=list[ParameterFailure])
         after = {each.name: each.value for each in await self._dump(card)}
         failed = {each.name for each in failures}
+        not_stored = Message.of("The device has not stored the value.")
         failures += [
-            ParameterFailure(each.name, "The device has not stored the value.")
+            ParameterFailure(each.name, not_stored.text)
             for each in wanted
             if each.name not in failed and after.get(each.name) != each.value
         ]
