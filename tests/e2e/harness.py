@@ -82,8 +82,8 @@ class Cell:
         ready = await self._start(name, lambda log: start_forked_fake(module, [*arguments, *control], log))
         self.at[name] = msgspec.json.decode(ready)
 
-    async def start_robot(self) -> None:
-        await self.start_fake("robot", "ur", "--host", self.robot_host)
+    async def start_robot(self, *arguments: str) -> None:
+        await self.start_fake("robot", "ur", "--host", self.robot_host, *arguments)
 
     async def start_devices(self) -> None:
         async with asyncio.TaskGroup() as tasks:
@@ -120,11 +120,11 @@ class Cell:
         with outliving_the_test():
             await self.start_server()
 
-    async def renew_robot(self) -> None:
-        """Restart the simulated robot at the same address."""
+    async def renew_robot(self, *arguments: str) -> None:
+        """Restart the simulated robot at the same address, with more arguments."""
         await self.children["robot"].stop()
         with outliving_the_test():
-            await self.start_robot()
+            await self.start_robot(*arguments)
 
     async def kill(self, name: str) -> None:
         """Kill a process, as a power failure would."""

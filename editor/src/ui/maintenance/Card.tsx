@@ -52,8 +52,8 @@ export function Card({ card, reload, onReplace }: Props) {
           <strong>{differenceOf(card)}</strong>
           <span>
             {technician
-              ? t`It does not move until you confirm it.`
-              : t`It does not move until a technician has confirmed it. Call a technician.`}
+              ? t`It executes no commands until you confirm it.`
+              : t`It executes no commands until a technician has confirmed it. Call a technician.`}
           </span>
           {technician && (
             <Button look="primary" onPress={onReplace}>

@@ -2,7 +2,8 @@
 
 import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
-import { useState } from "react";
+import { useEffect, useState } from "react";
+import { type CalibrationRecord, recordsOf } from "../../commands/calibrate";
 import { differenceOf, IDENTITY_FIELDS, isOtherUnit } from "../../commands/maintenance";
 import { refusal } from "../../commands/requests";
 import { dateAndTime } from "../../formats";
@@ -33,6 +34,10 @@ export function SwapWizard({ card: given, reload, onClose, onLeave }: Props) {
   const object = useEditor((state) => state.doc?.objects[card.object_id]);
   const inScene = useEditor((state) => state.doc !== null && state.doc.project === null);
   const { refused, busy, ask } = useRefusal();
+  const [measured, setMeasured] = useState<CalibrationRecord[] | null>(null);
+  useEffect(() => {
+    recordsOf(card.object_id).then(setMeasured, () => setMeasured([]));
+  }, [card.object_id]);
   const { found, identity } = card;
   const backup = card.backups[0];
   const other = isOtherUnit(card);
@@ -116,12 +121,14 @@ export function SwapWizard({ card: given, reload, onClose, onLeave }: Props) {
         {step === 2 && (
           <>
             <p>
-              {other
-                ? t`Calibrations of the previous device no longer hold. Measure again what is listed here.`
-                : t`The device is the same one. Its calibrations still hold; check them if the firmware changes its kinematics.`}
+              {!other
+                ? t`The device is the same one. Its calibrations still hold; check them if the firmware changes its kinematics.`
+                : measured?.length === 0
+                  ? t`No calibration of the previous device is recorded.`
+                  : t`These calibrations of the previous device no longer hold. Measure them again.`}
             </p>
-            {object && <Records id={card.object_id} />}
-            {other && object && (
+            {measured && measured.length > 0 && <Records id={card.object_id} />}
+            {other && object && measured && measured.length > 0 && (
               <p className="quiet small">
                 {inScene
                   ? t`Confirm the device first if it has to move for the calibration.`
@@ -132,14 +139,14 @@ export function SwapWizard({ card: given, reload, onClose, onLeave }: Props) {
         )}
         {step === LAST &&
           (confirmed ? (
-            <p role="status">{t`${card.name} is confirmed and can move again.`}</p>
+            <p role="status">{t`${card.name} is confirmed and executes commands again.`}</p>
           ) : (
             <>
               <p>{differenceOf(card)}</p>
               <p>
                 {other
-                  ? t`After that, programs and users can move it. Hours and actions are counted from zero.`
-                  : t`After that, programs and users can move it.`}
+                  ? t`After that, programs and users can command it. Hours and actions are counted from zero.`
+                  : t`After that, programs and users can command it.`}
               </p>
             </>
           ))}
@@ -148,7 +155,9 @@ export function SwapWizard({ card: given, reload, onClose, onLeave }: Props) {
       <div className="actions">
         {confirmed ? (
           <>
-            {other && object && inScene && <Button onPress={calibrate}>{t`Open calibration`}</Button>}
+            {other && object && inScene && measured && measured.length > 0 && (
+              <Button onPress={calibrate}>{t`Open calibration`}</Button>
+            )}
             <Button look="primary" onPress={onClose}>
               {t`Close`}
             </Button>
