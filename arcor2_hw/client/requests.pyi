@@ -12,6 +12,7 @@ from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.calibration import CalibrationCheck, CalibrationKind
 from arcor2_hw.data.camera import CameraParameters, EstimatedPose, MarkerCorners
 from arcor2_hw.data.cell_state import CellAuthority, CellJob, CellMode, CellStatus
+from arcor2_hw.data.device import Identity
 from arcor2_hw.data.dry_run import DryRunHead
 from arcor2_hw.data.editor import (
     HistoryChangedData,
@@ -55,6 +56,7 @@ from arcor2_hw.data.events import (
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.held import HeldData, HoldChoice, HoldDecidedData, OnError
 from arcor2_hw.data.interlocks import Interlock, InterlockStates
+from arcor2_hw.data.maintenance import BackupInfo, DeviceCard, ParameterBackup
 from arcor2_hw.data.object_type import ObjectAction, ObjectModel, ObjectTypeMeta, ObservationMeta, ParameterMeta
 from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHoldData
 from arcor2_hw.data.package import PackageSummary
@@ -98,6 +100,7 @@ from arcor2_hw.data.rpc.general import AuthenticateData, SystemInfoData
 from arcor2_hw.data.rpc.history import HistoryData, RestoreRevisionData, UndoData
 from arcor2_hw.data.rpc.interlocks import ListInterlocksData, PutInterlockData
 from arcor2_hw.data.rpc.locks import LockHolder, LockType, TakeOverLocksData
+from arcor2_hw.data.rpc.maintenance import CompareParametersData, ListDeviceCardsData, RestoreParametersData
 from arcor2_hw.data.rpc.object_types import DeleteObjectTypesData, ObjectAimingAddPointData
 from arcor2_hw.data.rpc.operation import JogFrame, JogRobotData, StopAllData
 from arcor2_hw.data.rpc.persons import ListPersonsData, LogOnData
@@ -311,6 +314,9 @@ class Requests(ABC):
     async def authenticate(self, token: str, *, timeout: float | None = None) -> AuthenticateData:
         """Authenticate. Needs the role operator."""
 
+    async def back_up_parameters(self, object_id: str, *, timeout: float | None = None) -> BackupInfo:
+        """BackUpParameters: id of the scene object. Needs the role technician."""
+
     async def build_project(
         self, *, project_id: str, package_name: str, timeout: float | None = None
     ) -> BuildProjectData:
@@ -391,8 +397,16 @@ class Requests(ABC):
     async def close_scene(self, *, force: bool = False, dry_run: bool = False, timeout: float | None = None) -> None:
         """CloseScene. Needs the role standard user."""
 
+    async def compare_parameters(
+        self, *, object_id: str, backup_id: str, timeout: float | None = None
+    ) -> CompareParametersData:
+        """CompareParameters: the device and the backup. Needs the role technician."""
+
     async def compare_recipes(self, *, before: str, after: str, timeout: float | None = None) -> RecipeComparison:
         """CompareRecipes: ids of two recipes. Needs the role operator."""
+
+    async def confirm_device(self, *, object_id: str, identity: Identity, timeout: float | None = None) -> DeviceCard:
+        """ConfirmDevice: the device, and its new identity as the technician has seen it. Needs the role technician."""
 
     async def confirm_parts(
         self, *, scene_id: str, parts: list[ConfirmedPart], dismiss: bool = False, timeout: float | None = None
@@ -445,6 +459,9 @@ class Requests(ABC):
 
     async def delete_package(self, id: str, *, timeout: float | None = None) -> None:
         """DeletePackage. Needs the role advanced user."""
+
+    async def delete_parameter_backup(self, *, object_id: str, backup_id: str, timeout: float | None = None) -> None:
+        """DeleteParameterBackup: the device and the backup. Needs the role technician."""
 
     async def delete_project(self, id: str, *, timeout: float | None = None) -> None:
         """DeleteProject. Needs the role standard user."""
@@ -555,6 +572,11 @@ class Requests(ABC):
 
     async def get_package_parameters(self, id: str, *, timeout: float | None = None) -> PackageParametersData:
         """GetPackageParameters. Needs the role operator."""
+
+    async def get_parameter_backup(
+        self, *, object_id: str, backup_id: str, timeout: float | None = None
+    ) -> ParameterBackup:
+        """GetParameterBackup: the device and the backup. Needs the role technician."""
 
     async def get_parts(self, *, timeout: float | None = None) -> list[PartBooks]:
         """GetParts. Needs the role operator."""
@@ -703,6 +725,9 @@ class Requests(ABC):
         timeout: float | None = None,
     ) -> ListCalibrationsData:
         """ListCalibrations: maximum number, latest date, object, kind. Needs the role operator."""
+
+    async def list_device_cards(self, *, timeout: float | None = None) -> ListDeviceCardsData:
+        """ListDeviceCards. Needs the role operator."""
 
     async def list_interlocks(self, *, timeout: float | None = None) -> ListInterlocksData:
         """ListInterlocks. Needs the role operator."""
@@ -937,6 +962,11 @@ class Requests(ABC):
     ) -> PutInterlockData:
         """PutInterlock: a new interlock without an id, or a changed one. Needs the role technician."""
 
+    async def put_parameter_backup(
+        self, *, object_id: str, backup: ParameterBackup, timeout: float | None = None
+    ) -> BackupInfo:
+        """PutParameterBackup: the device, and the contents of the file. Needs the role technician."""
+
     async def put_recipe(
         self,
         *,
@@ -1071,6 +1101,11 @@ class Requests(ABC):
 
         Needs the role technician.
         """
+
+    async def restore_parameters(
+        self, *, object_id: str, backup_id: str, timeout: float | None = None
+    ) -> RestoreParametersData:
+        """RestoreParameters: the device and the backup. Needs the role technician."""
 
     async def restore_revision(
         self, revision: int, *, dry_run: bool = False, timeout: float | None = None
@@ -1495,6 +1530,10 @@ class Requests(ABC):
     def follow(
         self, name: Literal["ChangeoverChanged"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[Changeover]]: ...
+    @overload
+    def follow(
+        self, name: Literal["DeviceCardChanged"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[DeviceCard]]: ...
     @overload
     def follow(
         self, name: Literal["DryRunChanged"], /, *, limit: int = LIMIT

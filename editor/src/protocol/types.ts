@@ -374,6 +374,30 @@ export interface AuthenticateData {
   shared?: boolean;
 }
 
+/** Arguments of requests about a backup: the device and the backup. */
+export interface BackupArgs {
+  object_id: string;
+  backup_id: string;
+}
+
+/**
+ * A backup of the parameters of a device, without the parameters.
+ *
+ * identity: of the device that was read. at, by: when, and who requested it. count: number of parameters. digest:
+ * SHA-256 of identity, type and parameters. uploaded: whether it was uploaded as a file.
+ */
+export interface BackupInfo {
+  id: string;
+  object_id: string;
+  object_type: string;
+  identity: Identity;
+  at: string;
+  by: string;
+  count: number;
+  digest: string;
+  uploaded: boolean;
+}
+
 /** An action without parameters and flows; `type` is `<object id>/<action name>`, or `<function id>/call`. */
 export interface BareAction {
   name: string;
@@ -671,10 +695,22 @@ export interface CollisionModels {
   meshes: Mesh[];
 }
 
+/** Answer to CompareParameters: the differences by name, and the number of equal parameters. */
+export interface CompareParametersData {
+  differences: ParameterDifference[];
+  equal: number;
+}
+
 /** Arguments of CompareRecipes: ids of two recipes. */
 export interface CompareRecipesArgs {
   before: string;
   after: string;
+}
+
+/** Arguments of ConfirmDevice: the device, and its new identity as the technician has seen it. */
+export interface ConfirmDeviceArgs {
+  object_id: string;
+  identity: Identity;
 }
 
 /**
@@ -775,6 +811,67 @@ export interface DeleteObjectTypesData {
 export interface DeleteOverrideArgs {
   id: string;
   override: Parameter;
+}
+
+/** Arguments of requests about a device: id of the scene object. */
+export interface DeviceArgs {
+  object_id: string;
+}
+
+/**
+ * What is known about a device of the workplace.
+ *
+ * Attributes:
+ *     object_id: Id of the scene object.
+ *     name: Its name.
+ *     object_type: Its object type.
+ *     identity: The confirmed identity; the one that was seen first needs no confirmation.
+ *     found: The identity of the connected device, if it is not the confirmed one. Then it is not commanded.
+ *     differing: The fields of `found` that differ.
+ *     first_seen: When the device was connected first.
+ *     seen: When its identity was last read.
+ *     confirmed_at: When a technician confirmed the identity; omitted if it was seen first.
+ *     confirmed_by: Who confirmed it.
+ *     parameters: Whether the driver can read the parameters.
+ *     restores: Whether it can write them.
+ *     hours: Hours for which the device was connected since `counted_since`.
+ *     cycles: Number of actions that it executed since then.
+ *     counted_since: When this device, by its serial number, was put into operation here.
+ *     problem: Why the identity could not be read at the last connection; `key` and `values` translate it.
+ *     backups: The backups of its parameters, newest first.
+ */
+export interface DeviceCard {
+  object_id: string;
+  name: string;
+  object_type: string;
+  identity: Identity;
+  first_seen: string;
+  seen: string;
+  counted_since: string;
+  found?: Identity;
+  differing: string[];
+  confirmed_at?: string;
+  confirmed_by?: string;
+  parameters: boolean;
+  restores: boolean;
+  hours: number;
+  cycles: number;
+  problem?: string;
+  backups: BackupInfo[];
+  key?: string;
+  values?: Record<string, string | Message>;
+}
+
+/**
+ * A parameter that a device stores.
+ *
+ * name: unique in the device, as in its manual, such as "servo 1: homing offset". unit: of the value as the device
+ * stores it; empty for a plain number.
+ */
+export interface DeviceParameter {
+  name: string;
+  value: boolean | number | string;
+  unit: string;
 }
 
 /** A device in a run. busy: time during which it executed actions, s. share: `busy` divided by the whole time. */
@@ -1439,6 +1536,11 @@ export interface ListCalibrationsData {
   records: CalibrationRecord[];
 }
 
+/** Answer to ListDeviceCards, by name. */
+export interface ListDeviceCardsData {
+  devices: DeviceCard[];
+}
+
 /** Answer to ListInterlocks: the interlocks of the open scene, and their states while they are known. */
 export interface ListInterlocksData {
   interlocks: Interlock[];
@@ -2092,6 +2194,31 @@ export interface Parameter {
   value: string;
 }
 
+/** The parameters of a device, as they are stored and written to a file. Fields as in BackupInfo. */
+export interface ParameterBackup {
+  object_type: string;
+  identity: Identity;
+  at: string;
+  parameters: DeviceParameter[];
+  digest: string;
+}
+
+/** A parameter with different values in a backup and in the device; omitted where there is none. */
+export interface ParameterDifference {
+  name: string;
+  backup?: boolean | number | string;
+  device?: boolean | number | string;
+  unit: string;
+}
+
+/** A parameter that could not be written, and why. */
+export interface ParameterFailure {
+  name: string;
+  reason: string;
+  key?: string;
+  values?: Record<string, string | Message>;
+}
+
 /**
  * One parameter of an action or setting; `extra` and `default_value` are JSON in strings.
  *
@@ -2408,6 +2535,12 @@ export interface PutInterlockData {
   id: string;
 }
 
+/** Arguments of PutParameterBackup: the device, and the contents of the file. */
+export interface PutParameterBackupArgs {
+  object_id: string;
+  backup: ParameterBackup;
+}
+
 /**
  * Arguments of PutRecipe: a new draft, or a draft to change.
  *
@@ -2652,6 +2785,12 @@ export interface RenameProjectArgs {
 export interface RenewForcesArgs {
   ids: string[];
   valid_ms: number;
+}
+
+/** Answer to RestoreParameters: the number of written parameters, and those that could not be written. */
+export interface RestoreParametersData {
+  written: number;
+  failures: ParameterFailure[];
 }
 
 /** Arguments of RestoreRevision: the number of the edit after which the document is restored. */
@@ -3698,6 +3837,7 @@ export interface Requests {
   AddVirtualCollisionObjectToScene: { args: AddVirtualCollisionObjectToSceneArgs; data: undefined };
   AlarmStatistics: { args: AlarmStatisticsArgs | undefined; data: AlarmStatisticsData };
   Authenticate: { args: AuthenticateArgs; data: AuthenticateData };
+  BackUpParameters: { args: DeviceArgs; data: BackupInfo };
   BuildProject: { args: BuildProjectArgs; data: BuildProjectData };
   CalibrateCamera: { args: CalibrateCameraArgs; data: undefined };
   CalibrateRobot: { args: CalibrateRobotArgs; data: undefined };
@@ -3712,7 +3852,9 @@ export interface Requests {
   CheckScript: { args: ScriptArgs; data: CheckScriptData };
   CloseProject: { args: CloseProjectArgs | undefined; data: undefined };
   CloseScene: { args: CloseSceneArgs | undefined; data: undefined };
+  CompareParameters: { args: BackupArgs; data: CompareParametersData };
   CompareRecipes: { args: CompareRecipesArgs; data: RecipeComparison };
+  ConfirmDevice: { args: ConfirmDeviceArgs; data: DeviceCard };
   ConfirmParts: { args: ConfirmPartsArgs; data: undefined };
   CopyActionPoint: { args: CopyActionPointArgs; data: undefined };
   CopyProject: { args: CopyProjectArgs; data: undefined };
@@ -3723,6 +3865,7 @@ export interface Requests {
   DeleteObjectTypes: { args: string[] | undefined; data: DeleteObjectTypesData[] };
   DeleteOverride: { args: DeleteOverrideArgs; data: undefined };
   DeletePackage: { args: IdArgs; data: undefined };
+  DeleteParameterBackup: { args: BackupArgs; data: undefined };
   DeleteProject: { args: IdArgs; data: undefined };
   DeleteRecipe: { args: IdArgs; data: undefined };
   DeleteScene: { args: IdArgs; data: string[] };
@@ -3746,6 +3889,7 @@ export interface Requests {
   GetHeld: { args: undefined; data: GetHeldData };
   GetObjectTypes: { args: undefined; data: ObjectTypeMeta[] };
   GetPackageParameters: { args: IdArgs; data: PackageParametersData };
+  GetParameterBackup: { args: BackupArgs; data: ParameterBackup };
   GetParts: { args: undefined; data: PartBooks[] };
   GetProduction: { args: GetProductionArgs | undefined; data: Production };
   GetProgramPosition: { args: undefined; data: ProgramPosition };
@@ -3767,6 +3911,7 @@ export interface Requests {
   KeepLoggedOn: { args: undefined; data: undefined };
   ListAlarms: { args: ListAlarmsArgs | undefined; data: ListAlarmsData };
   ListCalibrations: { args: ListCalibrationsArgs | undefined; data: ListCalibrationsData };
+  ListDeviceCards: { args: undefined; data: ListDeviceCardsData };
   ListInterlocks: { args: undefined; data: ListInterlocksData };
   ListLocks: { args: undefined; data: LockHolder[] };
   ListPackages: { args: undefined; data: PackageSummary[] };
@@ -3799,6 +3944,7 @@ export interface Requests {
   ProjectScript: { args: undefined; data: ProjectScriptData };
   ProjectsWithScene: { args: IdArgs; data: string[] };
   PutInterlock: { args: PutInterlockArgs; data: PutInterlockData };
+  PutParameterBackup: { args: PutParameterBackupArgs; data: BackupInfo };
   PutRecipe: { args: PutRecipeArgs; data: Recipe };
   Reachability: { args: ReachabilityArgs | undefined; data: ReachabilityData[] };
   ReadLock: { args: ReadLockArgs; data: undefined };
@@ -3827,6 +3973,7 @@ export interface Requests {
   RenameProject: { args: RenameProjectArgs; data: undefined };
   RenameScene: { args: RenameArgs; data: undefined };
   RenewForces: { args: RenewForcesArgs; data: undefined };
+  RestoreParameters: { args: BackupArgs; data: RestoreParametersData };
   RestoreRevision: { args: RestoreRevisionArgs; data: RestoreRevisionData };
   ResumePackage: { args: undefined; data: undefined };
   RetryObject: { args: RetryObjectArgs; data: undefined };
@@ -3904,6 +4051,7 @@ export interface Events {
   CellChanged: CellStatus;
   ChangedObjectTypes: ObjectTypeMeta[];
   ChangeoverChanged: Changeover;
+  DeviceCardChanged: DeviceCard;
   DryRunChanged: DryRunHead;
   ExecutionTrace: TraceEntry;
   ForcesChanged: ForcesChangedData;
@@ -4008,6 +4156,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   AddVirtualCollisionObjectToScene: 4,
   AlarmStatistics: 1,
   Authenticate: 1,
+  BackUpParameters: 4,
   BuildProject: 2,
   CalibrateCamera: 4,
   CalibrateRobot: 4,
@@ -4022,7 +4171,9 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   CheckScript: 2,
   CloseProject: 2,
   CloseScene: 2,
+  CompareParameters: 4,
   CompareRecipes: 1,
+  ConfirmDevice: 4,
   ConfirmParts: 1,
   CopyActionPoint: 2,
   CopyProject: 2,
@@ -4033,6 +4184,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   DeleteObjectTypes: 5,
   DeleteOverride: 3,
   DeletePackage: 3,
+  DeleteParameterBackup: 4,
   DeleteProject: 2,
   DeleteRecipe: 3,
   DeleteScene: 4,
@@ -4056,6 +4208,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   GetHeld: 1,
   GetObjectTypes: 1,
   GetPackageParameters: 1,
+  GetParameterBackup: 4,
   GetParts: 1,
   GetProduction: 1,
   GetProgramPosition: 1,
@@ -4077,6 +4230,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   KeepLoggedOn: 1,
   ListAlarms: 1,
   ListCalibrations: 1,
+  ListDeviceCards: 1,
   ListInterlocks: 1,
   ListLocks: 1,
   ListPackages: 1,
@@ -4109,6 +4263,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   ProjectScript: 1,
   ProjectsWithScene: 1,
   PutInterlock: 4,
+  PutParameterBackup: 4,
   PutRecipe: 3,
   Reachability: 1,
   ReadLock: 1,
@@ -4137,6 +4292,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   RenameProject: 2,
   RenameScene: 4,
   RenewForces: 4,
+  RestoreParameters: 4,
   RestoreRevision: 2,
   ResumePackage: 1,
   RetryObject: 2,
@@ -4206,6 +4362,7 @@ export const ADDITIONAL_EVENTS = [
   "BreakpointsChanged",
   "CellChanged",
   "ChangeoverChanged",
+  "DeviceCardChanged",
   "DryRunChanged",
   "ExecutionTrace",
   "ForcesChanged",
