@@ -82,6 +82,7 @@ from arcor2_hw.data.project import (
     Retry,
 )
 from arcor2_hw.data.recipes import Changeover, Recipe, RecipeComparison, RecipeState, RecipeValue
+from arcor2_hw.data.recordings import RecordingChangedData
 from arcor2_hw.data.robot import Joint, RobotArg, RobotMeta
 from arcor2_hw.data.rpc.alarms import AlarmStatisticsData, ListAlarmsData
 from arcor2_hw.data.rpc.calibrations import ListCalibrationsData
@@ -1680,6 +1681,10 @@ class Requests(ABC):
     ) -> EventStream[TypedEvent[ReachabilityData]]: ...
     @overload
     def follow(self, name: Literal["RecipeChanged"], /, *, limit: int = LIMIT) -> EventStream[TypedEvent[Recipe]]: ...
+    @overload
+    def follow(
+        self, name: Literal["RecordingChanged"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[RecordingChangedData]]: ...
     @overload
     def follow(self, name: Literal["RobotEef"], /, *, limit: int = LIMIT) -> EventStream[TypedEvent[RobotEefData]]: ...
     @overload

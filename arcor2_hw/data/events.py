@@ -46,6 +46,7 @@ from arcor2_hw.data.project import (
     ProjectRobotJoints,
 )
 from arcor2_hw.data.recipes import Changeover, Recipe
+from arcor2_hw.data.recordings import RecordingChangedData
 from arcor2_hw.data.robot import EefPose, Joint
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.scene import BareScene, Scene, SceneObject
@@ -375,6 +376,7 @@ EVENTS: Final = {
         EventType("ObjectValues", ObjectValuesData, Role.OPERATOR, additional=True),
         EventType("RobotHold", RobotHoldData, Role.OPERATOR, additional=True),
         EventType("AlarmChanged", AlarmRecord, Role.OPERATOR, additional=True),
+        EventType("RecordingChanged", RecordingChangedData, Role.OPERATOR, additional=True),
         EventType("BreakpointsChanged", ProjectBreakpoints, Role.OPERATOR, additional=True),
         EventType("CellChanged", CellStatus, Role.OPERATOR, additional=True),
         EventType("DryRunChanged", DryRunHead, Role.OPERATOR, additional=True),

@@ -32,17 +32,27 @@ _created_here = threading.local()
 
 
 @contextlib.contextmanager
-def listening(changed: "Callable[[Observing], None]") -> Iterator[None]:
-    """Call `changed` after every state change of the connections that this thread creates in this context.
+def listening(changed: "Callable[[Observing], None]", taken: Callable[[object], None] | None = None) -> Iterator[None]:
+    """Call functions after changes of the connections and state observers that this thread creates in this context.
 
-    It is called on the thread that changed the state, and must neither raise nor wait.
+    They are called on the thread that changed the state, and must neither raise nor wait.
+
+    Args:
+        changed: called after every state change of a connection.
+        taken: called with every new state of a device.
     """
-    before = getattr(_created_here, "changed", None)
-    _created_here.changed = changed
+    before = getattr(_created_here, "changed", None), getattr(_created_here, "taken", None)
+    _created_here.changed, _created_here.taken = changed, taken
     try:
         yield
     finally:
-        _created_here.changed = before
+        _created_here.changed, _created_here.taken = before
+
+
+def listener_of_states() -> Callable[[object], None] | None:
+    """Return the function `taken` of the present `listening`; None outside of it."""
+    found: Callable[[object], None] | None = getattr(_created_here, "taken", None)
+    return found
 
 
 class Observing:

@@ -9,7 +9,7 @@ from arcor2_hw.data.base import Timestamp, now
 from arcor2_hw.exceptions import DeviceError, DeviceTimeout, Stale
 from arcor2_hw.keep_alive import BUSY_FOR, LONGEST_STEP, RunningTime, once_within
 from arcor2_hw.messages import Message
-from arcor2_hw.objects.observing import GoOn, Observing
+from arcor2_hw.objects.observing import GoOn, Observing, listener_of_states
 
 T = TypeVar("T")
 
@@ -56,6 +56,7 @@ class StateObserver(Generic[T]):
         self._waiting = 0
         self._hurry = threading.Event()
         self._ending = False
+        self._taken = listener_of_states()
 
     # -------------------------------------------------------------------------------- hooks
     def open(self, timeout: float) -> Snapshot[T]:
@@ -238,6 +239,8 @@ class StateObserver(Generic[T]):
             self.on_state(snapshot)
             self._newest = snapshot
             self._changed.notify_all()
+        if self._taken is not None:
+            self._taken(snapshot.value)
 
     def _lost(self, error: DeviceError) -> None:
         self.on_lost(error)

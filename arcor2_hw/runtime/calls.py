@@ -17,6 +17,7 @@ from arcor2_hw.runtime.device import STOP_DEADLINE, STOP_GRACE, Device, describe
 from arcor2_hw.runtime.interlocks import Interlocks
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.program import Program
+from arcor2_hw.runtime.recorder import Recorder
 from arcor2_hw.runtime.stopping import SentStop, outcomes, send_stop
 from arcor2_hw.runtime.teaching import SET_MODE, Teaching
 
@@ -43,6 +44,7 @@ class Calls:
         stopping: Called for each device that is being stopped.
         teaching: Receives the changes of hand teaching mode.
         interlocks: Admit the calls that act on a device.
+        recorder: Records the calls that act on a device.
     """
 
     def __init__(
@@ -53,6 +55,7 @@ class Calls:
         stopping: Callable[[Device], None] = lambda _: None,
         teaching: Teaching | None = None,
         interlocks: Interlocks | None = None,
+        recorder: Recorder | None = None,
     ) -> None:
         self._cell = cell
         self._post = post
@@ -60,6 +63,7 @@ class Calls:
         self._stopping = stopping
         self._teaching = teaching
         self._interlocks = interlocks
+        self._recorder = recorder or Recorder()
         self._answering: threading.Thread | None = None
 
     def call(self, message: m.Call) -> None:
@@ -75,8 +79,11 @@ class Calls:
             guard, waits = self._guard(device, method, message.control)
             job, own = device.prepare(method, message.arguments, message.control, answer, guard)
             lane = device.stop_lane if message.cancel else device.lane_for(method)
+            if message.control and method not in _ONLY_CONTROL:
+                self._recorder.action_started(-message.id, f"{device.name}: {method}", device.id)
             lane.submit(job)
         except Exception as error:  # noqa: BLE001 - a call that cannot start is answered too
+            self._recorder.action_ended(-message.id, error=message_of(error))
             reported = error if device is None else describe(device, error)
             self._post(m.CallFailed(message.id, error_data(reported, message.object_id)))
             return
@@ -115,6 +122,7 @@ class Calls:
 
         def answer(job: Job) -> None:
             error = job.error
+            self._recorder.action_ended(-number, error=None if error is None else message_of(error))
             if error is None:
                 try:
                     value = b"" if job.value is None else encode_json(job.value).encode()

@@ -151,6 +151,8 @@ class Cell:
         """The confirmed identities by object id."""
         self.identified: Callable[[Device, Reported], None] | None = None
         """Called with the identity of a device after it connected, on any thread; None: identities are not read."""
+        self.state_taken: Callable[[Device, object], None] = lambda *_: None
+        """Called when a driver has read a new state of its device, on the thread that observes it."""
 
     def __iter__(self) -> Iterator[Device]:
         return iter(list(self._devices.values()))
@@ -241,6 +243,7 @@ class Cell:
             self._identification(how),
         )
         device.conditions_changed = lambda: self.conditions_changed(device)
+        device.state_taken = lambda state: self.state_taken(device, state)
         self._devices[device.id] = device
         return device
 

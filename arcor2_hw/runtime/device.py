@@ -79,6 +79,8 @@ class Device:
         self.name = recipe.scene_object.name
         self.conditions_changed: Callable[[], None] = lambda: None
         """Called when the instance has reported a condition, on any thread."""
+        self.state_taken: Callable[[object], None] = lambda _: None
+        """Called with each new state that the driver has read, on the thread that observes the device."""
         self.instance: Generic | None = None
         self.lane = Lane(self.name)
         self.stop_lane = Lane(self.name, "stop")
@@ -130,7 +132,7 @@ class Device:
         return opening is not None and opening.ended and opening.error is None and not self.closing
 
     def _open(self) -> None:
-        with listening(self._connection_changed):
+        with listening(self._connection_changed, lambda state: self.state_taken(state)):
             self.instance = instance = self._make()
             conditions_of(instance).listener = lambda: self.conditions_changed()
             if isinstance(instance, CollisionObject):

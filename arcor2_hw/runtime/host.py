@@ -43,6 +43,8 @@ from arcor2_hw.runtime.link import Link
 from arcor2_hw.runtime.methods import overrides
 from arcor2_hw.runtime.program import Program, set_current, traceback_text
 from arcor2_hw.runtime.record import RunRecord
+from arcor2_hw.runtime.recorder import Recorder
+from arcor2_hw.runtime.ring import Ring
 from arcor2_hw.runtime.script import execute, save_traceback
 from arcor2_hw.runtime.stopping import wait_stopped
 from arcor2_hw.runtime.streaming import RatedStreams, Streams
@@ -79,7 +81,7 @@ class _LogHandler(logging.Handler):
 class Host:
     """Serve one scene or one program run, from the first message to the exit."""
 
-    def __init__(self, sock: socket.socket) -> None:
+    def __init__(self, sock: socket.socket, ring: Ring | None = None) -> None:
         self.link = Link(sock)
         self.clock = Clock()
         self.program: Program | None = None
@@ -89,19 +91,29 @@ class Host:
         self._subscribed: dict[str, m.Subscribe] = {}
         self._teaching = Teaching(lambda *ended: self._holds.teaching_ended(*ended))
         self._interlocks = Interlocks(lambda: self._cell, self._interlocks_changed)
+        self._recorder = Recorder(ring, lambda: self._cell)
+        self._cell.state_taken = self._recorder.state_taken
         self._calls = Calls(
-            lambda: self._cell, self.link.post, self.clock, self._stopping, self._teaching, self._interlocks
+            lambda: self._cell,
+            self.link.post,
+            self.clock,
+            self._stopping,
+            self._teaching,
+            self._interlocks,
+            self._recorder,
         )
         self._holds = Holds(
             lambda: self._cell, self.link.post, self.clock, self._calls, self._teaching, self._interlocks
         )
         self._forces = Forces(lambda: self._cell, self.link.post, self.clock)
-        self._streams = Streams(self.link.post_stream)
+        self._streams = Streams(self.link.post_stream, self._recorder)
         self._rated = RatedStreams(lambda: self._cell, self.clock, self._streams)
-        self._watch = Watch(self._cell, self.link.post, self._device_lost)
+        self._watch = Watch(self._cell, self._device_changed, self._device_lost)
         self._shutting_down = threading.Event()
+        self._saved = threading.Event()
         self._stop_requested = threading.Event()
         self._scene: m.OpenScene | None = None
+        self._package: m.RunPackage | None = None
         self._connecting = threading.Lock()
         self._wake, wake_up = socket.socketpair()
         wake_up.setblocking(False)
@@ -135,6 +147,8 @@ class Host:
                 case _:
                     self._close_scene()
                     break
+        if self._shutting_down.is_set():
+            self._saved.wait(EXIT_TIMEOUT)
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError, ValueError):
                 stream.flush()
@@ -281,10 +295,11 @@ class Host:
             interlock_states=self._interlocks_changed,
             values=message.values,
         )
-        self._cell = program.cell
+        self._package, self._cell = message, program.cell
         self._cell.assets, self._cell.updates = message.assets, self._updates
         self._recognise(message.identities)
-        self._watch = Watch(program.cell, self.link.post, self._device_lost)
+        self._watch = Watch(program.cell, self._device_changed, self._device_lost)
+        self._cell.state_taken = self._recorder.state_taken
         program.inside = True
         self.program = program
         set_current(program)
@@ -352,6 +367,10 @@ class Host:
         attempt: int = 1,
     ) -> None:
         """Send an encoded event of the program. Wait up to EVENT_WAIT for a server that does not keep up."""
+        if name == "ActionStateBefore":
+            self._recorder.action_started(number, action, device, frames, branch, call)
+        elif name == "ActionStateAfter":
+            self._recorder.action_ended(number, waited, event=encoded)
         self.link.wait_for_room(EVENT_WAIT)
         self.link.post(
             m.ProgramEvent(name, encoded, number, action, time, device, waited, call, list(frames), branch, attempt)
@@ -363,6 +382,7 @@ class Host:
 
     def action_over(self, number: int, duration: float, error: Message | None, waited: float) -> None:
         """Report the end of an action that sends no event at its end."""
+        self._recorder.action_ended(number, waited, error)
         self.link.post(m.ActionFailed(number, duration, error, waited))
 
     # -------------------------------------------------------------------------------- reader thread
@@ -432,6 +452,10 @@ class Host:
             case m.ConfirmParts():
                 self._confirm_parts(message)
 
+    def _device_changed(self, report: m.DeviceChanged) -> None:
+        self.link.post(report)
+        self._recorder.device_changed(report)
+
     def _interlocks_changed(self, states: list[InterlockState]) -> None:
         self.link.post(m.InterlocksChanged(states))
 
@@ -479,12 +503,17 @@ class Host:
         watchdog.daemon = True
         watchdog.start()
         self._shutting_down.set()
+        interrupted = self._package is not None and not (self.program is not None and self.program.ended)
         if self.program is not None and self.program.record is not None:
             self.program.record.interrupt()
         self._cell.stop_all()
         self._stop_program()
         self._cell.abandon()
         self._work.put(m.CloseScene())
+        if interrupted and self._package is not None and self._package.recordings:
+            with contextlib.suppress(OSError):  # such as a full disk
+                self._recorder.save(Path(self._package.recordings), self._package.run)
+        self._saved.set()
 
     def _stop_program(self) -> None:
         self._stop_requested.set()  # before the check, so that a program that is being created is stopped too
@@ -540,6 +569,7 @@ def main() -> None:
     """Serve the socket inherited as `--fd`, then end the process even if threads still run."""
     parser = argparse.ArgumentParser(description="Run the devices of a scene. The server starts this process.")
     parser.add_argument("--fd", type=int, required=True, help="inherited socket to the server")
+    parser.add_argument("--ring", type=int, help="inherited memory of the ring of recent values")
     options = parser.parse_args()
     faulthandler.enable()
     with contextlib.suppress(OSError):  # not permitted without LimitNICE in the service file
@@ -548,7 +578,8 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(line_buffering=True, errors="backslashreplace")
-    status = Host(socket.socket(fileno=options.fd)).run()
+    ring = None if options.ring is None else Ring(options.ring)
+    status = Host(socket.socket(fileno=options.fd), ring).run()
     os._exit(status)
 
 

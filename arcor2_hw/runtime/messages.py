@@ -117,7 +117,8 @@ class RunPackage(ToHost, frozen=True):
     program, see ProgramHeld. run: number of the run. records: directory of the books of parts and of checkpoints; empty
     to store nothing. checkpoints: whether the state is stored before and after each action. continues: whether the
     program continues where it was interrupted. values: values of constants and variables of the project by their ids,
-    JSON in a string, which replace those of the package.
+    JSON in a string, which replace those of the package. recordings: directory in which the host stores the recording
+    of a run that the end of the server interrupts; empty to store nothing.
     """
 
     package_id: str
@@ -138,6 +139,7 @@ class RunPackage(ToHost, frozen=True):
     continues: bool = False
     values: dict[str, str] = field(default_factory=dict)
     identities: dict[str, Identity] = field(default_factory=dict)
+    recordings: str = ""
 
 
 class AddBody(ToHost, frozen=True):

@@ -17,6 +17,7 @@ from arcor2_hw.data.position import ProgramStep
 from arcor2_hw.exceptions import ProgramStopped
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime.program import Program
+from arcor2_hw.runtime.recorder import Recorder
 from arcor2_hw.runtime.streaming import Streams
 
 _encode = msgspec.json.Encoder().encode
@@ -60,7 +61,7 @@ class Standalone:
         self.directory = Path(script).resolve().parent if script else Path.cwd()
         channel = _StdoutChannel()
         self.program = Program(channel, self.directory.name, start_paused=options.pause, breakpoints=breakpoints)
-        self._streams = Streams(lambda event: channel.event(event.event, event.encoded))
+        self._streams = Streams(lambda event: channel.event(event.event, event.encoded), Recorder())
         self._ended = threading.Event()
 
     def start(self) -> None:

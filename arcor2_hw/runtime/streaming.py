@@ -9,6 +9,7 @@ from typing import Any, Final, Literal
 import msgspec
 
 from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.device import Observation
 from arcor2_hw.data.events import Event, ObjectObservationsData, RobotEefData, RobotJointsData
 from arcor2_hw.data.points import ObjectPointsData
 from arcor2_hw.data.robot import EefPose
@@ -20,6 +21,7 @@ from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.messages import Stream, StreamEvent
 from arcor2_hw.runtime.points import PointReader
+from arcor2_hw.runtime.recorder import Recorder
 
 OBSERVATIONS: Final = "ObjectObservations"
 """The event with the observations of a device."""
@@ -32,8 +34,9 @@ _encode = msgspec.json.Encoder().encode
 Send = Callable[[StreamEvent], None]
 
 
-def _joints(robot: Robot, time_ms: float | Unset) -> bytes:
+def _joints(robot: Robot, time_ms: float | Unset, record: Recorder) -> bytes:
     joints = robot.robot_joints(True)
+    record.joints(robot, joints)
     return _encode(Event("RobotJoints", data=RobotJointsData(robot.id, joints, time_ms)))
 
 
@@ -64,10 +67,11 @@ def _encoded(
 
 
 class Streams:
-    """Read and send the state of devices. A device is not queried again before it has answered."""
+    """Read, send and record the state of devices. A device is not queried again before it has answered."""
 
-    def __init__(self, send: Send) -> None:
+    def __init__(self, send: Send, record: Recorder) -> None:
         self._send = send
+        self._record = record
         self._pending: dict[tuple[str, str, float], Job] = {}
         self._points = PointReader()
 
@@ -100,7 +104,12 @@ class Streams:
         device.watch_lane.submit_or_fail(job)
 
     def _observe(self, instance: Generic, rate: float) -> None:
-        encoded = _encoded(OBSERVATIONS, ObjectObservationsData, instance.id, instance.observations)
+        def read() -> list[Observation]:
+            observations = instance.observations()
+            self._record.observed(instance, observations, time.monotonic())
+            return observations
+
+        encoded = _encoded(OBSERVATIONS, ObjectObservationsData, instance.id, read)
         self._send(StreamEvent(OBSERVATIONS, instance.id, encoded, rate))
 
     def _read_points(self, device: Device, rate: float) -> None:
@@ -111,7 +120,7 @@ class Streams:
         # A read error sends no event: clients see the age of the last one.
         time_ms: float | Unset = round(time.monotonic() * 1e3, 3) if rate else UNSET
         if joints:
-            self._send(StreamEvent("RobotJoints", robot.id, _joints(robot, time_ms), rate))
+            self._send(StreamEvent("RobotJoints", robot.id, _joints(robot, time_ms, self._record), rate))
         if eef:
             self._send(StreamEvent("RobotEef", robot.id, _eef(robot, time_ms), rate))
 

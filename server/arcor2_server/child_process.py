@@ -30,7 +30,12 @@ class ChildProcess:
 
     @classmethod
     async def start(
-        cls, command: Sequence[str], connection: socket.socket, environment: Mapping[str, str] = os.environ
+        cls,
+        command: Sequence[str],
+        connection: socket.socket,
+        environment: Mapping[str, str] = os.environ,
+        *,
+        inherited: Sequence[int] = (),
     ) -> "ChildProcess":
         """Start `python COMMAND --fd N`, where N is the file descriptor of the process's end of a socket.
 
@@ -38,6 +43,7 @@ class ChildProcess:
             command: the arguments of Python, such as `-m` and a module.
             connection: the end of the socket for the process. It is closed in this process.
             environment: the environment of the process.
+            inherited: other file descriptors for the process.
 
         Raises:
             OSError: the process cannot be started.
@@ -46,7 +52,7 @@ class ChildProcess:
         try:
             process = await asyncio.create_subprocess_exec(
                 sys.executable, *command, "--fd", str(connection.fileno()),
-                pass_fds=[connection.fileno()],
+                pass_fds=[connection.fileno(), *inherited],
                 stdin=asyncio.subprocess.DEVNULL,
                 stdout=asyncio.subprocess.PIPE,
                 stderr=asyncio.subprocess.STDOUT,

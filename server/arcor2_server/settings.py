@@ -129,6 +129,11 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return self.data_dir / "checkpoints"
 
     @property
+    def recordings_dir(self) -> Path:
+        """The recordings of alarms and failed runs."""
+        return self.data_dir / "recordings"
+
+    @property
     def analysis_file(self) -> Path:
         """The cached analysis of object types. It may be deleted."""
         return self.data_dir / "analysis.msgpack"

@@ -2667,6 +2667,54 @@ export interface RecipeValue {
   max?: number;
 }
 
+/**
+ * An alarm in a recording.
+ *
+ * number: of its record. time: when it was raised, ms after the event of the recording.
+ */
+export interface RecordedAlarm {
+  number: number;
+  time: number;
+  text: string;
+  text_message?: Message;
+  object_id?: string;
+  object_name?: string;
+}
+
+/**
+ * A recording was stored or has changed.
+ *
+ * deleted: numbers of the recordings that were deleted because there are newer ones.
+ */
+export interface RecordingChangedData {
+  recording: RecordingInfo;
+  deleted: number[];
+}
+
+/**
+ * A stored recording without its values.
+ *
+ * number: of the recording, from 1. at: time of the event, to which all times are relative. stamp: the same on the
+ * monotonic clock of the computer, s. begin, end: the recorded time, ms after the event. size: of its file, bytes.
+ * complete: false while the recording continues, and for one that the end of the server cut off. run: number of the
+ * run; omitted in an online scene. run_failed: whether the run ended with an error or was interrupted. error: why.
+ * alarms: the recorded ones, the event first.
+ */
+export interface RecordingInfo {
+  number: number;
+  at: string;
+  stamp: number;
+  begin: number;
+  end: number;
+  size: number;
+  complete: boolean;
+  run?: number;
+  run_failed: boolean;
+  error?: string;
+  error_message?: Message;
+  alarms: RecordedAlarm[];
+}
+
 /** Arguments of Redo: the undo of the caller, by default the latest one. */
 export interface RedoArgs {
   number?: number;
@@ -4092,6 +4140,7 @@ export interface Events {
   ProjectSaved: undefined;
   ReachabilityChanged: ReachabilityData;
   RecipeChanged: Recipe;
+  RecordingChanged: RecordingChangedData;
   RobotEef: RobotEefData;
   RobotHold: RobotHoldData;
   RobotJoints: RobotJointsData;
@@ -4384,6 +4433,7 @@ export const ADDITIONAL_EVENTS = [
   "ProgramPosition",
   "ReachabilityChanged",
   "RecipeChanged",
+  "RecordingChanged",
   "RobotHold",
   "RunChanged",
   "RunStatistics",

@@ -50,6 +50,8 @@ class Alarms:
         self._unwritten: dict[int, AlarmRecord] = {}
         self._writing: asyncio.Task[None] | None = None
         self._shelved: dict[int, asyncio.TimerHandle] = {}
+        self.on_raised: list[Callable[[AlarmRecord, float], None]] = []
+        """Called with the record of each occurrence, and when it was, on the monotonic clock, s."""
 
     async def open(self) -> None:
         """Read the stored records. Conditions that were active when the server ended count as ended.
@@ -103,22 +105,20 @@ class Alarms:
         for code in sorted(codes - before, key=lambda each: stamps.get(each, 0.0)):
             alarm: Alarm | None = alarms.get(code)
             stamp = stamps.get(code) or time.monotonic()
-            self._changed(
-                self._book.raised(
-                    Occurrence(
-                        report.object_id,
-                        code,
-                        self._kinds.of_device(device.type, code),
-                        _at(stamp) if alarm is None else alarm.since,
-                        stamp,
-                        report.reason if alarm is None else _message(alarm.text, alarm.text_message),
-                        None if alarm is None else _message(alarm.remedy, alarm.remedy_message),
-                        None if alarm is None else alarm.severity,
-                        device.name,
-                        device.type,
-                        self._run(),
-                        session=self._session(),
-                    )
+            self._raised(
+                Occurrence(
+                    report.object_id,
+                    code,
+                    self._kinds.of_device(device.type, code),
+                    _at(stamp) if alarm is None else alarm.since,
+                    stamp,
+                    report.reason if alarm is None else _message(alarm.text, alarm.text_message),
+                    None if alarm is None else _message(alarm.remedy, alarm.remedy_message),
+                    None if alarm is None else alarm.severity,
+                    device.name,
+                    device.type,
+                    self._run(),
+                    session=self._session(),
                 )
             )
 
@@ -143,22 +143,20 @@ class Alarms:
         else:
             code, kind = "program_failed", self._kinds.of_system("program_failed")
         stamp = error.stamp or time.monotonic()
-        self._changed(
-            self._book.raised(
-                Occurrence(
-                    error.object_id,
-                    code or error.code,
-                    kind,
-                    _at(stamp),
-                    stamp,
-                    error.message,
-                    name=error.object_name,
-                    object_type=error.object_type,
-                    run=run,
-                    action=action,
-                    momentary=True,
-                    session=f"run {run}",
-                )
+        self._raised(
+            Occurrence(
+                error.object_id,
+                code or error.code,
+                kind,
+                _at(stamp),
+                stamp,
+                error.message,
+                name=error.object_name,
+                object_type=error.object_type,
+                run=run,
+                action=action,
+                momentary=True,
+                session=f"run {run}",
             )
         )
 
@@ -193,7 +191,7 @@ class Alarms:
         moment = time.monotonic()
         run = self._run()
         what = Occurrence("", code, kind, now(), moment, text, run=run, momentary=momentary, session=session)
-        self._changed(self._book.raised(what))
+        self._raised(what)
 
     def data_damaged(self, notice: Message) -> None:
         """Record that a file of the data directory is damaged. Each file has its own alarm."""
@@ -264,6 +262,13 @@ class Alarms:
     def _end_shelving(self, number: int) -> None:
         self._shelved.pop(number, None)
         self._changed(self._book.shelved(number, None, "", ""))
+
+    def _raised(self, what: Occurrence) -> None:
+        changed = self._book.raised(what)
+        for record in changed[:1]:  # the others have another first-up
+            for notify in self.on_raised:
+                notify(record, what.stamp)
+        self._changed(changed)
 
     def _changed(self, records: list[AlarmRecord]) -> None:
         self._unwritten |= {record.number: record for record in records}

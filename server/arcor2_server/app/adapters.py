@@ -21,6 +21,7 @@ from arcor2_server.rest.models import ModelOperations
 from arcor2_server.rest.object_types import ObjectTypeOperations
 from arcor2_server.rest.production import ProductionOperations
 from arcor2_server.rest.projects import ProjectOperations
+from arcor2_server.rest.recordings import RecordingOperations
 from arcor2_server.rest.runs import RunOperations
 from arcor2_server.rest.scene_service import SceneServiceOperations
 from arcor2_server.rest.scenes import SceneOperations
@@ -152,6 +153,7 @@ def rest_groups(s: Server) -> list[object]:
         ApiDocumentOperations(s.settings),
         ExecutionOperations(s.hub, s.storage, s.execution, s.package_runs),
         GeneralOperations(s.settings, s.online, s.execution),
+        RecordingOperations(s.recordings),
         KinematicsOperations(s.online, s.robot_calibrations, s.robots),
         ModelOperations(s.storage, s.type_notifications),
         ObjectTypeOperations(s.storage, s.types, s.type_notifications),

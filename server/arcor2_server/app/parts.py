@@ -8,6 +8,7 @@ from arcor2_hw.data.audit import AuditOutcome
 from arcor2_hw.data.events import Event
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime.messages import ToHost
+from arcor2_hw.runtime.ring import Ring
 from arcor2_server.access.admission import Access
 from arcor2_server.alarms.kinds import AlarmKinds
 from arcor2_server.alarms.service import Alarms
@@ -64,6 +65,7 @@ from arcor2_server.packml.record import CellFile
 from arcor2_server.production.cell_time import CellTime, activity_of
 from arcor2_server.production.recipes import Recipes
 from arcor2_server.production.units import Units
+from arcor2_server.recordings.service import Recordings
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import AssetStore, Storage
 from arcor2_server.storage.alarms import AlarmStore
@@ -73,6 +75,7 @@ from arcor2_server.storage.maintenance import MaintenanceStore
 from arcor2_server.storage.packages import Packages
 from arcor2_server.storage.persons import PersonStore
 from arcor2_server.storage.recipes import RecipeStore
+from arcor2_server.storage.recordings import RecordingFiles
 from arcor2_server.storage.secret_migration import migrate_secrets
 from arcor2_server.storage.secret_store import SecretStore
 from arcor2_server.storage.setting_secrets import SettingSecrets
@@ -239,6 +242,19 @@ class Server:
         connect_devices(devices, scene_host, program_host, online, execution)
         devices.start()
         self.parameters = Parameters(devices, maintenance_store, online, execution)
+
+        def ring() -> Ring | None:
+            host = program_host.host or scene_host.host
+            return None if host is None else host.ring
+
+        recordings = self.recordings = closed(Recordings(hub, RecordingFiles(settings.recordings_dir), ring))
+        await recordings.open(runs.error_of)
+        alarms.on_raised.append(recordings.alarm)
+        execution.on_failed.append(
+            lambda run, error, host: recordings.run_failed(
+                run, None if error is None else error.message, None if host is None else host.ring
+            )
+        )
         system_alarms = closed(
             SystemAlarms(
                 alarms,

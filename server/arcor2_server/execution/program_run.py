@@ -140,8 +140,8 @@ class ProgramRun:
             key, values = published.key or published.message, published.values or {}
             self.error = replace(error, type=published.type, message=Message(published.message, key, values))
 
-    def end(self, *, lost: bool) -> None:
-        """Store the end of the run."""
+    def end(self, *, lost: bool) -> RunEnd:
+        """Store the end of the run and return it."""
         error = self.error
         self._frames.clear()
         end = RunEnd.FINISHED if error is None else RunEnd.LOST if lost else RunEnd.FAILED
@@ -159,3 +159,4 @@ class ProgramRun:
             stopped_by=self.stopped_by or "",
         )
         self.action = None
+        return end

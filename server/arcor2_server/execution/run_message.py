@@ -48,6 +48,7 @@ class RunMessages:
             checkpoints=how.checkpoints,
             continues=how.continues,
             values=dict(how.values),
+            recordings=str(self._settings.recordings_dir),
         )
 
     async def complete(self, message: m.RunPackage, shared_of: str) -> m.RunPackage:

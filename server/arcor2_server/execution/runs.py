@@ -265,6 +265,11 @@ class Runs:
         """Return a run, None if the number is unknown."""
         return self._runs.get(number)
 
+    def error_of(self, number: int) -> Message | None:
+        """Return the error that ended a run, None if it has none or is unknown."""
+        run = self._runs.get(number)
+        return None if run is None or isinstance(run.error, Unset) else run.as_message(run.error)
+
     def entry(self, number: int) -> TraceEntry | None:
         """Return an action of the present or last run, None if it is unknown."""
         call = self._trace.get(number)

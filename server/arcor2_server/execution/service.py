@@ -12,6 +12,7 @@ from msgspec.structs import replace
 
 from arcor2_hw.data import events as e
 from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.editor import RunEnd
 from arcor2_hw.data.events import Event, MainScreen, ProjectExceptionData
 from arcor2_hw.data.held import HoldDecidedData, OnError
 from arcor2_hw.data.package import PackageStateEnum
@@ -93,6 +94,8 @@ class Execution(PackageLibrary):
         self._messages = messages
         self.on_error: list[Callable[[m.ErrorData, int, str], None]] = []
         """Called with the error that ends or holds a program, before its devices are gone, the run, and the action."""
+        self.on_failed: list[Callable[[int, m.ErrorData | None, CellHost | None], None]] = []
+        """Called with each run that has failed or was interrupted, the reason, and its host, which ends."""
         self.on_decided: list[Callable[[HoldDecidedData], None]] = []
         """Called with each decision about a held program."""
         self.before_start: list[Callable[[How], None]] = []
@@ -538,9 +541,11 @@ class Execution(PackageLibrary):
         self._hub.broadcast(make_event("ProjectException", data))
 
     def _ended(self, *, lost: bool = False) -> None:
-        self._host.host = None
+        host, self._host.host = self._host.host, None
         self._end_hold()
-        self.program.end(lost=lost)
+        if self.program.end(lost=lost) in (RunEnd.FAILED, RunEnd.LOST):
+            for notify in self.on_failed:
+                notify(self.program.number, self.program.error, host)
         self._publish_position()
         self.streams.clear()
         error = self.program.error

@@ -19,6 +19,8 @@ from arcor2_hw.data.parts import ConfirmedPart
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
+from arcor2_hw.runtime import ring
+from arcor2_hw.runtime.ring import Ring
 from arcor2_server.child_process import ChildProcess, describe_exit
 
 log = structlog.get_logger(__name__)
@@ -103,8 +105,10 @@ class _Connection(asyncio.Protocol):
 class CellHost:
     """A running cell host."""
 
-    def __init__(self, process: ChildProcess, connection: _Connection) -> None:
+    def __init__(self, process: ChildProcess, connection: _Connection, ring: Ring) -> None:
         self.process = process
+        self.ring = ring
+        """The recent values of the devices, also after the end of the host."""
         self.user: HostUser | None = None
         self.ready: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self.ended: asyncio.Future[None] = asyncio.get_running_loop().create_future()
@@ -124,17 +128,21 @@ class CellHost:
         """Start the process. It can be used when `ready` is done."""
         ours, theirs = socket.socketpair()
         connection = _Connection()
+        memory = ring.create()
         try:
             # The connection first: nothing may be awaited between the start of the process and of its tasks.
             await asyncio.get_running_loop().create_unix_connection(lambda: connection, sock=ours)
-            process = await ChildProcess.start(COMMAND, theirs, environment)
+            process = await ChildProcess.start(
+                (*COMMAND, "--ring", str(memory)), theirs, environment, inherited=[memory]
+            )
         except BaseException:
+            os.close(memory)
             if connection.transport is not None:
                 connection.transport.abort()
             ours.close()
             theirs.close()
             raise
-        host = cls(process, connection)
+        host = cls(process, connection, ring.Ring(memory))
         connection.host = host
         host._tasks = [
             asyncio.create_task(host._read_output(), name=f"output of cell host {process.pid}"),

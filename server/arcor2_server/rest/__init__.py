@@ -29,6 +29,7 @@ from arcor2_server.rest import (  # noqa: F401
     object_types,
     production,
     projects,
+    recordings,
     runs,
     scene_service,
     scenes,

@@ -1,0 +1,1 @@
+"""Recordings: points, joints and actions around each alarm and the end of each failed run."""
