@@ -12,6 +12,7 @@ import {
   type ObjectObservationsData,
   type ObjectPointsData,
   type PartBooks,
+  type RecordingChangedData,
   ROLES,
   type ServerEvent,
 } from "../protocol/types";
@@ -44,6 +45,8 @@ declare module "../store/runtime" {
     takePoints?: ((data: ObjectPointsData) => void) | undefined;
     /** Receive changed alarms, which bypass the store, while they are shown. */
     takeAlarm?: Set<(record: AlarmRecord) => void>;
+    /** Receive stored recordings, which bypass the store, while they are listed. */
+    takeRecording?: Set<(changed: RecordingChangedData) => void>;
     /** Receive changed books of parts, which bypass the store, while they are shown. */
     takeParts?: Set<(books: PartBooks) => void>;
     /** Receives changed interlocks and their states, which bypass the store, while they are shown. */
@@ -117,6 +120,7 @@ export class Session {
     else if (event.event === "ObjectObservations") now().runtime.takeObservations?.(event.data);
     else if (event.event === "ObjectPoints") now().runtime.takePoints?.(event.data);
     else if (event.event === "AlarmChanged") for (const take of now().runtime.takeAlarm ?? []) take(event.data);
+    else if (event.event === "RecordingChanged") for (const take of now().runtime.takeRecording ?? []) take(event.data);
     else if (event.event === "PartsChanged") for (const take of now().runtime.takeParts ?? []) take(event.data);
     else if (event.event === "LogOnChanged")
       void import("./logOn").then(({ changed }) => changed(event.data, () => this.onState("open", "", 0)));

@@ -7,12 +7,14 @@ import { ask } from "../../commands/requests";
 import { ago, clock, duration } from "../../formats";
 import { translate } from "../../i18n/serverMessages";
 import { splitAddress } from "../../program/messages";
-import type { AlarmFrequency, AlarmRecord, AlarmStatisticsData, Priority } from "../../protocol/types";
+import type { AlarmFrequency, AlarmRecord, AlarmStatisticsData, Priority, RecordingInfo } from "../../protocol/types";
 import { call } from "../../session/connection";
 import { whyUnavailable } from "../../store/permissions";
 import { useEditor } from "../../store/store";
 import { OneOf, Pick } from "../kit/fields";
 import { Button } from "../kit/kit";
+import { OpenRecording } from "../recording/OpenRecording";
+import { useRecordings } from "../recording/useRecordings";
 import { useTicking } from "../times";
 import { Acknowledge } from "./AlarmCard";
 import { type Show, timesOf, useAlarms } from "./useAlarms";
@@ -46,6 +48,7 @@ export default function AlarmList() {
 
 function Records({ show }: { show: Show }) {
   const alarms = useAlarms(show);
+  const recordings = useRecordings();
   const [object, setObject] = useState("");
   useTicking();
   if (!alarms) return <p className="quiet">{t`Loading…`}</p>;
@@ -64,14 +67,24 @@ function Records({ show }: { show: Show }) {
       )}
       <ul className="alarm-records">
         {shown.map((each) => (
-          <Row key={each.number} record={each} />
+          <Row key={each.number} record={each} recording={recordingOf(each, recordings)} />
         ))}
       </ul>
     </>
   );
 }
 
-function Row({ record }: { record: AlarmRecord }) {
+/** Return the newest recording of an alarm. */
+function recordingOf({ number }: AlarmRecord, recordings: readonly RecordingInfo[]): RecordingInfo | undefined {
+  return recordings.find(({ alarms }) => alarms.some((each) => each.number === number));
+}
+
+interface RowProps {
+  record: AlarmRecord;
+  recording: RecordingInfo | undefined;
+}
+
+function Row({ record, recording }: RowProps) {
   const why = useEditor((state) => whyUnavailable(state, "ShelveAlarm"));
   const shelved = record.shelved_until;
   const shelve = (seconds: number) => void ask("ShelveAlarm", { number: record.number, seconds });
@@ -89,6 +102,7 @@ function Row({ record }: { record: AlarmRecord }) {
           {shelved && ` · ${t`shelved until ${clock(shelved)} by ${record.shelved_by ?? ""}`}`}
         </p>
       </div>
+      <OpenRecording recording={recording} />
       {record.retain && !shelved && !record.acknowledged && <Acknowledge record={record} />}
       {shelved ? (
         <Button look="plain" why={why} onPress={() => shelve(0)}>{t`Show again`}</Button>

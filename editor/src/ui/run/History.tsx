@@ -10,6 +10,8 @@ import type { Run, RunEnd } from "../../protocol/types";
 import { notify, useEditor } from "../../store/store";
 import { Gantt } from "../gantt/Gantt";
 import { Button } from "../kit/kit";
+import { OpenRecording } from "../recording/OpenRecording";
+import { useRecordings } from "../recording/useRecordings";
 import { useTicking } from "../times";
 import { Facts } from "./DryRun";
 
@@ -28,6 +30,7 @@ const SHOWN = 10;
 /** Show the newest runs of the open project, or of all projects if none is open; with `charts`, also their charts. */
 export function History({ charts = false }: { charts?: boolean }) {
   const runs = useEditor((state) => state.program.runs);
+  const recordings = useRecordings();
   const project = useEditor((state) => state.doc?.project?.id);
   useTicking();
   const mine = runs.filter((each) => project === undefined || each.project_id === project).slice(0, SHOWN);
@@ -43,6 +46,7 @@ export function History({ charts = false }: { charts?: boolean }) {
               {each.started_by && <span className="quiet"> {t`by ${each.started_by}`}</span>}
             </span>
             <span className="quiet small">{summary(each)}</span>
+            <OpenRecording recording={recordings.find(({ run }) => run === each.number)} />
             {charts && each.end !== "running" && each.actions > 0 && <RunChart number={each.number} />}
           </li>
         ))}
