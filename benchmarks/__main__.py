@@ -1,8 +1,8 @@
 """Measure all metrics: JSON lines on standard output, a table on standard error (`make bench`).
 
 `python -m benchmarks [--long] [GROUP ...]` measures the named groups, or all. `--long` increases the number of samples:
-recovery 50 cycles (3 without it), stops 500 for each driver in a busy process (100), demo 5 runs (1), books 10 seeds
-(1), calibration 2,000 pictures of each kind (200), robot_pose 300 views (30).
+recovery 50 cycles (3 without it), recorder 6 pairs of runs (2), stops 500 for each driver in a busy process (100), demo
+5 runs (1), books 10 seeds (1), calibration 2,000 pictures of each kind (200), robot_pose 300 views (30).
 """
 
 import asyncio
@@ -28,6 +28,7 @@ from benchmarks import (
     listeners,
     meshes,
     operation,
+    recorder,
     recovery,
     requests,
     restart,
@@ -62,6 +63,7 @@ GROUPS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
     "demo": lambda report, folder: demo.run(report, folder, LONG in sys.argv),
     "books": lambda report, folder: books.run(report, folder, LONG in sys.argv),
     "dry_run": dry_run.run,
+    "recorder": lambda report, folder: recorder.run(report, folder, LONG in sys.argv),
     "recovery": lambda report, _: recovery.run(report, LONG in sys.argv),
 }
 

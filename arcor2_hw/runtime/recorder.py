@@ -37,6 +37,8 @@ JOINT_DIGITS: Final = 4
 """Decimal places of recorded joints, rad or m: noise of a robot at standstill is not recorded."""
 LONGEST_EVENT: Final = 4096
 """Length of the events whose results are recorded, bytes."""
+SHOWN_BINARY: Final = frozenset({"gripped", "red", "amber", "green", "blue", "white"})
+"""Names of shown values (`Generic.shown_values`) that are on or off."""
 INTERRUPTED: Final = "run-{run}.ring"
 """Name of the file with the ring of a run that the end of the server interrupted."""
 
@@ -125,7 +127,11 @@ class Recorder:
             self._values("state", SignalKind.STATE, report.object_id, name, ["connected"], [""], [connected], stamp)
         observed = self._sources.get((report.object_id, "observations"))
         known = set() if observed is None or observed.names is None else {n.casefold() for n in observed.names.names}
-        shown = {name: value for name, value in report.values.items() if name.casefold() not in known}
+        shown: dict[str, Value] = {
+            name: bool(value) if name in SHOWN_BINARY else value
+            for name, value in report.values.items()
+            if name.casefold() not in known
+        }
         if shown:
             self._values(
                 "shown",

@@ -4,10 +4,11 @@ import contextlib
 import json
 import re
 from collections.abc import AsyncIterator, Iterator
+from pathlib import Path
 
 import pytest
 import pytest_asyncio
-from playwright.async_api import Browser, Error, expect
+from playwright.async_api import Browser, Error, Locator, expect
 
 from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
@@ -224,6 +225,37 @@ async def test_pause_step_and_stop(cell: Cell, colleague: Client, browser: Brows
         await page.get_by_role("heading", name=texts.HOME_HEADING).wait_for()
 
 
+async def recording_is_shown(screen: Screen, alarms: Locator) -> None:
+    """Open the recording of an alarm, read values, and zoom."""
+    page = screen.page
+    await alarms.get_by_role("button", name="Recording").first.click()
+    window = page.get_by_role("dialog", name="Recording of")
+    await expect(window).to_contain_text("The box for bad parts is full.")
+    actions = window.get_by_role("region", name="Actions")
+    band = actions.get_by_title("say", exact=True)
+    await expect(band).to_have_count(1)
+    await window.get_by_role("slider", name="Values at").press("ArrowLeft")
+    await expect(window).to_contain_text("−0.01 s")
+    everything = await band.bounding_box()
+    await window.get_by_role("button", name="Zoom in").click()
+    await screen.until(
+        "([title, width]) => document.querySelector(`[title=${title}]`)?.getBoundingClientRect().width !== width",
+        ["say", 0 if everything is None else everything["width"]],
+    )
+    for name, size in VIEWPORTS.items():
+        await page.set_viewport_size(size)  # type: ignore[arg-type]
+        await screen.settle()
+        assert await screen.faults() == [], name
+        await screen.picture(f"recording {name}")
+    assert await screen.barriers() == []
+    async with page.expect_download() as download:
+        await window.get_by_role("button", name="Export CSV").click()
+    exported = await (await download.value).path()
+    assert "The box for bad parts is full." in Path(exported).read_text()
+    await window.get_by_role("button", name="Close").click()
+    await expect(window).to_have_count(0)
+
+
 async def test_alarm_is_acknowledged_during_a_run(cell: Cell, colleague: Client, browser: Browser, token: str) -> None:
     text = "The box for bad parts is full."
     package = await built(cell, colleague, text, "raise_alarm")
@@ -261,6 +293,7 @@ async def test_alarm_is_acknowledged_during_a_run(cell: Cell, colleague: Client,
         await screen.press("All alarms")
         await everything.get_by_role("radio", name="History").check(force=True)
         await expect(everything).to_contain_text("acknowledged by Olga")
+        await recording_is_shown(screen, everything)
         await everything.get_by_role("radio", name="Statistics").check(force=True)
         await expect(everything).to_contain_text("Most frequent in 7 days")
     # A technician finds the same list in the workplace.

@@ -23,7 +23,9 @@ export function ActionLanes({ lanes, range: [from, to], end, cursor, alarms }: A
     <section className="recorded-actions" aria-label={t`Actions`}>
       {lanes.map((lane) => (
         <div key={lane.name} className="recorded-lane">
-          <span className="small quiet">{lane.name || t`Program`}</span>
+          <span className="small quiet" title={lane.name}>
+            {lane.name || t`Program`}
+          </span>
           <div className="recorded-track" style={{ height: lane.rows * ROW }}>
             {lane.bands
               .filter(({ action }) => action.begin <= to && (action.end ?? end) >= from)
@@ -43,10 +45,10 @@ export function ActionLanes({ lanes, range: [from, to], end, cursor, alarms }: A
                   </span>
                 );
               })}
+            {inside(cursor) && <span className="recorded-cursor" style={{ left: `${at(cursor)}%` }} />}
             {alarms.filter(inside).map((time) => (
               <span key={time} className="recorded-alarm" style={{ left: `${at(time)}%` }} />
             ))}
-            {inside(cursor) && <span className="recorded-cursor" style={{ left: `${at(cursor)}%` }} />}
           </div>
         </div>
       ))}

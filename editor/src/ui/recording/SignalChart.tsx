@@ -8,7 +8,7 @@ import { columns, type Range, STEP, type Trace } from "./layout";
 import "uplot/dist/uPlot.min.css";
 
 /** Width of the axis of values, and of the space on the right, pixels. The lanes of actions have the same. */
-export const AXIS = 56;
+export const AXIS = 76;
 export const MARGIN = 10;
 const HEIGHT = 150;
 /** Height of the axis of time, of a digital trace, and of the space above it, pixels. */
@@ -81,8 +81,8 @@ export function SignalChart({ traces, whole, range, cursor, alarms, label }: Sig
         hooks: {
           draw: [
             (drawn) => {
-              for (const each of marks.current.alarms) line(drawn, each, lines.alarm, [6, 4]);
               line(drawn, marks.current.cursor, lines.cursor, []);
+              for (const each of marks.current.alarms) line(drawn, each, lines.alarm, [6, 6]);
             },
           ],
         },

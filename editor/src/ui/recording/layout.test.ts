@@ -24,9 +24,9 @@ test("values are in the units of the user, and what is on or off is digital", ()
   expect(traceOf(signal("level", [0], [0.25], { unit: "m" }), "rad")).toMatchObject({ unit: "mm", values: [250] });
   const joint = traceOf(signal("j1", [0], [Math.PI], { kind: "joint" }), "rad");
   expect([joint.unit, joint.digital, joint.values[0]]).toEqual(["°", false, 180]);
-  expect(traceOf(signal("lamp", [0, 1], [0, 1]), "")).toMatchObject({ digital: true, values: [0, 1] });
+  expect(traceOf(signal("lamp", [0, 1], [false, true]), "")).toMatchObject({ digital: true, values: [0, 1] });
   expect(traceOf(signal("part", [0, 1], [null, true]), "")).toMatchObject({ digital: true, values: [null, 1] });
-  expect(traceOf(signal("count", [0, 1], [1, 2]), "")).toMatchObject({ digital: false, unit: "" });
+  expect(traceOf(signal("count", [0, 1], [0, 1]), "")).toMatchObject({ digital: false, unit: "" });
 });
 
 test("the signals of the device with the alarm come first, and unchanged ones are not shown", () => {

@@ -43,11 +43,8 @@ export function nameOf({ kind, name }: Signal): string {
   return kind === "joint" ? name : translate({ text: name });
 }
 
-/** Return whether a signal is drawn in steps. Values that devices show are numbers also if they are on or off. */
-function isDigital({ kind, unit, values }: Signal): boolean {
-  if (values.some((value) => typeof value === "boolean")) return true;
-  return kind === "point" && unit === "" && values.every((value) => value === null || value === 0 || value === 1);
-}
+/** Return whether a signal is on or off, which is drawn in steps. */
+const isDigital = ({ values }: Signal): boolean => values.some((value) => typeof value === "boolean");
 
 /** Return the ids of the signals that explain the event best: of its devices, then those that changed near it. */
 export function shownAtFirst({ signals, alarms }: Recording): Set<string> {

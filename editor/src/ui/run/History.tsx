@@ -7,6 +7,7 @@ import { loadTiming, sentence, type Timing } from "../../commands/dryRun";
 import { ago, duration } from "../../formats";
 import { splitAddress } from "../../program/messages";
 import type { Run, RunEnd } from "../../protocol/types";
+import { isRunning } from "../../store/selectors";
 import { notify, useEditor } from "../../store/store";
 import { Gantt } from "../gantt/Gantt";
 import { Button } from "../kit/kit";
@@ -31,6 +32,8 @@ const SHOWN = 10;
 export function History({ charts = false }: { charts?: boolean }) {
   const runs = useEditor((state) => state.program.runs);
   const recordings = useRecordings();
+  // The operator's screen does not scroll during a run.
+  const offered = useEditor((state) => charts || !isRunning(state));
   const project = useEditor((state) => state.doc?.project?.id);
   useTicking();
   const mine = runs.filter((each) => project === undefined || each.project_id === project).slice(0, SHOWN);
@@ -46,7 +49,9 @@ export function History({ charts = false }: { charts?: boolean }) {
               {each.started_by && <span className="quiet"> {t`by ${each.started_by}`}</span>}
             </span>
             <span className="quiet small">{summary(each)}</span>
-            <OpenRecording recording={recordings.find(({ run }) => run === each.number)} />
+            {offered && (each.end === "failed" || each.end === "lost") && (
+              <OpenRecording recording={recordings.find(({ run }) => run === each.number)} />
+            )}
             {charts && each.end !== "running" && each.actions > 0 && <RunChart number={each.number} />}
           </li>
         ))}
