@@ -24,19 +24,22 @@ from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.creation import module_name
+from arcor2_hw.runtime.ring import Ring, create
 
 T = TypeVar("T")
+HOST = (sys.executable, "-P", "-m", "arcor2_hw.runtime.host")
 PATIENCE = 20.0  # time limit, s; the machine may be busy
 
 
 class HostProcess:
     def __init__(self) -> None:
         ours, theirs = socket.socketpair()
+        memory = create()
         self.socket = ours
         self._folder = tempfile.TemporaryDirectory()  # as the server does
         self.process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "arcor2_hw.runtime.host", "--fd", str(theirs.fileno())],
-            pass_fds=[theirs.fileno()],
+            [*HOST, "--fd", str(theirs.fileno()), "--ring", str(memory)],
+            pass_fds=[theirs.fileno(), memory],
             env=os.environ | {"TMPDIR": self._folder.name},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
@@ -44,6 +47,7 @@ class HostProcess:
             start_new_session=True,
         )
         theirs.close()
+        self.ring = Ring(memory)
         self._buffer = b""
         self.seen: list[Any] = []
         self.times: list[float] = []
