@@ -2,6 +2,7 @@
 
 import contextlib
 import inspect
+import threading
 import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
@@ -85,6 +86,7 @@ class Device:
         self.lane = Lane(self.name)
         self.stop_lane = Lane(self.name, "stop")
         self._watch_lane: Lane | None = None
+        self._creating_lane = threading.Lock()
         self.closing = False
         self._opening: Job | None = None
         self.closed_by: Job | None = None
@@ -224,9 +226,10 @@ class Device:
     @property
     def watch_lane(self) -> Lane:
         """Return the lane of methods that only observe. It is created on first use."""
-        if self._watch_lane is None:
-            self._watch_lane = Lane(self.name, "watch")
-        return self._watch_lane
+        with self._creating_lane:
+            if self._watch_lane is None:
+                self._watch_lane = Lane(self.name, "watch")
+            return self._watch_lane
 
     def lane_for(self, method: str) -> Lane:
         """Return the lane on which a method runs."""

@@ -69,6 +69,7 @@ class Recordings:
         self._counts: dict[int, int] = {}
         """How often the condition of each alarm of this server has occurred."""
         self._writing = asyncio.Lock()
+        self._closed = False
 
     async def open(self, error_of: Callable[[int], Message | None]) -> None:
         """Read which recordings exist, and store those of runs that the end of the server has interrupted.
@@ -95,7 +96,8 @@ class Recordings:
             await asyncio.to_thread(self._files.discard, ring.path)
 
     async def close(self) -> None:
-        """Store the recording that continues."""
+        """Store the recording that continues. Nothing is recorded afterwards."""
+        self._closed = True
         if self._open is not None:
             self._open.over.set()
         await self._background.settled()
@@ -107,7 +109,7 @@ class Recordings:
         if before == record.count or not isinstance(record.shelved_until, Unset):
             return
         ring = self._ring()
-        if ring is None or time.monotonic() - stamp > BEFORE:
+        if ring is None or self._closed or time.monotonic() - stamp > BEFORE:
             return
         opened = self._continue(ring) or self._begin(ring, stamp, record.run)
         if any(alarm.number == record.number for alarm in opened.info.alarms):
@@ -130,7 +132,7 @@ class Recordings:
 
     def run_failed(self, run: int, error: Message | None, ring: Ring | None) -> None:
         """Record that a run has failed. Its host ends. ring: of its host."""
-        if ring is None:
+        if ring is None or self._closed:
             return
         moment = time.monotonic()
         opened = self._continue(ring) or self._begin(ring, moment, run)

@@ -67,7 +67,9 @@ class Bench:
         return Recordings(hub, RecordingFiles(self.folder), lambda: self.ring)
 
     async def settled(self) -> None:
+        """Store the recording that continues; the server goes on."""
         await self.recordings.close()
+        self.recordings._closed = False
 
 
 @pytest.fixture

@@ -29,8 +29,9 @@ test("values are in the units of the user, and what is on or off is digital", ()
   expect(traceOf(signal("count", [0, 1], [0, 1]), "")).toMatchObject({ digital: false, unit: "" });
 });
 
-test("the signals of the device with the alarm come first, and unchanged ones are not shown", () => {
+test("the signals of the device with the alarm come first, then joints, and unchanged ones are not shown", () => {
   const signals = [
+    signal("j1", [-9e4, -4e4], [0, 1], { kind: "joint" }),
     signal("far", [-9e4, -4e4], [0, 1]),
     signal("still", [-9e4], [1]),
     signal("near", [-9e4, -100], [0, 1]),
@@ -41,6 +42,7 @@ test("the signals of the device with the alarm come first, and unchanged ones ar
     "obj_tester/point/own",
     "obj_io/point/near",
     "obj_io/point/far",
+    "obj_io/joint/j1",
   ]);
 });
 

@@ -4,8 +4,9 @@ import type { RecordedAction, Recording, Signal } from "../../commands/recording
 import { translate } from "../../i18n/serverMessages";
 import { shownUnit } from "../../program/values";
 
-/** Number of signals that are shown at first. */
-const SHOWN = 12;
+/** Number of points and of joints that are shown at first. */
+const SHOWN_POINTS = 8;
+const SHOWN_JOINTS = 6;
 /** Time around the event in which a change is interesting, ms. */
 const NEAR = 5000;
 /** Time without a value after which a line stays level until shortly before the next one, ms. */
@@ -52,7 +53,9 @@ export function shownAtFirst({ signals, alarms }: Recording): Set<string> {
   const rank = (signal: Signal) =>
     devices.has(signal.object_id) ? 0 : signal.times.some((time) => Math.abs(time) < NEAR) ? 1 : 2;
   const found = signals.filter(changes).sort((a, b) => rank(a) - rank(b));
-  return new Set(found.slice(0, SHOWN).map(idOf));
+  const points = found.filter(({ kind }) => kind !== "joint").slice(0, SHOWN_POINTS);
+  const joints = found.filter(({ kind }) => kind === "joint").slice(0, SHOWN_JOINTS);
+  return new Set([...points, ...joints].map(idOf));
 }
 
 /** Return the traces by chart: digital ones together, others with the same unit, at most `most` in one. */
