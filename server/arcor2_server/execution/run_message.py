@@ -44,11 +44,11 @@ class RunMessages:
             self._settings.cell,
             assets=self._host_world.shape_files(),
             hold_on_error=how.on_error is OnError.HOLD,
-            records=str(self._settings.checkpoints_dir),
+            records=str(self._settings.checkpoints_dir.resolve()),
             checkpoints=how.checkpoints,
             continues=how.continues,
             values=dict(how.values),
-            recordings=str(self._settings.recordings_dir),
+            recordings=str(self._settings.recordings_dir.resolve()),
         )
 
     async def complete(self, message: m.RunPackage, shared_of: str) -> m.RunPackage:

@@ -20,8 +20,11 @@ from arcor2_hw.exceptions import NotFound, StorageError
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime.recorder import Recorder
 from arcor2_hw.runtime.ring import Ring
+from arcor2_server.execution.run_message import RunMessages
+from arcor2_server.execution.runs import How
 from arcor2_server.recordings.export import as_csv
 from arcor2_server.recordings.service import MOST_OF_ONE_ALARM, Recordings
+from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import recordings as storage
 from arcor2_server.storage.recordings import RecordingFiles
 
@@ -244,3 +247,12 @@ async def test_csv_repeats_values_and_states_what_happened(bench: Bench) -> None
         ["-1.000", "", "0"],
         ["0.000", "alarm 5: io: =It jams.", "1"],
     ]
+
+
+def test_a_program_gets_absolute_paths_because_it_changes_its_directory(tmp_path: Path) -> None:
+    world: Any = SimpleNamespace(shape_files=dict)
+    unused: Any = None
+    messages = RunMessages(ServerSettings(data_dir=Path("data")), unused, unused, world)
+    message = messages.prepare("pkg_1", tmp_path, How())
+    assert message.recordings == str(Path.cwd() / "data" / "recordings")
+    assert message.records == str(Path.cwd() / "data" / "checkpoints")
