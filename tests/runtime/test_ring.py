@@ -2,6 +2,7 @@
 
 import os
 import threading
+import time
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,7 +14,6 @@ from arcor2_hw.data.position import Frame
 from arcor2_hw.data.recordings import SignalKind
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.messages import Message
-from arcor2_hw.runtime import recorder as recorder_module
 from arcor2_hw.runtime import ring as ring_module
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.messages import DeviceChanged
@@ -31,7 +31,7 @@ class Time:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now = 1000.0
-        monkeypatch.setattr(recorder_module.time, "monotonic", lambda: self.now)
+        monkeypatch.setattr(time, "monotonic", lambda: self.now)
 
 
 @pytest.fixture
