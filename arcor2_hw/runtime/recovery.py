@@ -208,7 +208,6 @@ class Recovery:
             if present is not None and present.data.number == hold.data.number:  # the program or the branch was stopped
                 self._present = None
         decision = self._decisions.pop(hold.data.number)
-        self._unusable.pop(hold.device.id, None)
         self._uncontrolled = {device.id for device in self._cell}
         if decision.error is not None:
             mark_decided(decision.error)
@@ -260,6 +259,8 @@ class Recovery:
                 decision = Decision(choice, error=self._forced(hold, message.exit_id))
             case HoldChoice.END:
                 decision = Decision(choice, error=hold.error)
+        # Before the release: another branch, which checks it before its next action, may continue first.
+        self._unusable.pop(hold.device.id, None)
         self._present, self._decisions[message.number] = None, decision
 
     def release(self) -> None:

@@ -427,6 +427,8 @@ def test_another_hold_begins_before_the_decision_takes_effect() -> None:
             begin()
             recovery.decide(m.DecideHeld(1, len(seen), HoldChoice.RETRY if len(seen) == 1 else HoldChoice.END, []))
             if len(seen) == 1:  # the thread of the decided branch has not continued yet
+                assert recovery.before_action(Branch(), ActionCall(2, "work", ["act_work"])) is None
+                recovery.hold_before_next(device, ConnectionLost("cable cut again"))
                 assert hold(2).choice is HoldChoice.END
 
     def hold(number: int) -> Decision:
