@@ -10,17 +10,18 @@ import re
 import sys
 import tempfile
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from playwright.async_api import Error, expect
 
 from arcor2_hw.client import Client
+from arcor2_hw.exceptions import DeviceTimeout
 from benchmarks.books.cell import Cell
 from benchmarks.books.places import NAMES
 from tests.e2e.harness import until
 from tests.editor.screen import Screen, running_browser, screen_of
 
-BOARDS, SEED = 6, 3
+BOARDS, SEED = 12, 3
 SLOW: Final = 40.0
 """Time limit of each step, s."""
 
@@ -41,8 +42,8 @@ class Operator:
         await self._labels_out()
         await self._protective_stop()
         await self._door_open()
-        await self._nest_occupied()
         await self._killed_in_mid_pick()
+        await self._nest_occupied()
 
     async def _labels_out(self) -> None:
         await self._at("into_nest")
@@ -67,24 +68,8 @@ class Operator:
         await self._cell.command("tester", "push_door", opening=True)
         await self._is_held()
         await self._take("door-open")
+        await self._cell.command("tester", "push_door", opening=False)
         await self._acknowledge()
-        await self._try_again()
-
-    async def _nest_occupied(self) -> None:
-        """Stop the program while a board is in the label printer, and start it again."""
-        await self._at("label")
-        await self._screen.press("Stop")
-        await expect(self._screen.page.get_by_role("button", name="Start", exact=True)).to_be_visible()
-        await self._confirm_parts()
-        await self._start()
-        await self._is_held("occupied")
-        await self._take("nest-occupied")
-        text = await self._held.inner_text()
-        board = next(each for each in await self._cell.boards() if each["code"] in text)
-        await self._cell.command("tester", "push_door", opening=True)
-        await self._cell.command("world", "remove_board", code=board["code"])
-        await self._held.get_by_role("button", name=f"Correct {board['code']}").click()
-        await self._held.get_by_role("button", name="I have taken it out of the cell").click()
         await self._try_again()
 
     async def _killed_in_mid_pick(self) -> None:
@@ -93,7 +78,13 @@ class Operator:
         await expect(self._parts).to_contain_text("Where is part")
         await self._take("killed")
         await self._confirm_parts()
-        await expect(self._parts.get_by_role("button", name="Do not continue")).to_be_visible()
+        await self._parts.get_by_role("button", name="Do not continue").click()
+
+    async def _nest_occupied(self) -> None:
+        """Start the program from its beginning, with boards in the cell."""
+        await self._start()
+        await self._is_held("is occupied")
+        await self._take("nest-occupied")
 
     # -------------------------------------------------------------------------------- steps
     async def _start(self) -> None:
@@ -112,17 +103,23 @@ class Operator:
             await expect(self._parts.get_by_text(question[0])).to_have_count(0)
 
     async def _at(self, action: str) -> None:
-        """Wait until the program starts an action."""
+        """Wait until the program starts an action, from now on."""
+        with contextlib.suppress(DeviceTimeout):
+            while event := await self._client.next_event(timeout=0.05):
+                self._see(event)
         async with asyncio.timeout(3.0 * SLOW):
             while True:
                 event = await self._client.next_event(timeout=SLOW)
-                if event.event == "PackageInfo":
-                    self._names = {each.id: each.name for each in event.data.project.all_actions()}
+                self._see(event)
                 if event.event == "Held" and await self._held.count():  # another effect of the last fault
                     await self._acknowledge()
                     await self._try_again()
                 if event.event == "ActionStateBefore" and self._names.get(event.data.action_id) == action:
                     return
+
+    def _see(self, event: Any) -> None:
+        if event.event == "PackageInfo":
+            self._names = {each.id: each.name for each in event.data.project.all_actions()}
 
     async def _state_of_tester(self, wanted: str) -> None:
         async def reached() -> bool:
@@ -136,23 +133,42 @@ class Operator:
     async def _acknowledge(self) -> None:
         """Acknowledge all alarms of the held device. One that ends meanwhile needs nothing."""
         button = self._held.get_by_role("button", name="Acknowledge").first
-        while await button.count():
-            with contextlib.suppress(Error):
-                await button.click(timeout=3000)
-            await asyncio.sleep(0.5)
+        async with asyncio.timeout(SLOW):
+            while await button.count():
+                with contextlib.suppress(Error):
+                    await button.click(timeout=3000)
+                await asyncio.sleep(0.5)
 
     async def _try_again(self) -> None:
-        await self._held.get_by_role("button", name=re.compile("^(Try again|Continue)$")).click()
-        await self._screen.until("() => document.querySelector('[role$=dialog]') || !document.querySelector('.held')")
-        dialog = self._screen.page.get_by_role("alertdialog").or_(self._screen.page.get_by_role("dialog"))
-        if await dialog.count():
-            await dialog.get_by_role("button", name="Try again").click()
-        with contextlib.suppress(AssertionError):  # another effect of the fault may hold the program at once
-            await expect(self._held).to_have_count(0, timeout=3000)
+        """Press until it is accepted: it is refused while the device is not connected again."""
+        page = self._screen.page
+        dialog = page.get_by_role("alertdialog").or_(page.get_by_role("dialog"))
+        async with asyncio.timeout(SLOW):
+            while True:
+                await self._dismiss()
+                await self._held.get_by_role("button", name=re.compile("^(Try again|Continue)$")).click()
+                await self._answered()
+                if await dialog.count():
+                    await dialog.get_by_role("button", name="Try again").click()
+                    await self._answered()
+                if not await page.locator(".notice.error").count():
+                    break
+                await asyncio.sleep(0.5)
+
+    async def _answered(self) -> None:
+        """Wait until the screen asks, the decision is refused, or the program continues."""
+        answered = "() => document.querySelector('[role$=dialog], .notice.error') || !document.querySelector('.held')"
+        with contextlib.suppress(Error):  # another effect of the fault may hold the program at once
+            await self._screen.page.wait_for_function(answered, timeout=3000)
+
+    async def _dismiss(self) -> None:
+        for each in await self._screen.page.locator(".notices").get_by_role("button", name="Dismiss").all():
+            with contextlib.suppress(Error):  # it has disappeared by itself
+                await each.click(timeout=1000)
 
     async def _take(self, name: str) -> None:
         await expect(self._screen.page.get_by_text("for the editor")).to_have_count(0)  # models are prepared
-        await self._screen.page.evaluate("() => document.querySelectorAll('.notices button').forEach((e) => e.click())")
+        await self._dismiss()
         await self._screen.settle()
         (self._to / f"recover-{name}.png").write_bytes(await self._screen.page.screenshot())
 

@@ -70,23 +70,23 @@ class Fault(NamedTuple):
 
 
 FAULTS: Final = {
-    101: Fault("board lost during the test", "put the board in, then clear"),
-    102: Fault("door opened during the test", "close the door, then clear"),
+    101: Fault("board lost during the test", "put the board in, then acknowledge"),
+    102: Fault("door opened during the test", "close the door, then acknowledge"),
     103: Fault(
         "no contact to the board",
-        "clean the pins, check the position of the board, then clear",
+        "clean the pins, check the position of the board, then acknowledge",
         health=Health.MAINTENANCE_REQUIRED,
     ),
-    104: Fault("supply overload", "take the board out, then clear", health=Health.OFF_SPEC),
-    105: Fault("host lost", "check the network, then clear"),
-    106: Fault("emergency stop", "release the button, then clear", Severity.CRITICAL),
+    104: Fault("supply overload", "take the board out, then acknowledge", health=Health.OFF_SPEC),
+    105: Fault("host lost", "check the network, then acknowledge"),
+    106: Fault("emergency stop", "release the button, then acknowledge", Severity.CRITICAL),
 }
 EMERGENCY_STOP: Final = 106
 
 
 def fault_of(code: int) -> Fault:
     """Return the meaning of a fault code; an unknown one counts as a failure."""
-    unknown = Fault("unknown fault", "see the manual of the tester, then clear", health=Health.FAILURE)
+    unknown = Fault("unknown fault", "see the manual of the tester, then acknowledge", health=Health.FAILURE)
     return FAULTS.get(code, unknown)
 
 

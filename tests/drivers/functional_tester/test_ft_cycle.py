@@ -212,16 +212,16 @@ def test_a_test_that_takes_too_long_is_stopped(
 @pytest.mark.parametrize(
     ("code", "text", "health"),
     [
-        (101, "board lost during the test; put the board in, then clear", Health.CHECK_FUNCTION),
-        (102, "door opened during the test; close the door, then clear", Health.CHECK_FUNCTION),
+        (101, "board lost during the test; put the board in, then acknowledge", Health.CHECK_FUNCTION),
+        (102, "door opened during the test; close the door, then acknowledge", Health.CHECK_FUNCTION),
         (
             103,
-            "no contact to the board; clean the pins, check the position of the board, then clear",
+            "no contact to the board; clean the pins, check the position of the board, then acknowledge",
             Health.MAINTENANCE_REQUIRED,
         ),
-        (104, "supply overload; take the board out, then clear", Health.OFF_SPEC),
-        (105, "host lost; check the network, then clear", Health.CHECK_FUNCTION),
-        (106, "emergency stop; release the button, then clear", Health.CHECK_FUNCTION),
+        (104, "supply overload; take the board out, then acknowledge", Health.OFF_SPEC),
+        (105, "host lost; check the network, then acknowledge", Health.CHECK_FUNCTION),
+        (106, "emergency stop; release the button, then acknowledge", Health.CHECK_FUNCTION),
     ],
 )
 def test_each_fault_is_named_with_its_remedy_and_cleared(

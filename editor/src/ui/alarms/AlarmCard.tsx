@@ -94,7 +94,7 @@ export function Acknowledge({ record }: { record: AlarmRecord }) {
  * The picture of an alarm. It is loaded with the token of the user, which an address cannot contain. Its space is
  * reserved, so that the button next to it does not move.
  */
-function Picture({ number }: { number: number }) {
+export function Picture({ number }: { number: number }) {
   const [url, setUrl] = useState("");
   useEffect(() => {
     let made = "";

@@ -5,10 +5,12 @@ import { type ReactNode, useState } from "react";
 import { acknowledge, type Decision, decide } from "../../commands/held";
 import { translate, translatedAlarm } from "../../i18n/serverMessages";
 import { splitAddress } from "../../program/messages";
-import type { HeldData, ResultType } from "../../protocol/types";
+import type { AlarmRecord, Alarm as DeviceAlarm, HeldData, ResultType } from "../../protocol/types";
 import { whyUnavailable } from "../../store/permissions";
 import { useEditor } from "../../store/store";
 import { nameOf, withNames } from "../../viewmodel/names";
+import { Picture } from "../alarms/AlarmCard";
+import { useAlarms } from "../alarms/useAlarms";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
 import { Confirm } from "../kit/lazyControls";
@@ -155,38 +157,48 @@ function Retry({ held, why }: { held: HeldData; why: string }) {
   );
 }
 
-/** The alarms of devices with their remedies, which can be acknowledged. */
+/** The alarms of the device with their remedies, which can be acknowledged. */
 function Remedies({ held }: { held: HeldData }) {
   const state = useEditor((each) => each);
   const why = whyUnavailable(state, "AcknowledgeStop");
+  const records = useAlarms("retained") ?? [];
   const [refused, setRefused] = useState("");
-  const [acknowledged, setAcknowledged] = useState("");
-  const alarms = (state.live.health[held.device]?.alarms ?? []).map(translatedAlarm);
+  const [done, setDone] = useState<string[]>([]); // what was acknowledged; the device reports it a little later
   const type = state.doc?.objects[held.device]?.type ?? "";
   const stops = state.types.robots[type]?.features?.acknowledge_stop === true;
-  if (alarms.length === 0 && held.kind !== "safety_stop") return null;
+  const present = (state.live.health[held.device]?.alarms ?? []).map(translatedAlarm);
+  const keyOf = (alarm: DeviceAlarm) => `${alarm.code} ${alarm.since}`;
+  const alarms = present.filter((each) => !done.includes(keyOf(each)));
+  const generic = stops && held.kind === "safety_stop" && present.length === 0 && !done.includes(held.since);
+  if (alarms.length === 0 && !generic && !refused) return null;
   const confirm = (code: string) =>
     void acknowledge(held.device, stops ? "" : code).then((reason) => {
+      const ended = present.filter((each) => stops || each.code === code).map(keyOf);
       setRefused(reason);
-      if (!reason) setAcknowledged(held.since);
+      if (!reason) setDone((known) => [...known, held.since, ...ended]);
     });
   return (
     <div className="held-alarms">
       {alarms.map((alarm) => (
-        <Alarm key={alarm.code} text={[alarm.text, alarm.remedy].filter(Boolean).join(": ")}>
+        <Alarm
+          key={alarm.code}
+          alarm={alarm}
+          record={records.find((each) => each.object_id === held.device && each.code === alarm.code)}
+        >
           {(!stops || alarm === alarms[0]) && (
-            <Button why={why} icon={stops ? "check" : undefined} onPress={() => confirm(alarm.code)}>
+            <Button why={why} icon="check" onPress={() => confirm(alarm.code)}>
               {t`Acknowledge`}
             </Button>
           )}
         </Alarm>
       ))}
-      {stops && alarms.length === 0 && acknowledged !== held.since && (
-        <Alarm text={t`Check the robot and its surroundings. Then acknowledge the stop.`}>
+      {generic && (
+        <div className="held-alarm">
+          <p>{t`Check the robot and its surroundings. Then acknowledge the stop.`}</p>
           <Button why={why} icon="check" onPress={() => confirm("")}>
             {t`Acknowledge`}
           </Button>
-        </Alarm>
+        </div>
       )}
       {refused && (
         <p className="error" role="alert">
@@ -197,14 +209,35 @@ function Remedies({ held }: { held: HeldData }) {
   );
 }
 
-function Alarm({ text, children }: { text: string; children: ReactNode }) {
+/** An alarm of the device, as its record explains it if there is one. */
+function Alarm({
+  alarm,
+  record,
+  children,
+}: {
+  alarm: DeviceAlarm;
+  record: AlarmRecord | undefined;
+  children: ReactNode;
+}) {
+  // The remedy of the record is for a program that has ended.
+  const remedy = alarm.remedy || record?.remedy;
   return (
     <div className="held-alarm">
-      <p>{text}</p>
+      <div>
+        <p>{sentence(splitAddress(record?.text ?? alarm.text).text)}</p>
+        {remedy && (
+          <p>
+            <strong>{t`Do this`}</strong> {sentence(remedy)}
+          </p>
+        )}
+      </div>
+      {record?.picture && <Picture number={record.number} />}
       {children}
     </div>
   );
 }
+
+const sentence = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
 
 /** The results of the action, entered by the user. */
 function ResultForm({ held, onClose }: { held: HeldData; onClose: () => void }) {

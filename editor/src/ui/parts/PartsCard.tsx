@@ -127,7 +127,7 @@ function Books({ books, all }: { books: PartBooks; all: boolean }) {
           </p>
           <p>
             {!run.confirmed
-              ? t`Nothing moves by itself. Confirm where the parts are, then press Start.`
+              ? t`Nothing moves by itself. First confirm where the parts are.`
               : continues
                 ? t`It can continue there with its results, after your decision. Start starts it from its beginning.`
                 : whyNot(run.missing, found !== undefined)}
