@@ -351,6 +351,9 @@ class Requests(ABC):
     async def change_over(self, id: str, *, timeout: float | None = None) -> Changeover:
         """ChangeOver. Needs the role operator."""
 
+    async def change_own_pin(self, *, pin: str, new_pin: str, timeout: float | None = None) -> None:
+        """ChangeOwnPin: the present PIN of the person who is logged on, and the new one. Needs the role operator."""
+
     async def change_person(
         self,
         id: str,
@@ -691,6 +694,7 @@ class Requests(ABC):
         pose: Pose | Unset = UNSET,
         end_effector_id: str | Unset = UNSET,
         arm_id: str | Unset = UNSET,
+        retract: bool | Unset = UNSET,
         timeout: float | None = None,
     ) -> JogRobotData:
         """JogRobot: a velocity of the end effector (`linear` m/s, `angular` rad/s), or of joints (rad/s, m/s).

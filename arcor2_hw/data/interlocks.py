@@ -6,6 +6,7 @@ from typing import Annotated, Final
 from msgspec import Meta, field
 
 from arcor2_hw.data.base import UNSET, Data, TranslatableData, Unset
+from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.operator import Operator
 
 LONGEST_WAIT: Final = 3600.0
@@ -46,7 +47,8 @@ class Interlock(Data, frozen=True):
 
     object_id: the object, or the collision body that is the zone. A zone belongs to one robot at a time. actions: names
     of actions of the object; none for all its actions and motions. during: whether the conditions are needed as long as
-    the action runs, or a robot moves in the zone. within: longest time for which an action waits, s.
+    the action runs, or a robot moves in the zone. within: longest time for which an action waits, s. retract: path on
+    which a robot leaves the zone, points in the frame of the body, the last one outside; none for the shortest way.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Interlock(Data, frozen=True):
     within: Annotated[float, Meta(ge=0.0, le=LONGEST_WAIT)] = 30.0
     otherwise: Unmet = field(name="else", default=Unmet.WAIT)
     id: str = ""
+    retract: list[Position] = field(default_factory=list)
 
     @property
     def zone(self) -> str:
@@ -77,7 +80,7 @@ class InterlockState(TranslatableData, frozen=True):
     """The present state of an interlock.
 
     text: the first condition that is not met. owner: id of the robot that has the zone. waiting: ids of the objects
-    whose actions wait.
+    whose actions wait. inside: ids of the robots whose end effectors are in the zone.
     """
 
     id: str
@@ -85,6 +88,7 @@ class InterlockState(TranslatableData, frozen=True):
     text: str = ""
     owner: str = ""
     waiting: list[str] = field(default_factory=list)
+    inside: list[str] = field(default_factory=list)
 
 
 class InterlockStates(Data, frozen=True):

@@ -18,7 +18,7 @@ from arcor2_hw.runtime.calls import Calls, Post, error_data
 from arcor2_hw.runtime.cell import CONTROL_DEADLINE, Cell
 from arcor2_hw.runtime.clock import Clock
 from arcor2_hw.runtime.device import Device, describe
-from arcor2_hw.runtime.interlocks import Guard, Interlocks
+from arcor2_hw.runtime.interlocks import JOG, Guard, Interlocks
 from arcor2_hw.runtime.jogging import Jog
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.teaching import SET_MODE, Teaching
@@ -156,20 +156,24 @@ class Holds:
         device, robot = hold.device, hold.device.require()
         assert isinstance(robot, Robot)
         if not hold.driver_started:
-            what = "jog" if hold.kind is HoldKind.JOG else "hand teaching"
+            what = JOG if hold.kind is HoldKind.JOG else "hand teaching"
             device.require_not_lost(what)
             twist, frame = hold.newest.twist, hold.newest.frame
             velocity = Position(*twist[:3]) if twist is not None and frame == "world" else None
-            hold.guard = self._interlocks.hold(device, what, velocity, lambda error: self.end(hold, error))
+            hold.guard = self._interlocks.hold(
+                device, what, velocity, lambda error: self.end(hold, error), retract=hold.newest.retract
+            )
             device.take_control()
             device.lane.check_wanted()
             if hold.kind is HoldKind.JOG:
                 hold.jog = Jog(robot, hold.arm)
         if hold.ending:  # while control was being taken
             raise hold.error or Cancelled("{name}: the button was released before the robot moved", name=device.name)
-        lease = hold.newest
+        lease, scale = hold.newest, 1.0
+        if hold.guard is not None:
+            lease, scale = self._interlocks.steer(hold.guard, lease)
         if hold.jog is not None:
-            return hold.jog.drive(lease)
+            return scale * hold.jog.drive(lease)
         if not hold.driver_started:
             robot.set_hand_teaching_mode(True, **hold.arm)
         return 1.0

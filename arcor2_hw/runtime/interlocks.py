@@ -10,6 +10,8 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
+from msgspec.structs import replace
+
 from arcor2_hw.collision.description import Obstacle
 from arcor2_hw.collision.lines import first_hit
 from arcor2_hw.data.base import Unset
@@ -17,12 +19,14 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.interlocks import Interlock, InterlockCondition, InterlockState, InterlockTarget, Unmet
 from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.data.robot import Joint
-from arcor2_hw.exceptions import Arcor2Error, Interlocked
+from arcor2_hw.exceptions import Arcor2Error, Interlocked, Refused
 from arcor2_hw.messages import Message
 from arcor2_hw.objects import CollisionObject, MultiArmRobot, Robot
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import Device
+from arcor2_hw.runtime.messages import Lease
 from arcor2_hw.runtime.needs import Key, Seen, Verdict, key_of, read, verdict
+from arcor2_hw.runtime.retreat import Leaving, Retreat
 from arcor2_hw.runtime.stopping import send_stop
 from arcor2_hw.runtime.zones import ZoneTokens
 
@@ -36,6 +40,9 @@ LOOK_AHEAD: Final = 0.3
 """Time for which a motion with an unknown target is extrapolated, s: reading, stopping and braking."""
 FIRST_READING: Final = 1.0
 """Time after the start in which an action waits for the first values, s, also if it should not wait."""
+
+JOG: Final = "jog"
+"""Name of jogging in messages."""
 
 Wait = Callable[[float], float]
 """Waits for a time, s, and returns how long the program was paused meanwhile. It raises if the action is stopped."""
@@ -66,6 +73,10 @@ class Guard:
         self.targets_known, self.stop = targets_known, stop
         self.broken: Interlocked | None = None
         """Why it was stopped."""
+        self.leaving: Leaving | None = None
+        """Set if it may only leave the zones in which the robot is."""
+        self.retracts = False
+        """Whether it follows the retract paths of these zones."""
 
 
 class _Obstruction(NamedTuple):
@@ -188,17 +199,28 @@ class Interlocks:
                         self._tokens.release(device.id, keep=inside)  # it stands there, and does not wait
             return
         entered = set(inside)
-        if before is not None and not guard.targets_known and len(tips) == len(before.tips) and now > before.at:
+        if guard.leaving is not None:
+            back = guard.leaving.check(tips)
+            if back is not None:
+                if guard.broken is None:
+                    guard.stop(self._stopped(guard, back))
+                return
+            for zone in guard.zones - inside:
+                guard.zones.discard(zone)
+                if not guard.retracts:
+                    guard.leaving.left(self._name(zone))
+        elif before is not None and not guard.targets_known and len(tips) == len(before.tips) and now > before.at:
             share = LOOK_AHEAD / max(now - before.at, READ_PERIOD)
             entered |= self._touched((b, _extrapolated(a, b, share)) for a, b in zip(before.tips, tips, strict=True))
         with self._lock:
             entered -= guard.zones
             if not entered or guard.broken is not None:
                 return
-            found = self._obstruction(device.id, "", guard.zones | entered, inside - entered)
+            asked = entered if guard.leaving is not None else guard.zones | entered
+            found = self._obstruction(device.id, "", asked, inside - entered)
             if found is None:
                 guard.zones |= entered
-                guard.watched |= self._watched(device.id, "", guard.zones)
+                guard.watched |= self._watched(device.id, "", entered)
             else:
                 error = self._stopped(guard, found.reason)
         if error is not None:
@@ -337,23 +359,95 @@ class Interlocks:
         return FIRST_READING + sum(one.within for one in found if one.otherwise is Unmet.WAIT) if found else 0.0
 
     def hold(
-        self, device: Device, what: str, velocity: Position | None, stop: Callable[[Interlocked], None]
+        self,
+        device: Device,
+        what: str,
+        velocity: Position | None,
+        stop: Callable[[Interlocked], None],
+        *,
+        retract: bool = False,
     ) -> Guard | None:
         """Admit a hold-to-run motion without waiting; None without interlocks. Call `leave` at its end.
+
+        A robot in a zone that it may not have, for example after a stop, is admitted to leave it: see `steer`.
 
         Args:
             device: the robot.
             what: name of the motion.
             velocity: of the end effector in the world, m/s; None if it is unknown.
             stop: ends the motion, with the reason.
+            retract: leave the zones in which the robot is; `velocity` is None.
 
         Raises:
             Interlocked: a condition is not met, or another robot has a zone.
+            Refused: the robot is in no zone that it could leave.
         """
-        if not self._interlocks:
+        if not self._interlocks and not retract:
             return None
+        if retract:
+            return self._admit_leaving(device, what, stop, None)
         ahead = [] if velocity is None else [Position(*(LOOK_AHEAD * each for each in velocity))]
-        return self._admit(device, what, [], None, stop, ahead)
+        try:
+            return self._admit(device, what, [], None, stop, ahead)
+        except Interlocked as error:
+            if what != JOG:
+                raise
+            return self._admit_leaving(device, what, stop, error)
+
+    def _admit_leaving(
+        self, device: Device, what: str, stop: Callable[[Interlocked], None], refused: Interlocked | None
+    ) -> Guard:
+        """Admit a motion that only leaves zones: those that the robot may not have, or all without `refused`."""
+        robot = device.require()
+        tips = self._tips(device) if self._zones and not isinstance(robot, MultiArmRobot) else []
+        bodies = dict(self._bodies())
+        there = {zone: [n for n, tip in enumerate(tips) if zone in self._touched([(tip, tip)])] for zone in bodies}
+        inside = {zone for zone, found in there.items() if found}
+        with self._lock:
+            found = self._obstruction(device.id, what, set(), inside)
+            leaving = {zone for zone in inside if refused is None or self._obstruction(device.id, "", {zone}, inside)}
+            for ids in self._waiting.values():
+                ids.discard(device.id)
+            if found is not None:
+                raise Interlocked(
+                    "{device}: {what} was not started. {reason}", device=device.name, what=what, reason=found.reason
+                )
+            if not leaving:
+                raise refused or Refused("{device} is in no zone that it could leave.", device=device.name)
+            ways = {}
+            for zone in sorted(leaving):
+                paths = (one.retract for one in self._interlocks.values() if one.zone == zone and one.retract)
+                ways[self._name(zone)] = Retreat(bodies[zone], next(paths, []), there[zone])
+            guard = Guard(device, what, inside, self._watched(device.id, what, inside - leaving), False, stop)
+            guard.leaving, guard.retracts = Leaving(device.name, ways, tips), refused is None
+            self._guards[device.id] = guard
+            return guard
+
+    def steer(self, guard: Guard, lease: Lease) -> tuple[Lease, float]:
+        """Return the lease of a hold as the robot may move, and the scale of its velocity.
+
+        Raises:
+            Interlocked: the robot may only leave zones, and the velocity leads elsewhere.
+            Cancelled: the robot has left its zone.
+        """
+        if guard.leaving is None:
+            return lease, 1.0
+        device, tips = guard.device, self._tips(guard.device)
+        lease, scale = guard.leaving.steer(lease, tips)
+        step = Position(*(LOOK_AHEAD * each for each in (lease.twist or ())[:3]))
+        ahead = self._touched((tip, tip + step) for tip in tips) - guard.zones
+        with self._lock:
+            found = self._obstruction(device.id, "", ahead, guard.zones)
+            for ids in self._waiting.values():
+                ids.discard(device.id)
+        if found is not None:
+            raise Interlocked(
+                "{device}: {what} was stopped. {reason}", device=device.name, what=guard.what, reason=found.reason
+            )
+        return lease, scale
+
+    def _name(self, object_id: str) -> str:
+        return next((device.name for device in self._cell() if device.id == object_id), object_id)
 
     def _admit(
         self,
@@ -441,9 +535,11 @@ class Interlocks:
         unmet = self._unmet(interlock)
         owner = self._tokens.owner(interlock.zone) if interlock.zone else ""
         waiting = sorted(self._waiting.get(interlock.id, ()))
+        inside = sorted(key for key, track in self._tracks.items() if interlock.zone in track.inside)
+        state = InterlockState(interlock.id, InterlockCondition.MET, "", owner, waiting, inside)
         if unmet is None or unmet.text is None:
-            return InterlockState(interlock.id, InterlockCondition.MET, owner=owner, waiting=waiting)
-        return InterlockState(interlock.id, unmet.state, unmet.text.text, owner, waiting, **unmet.text.translation())
+            return state
+        return replace(state, state=unmet.state, text=unmet.text.text, **unmet.text.translation())
 
 
 def _extrapolated(before: Position, now: Position, share: float) -> Position:

@@ -241,7 +241,8 @@ class Lease(ToHost, frozen=True):
 
     hold: number of the hold; the first lease with a number starts it. until: time of the monotonic clock at which the
     robot is stopped unless the lease is renewed; 0 ends the hold. A jog has either `twist` (m/s, rad/s) in the axes of
-    `frame`, or `joints` with velocities (rad/s, m/s). The value of CallDone is `{"scale": fraction of the velocity}`.
+    `frame`, or `joints` with velocities (rad/s, m/s), or `retract` to leave a zone. The value of CallDone is
+    `{"scale": fraction of the velocity}`.
     """
 
     id: int
@@ -254,6 +255,7 @@ class Lease(ToHost, frozen=True):
     joints: list[Joint] | None = None
     end_effector_id: str | None = None
     arm_id: str | None = None
+    retract: bool = False
 
 
 class Pause(ToHost, frozen=True):

@@ -386,6 +386,42 @@ def test_jogging_stops_before_a_zone(cell: Cell) -> None:
     assert 0.6 < where["position"]["x"] < 0.8
 
 
+def hold(cell: Cell, number: int, velocity: float = 0.0) -> Any:
+    """Jog the arm, or let it leave its zone, until the hold is refused or ends; return why. number: of the hold."""
+    for lease_id in range(1000 * number, 1000 * number + 200):
+        twist = (velocity, 0.0, 0.0, 0.0, 0.0, 0.0) if velocity else None
+        lease = m.Lease(lease_id, "obj_arm", number, HoldKind.JOG, time.monotonic() + 0.3, twist, retract=not velocity)
+        cell.host.send(lease)
+        answer = cell.host.answer(lease_id)
+        if isinstance(answer, m.ErrorData):
+            cell.host.expect(m.HoldEnded)
+            return answer
+        time.sleep(0.05)
+    raise AssertionError("the robot moves on")
+
+
+def test_a_robot_leaves_a_zone_that_it_may_not_have(cell: Cell) -> None:
+    cell.objects[1] = cell.arm("arm", x=1.1)
+    # The nearest surface is at x = 1.2; the path leads through the door at x = 0.8.
+    cell.open(replace(ENTER, otherwise=Unmet.HOLD, retract=[Position(0.0), Position(-0.25)]))
+    state = cell.expect_state(lambda one: one.inside == ["obj_arm"])
+    assert state.state is InterlockCondition.NOT_MET
+    assert cell.host.answer(cell.move(OUTSIDE)).code == "interlock"
+    deeper = hold(cell, 1, velocity=0.25)
+    assert deeper.code == "interlock"
+    assert "not deeper" in str(deeper.message)
+    began = time.monotonic()
+    assert str(hold(cell, 2).message) == "arm has left the zone."
+    assert time.monotonic() - began > 0.3 / 0.05, "it is slow"
+    assert cell.log()[1:] == ["arm leaves"]
+    where = cell.host.call("obj_arm", "get_end_effector_pose", end_effector="tool")
+    assert 0.73 < where["position"]["x"] < 0.8
+    assert hold(cell, 3).code == "refused"
+    entering = hold(cell, 4, velocity=0.25)
+    assert "door: open is not met" in str(entering.message)
+    assert cell.log()[1:] == ["arm leaves"]
+
+
 def _ended(host: HostProcess) -> m.HoldEnded | None:
     return next((one for one in host.seen if isinstance(one, m.HoldEnded)), None)
 

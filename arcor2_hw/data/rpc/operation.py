@@ -35,6 +35,7 @@ class JogRobotArgs(Data, frozen=True):
     hold: number of this press of the button, larger than the previous one; renewals have the same number. sent_ms: time
     of sending by the sender's own steady clock with any origin. valid_ms: 1 to 300, duration of the velocity unless it
     is renewed; 0 ends it. object_id, pose: for the frame `user`, an object of the scene, or a pose in the world.
+    retract: leave the zone in which the robot is, on its retract path, instead of a velocity.
     """
 
     robot_id: str
@@ -49,6 +50,7 @@ class JogRobotArgs(Data, frozen=True):
     pose: Pose | Unset = UNSET
     end_effector_id: str | Unset = UNSET
     arm_id: str | Unset = UNSET
+    retract: bool | Unset = UNSET
 
 
 class JogRobotData(Data, frozen=True):

@@ -600,6 +600,12 @@ export interface CellStatus {
   plc?: PlcLink;
 }
 
+/** Arguments of ChangeOwnPin: the present PIN of the person who is logged on, and the new one. */
+export interface ChangeOwnPinArgs {
+  pin: string;
+  new_pin: string;
+}
+
 /** Arguments of ChangePerson: what changes. An empty `pin` or `card` is removed; `unlock` ends all lock-outs. */
 export interface ChangePersonArgs {
   id: string;
@@ -1422,7 +1428,8 @@ export interface ImportScriptData {
  *
  * object_id: the object, or the collision body that is the zone. A zone belongs to one robot at a time. actions: names
  * of actions of the object; none for all its actions and motions. during: whether the conditions are needed as long as
- * the action runs, or a robot moves in the zone. within: longest time for which an action waits, s.
+ * the action runs, or a robot moves in the zone. within: longest time for which an action waits, s. retract: path on
+ * which a robot leaves the zone, points in the frame of the body, the last one outside; none for the shortest way.
  */
 export interface Interlock {
   name: string;
@@ -1434,6 +1441,7 @@ export interface Interlock {
   within: number;
   else: Unmet;
   id: string;
+  retract: Position[];
 }
 
 /** Whether the conditions of an interlock are met. Unknown counts as not met. */
@@ -1443,7 +1451,7 @@ export type InterlockCondition = "met" | "not_met" | "unknown";
  * The present state of an interlock.
  *
  * text: the first condition that is not met. owner: id of the robot that has the zone. waiting: ids of the objects
- * whose actions wait.
+ * whose actions wait. inside: ids of the robots whose end effectors are in the zone.
  */
 export interface InterlockState {
   id: string;
@@ -1451,6 +1459,7 @@ export interface InterlockState {
   text: string;
   owner: string;
   waiting: string[];
+  inside: string[];
   key?: string;
   values?: Record<string, string | Message>;
 }
@@ -1482,6 +1491,7 @@ export type JogFrame = "world" | "robot" | "tool" | "user";
  * hold: number of this press of the button, larger than the previous one; renewals have the same number. sent_ms: time
  * of sending by the sender's own steady clock with any origin. valid_ms: 1 to 300, duration of the velocity unless it
  * is renewed; 0 ends it. object_id, pose: for the frame `user`, an object of the scene, or a pose in the world.
+ * retract: leave the zone in which the robot is, on its retract path, instead of a velocity.
  */
 export interface JogRobotArgs {
   robot_id: string;
@@ -1496,6 +1506,7 @@ export interface JogRobotArgs {
   pose?: Pose;
   end_effector_id?: string;
   arm_id?: string;
+  retract?: boolean;
 }
 
 /** Answer to JogRobot: the fraction of the requested velocity that is used, less than 1 where it is limited. */
@@ -3894,6 +3905,7 @@ export interface Requests {
   CancelAction: { args: undefined; data: undefined };
   CancelDryRun: { args: undefined; data: undefined };
   ChangeOver: { args: IdArgs; data: Changeover };
+  ChangeOwnPin: { args: ChangeOwnPinArgs; data: undefined };
   ChangePerson: { args: ChangePersonArgs; data: Person };
   CheckCalibration: { args: CheckCalibrationArgs; data: CalibrationCheck };
   CheckConnection: { args: CheckConnectionArgs; data: CheckConnectionData };
@@ -4214,6 +4226,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   CancelAction: 1,
   CancelDryRun: 2,
   ChangeOver: 1,
+  ChangeOwnPin: 1,
   ChangePerson: 5,
   CheckCalibration: 1,
   CheckConnection: 4,

@@ -49,10 +49,8 @@ declare module "../store/runtime" {
     takeRecording?: Set<(changed: RecordingChangedData) => void>;
     /** Receive changed books of parts, which bypass the store, while they are shown. */
     takeParts?: Set<(books: PartBooks) => void>;
-    /** Receives changed interlocks and their states, which bypass the store, while they are shown. */
-    takeInterlocks?:
-      | ((event: Extract<ServerEvent, { event: "InterlockStates" | "InterlockChanged" }>) => void)
-      | undefined;
+    /** Receive changed interlocks and their states, which bypass the store, while they are shown. */
+    takeInterlocks?: Set<(event: Extract<ServerEvent, { event: "InterlockStates" | "InterlockChanged" }>) => void>;
   }
 }
 
@@ -125,7 +123,7 @@ export class Session {
     else if (event.event === "LogOnChanged")
       void import("./logOn").then(({ changed }) => changed(event.data, () => this.onState("open", "", 0)));
     else if (event.event === "InterlockStates" || event.event === "InterlockChanged")
-      now().runtime.takeInterlocks?.(event);
+      for (const take of now().runtime.takeInterlocks ?? []) take(event);
     else {
       // Frequent events would push everything else out of the diary.
       if (event.event !== "MovePreview" && event.event !== "UserPresence")

@@ -112,6 +112,10 @@ class OperationRequests:
         """Return the parameters of a jog motion. Raise RequestRefused if the velocity is missing or ambiguous."""
         motion: dict[str, Any] = {"end_effector_id": optional(args.end_effector_id)}
         in_space = not (isinstance(args.linear, Unset) and isinstance(args.angular, Unset))
+        if args.retract is True:
+            if in_space or not isinstance(args.joints, Unset):
+                raise RequestRefused("With retract, the server chooses the velocity. Give none.")
+            return motion | {"retract": True}
         if isinstance(args.joints, Unset) != in_space:
             raise RequestRefused("Give either joint velocities, or a linear or angular velocity, or both of these.")
         if not isinstance(args.joints, Unset):

@@ -56,6 +56,17 @@ async def test_interlocks_are_edits_of_the_scene(work: Work, alice: Person) -> N
     assert [one.name for one in stored.interlocks or ()] == ["Door"]
 
 
+async def test_a_retract_path_ends_outside_of_the_zone(work: Work, alice: Person) -> None:
+    start, end = {"x": 0.0, "y": 0.0, "z": 0.0}, {"x": 0.0, "y": 0.06, "z": 0.0}
+    with pytest.raises(Refused, match="Door: the retract path must end outside of inside"):
+        await alice.ask("PutInterlock", interlock=zone(work, retract=[end, start]))
+    key = (await alice.ask("PutInterlock", interlock=zone(work, retract=[start, end])))["id"]
+    assert work.session.document.interlock(key).retract[1].y == 0.06
+    action = zone(work, id=key, on="action", object_id=work.object("scale"), retract=[end])
+    with pytest.raises(Refused, match="only an interlock of a zone"):
+        await alice.ask("PutInterlock", interlock=action)
+
+
 async def test_an_object_of_an_interlock_cannot_be_removed(work: Work, alice: Person) -> None:
     await alice.ask("PutInterlock", interlock=zone(work))
     for name in ("scale", "inside"):

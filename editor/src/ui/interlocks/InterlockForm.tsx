@@ -5,7 +5,7 @@ import { useState } from "react";
 import { canBeZone, needFor, putInterlock } from "../../commands/interlocks";
 import { byName } from "../../formats";
 import { words } from "../../program/naming";
-import type { Interlock, Need, SceneObject } from "../../protocol/types";
+import type { Interlock, Need, Position, SceneObject } from "../../protocol/types";
 import { useEditor } from "../../store/store";
 import { Field } from "../kit/Field";
 import { Amount, OneOf, OnOff, Pick } from "../kit/fields";
@@ -48,7 +48,7 @@ export function InterlockForm({ interlock, onDone }: { interlock: Interlock; onD
             ["zone", t`A zone`],
             ["action", t`Actions of a device`],
           ]}
-          onChange={(on) => change({ on, object_id: "", actions: [] })}
+          onChange={(on) => change({ on, object_id: "", actions: [], retract: [] })}
         />
         <Pick
           label={zone ? t`Body of the zone` : t`Device`}
@@ -63,6 +63,7 @@ export function InterlockForm({ interlock, onDone }: { interlock: Interlock; onD
               : t`Add a box, a cylinder or a sphere to the scene first.`}
           </p>
         )}
+        {zone && target && <RetractPath path={draft.retract ?? []} onChange={(retract) => change({ retract })} />}
         {!zone && target && (
           <Actions
             draft={draft}
@@ -137,6 +138,45 @@ const choicesOf = (objects: readonly SceneObject[]): [string, string][] => [
   ["", t`Select…`],
   ...objects.map((each): [string, string] => [each.id ?? "", each.name]),
 ];
+
+interface RetractPathProps {
+  path: readonly Position[];
+  onChange: (path: Position[]) => void;
+}
+
+/** The path on which a robot leaves the zone. */
+function RetractPath({ path, onChange }: RetractPathProps) {
+  return (
+    <fieldset>
+      <legend>{t`Retract path`}</legend>
+      <p className="quiet small">
+        {path.length > 0
+          ? t`Points in the frame of the body, from inside to outside. A robot that may not stay in the zone leaves it on this path.`
+          : t`A robot that may not stay in the zone leaves it on the shortest way.`}
+      </p>
+      {path.map((point, n) => (
+        <div key={n} className="need">
+          {(["x", "y", "z"] as const).map((axis) => (
+            <Amount
+              key={axis}
+              label={`${n + 1} ${axis.toUpperCase()}`}
+              unit="mm"
+              digits={0}
+              value={point[axis] * 1000}
+              onChange={(value) =>
+                onChange(path.map((each, at) => (at === n ? { ...each, [axis]: value / 1000 } : each)))
+              }
+            />
+          ))}
+          <Button onPress={() => onChange(path.filter((_, at) => at !== n))}>{t`Remove point`}</Button>
+        </div>
+      ))}
+      <Button icon="plus" onPress={() => onChange([...path, path.at(-1) ?? { x: 0, y: 0, z: 0 }])}>
+        {t`Add point`}
+      </Button>
+    </fieldset>
+  );
+}
 
 interface ActionsProps {
   draft: Interlock;

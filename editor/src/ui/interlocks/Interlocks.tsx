@@ -48,6 +48,7 @@ export default function Interlocks({ onClose }: { onClose: () => void }) {
       during: true,
       within: 30,
       else: "wait",
+      retract: [],
     });
   return (
     <Window title={t`Interlocks and zones`} onClose={onClose}>

@@ -24,7 +24,9 @@ export function useInterlocks(): Found | null {
     if (!ready || !scene || !serves("ListInterlocks")) return;
     let current = true;
     const { runtime } = now();
-    runtime.takeInterlocks = (event) => {
+    runtime.takeInterlocks ??= new Set();
+    const listeners = runtime.takeInterlocks;
+    const take: Parameters<typeof listeners.add>[0] = (event) => {
       if (event.event === "InterlockStates") {
         const states = byId(event.data.interlocks);
         setFound((known) => known && { ...known, states });
@@ -40,13 +42,14 @@ export function useInterlocks(): Found | null {
         return { ...known, interlocks: known.interlocks.map((each) => (each.id === changed.id ? changed : each)) };
       });
     };
+    listeners.add(take);
     call("ListInterlocks").then(
       ({ interlocks, states }) => current && setFound({ interlocks, states: byId(states) }),
       () => {}, // offline: loaded again after the reconnect
     );
     return () => {
       current = false;
-      runtime.takeInterlocks = undefined;
+      listeners.delete(take);
     };
   }, [ready, scene]);
   return found;

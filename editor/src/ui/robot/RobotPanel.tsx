@@ -6,6 +6,7 @@ import { chosenRobot, notReady } from "../../commands/robot";
 import { translated } from "../../i18n/choices";
 import { setUi, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
+import { LeaveZone } from "../interlocks/LeaveZone";
 import { OneOf } from "../kit/fields";
 import { GoTab } from "./GoTab";
 import { HandTab } from "./HandTab";
@@ -44,6 +45,7 @@ export default function RobotPanel() {
         </div>
         <RobotChooser />
         {!why && <Status chosen={chosen} />}
+        {!why && <LeaveZone chosen={chosen} />}
         <OneOf
           label={t`Control`}
           quiet

@@ -12,6 +12,7 @@ from arcor2_hw.data.project import LogicComparison
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_hw.messages import Message
+from arcor2_hw.runtime.retreat import ends_outside
 from arcor2_server.documents.checks.object_types import Types
 from arcor2_server.documents.comparisons import comparison_problem, decoded
 
@@ -35,7 +36,12 @@ def check_interlock(interlock: Interlock, find: FindObject, types: Types) -> Non
             raise InvalidData("{name} cannot be a zone. Use a box, a cylinder or a sphere.", name=target.name)
         if interlock.actions:
             raise InvalidData("{interlock}: an interlock of a zone has no actions.", interlock=interlock.name)
+        if interlock.retract and not ends_outside(interlock.retract, model.model()):
+            raise InvalidData("{interlock}: the retract path must end outside of {name}.", interlock=interlock.name,
+                              name=target.name)  # fmt: skip
     else:
+        if interlock.retract:
+            raise InvalidData("{interlock}: only an interlock of a zone has a retract path.", interlock=interlock.name)
         if not interlock.needs:
             raise InvalidData("{interlock}: add at least one condition.", interlock=interlock.name)
         for action in interlock.actions:
