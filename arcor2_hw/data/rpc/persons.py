@@ -98,6 +98,17 @@ class ChangePersonArgs(Data, frozen=True):
         return f"ChangePersonArgs(id={self.id!r}, name={self.name!r}, role={self.role!r}, unlock={self.unlock!r})"
 
 
+class ChangeOwnPinArgs(Data, frozen=True):
+    """Arguments of ChangeOwnPin: the present PIN of the person who is logged on, and the new one."""
+
+    pin: Secret
+    new_pin: Secret
+
+    def __repr__(self) -> str:
+        """Return the arguments without secrets."""
+        return "ChangeOwnPinArgs()"
+
+
 class RemovePersonArgs(Data, frozen=True):
     """Arguments of RemovePerson."""
 
@@ -106,6 +117,7 @@ class RemovePersonArgs(Data, frozen=True):
 
 PERSON_RPCS: Final = (
     Rpc("AddPerson", AddPersonArgs, Person, Role.PROGRAMMER, additional=True),
+    Rpc("ChangeOwnPin", ChangeOwnPinArgs, None, Role.OPERATOR, additional=True),
     Rpc("ChangePerson", ChangePersonArgs, Person, Role.PROGRAMMER, additional=True),
     Rpc("CreateAdministrator", CreateAdministratorArgs, Person, Role.OPERATOR, additional=True),
     Rpc("KeepLoggedOn", None, None, Role.OPERATOR, additional=True),

@@ -174,7 +174,7 @@ export interface Ui {
   /** Step of the guided tour; null while it is closed. */
   tour: number | null;
   /** The dialog that is open over the screen. */
-  overlay: "" | "search" | "about" | "messages" | "audit" | "interlocks" | "persons" | "production";
+  overlay: "" | "search" | "about" | "messages" | "audit" | "interlocks" | "persons" | "pin" | "production";
   /** Settings as typed, by the id of the object or, for a new device, by the name of its type. */
   forms: Record<string, FormDraft>;
   scriptDraft?: ScriptDraft | undefined;

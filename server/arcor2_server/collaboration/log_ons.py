@@ -168,6 +168,12 @@ class LogOns:
                 client.person = shown(person)
                 self._publish(client)
 
+    def pin_changed(self, person: StoredPerson) -> None:
+        """Record that a person has changed their own PIN: they remain logged on."""
+        for found in self._by_person.values():
+            if found.person.id == person.id:
+                found.person = person
+
     def close(self) -> None:
         """Cancel the timers."""
         for found in self._by_person.values():

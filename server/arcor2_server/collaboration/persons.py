@@ -116,6 +116,20 @@ class Persons:
             await self._store.delete_lock_outs(args.id)
         return after
 
+    async def change_own_pin(self, key: str, pin: str, new_pin: str, device: str) -> StoredPerson:
+        """Replace the PIN of a person who knows the present one; `device` is where they entered it.
+
+        Raises:
+            NotFound: the person does not exist.
+            LogOnRefused: the present PIN is wrong, the person has none, or they are locked out.
+            InvalidData: the new PIN is not acceptable.
+        """
+        check_pin(new_pin)
+        person = await self.check_pin(key, pin, device)
+        if pin == new_pin:
+            raise InvalidData("The new PIN is the present one. Choose another one.")
+        return await self.change(ChangePersonArgs(person.id, pin=new_pin))
+
     async def remove(self, key: str) -> StoredPerson:
         """Remove a person. Raise NotFound if there is none, RequestRefused if no administrator would remain."""
         person = await self.get(key)

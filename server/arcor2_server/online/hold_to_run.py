@@ -108,6 +108,8 @@ class HoldToRun:
     _spent: dict[Connection, int] = field(init=False, default_factory=dict)
     """The number of the newest ended press by client. Messages of it and earlier presses are refused."""
     _delays: dict[Connection, Delay] = field(init=False, default_factory=dict)
+    _taught: dict[tuple[str, str], tuple[Connection, str]] = field(init=False, default_factory=dict)
+    """Who has switched on HandTeachingMode of an arm: client and user, by robot and arm."""
 
     def holder(self, robot_id: str) -> str | None:
         """Return the user who holds a robot, None if it is not held."""
@@ -296,27 +298,59 @@ class HoldToRun:
             data = HandTeachingModeData(press.robot_id, held, press.arm_id)
             hub.broadcast(make_event("HandTeachingMode", data))
 
-    def teaching_ended(self, message: m.HandTeachingEnded) -> None:
-        """Publish that hand teaching mode ended without a request."""
+    # -------------------------------------------------------------------------------- hand teaching mode
+    def teaching_changed(self, client: Connection, user: str, data: HandTeachingModeData) -> None:
+        """Record who has switched hand teaching mode on, so that it ends with the client."""
+        key = data.robot_id, data.arm_id or ""
+        if data.enabled:
+            self._taught[key] = client, user
+        else:
+            self._taught.pop(key, None)
+
+    def _end_teaching(self, client: Connection, reason: Message) -> None:
+        """Switch off the hand teaching modes of a client."""
+        for key in [key for key, (owner, _) in self._taught.items() if owner is client]:
+            del self._taught[key]
+            self._background.spawn(self._switch_off(*key, reason), f"end of hand teaching of {key[0]}")
+
+    async def _switch_off(self, robot_id: str, arm_id: str, reason: Message) -> None:
+        arm = {"arm_id": arm_id} if arm_id else {}
+        try:
+            await self._host.call(robot_id, "set_hand_teaching_mode", {"enabled": False} | arm)
+        except Arcor2Error as error:
+            log.error("hand teaching cannot be switched off", robot=robot_id, reason=str(error))
+            return
+        text = Message.of("Hand teaching of {name} was switched off: {reason}.", name=self._robots.robot(robot_id).name,
+                          reason=reason)  # fmt: skip
+        self._publish_teaching_end(robot_id, arm_id, text)
+
+    def _publish_teaching_end(self, robot_id: str, arm_id: str, why: Message) -> None:
         hub = self._hub
-        log.warning("hand teaching ended", robot=message.object_id, reason=message.error.message.text)
-        data = HandTeachingModeData(message.object_id, False, message.arm_id or UNSET)
-        hub.broadcast(make_event("HandTeachingMode", data))
-        why = message.error.message
+        hub.broadcast(make_event("HandTeachingMode", HandTeachingModeData(robot_id, False, arm_id or UNSET)))
         notification = NotificationData(why.text, NotificationLevel.WARN, **why.translation())
         hub.broadcast(make_event("Notification", notification))
 
+    def teaching_ended(self, message: m.HandTeachingEnded) -> None:
+        """Publish that hand teaching mode ended without a request."""
+        log.warning("hand teaching ended", robot=message.object_id, reason=message.error.message.text)
+        self._taught.pop((message.object_id, message.arm_id or ""), None)
+        self._publish_teaching_end(message.object_id, message.arm_id or "", message.error.message)
+
+    # -------------------------------------------------------------------------------- clients
     def forget(self, client: Connection) -> None:
         """Release the robots of a client that disconnected."""
         self._delays.pop(client, None)
         self._spent.pop(client, None)
         for press in [press for press in self._held.values() if press.client is client]:
             self._end(press, Message.of("{user} is no longer connected", user=press.user))
+        user = next((user for owner, user in self._taught.values() if owner is client), "")
+        self._end_teaching(client, Message.of("{user} is no longer connected", user=user))
 
     def logged_off(self, client: Connection, reason: Message) -> None:
         """Release the robots of a client at which a person was logged off."""
         for press in [press for press in self._held.values() if press.client is client]:
             self._end(press, reason)
+        self._end_teaching(client, reason)
 
     def stop(self, by: str) -> None:
         """End all holds because a user sent StopAll."""
@@ -326,5 +360,6 @@ class HoldToRun:
 
     def offline(self, reason: Message | None) -> None:
         """Finish all holds after the scene went offline. The host has stopped the robots."""
+        self._taught.clear()
         for press in list(self._held.values()):
             self._finish(press, reason or Message.of("the scene is offline"))

@@ -8,6 +8,7 @@ from arcor2_hw.data.persons import Person
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import (
     AddPersonArgs,
+    ChangeOwnPinArgs,
     ChangePersonArgs,
     CreateAdministratorArgs,
     ListPersonsData,
@@ -107,6 +108,16 @@ class PersonRequests:
         context.emit("PersonChanged", person, ChangeType.UPDATE)
         await self._log_ons.refresh(args.id)
         return person
+
+    @rpc("ChangeOwnPin")
+    async def change_own_pin(self, context: Context, args: ChangeOwnPinArgs) -> None:
+        """Change the PIN of the person who is logged on at this connection."""
+        client = context.client
+        if client.person is None:
+            raise RequestRefused("Nobody is logged on here. Log on first.")
+        person = await self._persons.change_own_pin(client.person.id, args.pin, args.new_pin, client.device)
+        self._log_ons.pin_changed(person)
+        context.emit("PersonChanged", shown(person), ChangeType.UPDATE)
 
     @rpc("RemovePerson")
     async def remove_person(self, context: Context, args: RemovePersonArgs) -> None:

@@ -158,4 +158,6 @@ class RobotRequests:
         if context.dry_run:
             return
         await cell.call(args.robot_id, "set_hand_teaching_mode", {"enabled": args.enable} | arm, control=True)
-        context.emit("HandTeachingMode", HandTeachingModeData(args.robot_id, args.enable, args.arm_id))
+        data = HandTeachingModeData(args.robot_id, args.enable, args.arm_id)
+        cell.held.teaching_changed(context.client, context.user, data)
+        context.emit("HandTeachingMode", data)

@@ -234,6 +234,7 @@ async def test_an_idle_person_is_logged_off(tmp_path: Path) -> None:
         assert event["key"] == "{name} was logged off after {seconds} s without use."
         with pytest.raises(Refused, match="Log on"):
             await device.ask("SaveScene")
+        assert found.stopped_by == []  # a program goes on
         await device.ask("StopPackage")
         assert found.stopped_by == ["tablet"]
         assert found.server.services.users.names() == []
@@ -274,6 +275,37 @@ async def test_changes_of_a_person_apply_at_once(tmp_path: Path) -> None:
             "PersonChanged/update",
             "PersonChanged/remove",
         ]
+
+
+async def test_persons_change_their_own_pin(tmp_path: Path) -> None:
+    new = "48151623"
+    async with cell(tmp_path) as found:
+        device = await found.at_tablet()
+        with pytest.raises(Refused, match="Log on"):
+            await device.ask("ChangeOwnPin", pin=OTHER_PIN, new_pin=new)
+        await device.ask("LogOn", person=found.ids["Ivo"], pin=OTHER_PIN)
+        noted(found.server)
+        for old, wanted, reason in (
+            (PIN, new, "The PIN of Ivo is wrong"),
+            (OTHER_PIN, "1234", "digits"),
+            (OTHER_PIN, OTHER_PIN, "present one"),
+        ):
+            with pytest.raises(Refused, match=reason):
+                await device.ask("ChangeOwnPin", pin=old, new_pin=wanted)
+        await device.ask("ChangeOwnPin", pin=OTHER_PIN, new_pin=new)
+        entries = [each for each in noted(found.server) if each.request == "ChangeOwnPin"]
+        assert [(each.user, each.outcome) for each in entries] == [("Ivo", "refused")] * 3 + [("Ivo", "done")]
+        assert not any(secret in str(entries) for secret in (OTHER_PIN, new))
+        await found.server.services.log_ons.refresh()
+        assert (await device.ask("ListPersons"))["logged_on"] == found.ids["Ivo"]  # remains logged on
+        for _ in range(5):
+            with pytest.raises(Refused, match="wrong"):
+                await device.ask("ChangeOwnPin", pin=OTHER_PIN, new_pin=PIN)
+        with pytest.raises(Refused, match="too many wrong PINs"):
+            await device.ask("ChangeOwnPin", pin=new, new_pin=PIN)
+        await device.ask("LogOff")
+        with pytest.raises(Refused, match="too many wrong PINs"):
+            await device.ask("LogOn", person=found.ids["Ivo"], pin=new)
 
 
 # ------------------------------------------------------------------------------------------------ administrators

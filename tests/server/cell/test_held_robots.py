@@ -248,6 +248,27 @@ async def test_logging_off_stops_the_motion(arm: Server) -> None:
 
 
 @serving(with_arm)
+async def test_hand_teaching_mode_ends_with_its_user(arm: Server) -> None:
+    bob = await join(arm, "bob")
+    held, on = arm.services.online.held, {"robot_id": OBJ, "enable": True}
+
+    async def ended() -> str:
+        assert not (await bob.event("HandTeachingMode", lambda data: not data["enabled"]))["enabled"]
+        return str((await bob.event("Notification"))["message"])
+
+    await arm.ask("HandTeachingMode", on)
+    held.logged_off(bob, Message.of("bob logged off"))  # type: ignore[arg-type]  # he teaches nothing
+    held.logged_off(arm.client, Message.of("alice logged off"))  # type: ignore[arg-type]
+    assert await ended() == "Hand teaching of arm was switched off: alice logged off."
+    assert (await report(arm))[2] == [True, False]
+    bob.got.clear()
+    await arm.ask("HandTeachingMode", on)
+    arm.services.hub.remove(arm.client)  # type: ignore[arg-type]
+    assert await ended() == "Hand teaching of arm was switched off: alice is no longer connected."
+    assert (await report(arm))[2] == [True, False, True, False]
+
+
+@serving(with_arm)
 async def test_late_requests_are_ignored(arm: Server) -> None:
     """The sender's clock differs from ours."""
     hand = Hand(arm)

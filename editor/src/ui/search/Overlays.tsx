@@ -9,6 +9,7 @@ const OVERLAYS = {
   about: lazyComponent(() => import("./About")),
   messages: lazyComponent(() => import("../notices/Messages")),
   persons: lazyComponent(() => import("./more").then((more) => more.persons())),
+  pin: lazyComponent(() => import("./more").then((more) => more.pin())),
   audit: lazyComponent(() => import("./more").then((more) => more.audit())),
   interlocks: lazyComponent(() => import("./more").then((more) => more.interlocks())),
   production: lazyComponent(() => import("./more").then((more) => more.production())),

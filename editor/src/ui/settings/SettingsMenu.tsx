@@ -58,6 +58,7 @@ export default function SettingsMenu({ defaultOpen }: { defaultOpen: boolean }) 
     { id: "production", label: t`Recipes and units`, icon: "list", act: () => openOverlay("production") },
     { id: "audit", label: t`Who did what`, icon: "people", not: noAudit, act: () => openOverlay("audit") },
     { id: "persons", label: t`Persons`, icon: "people", not: noPersons, act: () => openOverlay("persons") },
+    ...(shared ? [{ id: "pin", label: t`Change PIN`, icon: "lock" as const, act: () => openOverlay("pin") }] : []),
     { id: "about", label: t`Invite others, about, keys ( ? )`, icon: "info", act: () => openOverlay("about") },
     shared
       ? { id: "leave", label: t`Log off ${user}`, icon: "close", act: () => void ask("LogOff") }
