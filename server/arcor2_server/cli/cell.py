@@ -1,6 +1,7 @@
 """`arcor2-hw cell`: the cell as a machine of a line: its mode, its authority, and the jobs of its PLC."""
 
 import getpass
+from collections.abc import Awaitable, Callable
 from typing import Annotated
 
 from cyclopts import App, Parameter
@@ -21,12 +22,7 @@ User = Annotated[str | None, Parameter(help="Your name, which is stored. The def
 @app.command
 def show(*, server: Server = HERE) -> int:
     """Show state, mode, authority, the connection of the PLC and its jobs."""
-
-    async def work() -> None:
-        async with server.client() as client:
-            _show(await client.get_cell())
-
-    return run("cell show", work)
+    return _run("show", server, Client.get_cell)
 
 
 @app.command
@@ -38,13 +34,7 @@ def mode(
     server: Server = HERE,
 ) -> int:
     """Change the mode while no program runs."""
-
-    async def work() -> None:
-        async with server.client() as client:
-            await _register(client, user)
-            _show(await client.set_cell_mode(mode))
-
-    return run("cell mode", work)
+    return _run("mode", server, lambda client: client.set_cell_mode(mode), user or getpass.getuser())
 
 
 @app.command
@@ -56,13 +46,7 @@ def authority(
     server: Server = HERE,
 ) -> int:
     """Give the authority to the hub, the PLC or nobody. A running program continues."""
-
-    async def work() -> None:
-        async with server.client() as client:
-            await _register(client, user)
-            _show(await client.set_cell_authority(authority))
-
-    return run("cell authority", work)
+    return _run("authority", server, lambda client: client.set_cell_authority(authority), user or getpass.getuser())
 
 
 @app.command
@@ -76,19 +60,25 @@ def job(
 ) -> int:
     """Assign a job to a package, or remove it."""
 
-    async def work() -> None:
+    async def assign(client: Client) -> CellStatus:
+        jobs = [each for each in (await client.get_cell()).jobs if each.number != number]
+        if package is not None:
+            jobs.append(CellJob(number, package))
+        return await client.set_cell_jobs(jobs)
+
+    return _run("job", server, assign, user or getpass.getuser())
+
+
+def _run(command: str, server: Server, work: Callable[[Client], Awaitable[CellStatus]], user: str = "") -> int:
+    """Run a request, as a user if it changes something, and show the cell."""
+
+    async def connected() -> None:
         async with server.client() as client:
-            await _register(client, user)
-            jobs = [each for each in (await client.get_cell()).jobs if each.number != number]
-            if package is not None:
-                jobs.append(CellJob(number, package))
-            _show(await client.set_cell_jobs(jobs))
+            if user:
+                await client.register_user(user_name=user)
+            _show(await work(client))
 
-    return run("cell job", work)
-
-
-async def _register(client: Client, user: str | None) -> None:
-    await client.register_user(user_name=user or getpass.getuser())
+    return run(f"cell {command}", connected)
 
 
 def _show(cell: CellStatus) -> None:
