@@ -375,6 +375,14 @@ class Recipes:
             InvalidData: a value is unknown or out of its limits.
             NotFound: the recipe or the package does not exist.
         """
+        if self._released_only and how.by_plc and not how.recipe_id:  # a job names only the package
+            released = [
+                each
+                for each in self._recipes.values()
+                if each.package_id == package_id and each.state is RecipeState.RELEASED
+            ]
+            if released:
+                how = replace(how, recipe_id=max(released, key=lambda each: each.revision).id)
         if not how.recipe_id:
             if how.recipe_values:
                 raise RequestRefused("Values need a recipe.")

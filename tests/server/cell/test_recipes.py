@@ -6,12 +6,14 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from arcor2_hw.data.held import OnError
 from arcor2_hw.data.project import ProjectParameter
 from arcor2_hw.data.recipes import Recipe, RecipeState
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.collaboration.persons import LogOnRefused
 from arcor2_server.errors import RequestRefused
+from arcor2_server.execution.runs import How
 
 from .conftest import Recorder
 from .production import PARAMETERS, SCRIPT, production
@@ -142,6 +144,20 @@ async def test_operators_run_only_released_recipes_where_this_is_set(tmp_path: P
         await made.client.state("stopped", "PackageState")
         with pytest.raises(RequestRefused, match="package belongs to board 1, which is released"):
             await made.ask("DeletePackage", {"id": "pkg_1"})
+
+
+async def test_a_plc_starts_only_released_packages_where_this_is_set(tmp_path: Path) -> None:
+    async with production(tmp_path, released_only=True) as made:
+        made.package()
+        by_plc = How(by="PLC", on_error=OnError.HOLD, by_plc=True)
+        recipe = await made.ask("PutRecipe", {"product": "board", "package_id": "pkg_1"})
+        with pytest.raises(RequestRefused, match="only released recipes"):
+            await made.services.execution.run("pkg_1", by_plc)
+        await made.sign(recipe.id, "tested", "released")
+        await made.services.execution.run("pkg_1", by_plc)
+        await made.client.state("stopped", "PackageState")
+        (run,) = (await made.ask("ListRuns", {})).runs
+        assert run.recipe.id == recipe.id
 
 
 async def test_the_cell_is_changed_over_and_rolled_back(tmp_path: Path) -> None:
