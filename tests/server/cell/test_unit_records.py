@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from arcor2_hw.calibration.records import CalibrationKind, CalibrationRecord
 from arcor2_hw.data.project import ProjectParameter
 from arcor2_hw.data.units import CellActivity, Effectiveness, UnitState
 from arcor2_hw.exceptions import InvalidData, NotFound
@@ -28,6 +29,8 @@ SERIAL = {"name": "serial", "value": '"A-1"'}
 async def test_a_run_yields_the_record_of_each_unit(tmp_path: Path) -> None:
     async with production(tmp_path) as made:
         made.package()
+        calibration = CalibrationRecord(CalibrationKind.BY_HAND, "", "obj_camera", "camera", "world", "")
+        await made.services.units._calibrations.put(calibration)
         recipe = await made.released(planned_rate=60.0)
         subscribe(made.server, "UnitChanged")
         await made.ask("RunPackage", {"id": "pkg_1", "recipe_id": recipe.id, "order": "O-1"})
@@ -39,6 +42,7 @@ async def test_a_run_yields_the_record_of_each_unit(tmp_path: Path) -> None:
         assert (record.serial, record.state, record.verdict, record.order) == ("A-1", UnitState.GOOD, True, "O-1")
         assert (record.recipe.revision, record.package_name, record.package_hash) == (1, "demo", recipe.package_hash)
         assert record.recipe.values == {}
+        assert [(one.object_name, one.kind) for one in record.calibrations] == [("camera", "by_hand")]
         assert [step.name for step in record.steps] == STEPS
         assert [step.results for step in record.steps if step.name in ("scan", "test")] == [['"A-1"'], ["true"]]
         assert (record.runs, record.started_by, record.entered < record.left) == ([1], "alice", True)
