@@ -401,7 +401,7 @@ def hold(cell: Cell, number: int, velocity: float = 0.0) -> Any:
 
 
 def test_a_robot_leaves_a_zone_that_it_may_not_have(cell: Cell) -> None:
-    cell.objects[1] = cell.arm("arm", x=1.1)
+    cell.objects[1] = cell.arm("arm", x=0.85)
     # The nearest surface is at x = 1.2; the path leads through the door at x = 0.8.
     cell.open(replace(ENTER, otherwise=Unmet.HOLD, retract=[Position(0.0), Position(-0.25)]))
     state = cell.expect_state(lambda one: one.inside == ["obj_arm"])
@@ -412,7 +412,7 @@ def test_a_robot_leaves_a_zone_that_it_may_not_have(cell: Cell) -> None:
     assert "not deeper" in str(deeper.message)
     began = time.monotonic()
     assert str(hold(cell, 2).message) == "arm has left the zone."
-    assert time.monotonic() - began > 0.3 / 0.05, "it is slow"
+    assert time.monotonic() - began > 1.5, "it is slow"
     assert cell.log()[1:] == ["arm leaves"]
     where = cell.host.call("obj_arm", "get_end_effector_pose", end_effector="tool")
     assert 0.73 < where["position"]["x"] < 0.8
