@@ -1136,6 +1136,7 @@ class Requests(ABC):
         on_error: OnError | Unset = UNSET,
         checkpoints: bool | Unset = UNSET,
         continues: bool | Unset = UNSET,
+        continue_at: int | Unset = UNSET,
         recipe_id: str | Unset = UNSET,
         recipe_values: dict[str, str] | Unset = UNSET,
         order: str | Unset = UNSET,

@@ -5,7 +5,7 @@ import enum
 from msgspec import field
 from msgspec.structs import replace
 
-from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
+from arcor2_hw.data.base import UNSET, Data, Timestamp, TranslatableData, Unset
 from arcor2_hw.data.position import Frame
 
 
@@ -92,7 +92,7 @@ class DoneAction(Data, frozen=True, omit_defaults=True):
 
     branch: of the program. action_id, name, device: the action and its object. results: in JSON. stored: whether the
     results are stored. error, code, text: kind, code and message of an error that the program has handled. lasts:
-    whether its effect ends with the program. moved: whether it has moved a part.
+    whether its effect ends with the program. moved: whether it has moved a part; source, target: from where to where.
     """
 
     branch: str
@@ -106,6 +106,20 @@ class DoneAction(Data, frozen=True, omit_defaults=True):
     text: str = ""
     lasts: bool = False
     moved: bool = False
+    source: str = ""
+    target: str = ""
+
+
+class Restart(TranslatableData, frozen=True):
+    """An action of the interrupted cycle at which the program can continue instead, so that it is repeated.
+
+    at: its position in the cycle. text: why it cannot continue there; empty if it can.
+    """
+
+    at: int
+    action_id: str
+    name: str
+    text: str = ""
 
 
 class RunCheckpoint(Data, frozen=True):
@@ -117,6 +131,7 @@ class RunCheckpoint(Data, frozen=True):
     cycle has done. variables: the values of the program's variables at its start, by name, in JSON. complete: whether
     `done` is complete. interrupted: whether the server has noticed that the run was interrupted. confirmed: whether a
     person has confirmed since where all parts are.
+    restarts: the actions before the interruption at which it can continue instead.
     continues, continues_at: whether the program can continue, and at which actions (empty: after `last`). missing: name
     of the action because of which it cannot.
     """
@@ -138,6 +153,11 @@ class RunCheckpoint(Data, frozen=True):
     continues: bool = False
     continues_at: list[str] = field(default_factory=list)
     missing: str = ""
+    restarts: list[Restart] = field(default_factory=list)
+
+    def until(self, at: int) -> "RunCheckpoint":
+        """Return the run as if it had been interrupted before an action that it has done."""
+        return replace(self, done=self.done[:at], actions=[])
 
     def split_done(self) -> tuple[list[DoneAction], list[DoneAction]]:
         """Return the actions whose results are used when the program continues, and those that are repeated.

@@ -349,6 +349,7 @@ class Host:
             lambda *concerned: self.link.post(m.PartStep(*concerned)),
             each_action=message.checkpoints,
             continues=message.continues,
+            continue_at=message.continue_at,
         )
 
     # -------------------------------------------------------------------------------- channel of the program

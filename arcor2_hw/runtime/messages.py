@@ -116,9 +116,10 @@ class RunPackage(ToHost, frozen=True):
     bodies, calibrations, secrets, identities: as in OpenScene. hold_on_error: whether a failed action holds the
     program, see ProgramHeld. run: number of the run. records: directory of the books of parts and of checkpoints; empty
     to store nothing. checkpoints: whether the state is stored before and after each action. continues: whether the
-    program continues where it was interrupted. values: values of constants and variables of the project by their ids,
-    JSON in a string, which replace those of the package. recordings: directory in which the host stores the recording
-    of a run that the end of the server interrupts; empty to store nothing.
+    program continues where it was interrupted. continue_at: how many actions of its cycle are not repeated. values:
+    values of constants and variables of the project by their ids, JSON in a string, which replace those of the package.
+    recordings: directory in which the host stores the recording of a run that the end of the server interrupts; empty
+    to store nothing.
     """
 
     package_id: str
@@ -137,6 +138,7 @@ class RunPackage(ToHost, frozen=True):
     records: str = ""
     checkpoints: bool = True
     continues: bool = False
+    continue_at: int | None = None
     values: dict[str, str] = field(default_factory=dict)
     identities: dict[str, Identity] = field(default_factory=dict)
     recordings: str = ""

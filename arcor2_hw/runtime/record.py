@@ -76,6 +76,7 @@ class RunRecord:
         concerned: called before the end of each action that concerned a part, with the values of PartStep.
         each_action: whether a checkpoint is stored before and after each action, or only of the start and the end.
         continues: whether the program continues where it was interrupted.
+        continue_at: number of actions of the interrupted cycle that are not repeated; None for all.
     """
 
     def __init__(
@@ -88,6 +89,7 @@ class RunRecord:
         *,
         each_action: bool = True,
         continues: bool = False,
+        continue_at: int | None = None,
     ) -> None:
         self._directory, self._changed, self._each_action = directory, changed, each_action
         self._concerned = concerned
@@ -121,7 +123,7 @@ class RunRecord:
         """What the present cycle has done; at most MOST_DONE actions."""
         self._cycle_call = 0
         """Number of the call with which the present cycle has started; 0 if it started with an action."""
-        self.continues = continues
+        self.continues, self._continue_at = continues, continue_at
         """Whether the program continues where it was interrupted."""
         self.continuation: Continuation | None = None
         """What the interrupted cycle has done already; None if the program starts from its beginning."""
@@ -158,6 +160,8 @@ class RunRecord:
 
     def _continue(self, former: RunCheckpoint | Unset) -> None:
         """Use what an interrupted run has done in its last cycle. Raises Conflict."""
+        if self._continue_at is not None and not isinstance(former, Unset):
+            former = former.until(self._continue_at)
         if isinstance(former, Unset) or former.ended or not former.published().continues:
             raise Conflict("The program cannot continue: it was not interrupted. Start it from its beginning.")
         if former.package_hash != self._run.package_hash:
@@ -288,7 +292,9 @@ class RunRecord:
             self._compare(source, target)
             part = self._ledger.move(source, target)
             self._publish()
-            return step._replace(part=part, target=target, done=replace(step.done, moved=True))
+            return step._replace(
+                part=part, target=target, done=replace(step.done, moved=True, source=source, target=target)
+            )
         if judges and self._ledger.has_part(device.id):
             own = device.id
         elif flow.identifies:

@@ -297,6 +297,24 @@ def test_an_interrupted_program_continues_at_its_interrupted_action(cell: Cell, 
     assert [done.name for done in cell.books().run.done] == ["scan", "pick", "insert", "test", "take", "into_box"]  # type: ignore[union-attr]
 
 
+def test_an_interrupted_program_continues_at_a_chosen_action(cell: Cell) -> None:
+    (cell.directory / "hang").touch()
+    host = cell.start(STEPS, PROJECT)
+    while not cell.notes():
+        pass
+    os.kill(host.process.pid, signal.SIGKILL)
+    host.gone()
+    (cell.directory / "hang").unlink()
+    host = cell.start(STEPS, PROJECT, continues=True, continue_at=0)
+    found = held(host)
+    assert (found.kind, found.action_name) == ("program_interrupted", "scan")
+    assert cell.notes() == ["pick"]  # nothing has moved
+    decide(host, found.number, HoldChoice.RETRY)
+    assert host.expect_state("stopped").finished
+    assert cell.notes() == ["pick", "pick", "place", "pick", "place"]
+    assert cell.books().counts.good == 1
+
+
 COUNTING = f"""{BODY}
 last: str = ""
 while True:

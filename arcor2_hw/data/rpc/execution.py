@@ -45,7 +45,8 @@ class RunPackageArgs(IdArgs, frozen=True):
     shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
     on_error: what the program does when an action fails and no error exit applies. checkpoints: whether the state is
     stored before and after each action; default: true. continues: whether the program continues where it was
-    interrupted, which requires that it is held on errors. recipe_id: the recipe, whose package this must be.
+    interrupted, which requires that it is held on errors. continue_at: position in the cycle of another action at which
+    it continues (see Restart). recipe_id: the recipe, whose package this must be.
     recipe_values: values of this run by name, JSON in a string, within the limits of the recipe. order: id of the order
     that is stored with the produced units.
     """
@@ -56,6 +57,7 @@ class RunPackageArgs(IdArgs, frozen=True):
     on_error: OnError | Unset = UNSET
     checkpoints: bool | Unset = UNSET
     continues: bool | Unset = UNSET
+    continue_at: int | Unset = UNSET
     recipe_id: str | Unset = UNSET
     recipe_values: dict[str, str] | Unset = UNSET
     order: OrderId | Unset = UNSET

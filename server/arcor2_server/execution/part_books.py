@@ -11,8 +11,10 @@ from msgspec import UNSET
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.parts import PartBooks
+from arcor2_hw.data.parts import PartBooks, PlaceKind, Restart, RunCheckpoint
+from arcor2_hw.data.position import MAIN_BRANCH
 from arcor2_hw.data.rpc import ConfirmPartsArgs
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime.checkpoints import CheckpointFile, stored_scenes
 from arcor2_hw.runtime.ledger import Ledger
 from arcor2_server.errors import RequestRefused
@@ -69,8 +71,13 @@ class AllPartBooks:
             )
         return scene_id
 
-    async def require_continues(self, scene_id: str, package_id: str) -> int:
+    async def require_continues(self, scene_id: str, package_id: str, at: int | None = None) -> int:
         """Check that the last program of a scene was interrupted and can continue. Return the number of its run.
+
+        Args:
+            scene_id: the scene.
+            package_id: the package of the program.
+            at: position in the cycle of the action at which it continues; None for where it was interrupted.
 
         Raises:
             RequestRefused: it cannot. The message names the missing condition.
@@ -81,6 +88,13 @@ class AllPartBooks:
             raise RequestRefused("This program was not interrupted. Start it from its beginning.")
         if not run.confirmed:
             raise RequestRefused("Confirm first where the parts are, then continue the program.")
+        if at is not None and books is not None:
+            found = next((one for one in _restarts(books, run) if one.at == at), None)
+            if found is None:
+                raise RequestRefused("The interrupted cycle has no action {at} at which it could continue.", at=at)
+            if found.text:
+                raise RequestRefused(found.as_message(found.text))
+            return run.run
         if name := run.why_not():
             raise RequestRefused(
                 "The program cannot continue, because the result of {action} is not stored, or it would have to "
@@ -199,4 +213,38 @@ class AllPartBooks:
 
 def _published(books: PartBooks) -> PartBooks:
     """Return books as clients see them."""
-    return books if isinstance(books.run, Unset) else replace(books, run=books.run.published())
+    if isinstance(books.run, Unset):
+        return books
+    return replace(books, run=replace(books.run.published(), restarts=_restarts(books, books.run)))
+
+
+def _restarts(books: PartBooks, run: RunCheckpoint) -> list[Restart]:
+    """Return the actions of the program that the interrupted cycle has done, and why it cannot continue there."""
+    if not run.complete or not run.confirmed or run.cycle < 1:
+        return []
+    found = []
+    for at, done in enumerate(run.done):
+        if done.branch == MAIN_BRANCH:
+            why = _why_not(books, run, at)
+            texts = {} if why is None else {"text": why.text, **why.translation()}
+            found.append(Restart(at, done.action_id, done.name, **texts))
+    return found
+
+
+def _why_not(books: PartBooks, run: RunCheckpoint, at: int) -> Message | None:
+    """Return why an interrupted program cannot continue at an action of its cycle; None if it can."""
+    if name := run.until(at).why_not():
+        return Message.of("The result of {action} is not stored, or it would have to be repeated.", action=name)
+    places = {place.id: place for place in books.places}
+    move = next((done for done in run.done[at:] if done.moved), None)
+    if move is None or not {move.source, move.target} <= places.keys():
+        return None
+    source, target = places[move.source], places[move.target]
+    there = [part for part in books.parts if part.place == source.id]
+    if not there and source.kind is not PlaceKind.FEEDER:
+        return Message.of("{action} needs a part at {place}, and there is none.", action=move.name, place=source.name)
+    others = [part.shown for part in books.parts if part.place == target.id and part not in there]
+    if target.capacity and len(others) >= target.capacity:
+        return Message.of("{action} needs room at {place}, where part {part} is.", action=move.name,
+                          place=target.name, part=others[0])  # fmt: skip
+    return None

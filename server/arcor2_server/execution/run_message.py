@@ -47,6 +47,7 @@ class RunMessages:
             records=str(self._settings.checkpoints_dir.resolve()),
             checkpoints=how.checkpoints,
             continues=how.continues,
+            continue_at=how.continue_at,
             values=dict(how.values),
             recordings=str(self._settings.recordings_dir.resolve()),
         )

@@ -98,6 +98,7 @@ class How(Struct, frozen=True):
         on_error: what the program does when an action fails and no error exit applies.
         checkpoints: store the state before and after each action.
         continues: continue where the program was interrupted.
+        continue_at: how many actions of the interrupted cycle are not repeated; None for all.
         role: role of the user.
         by_plc: whether the PLC above the cell starts it.
         recipe_id: the recipe; empty for none.
@@ -114,6 +115,7 @@ class How(Struct, frozen=True):
     on_error: OnError = OnError.END
     checkpoints: bool = True
     continues: bool = False
+    continue_at: int | None = None
     role: Role = Role.OPERATOR
     recipe_id: str = ""
     recipe_values: Mapping[str, str] = MappingProxyType({})

@@ -243,7 +243,7 @@ class Execution(PackageLibrary):
         if how.continues:
             if how.on_error is not OnError.HOLD:
                 raise RequestRefused("A program can only continue if it is held on errors.")
-            how = self._as_before(await self.parts.require_continues(scene_id, package_id), how)
+            how = self._as_before(await self.parts.require_continues(scene_id, package_id, how.continue_at), how)
         for prepare in self.before_run:
             how = await prepare(package_id, how)
         self.require_permitted(how)

@@ -50,6 +50,7 @@ def _run_options(context: Context, args: RunPackageArgs | TemporaryPackageArgs) 
     return replace(
         how,
         continues=args.continues is True,
+        continue_at=None if isinstance(args.continue_at, Unset) else args.continue_at,
         recipe_id=args.recipe_id or "",
         recipe_values=args.recipe_values or {},
         order=args.order or "",

@@ -24,6 +24,7 @@ from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.runtime.checkpoints import CheckpointFile
 from arcor2_server.errors import RequestRefused
 from arcor2_server.execution.part_books import AllPartBooks
+from tests.e2e.harness import until
 from tests.runtime.test_host_parts import ONE, write_package
 
 from .conftest import Recorder, running_server
@@ -46,6 +47,7 @@ async def test_after_an_interruption_a_person_confirms_where_parts_are(tmp_path:
         assert (books.parts[0].serial, books.run) == ("A-1", UNSET)
         with pytest.raises(Arcor2Error, match="while an action runs: pick"):
             await server.ask("ConfirmParts", CONFIRMED)
+        await until((tmp_path / "notes").exists, "the arm picks the part")
         host = server.services.execution._host.host
         os.kill(host.pid, signal.SIGKILL)
         await server.client.state("stopped", "PackageState")
@@ -109,3 +111,43 @@ def test_a_run_names_the_result_because_of_which_it_cannot_continue() -> None:
     done = [DoneAction("main", "act_1", "picture", "obj_camera", stored=False)]
     run = RunCheckpoint(1, "pkg_1", "", now(), cycle=1, complete=True, done=done)
     assert (run.published().continues, run.published().missing) == (False, "picture")
+
+
+async def test_a_person_chooses_where_an_interrupted_program_continues(tmp_path: Path) -> None:
+    books = AllPartBooks(SimpleNamespace(broadcast=lambda event: None), tmp_path)  # type: ignore[arg-type]
+    places = [Place("feeder", "feeder", PlaceKind.FEEDER, 0)]
+    places += [Place(each, each, PlaceKind.HOLDER) for each in ("arm", "nest")]
+    done = [
+        DoneAction("main", "act_scan", "scan", "reader", results=['"A-1"']),
+        DoneAction("main", "act_pick", "pick", "arm", moved=True, source="feeder", target="arm"),
+        DoneAction("act_b", "act_light", "light", "lamp"),  # of a branch of parallel work
+        DoneAction("main", "act_insert", "insert", "arm", moved=True, source="arm", target="nest"),
+        DoneAction("main", "act_look", "look", "camera", stored=False),
+        DoneAction("main", "act_test", "test", "tester", results=["true"]),
+    ]
+    run = RunCheckpoint(1, "pkg_1", "", now(), cycle=1, complete=True, done=done)
+    file = CheckpointFile(tmp_path, "scn_1")
+    file.write(PartBooks("scn_1", [Part(1, "nest"), Part(2, "arm")], places, PartCounts(2, in_cell=2), run))
+    file.close()
+    with pytest.raises(RequestRefused, match="Confirm first"):
+        await books.require_continues("scn_1", "pkg_1", 0)
+
+    async def confirmed(*parts: ConfirmedPart) -> dict[str, str]:
+        await books.confirm(None, ConfirmPartsArgs("scn_1", list(parts)), "ann")
+        (found,) = await books.all()
+        return {each.name: each.text for each in found.run.restarts}  # type: ignore[union-attr]
+
+    assert await confirmed(ConfirmedPart(1, "nest"), ConfirmedPart(2, "arm")) == {
+        "scan": "pick needs room at arm, where part #2 is.",
+        "pick": "pick needs room at arm, where part #2 is.",
+        "insert": "insert needs room at nest, where part #1 is.",
+        "look": "",
+        "test": "The result of look is not stored, or it would have to be repeated.",
+    }
+    with pytest.raises(RequestRefused, match="insert needs room at nest"):
+        await books.require_continues("scn_1", "pkg_1", 3)
+    with pytest.raises(RequestRefused, match="no action 2"):
+        await books.require_continues("scn_1", "pkg_1", 2)
+    found = await confirmed(ConfirmedPart(1, ""), ConfirmedPart(2, "nest"))
+    assert found["insert"] == "insert needs a part at arm, and there is none."
+    assert await books.require_continues("scn_1", "pkg_1", 0) == 1

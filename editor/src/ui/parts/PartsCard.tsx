@@ -4,6 +4,7 @@ import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { ask } from "../../commands/requests";
 import { runPackage } from "../../commands/run";
+import { translate } from "../../i18n/serverMessages";
 import type { ConfirmedPart, Part, PartBooks, Place } from "../../protocol/types";
 import { call, serves } from "../../session/connection";
 import { whyUnavailable } from "../../store/permissions";
@@ -182,6 +183,23 @@ function Books({ books, all }: { books: PartBooks; all: boolean }) {
             {continues ? t`Do not continue` : t`Dismiss`}
           </Button>
         </div>
+      )}
+      {run?.confirmed && found && (run.restarts?.length ?? 0) > 0 && (
+        <details>
+          <summary>{t`Continue at another action`}</summary>
+          <p>{t`It and the actions after it are executed again. The program waits there for your decision.`}</p>
+          <div className="held-choices">
+            {run.restarts?.map((each) => (
+              <Button
+                key={each.at}
+                why={whyContinue || translate({ ...each, text: each.text ?? "" })}
+                onPress={() => void runPackage(found.id, false, true, { continue_at: each.at })}
+              >
+                {each.name}
+              </Button>
+            ))}
+          </div>
+        </details>
       )}
       {run && !run.confirmed && parts.length === 0 && (
         <div className="held-choices">
