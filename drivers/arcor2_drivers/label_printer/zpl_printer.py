@@ -5,7 +5,7 @@ import time
 from collections.abc import Mapping
 from typing import ClassVar, Final
 
-from arcor2_hw.actions import action
+from arcor2_hw.actions import action, observation
 from arcor2_hw.data.device import Health, Identity, LossReaction
 from arcor2_hw.data.maintenance import DeviceParameter, ParameterFailure
 from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused
@@ -64,6 +64,11 @@ class ZplPrinter(LineDevice, Printer):
     def condition(self) -> Health:
         """Return check_function while it cannot print or a label is unconfirmed."""
         return Health.CHECK_FUNCTION if self.alarms() else Health.NORMAL
+
+    @observation
+    def can_print(self) -> bool:
+        """Return whether labels are loaded, the head is closed, and nothing else prevents printing."""
+        return not self.alarms()
 
     def acknowledge(self, code: str) -> None:
         """Acknowledge a label whose fate is unknown (code unconfirmed). Raises NotFound for another code."""

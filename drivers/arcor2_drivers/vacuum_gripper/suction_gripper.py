@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import ClassVar, Final
 
-from arcor2_hw.actions import action
+from arcor2_hw.actions import action, observation
 from arcor2_hw.data.device import Health, LossReaction, Reading
 from arcor2_hw.exceptions import DeviceError, DeviceFault, NotFound, Refused
 from arcor2_hw.keep_alive import once_within
@@ -129,6 +129,7 @@ class SuctionGripper(Connected, Suction):
         """Return whether a sensor detects a gripped part."""
         return bool(self._set.part_input or self._set.vacuum_input)
 
+    @observation
     def part_held(self) -> bool:
         """Return whether a part is held: by the sensor, else by the vacuum, else by whether the vacuum is on.
 
@@ -141,6 +142,7 @@ class SuctionGripper(Connected, Suction):
             return float(self._carrier.read(self._set.vacuum_input).value) >= self._set.part_vacuum
         return bool(self._carrier.read(self._set.vacuum_output).value)
 
+    @observation
     def vacuum(self) -> Reading[float]:
         """Return the vacuum below ambient pressure, Pa. Raise Refused without vacuum_input."""
         if not self._set.vacuum_input:
