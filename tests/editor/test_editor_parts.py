@@ -51,6 +51,10 @@ async def test_operator_confirms_a_part_and_continues_after_kill(tmp_path: Path,
                 await expect(parts).to_contain_text("after your decision.")
                 assert await screen.faults() == []
                 await screen.picture("parts, continue")
+                await parts.get_by_text("Continue at another action").click()
+                await expect(parts.get_by_role("button", name="scan", exact=True)).to_be_visible()
+                assert await screen.faults() == []
+                await screen.picture("parts, continue at another action")
                 await parts.get_by_role("button", name="Continue at pick").click()
                 held = screen.page.get_by_role("region", name="The program is held")
                 await expect(held).to_contain_text("pick was interrupted.")
