@@ -922,7 +922,7 @@ export interface DissolveParallelArgs {
  *
  * branch: of the program. action_id, name, device: the action and its object. results: in JSON. stored: whether the
  * results are stored. error, code, text: kind, code and message of an error that the program has handled. lasts:
- * whether its effect ends with the program. moved: whether it has moved a part.
+ * whether its effect ends with the program. moved: whether it has moved a part; source, target: from where to where.
  */
 export interface DoneAction {
   branch: string;
@@ -936,6 +936,8 @@ export interface DoneAction {
   text?: string;
   lasts?: boolean;
   moved?: boolean;
+  source?: string;
+  target?: string;
 }
 
 /**
@@ -2846,6 +2848,20 @@ export interface RenewForcesArgs {
   valid_ms: number;
 }
 
+/**
+ * An action of the interrupted cycle at which the program can continue instead, so that it is repeated.
+ *
+ * at: its position in the cycle. text: why it cannot continue there; empty if it can.
+ */
+export interface Restart {
+  at: number;
+  action_id: string;
+  name: string;
+  text: string;
+  key?: string;
+  values?: Record<string, string | Message>;
+}
+
 /** Answer to RestoreParameters: the number of written parameters, and those that could not be written. */
 export interface RestoreParametersData {
   written: number;
@@ -3043,6 +3059,7 @@ export interface Run {
  * cycle has done. variables: the values of the program's variables at its start, by name, in JSON. complete: whether
  * `done` is complete. interrupted: whether the server has noticed that the run was interrupted. confirmed: whether a
  * person has confirmed since where all parts are.
+ * restarts: the actions before the interruption at which it can continue instead.
  * continues, continues_at: whether the program can continue, and at which actions (empty: after `last`). missing: name
  * of the action because of which it cannot.
  */
@@ -3064,6 +3081,7 @@ export interface RunCheckpoint {
   continues: boolean;
   continues_at: string[];
   missing: string;
+  restarts: Restart[];
 }
 
 /** How a run ended: completed, stopped by a user, by an error, or with the server or its host. */
@@ -3075,7 +3093,8 @@ export type RunEnd = "running" | "finished" | "stopped" | "failed" | "lost";
  * shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
  * on_error: what the program does when an action fails and no error exit applies. checkpoints: whether the state is
  * stored before and after each action; default: true. continues: whether the program continues where it was
- * interrupted, which requires that it is held on errors. recipe_id: the recipe, whose package this must be.
+ * interrupted, which requires that it is held on errors. continue_at: position in the cycle of another action at which
+ * it continues (see Restart). recipe_id: the recipe, whose package this must be.
  * recipe_values: values of this run by name, JSON in a string, within the limits of the recipe. order: id of the order
  * that is stored with the produced units.
  */
@@ -3087,6 +3106,7 @@ export interface RunPackageArgs {
   on_error?: OnError;
   checkpoints?: boolean;
   continues?: boolean;
+  continue_at?: number;
   recipe_id?: string;
   recipe_values?: Record<string, string>;
   order?: string;
