@@ -18,13 +18,18 @@ const UNUSED = new RegExp(`/three/src/renderers/shaders/Shader(Lib/(${LIBRARY})|
 const PARTS: Readonly<Record<string, string>> = {
   "extras/PMREMGenerator.js": "export class PMREMGenerator {}",
   "renderers/shaders/DFGLUTData.js": "export const getDFGLUT = () => null;",
-  // Needed again by AR in the browser.
+  // AR draws into the framebuffer of its session by itself: src/ar/xrView.ts.
   "renderers/webxr/WebXRManager.js": `export class WebXRManager {
     enabled = false; isPresenting = false;
     addEventListener() {} removeEventListener() {} setAnimationLoop() {} dispose() {}
     hasDepthSensing() { return false; }
     getEnvironmentBlendMode() { return "opaque"; }
   }`,
+  "renderers/webgl/WebGLClipping.js": `export class WebGLClipping {
+    uniform = { value: null, needsUpdate: false }; numPlanes = 0; numIntersection = 0;
+    init() { return false; } beginShadows() {} endShadows() {} setGlobalState() {} setState() {}
+  }`,
+  "math/FrustumArray.js": "export class FrustumArray {}",
   "renderers/webgl/WebGLUniformsGroups.js": "export class WebGLUniformsGroups { bind() {} update() {} dispose() {} }",
   "renderers/webgl/WebGLOutput.js": "export class WebGLOutput {}",
   "renderers/webgl/WebGLEnvironments.js":

@@ -1,6 +1,6 @@
 /** The 3D view: shows items, follows robots, reports taps. It does not use React, and draws only after changes. */
 
-import { Fog, Scene, type Vector3, type WebGLRenderer } from "three";
+import { type Camera, Fog, Scene, type Vector3 } from "three";
 import type { Telemetry } from "../store/telemetry";
 import { checkAges } from "./ages";
 import { Animation } from "./animation";
@@ -22,7 +22,7 @@ import type { StraightPath } from "./pathLine";
 import { type Hit, onFloor, pick } from "./picking";
 import { followPointer } from "./pointer";
 import { type Probe, probe } from "./probe";
-import { rendererOf } from "./renderer";
+import { type Renderer, rendererOf } from "./renderer";
 import { Resolution } from "./resolution";
 import type { LowQuality, Quality } from "./surface";
 import type { Context, Thing } from "./thing";
@@ -57,8 +57,10 @@ export class Engine {
   /** Return the labels that are drawn, and places that they leave free, pixels. */
   arrange: (labels: Label[]) => [Label[], Rect[]] = (labels) => [labels, []];
 
+  /** Draws the items: on the canvas, or for each eye of a headset. */
+  output = (scene: Scene, camera: Camera): void => this.renderer.render(scene, camera);
   private readonly watchers = new Set<() => void>();
-  readonly renderer: WebGLRenderer;
+  readonly renderer: Renderer;
   private readonly things = new Map<string, Thing>();
   private readonly batches: Batches;
   private readonly labels: Labels;
@@ -66,7 +68,7 @@ export class Engine {
   private readonly floorGrid: Floor;
   private readonly animation: Animation;
   private palette: Palette = LIGHT;
-  private readonly requests: Frames;
+  readonly requests: Frames;
   private readonly resolution: Resolution;
   /** Frames of items may have changed since the last frame. */
   private dirty = true;
@@ -210,11 +212,11 @@ export class Engine {
     this.invalidate();
   }
 
-  /** Return the items at a position in the view, pixels, best first. */
-  pick(x: number, y: number, slack = 12): Hit[] {
+  /** Return the items at a position in the view, pixels, best first; or as another camera shows them. */
+  pick(x: number, y: number, slack = 12, camera: Camera = this.view.camera): Hit[] {
     this.place();
     const roots = this.scene.children.filter((each) => !each.userData.ground);
-    return pick(x, y, { width: this.width, height: this.height }, this.view.camera, roots, slack, (id) => {
+    return pick(x, y, { width: this.width, height: this.height }, camera, roots, slack, (id) => {
       const kind = this.things.get(id)?.item.kind;
       return kind !== undefined && SMALL.has(kind);
     });
@@ -381,7 +383,7 @@ export class Engine {
   private render(): void {
     const { camera } = this.view;
     camera.updateMatrixWorld();
-    this.resolution.follow(camera);
+    if (!this.requests.driven) this.resolution.follow(camera);
     // Sizes on the screen are adjusted when the camera has stopped: to place hundreds of items takes most of a frame.
     if (!this.resolution.moving) for (const thing of this.things.values()) if (thing.resized()) this.dirty = true;
     this.place();
@@ -391,7 +393,7 @@ export class Engine {
     const labels = labelsOf(this.things, this.hovered, this.notes, camera.position, this.width);
     this.labels.show(...this.arrange(labels), camera, this.width, this.height);
     placeConditions(this.things, this.labels, camera, this.width, this.height);
-    this.renderer.render(this.scene, camera);
+    this.output(this.scene, camera);
     this.frames++;
     if (this.movedRobots.size > 0) this.draw();
   }

@@ -5,6 +5,8 @@ export class Frames {
   private last = 0;
   /** Earliest time of the next frame, ms. */
   private due = 0;
+  /** Whether frames are drawn by `step` only: a headset or tablet in AR requests them at its own pace. */
+  driven = false;
 
   /** `period` is the time between two frames, s; `frame` draws one and returns whether another one is needed. */
   constructor(
@@ -19,7 +21,13 @@ export class Frames {
   }
 
   request(): void {
+    if (this.driven) return;
     this.scheduled ||= requestAnimationFrame((time) => this.run(time));
+  }
+
+  /** Draw a frame now, after a time, s. */
+  step(seconds: number): void {
+    this.frame(seconds);
   }
 
   dispose(): void {
@@ -28,6 +36,7 @@ export class Frames {
 
   private run(time: number): void {
     this.scheduled = 0;
+    if (this.driven) return;
     if (this.limited && time < this.due - 3) return this.request();
     const seconds = (time - this.last) / 1000;
     this.last = time;
