@@ -2,10 +2,11 @@
 
 import type { Engine } from "../engine/engine";
 import type { Ar } from "../store/ui";
-import { Backdrop, pictured } from "./backdrop";
+import { Backdrop, pictured, placed } from "./backdrop";
 import { type Mat3, mean, norm, type Point, sub, type Vec3 } from "./geometry";
 import { Gyro, turnedView } from "./gyro";
 import { type FocalLength, KNOWN, lensOf } from "./lens";
+import type { ArMode, Shown } from "./mode";
 import type { Layout } from "./places";
 import {
   combined,
@@ -21,7 +22,7 @@ import {
   UNMOVED,
   viewFrom,
 } from "./placing";
-import type { Lens, View } from "./pose";
+import type { View } from "./pose";
 import { JUMP, jumpBetween } from "./registration";
 import { Sharing } from "./sharing";
 import { ArProblem, obstacleOfError } from "./support";
@@ -41,6 +42,7 @@ const VEILS: Readonly<Record<Ar["phase"], number>> = {
   looking: 1,
   registered: 0,
   bridging: 0.2,
+  tracked: 0,
   lost: 0.65,
   hand: 0,
 };
@@ -50,18 +52,6 @@ const WANTED: MediaTrackConstraints = {
   height: { ideal: 720 },
   frameRate: { ideal: 30 },
 };
-
-/** What is shown: for the outlines of the markers, and for tests. */
-export interface Shown {
-  found: Found;
-  view: View | null;
-  lens: Lens;
-  /** Time from the picture to the overlay, and in the worker, ms. */
-  latency: number;
-  ms: number;
-  /** Number of pictures. */
-  count: number;
-}
 
 interface Options {
   engine: Engine;
@@ -90,15 +80,12 @@ export function releaseCamera(stream: MediaStream): void {
   for (const track of stream.getTracks()) track.stop();
 }
 
-export class ArSession {
-  /** The configured markers. */
+export class ArSession implements ArMode {
   get places(): Layout["places"] {
     return this.options.layout.places;
   }
 
-  /** What is shown; null before the first picture. */
   shown: Shown | null = null;
-  /** Called after each picture. */
   onPicture: () => void = () => {};
 
   private readonly video = document.createElement("video");
@@ -155,7 +142,6 @@ export class ArSession {
     this.next();
   }
 
-  /** Release the camera. `stay`: keep the viewpoint instead of returning to the one before. */
   stop(stay = false): void {
     this.ended = true;
     releaseCamera(this.stream);
@@ -166,7 +152,6 @@ export class ArSession {
     this.options.engine.view.release(stay);
   }
 
-  /** Keep the picture and the pose, or continue. */
   freeze(on: boolean): void {
     this.frozen = on;
     this.options.report({ frozen: on });
@@ -185,7 +170,6 @@ export class ArSession {
     this.freeze(false);
   }
 
-  /** Place the workplace by hand until markers register it, unless they do so now. */
   placeByHand(): void {
     const { shown, byHand, phase, options } = this;
     this.placeLater = !shown;
@@ -195,7 +179,6 @@ export class ArSession {
     this.change(shown.view ?? viewFrom(sight, this.shownOrientation), "hand");
   }
 
-  /** Move the workplace with the fingers from points of the 3D view to others, pixels. */
   drag(from: readonly Point[], to: readonly Point[]): void {
     const { shown } = this;
     if (!shown?.view) return;
@@ -205,24 +188,20 @@ export class ArSession {
     if (movement) this.move(movement);
   }
 
-  /** Move the workplace by a distance, m, or an angle, rad. */
   step(direction: Direction, size: { distance: number; angle: number }): void {
     if (this.shown?.view) this.move(stepTowards(direction, size, this.shown.view));
   }
 
-  /** Tilt the camera of a view that was placed by hand upwards, rad. */
   tilt(angle: number): void {
     if (this.byHand && this.shown?.view) this.change(tilted(this.shown.view, angle));
   }
 
-  /** Store what was placed by hand on this device. */
   keepPlacement(): void {
     const { nudge, byHand, shown } = this;
     const sight = byHand && shown?.view ? sightOf(shown.view) : this.options.placement(this.camera).sight;
     this.options.storePlacement(this.camera, { ...(sight && { sight }), ...(nudge !== UNMOVED && { nudge }) });
   }
 
-  /** Forget what was placed by hand. */
   resetPlacement(): void {
     this.nudge = UNMOVED;
     this.options.storePlacement(this.camera, {});
@@ -236,6 +215,14 @@ export class ArSession {
       const view = this.predicted(this.shownOrientation);
       if (view) this.change(view);
     }
+  }
+
+  onScreen([x, y]: Point): Point {
+    const { found } = this.shown ?? {};
+    if (!found) return [0, 0];
+    const { width, height } = this.options.engine.shown();
+    const { scale } = placed(found, { width, height });
+    return [(x + 0.5 - found.width / 2) * scale + width / 2, (y + 0.5 - found.height / 2) * scale + height / 2];
   }
 
   private move(by: Movement): void {

@@ -8,6 +8,7 @@ import {
   MeshBasicMaterial,
   type Object3D,
   PlaneGeometry,
+  type Scene,
   SRGBColorSpace,
 } from "three";
 import type { Engine } from "../engine/engine";
@@ -49,8 +50,8 @@ export function pictured(
 
 export class Backdrop {
   private readonly texture: CanvasTexture;
-  private readonly picture: Mesh<PlaneGeometry, MeshBasicMaterial>;
-  private readonly veil: Mesh<PlaneGeometry, MeshBasicMaterial>;
+  private readonly picture: Sheet;
+  private readonly veil: Sheet;
   private readonly hidden: Object3D[];
   private readonly fog;
 
@@ -89,37 +90,69 @@ export class Backdrop {
   }
 
   dispose(): void {
-    for (const sheet of [this.picture, this.veil]) {
-      sheet.removeFromParent();
-      sheet.geometry.dispose();
-      sheet.material.dispose();
-    }
+    for (const sheet of [this.picture, this.veil]) discard(sheet);
     this.texture.dispose();
     for (const each of this.hidden) each.visible = true;
     this.engine.scene.fog ??= this.fog;
     this.engine.invalidate();
   }
 
-  private sheet(order: number, opacity: number): Mesh<PlaneGeometry, MeshBasicMaterial> {
-    const material = new MeshBasicMaterial({
-      map: this.texture,
-      side: DoubleSide, // the projection mirrors it
-      depthTest: false,
-      depthWrite: false,
-      fog: false,
-      toneMapped: false,
-      transparent: opacity < 1,
-      opacity,
-    });
-    const sheet = new Mesh(new PlaneGeometry(2, 2), material);
-    sheet.renderOrder = order;
-    sheet.frustumCulled = false;
-    sheet.matrixAutoUpdate = sheet.matrixWorldAutoUpdate = false;
-    sheet.raycast = () => {};
-    sheet.userData.ground = true; // nothing to select
-    this.engine.scene.add(sheet);
-    return sheet;
+  private sheet(order: number, opacity: number): Sheet {
+    return sheetOf(this.engine.scene, this.texture, order, opacity);
   }
+}
+
+/** A picture that stays behind the items in an XR session. */
+export class FrozenPicture {
+  private readonly texture: CanvasTexture;
+  private readonly sheet: Sheet;
+
+  constructor(scene: Scene, canvas: HTMLCanvasElement) {
+    this.texture = new CanvasTexture(canvas);
+    this.texture.colorSpace = SRGBColorSpace;
+    this.texture.generateMipmaps = false;
+    this.sheet = sheetOf(scene, this.texture, -1000, 1);
+  }
+
+  /** Fill the view of a camera. */
+  follow(camera: Matrix4, projection: Matrix4): void {
+    plane.makeTranslation(0, 0, DEPTH);
+    this.sheet.matrixWorld.multiplyMatrices(camera, inverse.copy(projection).invert()).multiply(plane);
+  }
+
+  dispose(): void {
+    discard(this.sheet);
+    this.texture.dispose();
+  }
+}
+
+type Sheet = Mesh<PlaneGeometry, MeshBasicMaterial>;
+
+function sheetOf(scene: Scene, map: CanvasTexture, order: number, opacity: number): Sheet {
+  const material = new MeshBasicMaterial({
+    map,
+    side: DoubleSide, // the projection mirrors it
+    depthTest: false,
+    depthWrite: false,
+    fog: false,
+    toneMapped: false,
+    transparent: opacity < 1,
+    opacity,
+  });
+  const sheet = new Mesh(new PlaneGeometry(2, 2), material);
+  sheet.renderOrder = order;
+  sheet.frustumCulled = false;
+  sheet.matrixAutoUpdate = sheet.matrixWorldAutoUpdate = false;
+  sheet.raycast = () => {};
+  sheet.userData.ground = true; // nothing to select
+  scene.add(sheet);
+  return sheet;
+}
+
+function discard(sheet: Sheet): void {
+  sheet.removeFromParent();
+  sheet.geometry.dispose();
+  sheet.material.dispose();
 }
 
 /** Return the pose of a camera of three.js (x right, y up, z backward) in the workplace. */

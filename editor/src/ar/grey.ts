@@ -8,12 +8,19 @@ export interface Grey {
 }
 
 /** Return the picture of a canvas in grey. */
-export function greyOf(rgba: Uint8ClampedArray, width: number, height: number): Grey {
+export function greyOf(rgba: ArrayLike<number>, width: number, height: number): Grey {
   const data = new Uint8Array(width * height);
   for (let i = 0, j = 0; i < data.length; i++, j += 4) {
     data[i] = ((rgba[j] as number) * 77 + (rgba[j + 1] as number) * 150 + (rgba[j + 2] as number) * 29) >> 8;
   }
   return { data, width, height };
+}
+
+/** Return a picture whose rows are from the bottom, upright. */
+export function flipped({ data, width, height }: Grey): Grey {
+  const out = new Uint8Array(data.length);
+  for (let y = 0; y < height; y++) out.set(data.subarray(y * width, (y + 1) * width), (height - 1 - y) * width);
+  return { data: out, width, height };
 }
 
 /** Return a picture of half the size. */

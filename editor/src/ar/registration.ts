@@ -40,10 +40,10 @@ const FINEST = 0.1;
 /** Places of markers are measured with a ruler, m. */
 const PLACING = 0.001;
 /** Distance from the markers for which the error is stated, m. */
-const ASIDE = 0.5;
+export const ASIDE = 0.5;
 /** Limits of the grades, m. */
-const GOOD = 0.004;
-const FAIR = 0.012;
+export const GOOD = 0.004;
+export const FAIR = 0.012;
 /** Jump after which the overlay was visibly wrong, m. */
 export const JUMP = 0.01;
 

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { codesOf } from "./codes";
 import { layoutOf } from "./places";
-import { abilitiesOf, obstacleOf, obstacleOfError } from "./support";
+import { abilitiesOf, obstacleOf, obstacleOfError, waysOf } from "./support";
 
 const ABLE = { secure: true, camera: true, workers: true };
 const pose = { position: { x: 1, y: 2, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } };
@@ -35,4 +35,20 @@ test("markers have their own or the common size, and ids of their dictionary", (
   ]);
   expect([...codesOf("4x4_50", [0, 49, 50, -1]).keys()]).toEqual([0, 49]);
   expect(codesOf("4x4_250", [249]).size).toBe(1);
+});
+
+test("WebXR is used where the device has it, and the picture of the camera otherwise", async () => {
+  const scope = (xr?: { isSessionSupported: (mode: string) => Promise<boolean> }, camera = true) =>
+    ({
+      isSecureContext: true,
+      navigator: { xr, ...(camera && { mediaDevices: { getUserMedia: () => {} } }) },
+      OffscreenCanvas: class {},
+      createImageBitmap: () => {},
+    }) as unknown as typeof globalThis;
+  const supports = { isSessionSupported: async (mode: string) => mode === "immersive-ar" };
+  expect(await waysOf(scope())).toEqual(["camera"]);
+  expect(await waysOf(scope(supports))).toEqual(["xr", "camera"]);
+  expect(await waysOf(scope(supports, false))).toEqual(["xr"]);
+  expect(await waysOf(scope({ isSessionSupported: () => Promise.reject(new Error()) }))).toEqual(["camera"]);
+  expect(await waysOf({ ...scope(supports), isSecureContext: false })).toEqual([]);
 });

@@ -3,11 +3,22 @@
 import type { Layout } from "./places";
 
 /**
- * Why AR cannot start. `insecure`: the page is not trusted; `browser`: it lacks a function; the others are about the
- * camera. With two of them, AR starts, and the user places the workplace by hand: `markers`: none is configured;
- * `dictionary`: AR does not detect the configured markers.
+ * Why AR cannot start. `insecure`: the page is not trusted; `browser`: it lacks a function; `session`: WebXR did not
+ * start; `overlay`: the page cannot be shown over it; the others are about the camera. With two of them, AR starts, and
+ * the user places the workplace by hand: `markers`: none is configured; `dictionary`: AR does not detect the configured
+ * markers.
  */
-export type Obstacle = "insecure" | "browser" | "markers" | "dictionary" | "refused" | "missing" | "busy" | "ended";
+export type Obstacle =
+  | "insecure"
+  | "browser"
+  | "markers"
+  | "dictionary"
+  | "refused"
+  | "missing"
+  | "busy"
+  | "ended"
+  | "session"
+  | "overlay";
 
 /** An obstacle, thrown by the start of AR. */
 export class ArProblem extends Error {
@@ -29,6 +40,20 @@ export function abilitiesOf(scope: typeof globalThis): Abilities {
     camera: typeof scope.navigator?.mediaDevices?.getUserMedia === "function",
     workers: typeof scope.OffscreenCanvas === "function" && typeof scope.createImageBitmap === "function",
   };
+}
+
+/**
+ * The ways in which AR can know where the device is. `xr`: the device tracks itself (WebXR on Android and headsets);
+ * `camera`: markers in pictures of the camera.
+ */
+export type Way = "xr" | "camera";
+
+/** Return the ways of this device, the better one first; none if AR cannot start. */
+export async function waysOf(scope: typeof globalThis): Promise<Way[]> {
+  const able = abilitiesOf(scope);
+  if (!able.secure) return [];
+  const xr = await scope.navigator?.xr?.isSessionSupported("immersive-ar").catch(() => false);
+  return [...(xr ? (["xr"] as const) : []), ...(able.camera && able.workers ? (["camera"] as const) : [])];
 }
 
 /** Return what prevents AR or registration; null if nothing is known to. */

@@ -3,7 +3,7 @@
 import { detect, type Sighting } from "./detector";
 import { type Grey, half } from "./grey";
 import { ASSUMED, type FocalLength, KNOWN, LensSearch, lensOf } from "./lens";
-import type { Places, View } from "./pose";
+import type { Lens, Places, View } from "./pose";
 import { markerErrors, type Registration, register } from "./registration";
 
 /** Why no marker is found: darkness, a blurred picture, or another reason. */
@@ -30,6 +30,8 @@ export interface Found {
   checked: boolean;
 }
 
+/** Standard deviation of a focal length that the device states, relative. */
+const STATED = 0.002;
 /** Mean brightness below which a picture is too dark. */
 const DARK = 35;
 /** Sharpness relative to the pictures with markers, below which a picture is blurred. */
@@ -37,6 +39,8 @@ const BLURRED = 0.5;
 
 export class Tracker {
   private focal: FocalLength;
+  /** The lens of the picture, if the device states it. */
+  private stated: Lens | null = null;
   private search: LensSearch | null = null;
   private size = "";
   private excluded: number[] = [];
@@ -48,8 +52,11 @@ export class Tracker {
     this.focal = setup.focal ?? ASSUMED;
   }
 
-  look(picture: Grey): Found {
+  /** `lens`: the lens of the picture, if it is known. */
+  look(picture: Grey, lens: Lens | null = null): Found {
     const { width, height } = picture;
+    this.stated = lens;
+    if (lens) this.focal = { relative: lens.focal / Math.max(width, height), deviation: STATED };
     const seen = detect(picture, this.setup.codes);
     const registration = this.register(seen, width, height);
     const learned = registration !== null && this.learn(seen, registration, width, height);
@@ -59,12 +66,16 @@ export class Tracker {
   private register(seen: readonly Sighting[], width: number, height: number): Registration | null {
     const { deviation } = this.focal;
     const options = { deviation, known: deviation <= KNOWN, excluded: this.excluded, near: this.last };
-    return register(seen, this.setup.places, lensOf(this.focal, width, height), options);
+    return register(seen, this.setup.places, this.lensOf(width, height), options);
+  }
+
+  private lensOf(width: number, height: number): Lens {
+    return this.stated ?? lensOf(this.focal, width, height);
   }
 
   private found(picture: Grey, seen: Sighting[], registration: Registration | null): Found {
     const { width, height } = picture;
-    const lens = lensOf(this.focal, width, height);
+    const lens = this.lensOf(width, height);
     const { light, sharpness } = registration && this.sharp > 0 ? NOT_MEASURED : lightOf(half(picture));
     if (registration) this.sharp ||= sharpness;
     this.last = registration?.view;

@@ -1,10 +1,12 @@
 /** The worker of AR: reads pictures and reports what they show. */
 
-import { greyOf } from "./grey";
+import type { Pixels } from "./cameraPixels";
+import { flipped, greyOf } from "./grey";
+import type { Lens } from "./pose";
 import { type Found, type Setup, Tracker } from "./tracker";
 
-/** The start, or a picture. */
-export type ToWorker = { setup: Setup } | { bitmap: ImageBitmap };
+/** The start, a picture, or the pixels of one with a known lens. */
+export type ToWorker = { setup: Setup } | { bitmap: ImageBitmap } | { pixels: Pixels; lens: Lens };
 /** What a picture shows, and the time that it took, ms. */
 export interface FromWorker {
   found: Found;
@@ -27,6 +29,13 @@ function serve(scope: Scope): void {
       return;
     }
     const began = performance.now();
+    if ("pixels" in data) {
+      if (!tracker) return;
+      const { width, height } = data.pixels;
+      const grey = flipped(greyOf(data.pixels.data, width, height));
+      scope.postMessage({ found: tracker.look(grey, data.lens), ms: performance.now() - began });
+      return;
+    }
     const { width, height } = data.bitmap;
     if (canvas.width !== width || canvas.height !== height) {
       canvas = new OffscreenCanvas(width, height);

@@ -9,6 +9,7 @@ const sessions: Options[] = [];
 const endHolds = vi.fn();
 vi.mock("./holdToRun", () => ({ endHolds }));
 vi.mock("../session/engine", () => ({ theEngine: () => ({}) }));
+vi.mock("./operation", () => ({ stopMotion: async () => {} }));
 vi.mock("../ar/gyro", () => ({ askForMotion: async () => {} }));
 vi.mock("../ar/arSession", () => ({
   openCamera: async () => ({}),
@@ -24,7 +25,7 @@ vi.mock("../ar/arSession", () => ({
 const { leaveAr, startAr } = await import("./ar");
 
 async function started(): Promise<Options> {
-  await startAr({ places: new Map() } as never, () => {});
+  await startAr({ places: new Map() } as never, "camera", () => {});
   endHolds.mockClear();
   return sessions.at(-1) as Options;
 }

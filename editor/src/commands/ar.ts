@@ -1,29 +1,37 @@
 /** Augmented reality on this device. Pictures of the camera are processed here and are not sent to the server. */
 
-import { ArSession, openCamera, releaseCamera } from "../ar/arSession";
+import type { Vector3 } from "three";
 import { askForMotion } from "../ar/gyro";
+import type { Grab } from "../ar/headset";
 import type { FocalLength } from "../ar/lens";
+import type { ArMode } from "../ar/mode";
 import { type Layout, layoutOf, type MarkerTable } from "../ar/places";
 import type { Placement } from "../ar/placing";
-import { ArProblem, type Obstacle } from "../ar/support";
+import { ArProblem, type Obstacle, obstacleOfError, type Way } from "../ar/support";
+import type { XrArSession } from "../ar/xrSession";
+import type { Engine } from "../engine/engine";
 import { theEngine } from "../session/engine";
 import { remember, remembered } from "../session/localStorage";
 import { rest } from "../session/rest";
 import { now, setUi } from "../store/store";
 import type { Ar } from "../store/ui";
+import { notMovable, targetOf } from "../transform/target";
+import { plus } from "../viewmodel/frames";
 import { endHolds } from "./holdToRun";
+import { moving } from "./move";
+import { stopMotion } from "./operation";
 
 declare module "../store/runtime" {
   interface Runtime {
     /** The running AR view; what users see of it is `ui.ar`. */
-    ar?: ArSession | undefined;
+    ar?: ArMode | undefined;
   }
 }
 
 declare global {
   interface Window {
     /** The running AR view, for tests and the browser console. */
-    __ar?: ArSession | undefined;
+    __ar?: ArMode | undefined;
   }
 }
 
@@ -33,20 +41,36 @@ export async function loadMarkers(): Promise<Layout> {
 }
 
 /**
- * Start AR; call it in a tap, since iOS asks for the motion sensor only then. Reject with ArProblem.
+ * Start AR; call it in a tap, since browsers ask for the camera and the motion sensor only then. Reject with ArProblem.
  *
- * @param onEnd called with the obstacle if the camera ends later.
+ * @param onEnd called with the obstacle if AR ends later without our doing.
  */
-export async function startAr(layout: Layout, onEnd: (obstacle: Obstacle) => void): Promise<void> {
+export async function startAr(layout: Layout, way: Way, onEnd: (obstacle: Obstacle) => void): Promise<void> {
   leaveAr();
-  await askForMotion();
-  const stream = await openCamera();
   const engine = theEngine();
+  const ended = () => {
+    leaveAr();
+    onEnd("ended");
+  };
+  const mode = way === "xr" ? await xrMode(layout, engine, ended) : await cameraMode(layout, engine, ended);
+  if (!mode) return;
+  use(mode);
+  setUi({ ar: initialAr(layout.places.size) });
+  await mode.start().catch(() => {
+    leaveAr();
+    throw new ArProblem(way === "xr" ? "session" : "busy");
+  });
+}
+
+async function cameraMode(layout: Layout, engine: Engine | null, ended: () => void): Promise<ArMode | null> {
+  await askForMotion();
+  const { ArSession, openCamera, releaseCamera } = await loadWay("camera");
+  const stream = await openCamera();
   if (!engine) {
     releaseCamera(stream);
-    return;
+    return null;
   }
-  const session = new ArSession(stream, {
+  return new ArSession(stream, {
     engine,
     layout,
     stored: (camera) => recordOf<FocalLength>("lenses")[camera] ?? null,
@@ -55,17 +79,52 @@ export async function startAr(layout: Layout, onEnd: (obstacle: Obstacle) => voi
     storePlacement: (camera, placement) =>
       remember("placements", JSON.stringify({ ...recordOf<Placement>("placements"), [camera]: placement })),
     report,
-    ended: () => {
-      leaveAr();
-      onEnd("ended");
+    ended,
+  });
+}
+
+const LOADS = { xr: () => import("../ar/xrSession"), camera: () => import("../ar/arSession") };
+
+/** Load what a way of AR needs; before the tap that starts it, since browsers ask for the camera only then. */
+export const loadWay = <W extends Way>(way: W): ReturnType<(typeof LOADS)[W]> =>
+  LOADS[way]() as ReturnType<(typeof LOADS)[W]>;
+
+async function xrMode(layout: Layout, engine: Engine | null, ended: () => void): Promise<ArMode | null> {
+  if (!engine) return null;
+  const { hasOverlay, requestXr, XrArSession } = await loadWay("xr");
+  const session = await requestXr().catch((error: unknown) => {
+    throw new ArProblem(obstacleOfError(error) === "refused" ? "refused" : "session");
+  });
+  // On the screen of a tablet, there are no controls without the page.
+  if (!hasOverlay(session) && session.interactionMode === "screen-space") {
+    await session.end();
+    throw new ArProblem("overlay");
+  }
+  return new XrArSession(session, {
+    engine,
+    layout,
+    report,
+    ended,
+    release: endHolds,
+    stopMotion: () => void stopMotion(),
+    grab,
+  });
+}
+
+/** Move the selected item with a ray. `from`: the point at which it is held, m. */
+function grab(id: string, from: Vector3): Grab | null {
+  const state = now();
+  const target = state.ui.selection?.id === id ? targetOf(state, state.ui.selection) : null;
+  if (!target?.moves || notMovable(state, target)) return null;
+  const one = moving(target);
+  const { position, orientation } = target.pose;
+  return {
+    to: (at) => {
+      const shift = { x: at.x - from.x, y: at.y - from.y, z: at.z - from.z };
+      one.to({ position: plus(position, shift), orientation });
     },
-  });
-  use(session);
-  setUi({ ar: initialAr(layout.places.size) });
-  await session.start().catch(() => {
-    leaveAr();
-    throw new ArProblem("busy");
-  });
+    end: () => one.finish(),
+  };
 }
 
 /** Leave AR, stop the camera and end a held motion. `stay`: continue in the 3D view from the same viewpoint. */
@@ -77,7 +136,7 @@ export function leaveAr(stay = false): void {
   if (now().ui.ar) setUi({ ar: null });
 }
 
-function use(session: ArSession | undefined): void {
+function use(session: ArMode | undefined): void {
   now().runtime.ar = session;
   window.__ar = session;
 }
@@ -86,6 +145,12 @@ export const freezeAr = (on: boolean): void => now().runtime.ar?.freeze(on);
 
 export function recalibrateAr(): void {
   now().runtime.ar?.recalibrate();
+}
+
+/** Return the running AR view of a headset or tablet that tracks itself. */
+export function xrView(): XrArSession | null {
+  const { ar } = now().runtime;
+  return ar && "touch" in ar ? (ar as XrArSession) : null;
 }
 
 /** Open or close the controls for placing; without a registration, the workplace is placed by hand from now on. */
@@ -112,6 +177,11 @@ function report(change: Partial<Ar>): void {
 function initialAr(configured: number): Ar {
   return {
     phase: "starting",
+    mode: "camera",
+    pictures: true,
+    drifted: false,
+    touched: 0,
+    stopButton: false,
     frozen: false,
     markers: false,
     grade: "rough",

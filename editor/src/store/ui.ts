@@ -116,9 +116,19 @@ export interface ScriptDraft {
 export interface Ar {
   /**
    * `looking`: no marker was seen yet; `bridging`: the orientation sensor replaces the markers for a moment; `hand`:
-   * the user placed the workplace by hand.
+   * the user placed the workplace by hand; `tracked`: it was registered, and the device tracks itself since.
    */
-  phase: "starting" | "looking" | "registered" | "bridging" | "lost" | "hand";
+  phase: "starting" | "looking" | "registered" | "bridging" | "tracked" | "lost" | "hand";
+  /** `camera`: the picture of the camera behind the 3D view; the others with WebXR: the page over it, or in space. */
+  mode: "camera" | "tablet" | "headset";
+  /** Whether pictures of the camera are available, for markers and to freeze them. */
+  pictures: boolean;
+  /** Whether a device that tracks itself has moved so far that a visible drift is expected. */
+  drifted: boolean;
+  /** Number of touched points that registered the workplace; 0 if it was registered otherwise. */
+  touched: number;
+  /** Whether Stop is on a button of a tracked controller. */
+  stopButton: boolean;
   /** Picture and pose are frozen. */
   frozen: boolean;
   /** Whether the outlines of the markers are shown. */

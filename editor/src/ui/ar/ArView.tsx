@@ -1,16 +1,20 @@
 /** Controls of AR over the picture of the camera: quality, freeze, markers, and the ways out. */
 
 import { t } from "@lingui/core/macro";
-import { useLayoutEffect } from "react";
+import { Suspense, useLayoutEffect } from "react";
 import { freezeAr, leaveAr, openPlacing, recalibrateAr, showMarkers } from "../../commands/ar";
 import type { Engine } from "../../engine/engine";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
+import { lazyComponent } from "../kit/lazy";
 import { useTicking } from "../times";
 import { MarkerOutlines } from "./MarkerOutlines";
 import { PlaceByHand } from "./PlaceByHand";
+import { SelectList } from "./SelectList";
 import { adviceOf, gradeOf, qualityOf } from "./words";
 import "./ar.css";
+
+const HeadsetPanel = lazyComponent(() => import("./HeadsetPanel"));
 
 /** Time after which a rest is suggested, ms. */
 const REST = 30 * 60_000;
@@ -34,14 +38,22 @@ export default function ArView({ engine }: { engine: Engine }) {
   const advice = stale || ar.frozen ? "" : adviceOf(ar);
   return (
     <>
-      {ar.markers && <MarkerOutlines engine={engine} />}
+      {ar.mode === "headset" && (
+        <Suspense fallback={null}>
+          <HeadsetPanel ar={ar} />
+        </Suspense>
+      )}
+      {ar.mode === "tablet" && <SelectList />}
+      {ar.markers && <MarkerOutlines />}
       <div className="view-controls ar-controls" role="group" aria-label={t`Augmented reality`}>
         <Button icon="close" onPress={() => leaveAr()}>
           <Word>{t`Leave AR`}</Word>
         </Button>
-        <Button icon={ar.frozen ? "play" : "pause"} onPress={() => freezeAr(!ar.frozen)} aria-pressed={ar.frozen}>
-          <Word>{ar.frozen ? t`Continue` : t`Freeze`}</Word>
-        </Button>
+        {ar.pictures && (
+          <Button icon={ar.frozen ? "play" : "pause"} onPress={() => freezeAr(!ar.frozen)} aria-pressed={ar.frozen}>
+            <Word>{ar.frozen ? t`Continue` : t`Freeze`}</Word>
+          </Button>
+        )}
         <Button icon="eye" onPress={() => leaveAr(true)}>
           <Word>{t`Seat view`}</Word>
         </Button>

@@ -1,39 +1,32 @@
 /** The outlines of the configured markers where they are expected, the corners as seen, and their errors. */
 
 import { useEffect, useRef } from "react";
-import { placed } from "../../ar/backdrop";
 import type { Point } from "../../ar/geometry";
 import { projected } from "../../ar/pose";
-import type { Engine } from "../../engine/engine";
 import { decimal } from "../../formats";
 import { now } from "../../store/store";
 
 const SVG = "http://www.w3.org/2000/svg";
 
-export function MarkerOutlines({ engine }: { engine: Engine }) {
+export function MarkerOutlines() {
   const drawing = useRef<SVGSVGElement>(null);
   useEffect(() => {
     const { ar } = now().runtime;
     if (!ar) return;
-    ar.onPicture = () => drawing.current && draw(drawing.current, engine);
+    ar.onPicture = () => drawing.current && draw(drawing.current);
     ar.onPicture();
     return () => {
       ar.onPicture = () => {};
     };
-  }, [engine]);
+  }, []);
   return <svg ref={drawing} className="ar-markers" aria-hidden="true" />;
 }
 
-function draw(into: SVGSVGElement, engine: Engine): void {
+function draw(into: SVGSVGElement): void {
   const session = now().runtime.ar;
   if (!session?.shown) return;
   const { found, view, lens } = session.shown;
-  const size = engine.shown();
-  const { scale } = placed(found, size);
-  const shown = ([x, y]: Point): Point => [
-    (x + 0.5 - found.width / 2) * scale + size.width / 2,
-    (y + 0.5 - found.height / 2) * scale + size.height / 2,
-  ];
+  const shown = (point: Point) => session.onScreen(point);
   const parts: SVGElement[] = [];
   const polygon = (corners: readonly Point[], look: string) => {
     const each = document.createElementNS(SVG, "polygon");

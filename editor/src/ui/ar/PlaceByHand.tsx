@@ -52,7 +52,7 @@ export function PlaceByHand({ engine, ar }: { engine: Engine; ar: Ar }) {
           {sign}
         </Button>
       ))}
-      {hand && (
+      {hand && ar.mode === "camera" && (
         <>
           <Button className="wide" onPress={tilt(1)}>{t`Camera up`}</Button>
           <Button className="wide" onPress={tilt(-1)}>{t`Camera down`}</Button>

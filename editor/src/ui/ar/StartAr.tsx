@@ -3,8 +3,8 @@
 import { plural, t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import type { Layout } from "../../ar/places";
-import { ArProblem, abilitiesOf, type Obstacle, obstacleOf } from "../../ar/support";
-import { loadMarkers, startAr } from "../../commands/ar";
+import { ArProblem, abilitiesOf, type Obstacle, obstacleOf, type Way, waysOf } from "../../ar/support";
+import { loadMarkers, loadWay, startAr } from "../../commands/ar";
 import { notify } from "../../store/store";
 import { Window } from "../kit/dialogs";
 import { Button, Waiting } from "../kit/kit";
@@ -33,6 +33,10 @@ function reasonOf(obstacle: Obstacle, dictionary: string): string {
       return t`This device has no camera.`;
     case "busy":
       return t`Another app uses the camera. Close it, then try again.`;
+    case "session":
+      return t`The browser did not start AR. Install or update Google Play Services for AR, or use the camera only.`;
+    case "overlay":
+      return t`This browser does not show the controls over AR. Use the camera only.`;
     case "ended":
       return t`The camera has stopped. Start AR again.`;
   }
@@ -43,8 +47,15 @@ export default function StartAr({ onClose }: { onClose: () => void }) {
   const [failure, setFailure] = useState("");
   const [obstacle, setObstacle] = useState(() => obstacleOf(abilitiesOf(globalThis), null));
   const [opening, setOpening] = useState(false);
+  const [ways, setWays] = useState<Way[]>(["camera"]);
   useEffect(() => {
     let over = false;
+    void waysOf(globalThis).then((found) => {
+      if (over) return;
+      for (const way of found) loadWay(way).catch(() => {}); // again by the start
+      if (found.includes("xr")) setObstacle((before) => (before === "browser" ? null : before));
+      if (found.length > 0) setWays(found);
+    });
     loadMarkers()
       .then((found) => {
         if (over) return;
@@ -56,10 +67,10 @@ export default function StartAr({ onClose }: { onClose: () => void }) {
       over = true;
     };
   }, []);
-  const start = () => {
+  const start = (way: Way) => {
     if (!layout) return;
     setOpening(true);
-    startAr(layout, (reason) => notify("error", reasonOf(reason, layout.dictionary)))
+    startAr(layout, way, (reason) => notify("error", reasonOf(reason, layout.dictionary)))
       .then(onClose)
       .catch((error: unknown) => {
         setOpening(false);
@@ -77,7 +88,9 @@ export default function StartAr({ onClose }: { onClose: () => void }) {
             {t`The 3D view appears over the picture of the camera. Markers in the workplace tell where the camera is.`}
           </p>
           <p className="quiet">
-            {t`The browser asks for the camera, and on an iPad also for the motion sensor.`}{" "}
+            {ways[0] === "xr"
+              ? t`The device follows its own position. The browser asks for AR, and for the camera to find markers.`
+              : t`The browser asks for the camera, and on an iPad also for the motion sensor.`}{" "}
             {t`Pictures stay on this device.`}
           </p>
         </>
@@ -97,9 +110,22 @@ export default function StartAr({ onClose }: { onClose: () => void }) {
       <div className="actions">
         <Button onPress={onClose}>{permanent ? t`Close` : t`Cancel`}</Button>
         {!permanent && (
-          <Button look="primary" icon="camera" isDisabled={!layout || opening} onPress={start} autoFocus>
-            {t`Start AR`}
-          </Button>
+          <>
+            {ways.length > 1 && (
+              <Button isDisabled={!layout || opening} onPress={() => start("camera")}>
+                {t`Camera only`}
+              </Button>
+            )}
+            <Button
+              look="primary"
+              icon="camera"
+              isDisabled={!layout || opening}
+              onPress={() => start(ways[0] ?? "camera")}
+              autoFocus
+            >
+              {t`Start AR`}
+            </Button>
+          </>
         )}
       </div>
     </Window>

@@ -4,6 +4,11 @@ import { adviceOf, gradeOf, qualityOf } from "./words";
 
 const GOOD: Ar = {
   phase: "registered",
+  mode: "camera",
+  pictures: true,
+  drifted: false,
+  touched: 0,
+  stopButton: false,
   frozen: false,
   markers: false,
   grade: "good",
@@ -27,6 +32,7 @@ test("the quality has error, markers and age", () => {
   expect(qualityOf(GOOD, 112_000)).toBe("±4 mm, 3 markers, 12 s ago");
   expect(qualityOf({ ...GOOD, used: [10], error: 0.0003 }, 100_400)).toBe("±1 mm, 1 marker, now");
   expect(qualityOf({ ...GOOD, checked: false, error: 0.0502 }, 100_000)).toBe("±50 mm, unchecked, 3 markers, now");
+  expect(qualityOf({ ...GOOD, used: [], touched: 3, error: 0.0081 }, 160_000)).toBe("±8 mm, 3 points, 60 s ago");
   // After a correction by hand, no error is known.
   const nudge = { distance: 0.012, angle: -0.0175 };
   expect(qualityOf({ ...GOOD, nudge }, 100_000)).toBe("12 mm, 1°, 3 markers, now");
@@ -42,6 +48,9 @@ test("every grade has a word and a shape", () => {
     { frozen: true },
     { phase: "hand" },
     { nudge: { distance: 0.012, angle: 0 } },
+    { phase: "tracked" },
+    { phase: "tracked", touched: 3 },
+    { phase: "lost", mode: "tablet" },
   ];
   const grades = states.map((each) => gradeOf({ ...GOOD, ...each }));
   expect(new Set(grades.map(({ word }) => word)).size).toBe(states.length);
@@ -53,6 +62,27 @@ test.each([
   [{ phase: "looking", configured: 0 }, "Press Place to place the workplace by hand."],
   [{ phase: "hand" }, "The overlay does not follow the camera. Hold the device still."],
   [{ phase: "hand", sensor: true }, "The overlay turns with the device. After a step, place it again."],
+  [{ phase: "looking", mode: "headset" }, "Press Touch points, then touch three corners of markers."],
+  [
+    { phase: "looking", mode: "headset", configured: 0 },
+    "Look at a surface, and press Place. The device follows your steps from then on.",
+  ],
+  [
+    { phase: "looking", mode: "tablet", pictures: false },
+    "The browser gives AR no pictures of markers. Press Place, or start again with the camera only.",
+  ],
+  [{ phase: "hand", mode: "tablet" }, "The device follows your steps. Check the place from time to time."],
+  [{ phase: "lost", mode: "tablet" }, "The device has lost its position. Move it slowly, in good light."],
+  [{ phase: "tracked", mode: "tablet", drifted: true }, "The position drifts as you move. Show a marker again."],
+  [
+    { phase: "tracked", mode: "headset", drifted: true, touched: 3, used: [] },
+    "The position drifts as you move. Touch the points again.",
+  ],
+  [
+    { phase: "tracked", mode: "headset", grade: "rough", touched: 3, used: [] },
+    "The touched points are close to each other. Configure markers that are farther apart.",
+  ],
+  [{ phase: "tracked", mode: "tablet", used: [10], grade: "rough" }, "Show a second marker."],
   [{ phase: "looking" }, "Point the camera at a marker."],
   [{ phase: "lost", loss: "dark" }, "It is too dark for the camera. Switch on the light."],
   [{ phase: "lost", loss: "blurred" }, "The picture is blurred. Move more slowly."],

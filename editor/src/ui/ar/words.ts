@@ -5,10 +5,12 @@ import { decimal } from "../../formats";
 import type { Ar } from "../../store/ui";
 
 /** Return the quality in words: expected error, number of markers, age. */
-export function qualityOf({ error, used, seenAt, checked, nudge }: Ar, present = Date.now()): string {
+export function qualityOf({ error, used, touched, seenAt, checked, nudge }: Ar, present = Date.now()): string {
   const age = Math.round((present - seenAt) / 1000);
   const size = decimal(Math.max(1, error * 1000), 0);
-  const markers = plural(used.length, { one: "# marker", other: "# markers" });
+  const markers = touched
+    ? plural(touched, { one: "# point", other: "# points" })
+    : plural(used.length, { one: "# marker", other: "# markers" });
   const when = age < 1 ? t`now` : t`${age} s ago`;
   if (nudge) return t`${movementOf(nudge)}, ${markers}, ${when}`;
   return checked ? t`±${size} mm, ${markers}, ${when}` : t`±${size} mm, unchecked, ${markers}, ${when}`;
@@ -26,17 +28,49 @@ export function gradeOf(ar: Ar): { word: string; shape: string; look: string } {
     return { word: ar.configured ? t`Looking for markers` : t`Not placed`, shape: "○", look: "rough" };
   }
   if (ar.phase === "hand") return { word: t`Placed by hand`, shape: "▢", look: "fair" };
-  if (ar.phase !== "registered") return { word: t`No marker in sight`, shape: "◇", look: "rough" };
+  if (ar.phase === "lost" && ar.mode !== "camera") return { word: t`Position lost`, shape: "⊘", look: "rough" };
+  if (ar.phase === "tracked" && !ar.nudge) {
+    const look = ar.drifted || ar.grade === "rough" ? "rough" : "fair";
+    return ar.touched ? { word: t`By touch`, shape: "◎", look } : { word: t`Tracked`, shape: "◍", look };
+  }
+  if (!["registered", "tracked"].includes(ar.phase)) return { word: t`No marker in sight`, shape: "◇", look: "rough" };
   if (ar.nudge) return { word: t`Moved by hand`, shape: "◆", look: "fair" };
   if (ar.grade === "good") return { word: t`Good`, shape: "●", look: "good" };
   if (ar.grade === "fair") return { word: t`Fair`, shape: "◐", look: "fair" };
   return { word: t`Rough`, shape: "△", look: "rough" };
 }
 
+/** Return what only concerns devices that track themselves. */
+function xrAdviceOf({ phase, mode, configured, touched, pictures, drifted, grade }: Ar): string {
+  if (phase === "lost") return t`The device has lost its position. Move it slowly, in good light.`;
+  if (phase === "hand") return t`The device follows your steps. Check the place from time to time.`;
+  if (phase === "looking" && mode === "headset" && configured > 0) {
+    return t`Press Touch points, then touch three corners of markers.`;
+  }
+  if (phase === "looking" && configured === 0) {
+    return t`Look at a surface, and press Place. The device follows your steps from then on.`;
+  }
+  if (phase === "looking" && !pictures) {
+    return t`The browser gives AR no pictures of markers. Press Place, or start again with the camera only.`;
+  }
+  if (phase === "tracked" && drifted) {
+    return touched
+      ? t`The position drifts as you move. Touch the points again.`
+      : t`The position drifts as you move. Show a marker again.`;
+  }
+  if (touched && grade === "rough") {
+    return t`The touched points are close to each other. Configure markers that are farther apart.`;
+  }
+  return "";
+}
+
 /** Return what the user can do for a better registration, most important first; an empty string if it is good. */
 export function adviceOf(ar: Ar): string {
   const { phase, loss, used, contradicting, undecided, checked, corrected, grade, configured, sensor } = ar;
-  if (phase === "hand") {
+  if (ar.mode !== "camera") {
+    const advice = xrAdviceOf(ar);
+    if (advice) return advice;
+  } else if (phase === "hand") {
     return sensor
       ? t`The overlay turns with the device. After a step, place it again.`
       : t`The overlay does not follow the camera. Hold the device still.`;

@@ -1,0 +1,275 @@
+/**
+ * Controllers and hands of a headset: their rays press buttons of the panel, select and move items, and touch known
+ * points. A motion that the user holds ends when its controller or hand is lost.
+ */
+
+import {
+  DoubleSide,
+  type Matrix4,
+  Mesh,
+  MeshBasicMaterial,
+  type PerspectiveCamera,
+  PlaneGeometry,
+  type Scene,
+  Vector3,
+} from "three";
+import type { Engine } from "../engine/engine";
+import type { Hit } from "../engine/picking";
+import type { Ar } from "../store/ui";
+import { mean, norm, sub, type Vec3 } from "./geometry";
+import { Panel, type PanelButton } from "./panel";
+import type { Layout } from "./places";
+import { fitTouched, type Known, knownPoints, type Touched } from "./touch";
+import { inverseOf, matrixOf } from "./xrView";
+
+/** Buttons of xr-standard gamepads that stop motion: A or X, and B or Y. */
+const STOP_BUTTONS = [4, 5];
+/** Buttons of the panel that work while points are touched. */
+const TOUCHING = ["touch", "stop"];
+/** Width of a ray, its length if it hits nothing, m, and half the angle in which it hits small items, rad. */
+const WIDTH = 0.004;
+const LENGTH = 3;
+const CONE = 0.02;
+/** Movement of the tip during a touch above which the touch does not count, m, and the fewest frames of one. */
+const STILL = 0.01;
+const FRAMES = 3;
+
+/** Moves an item that a ray holds: pose of the point at which it is held, in the workplace. */
+export type Grab = { to: (at: Vector3) => void; end: () => void };
+
+export interface HeadsetHost {
+  engine: Engine;
+  layout: Layout;
+  /** Pose of the workplace in the frame of WebXR. */
+  workplace: () => Matrix4 | null;
+  report: (state: Partial<Ar>) => void;
+  /** End a motion that is held. */
+  release: () => void;
+  stopMotion: () => void;
+  /** Start to move an item; null if it is not selected or cannot be moved. */
+  grab: (id: string, at: Vector3) => Grab | null;
+}
+
+/** What a controller or hand does from press to release. */
+interface Press {
+  source: XRInputSource;
+  end: () => void;
+  /** The item that it moves, and its distance along the ray, m. */
+  grab?: Grab;
+  distance?: number;
+  /** Positions of the tip, if it touches a point. */
+  tips?: Vec3[];
+}
+
+interface Touching {
+  points: Vec3[];
+  next: (count: number) => void;
+  done: (result: Touched) => void;
+}
+
+export class Headset {
+  readonly panel: Panel;
+  /** The points that can be touched. */
+  readonly known: readonly Known[];
+  private readonly rays = new Map<XRInputSource, Mesh<PlaneGeometry, MeshBasicMaterial>>();
+  private readonly poses = new Map<XRInputSource, Matrix4>();
+  private readonly tips = new Map<XRInputSource, Vec3>();
+  private readonly camera: PerspectiveCamera;
+  private readonly forget = new AbortController();
+  private press: Press | null = null;
+  private touching: Touching | null = null;
+  private pressedStop = false;
+  private reported: boolean | null = null;
+
+  constructor(
+    private readonly session: XRSession,
+    private readonly scene: Scene,
+    private readonly host: HeadsetHost,
+  ) {
+    this.panel = new Panel(scene);
+    this.known = knownPoints(host.layout.places);
+    this.camera = host.engine.view.camera.clone();
+    this.camera.fov = (4 * CONE * 180) / Math.PI;
+    const { signal } = this.forget;
+    const on = (event: string, act: (event: XRInputSourceEvent) => void) =>
+      session.addEventListener(event, act as unknown as EventListener, { signal });
+    on("selectstart", ({ inputSource }) => this.start(inputSource));
+    on("selectend", ({ inputSource }) => this.press?.source === inputSource && this.end());
+    on("inputsourceschange", (event) => {
+      for (const source of (event as unknown as XRInputSourcesChangeEvent).removed) this.lose(source);
+    });
+  }
+
+  /**
+   * Let the user touch the known points. `next`: called with the number of touched points; `done`: with the pose of the
+   * workplace, or why there is none. Without them, cancel.
+   */
+  touch(next?: Touching["next"], done?: Touching["done"]): void {
+    this.touching = next && done ? { points: [], next, done } : null;
+  }
+
+  /** Take the poses of controllers and hands in a frame. */
+  frame(frame: XRFrame, space: XRReferenceSpace, viewer: Matrix4, tracked: boolean): void {
+    this.panel.follow(viewer);
+    let stops = false;
+    let pressed = false;
+    let hovered = "";
+    for (const source of this.session.inputSources) {
+      const pose = frame.getPose(source.targetRaySpace, space);
+      if (!pose || pose.emulatedPosition) {
+        this.lose(source);
+        continue;
+      }
+      const { gamepad } = source;
+      if (gamepad?.mapping === "xr-standard" && STOP_BUTTONS.some((n) => gamepad.buttons[n])) {
+        stops = true;
+        pressed ||= STOP_BUTTONS.some((n) => gamepad.buttons[n]?.pressed);
+      }
+      const ray = matrixOf(pose.transform.matrix);
+      this.poses.set(source, ray);
+      this.tips.set(source, tipOf(frame, space, source, ray));
+      const hit = this.panel.hit(ray);
+      hovered ||= hit?.button?.id ?? "";
+      this.drawRay(source, ray, hit?.distance ?? this.itemAt(ray)?.distance ?? LENGTH);
+    }
+    this.panel.hover(hovered);
+    // By its press, as every Stop.
+    if (pressed && !this.pressedStop) this.host.stopMotion();
+    this.pressedStop = pressed;
+    if (!tracked) this.end();
+    if (stops !== this.reported) {
+      this.reported = stops;
+      if (!stops) this.host.release();
+      this.host.report({ stopButton: stops });
+    }
+    this.hold();
+  }
+
+  dispose(): void {
+    this.forget.abort();
+    this.end();
+    for (const source of [...this.rays.keys()]) this.lose(source);
+    this.panel.dispose();
+  }
+
+  private start(source: XRInputSource): void {
+    this.end();
+    const ray = this.poses.get(source);
+    if (!ray) return;
+    const hit = this.panel.hit(ray);
+    // The ray of a controller that touches a point may continue to the panel.
+    const meant = this.touching ? TOUCHING.includes(hit?.button?.id ?? "") : hit !== null;
+    if (meant && hit) this.pressButton(source, hit.button);
+    else if (this.touching) this.press = { source, tips: [], end: () => this.touched() };
+    else this.aim(source, ray);
+  }
+
+  private pressButton(source: XRInputSource, button: PanelButton | null): void {
+    if (!button || button.disabled) return;
+    const end = button.press();
+    this.press = { source, end: () => end?.() };
+  }
+
+  /** Select the item at a ray; the selected one is moved instead. */
+  private aim(source: XRInputSource, ray: Matrix4): void {
+    const workplace = this.host.workplace();
+    if (!workplace) return;
+    const hits = this.itemsAt(ray, workplace);
+    const [first] = hits;
+    const grab = first ? this.host.grab(first.id, first.point) : null;
+    if (grab && first) {
+      this.press = { source, grab, distance: first.distance, end: () => grab.end() };
+    } else {
+      this.host.engine.onTap(hits, null);
+    }
+  }
+
+  /** Continue what is pressed: move an item, or collect positions of the tip. */
+  private hold(): void {
+    const { press } = this;
+    if (!press) return;
+    const ray = this.poses.get(press.source);
+    const tip = this.tips.get(press.source);
+    if (press.tips && tip) press.tips.push(tip);
+    const workplace = this.host.workplace();
+    if (!press.grab || !ray || !workplace) return;
+    const at = new Vector3(0, 0, -(press.distance ?? 0)).applyMatrix4(ray);
+    press.grab.to(at.applyMatrix4(inverseOf(workplace)));
+  }
+
+  private touched(): void {
+    const { touching, press, known } = this;
+    const tips = press?.tips ?? [];
+    if (!touching || tips.length < FRAMES) return;
+    const middle = mean(tips);
+    if (Math.max(...tips.map((each) => norm(sub(each, middle)))) > STILL) return;
+    touching.points.push(middle);
+    touching.next(touching.points.length);
+    if (touching.points.length < known.length) return;
+    this.touching = null;
+    touching.done(
+      fitTouched(
+        known.map(({ at }) => at),
+        touching.points,
+      ),
+    );
+  }
+
+  private end(): void {
+    const { press } = this;
+    press?.end();
+    this.press = null;
+  }
+
+  /** A controller or hand is no longer tracked: end what it does, and every motion. */
+  private lose(source: XRInputSource): void {
+    const ray = this.rays.get(source);
+    ray?.removeFromParent();
+    ray?.geometry.dispose();
+    ray?.material.dispose();
+    this.rays.delete(source);
+    this.tips.delete(source);
+    if (!this.poses.delete(source)) return;
+    this.host.release();
+    if (this.press?.source === source) this.end();
+  }
+
+  private itemAt(ray: Matrix4): Hit | undefined {
+    const workplace = this.host.workplace();
+    return workplace ? this.itemsAt(ray, workplace)[0] : undefined;
+  }
+
+  private itemsAt(ray: Matrix4, workplace: Matrix4): Hit[] {
+    const { engine } = this.host;
+    const { width, height } = engine.shown();
+    const { camera } = this;
+    inverseOf(workplace).multiply(ray).decompose(camera.position, camera.quaternion, camera.scale);
+    camera.aspect = width / height;
+    camera.updateProjectionMatrix();
+    camera.updateMatrixWorld();
+    // The picture along the ray is four cones high.
+    return engine.pick(width / 2, height / 2, height / 4, camera);
+  }
+
+  private drawRay(source: XRInputSource, ray: Matrix4, length: number): void {
+    let line = this.rays.get(source);
+    if (!line) {
+      const geometry = new PlaneGeometry(WIDTH, 1).rotateX(-Math.PI / 2).translate(0, 0, -0.5);
+      line = new Mesh(geometry, new MeshBasicMaterial({ color: "#ffffff", side: DoubleSide }));
+      line.matrixAutoUpdate = line.frustumCulled = false;
+      this.scene.add(line);
+      this.rays.set(source, line);
+    }
+    line.matrix.copy(ray).scale(new Vector3(1, 1, length));
+    line.matrixWorldNeedsUpdate = true;
+  }
+}
+
+/** Return the position of the tip of a finger, or of a controller, where its ray starts. */
+function tipOf(frame: XRFrame, space: XRReferenceSpace, { hand }: XRInputSource, ray: Matrix4): Vec3 {
+  const joint = hand?.get("index-finger-tip");
+  const finger = joint && frame.getJointPose?.(joint, space);
+  if (!finger) return new Vector3().setFromMatrixPosition(ray).toArray();
+  const { x, y, z } = finger.transform.position;
+  return [x, y, z];
+}
