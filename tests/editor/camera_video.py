@@ -1,5 +1,6 @@
 """The picture of a camera that moves around markers, for Chromium's fake camera, with the true pose of each picture."""
 
+import base64
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -36,17 +37,27 @@ _BLACK: Final = 240
 
 
 @dataclass(frozen=True)
+class Lens:
+    """Size of pictures and focal length, pixels."""
+
+    width: int = WIDTH
+    height: int = HEIGHT
+    focal: float = FOCAL
+
+
+@dataclass(frozen=True)
 class Shot:
     """A pose of the camera: camera = turn * world + shift; x right, y down, z forward."""
 
     turn: Array
     shift: Array
+    lens: Lens = Lens()
 
     def project(self, points: Any) -> tuple[Array, Array]:
         """Return the pixels of points of the world and their depths, m."""
         seen = np.asarray(points, float) @ self.turn.T + self.shift
-        middle = ((WIDTH - 1) / 2, (HEIGHT - 1) / 2)
-        return FOCAL * seen[:, :2] / seen[:, 2:] + middle, seen[:, 2]
+        middle = ((self.lens.width - 1) / 2, (self.lens.height - 1) / 2)
+        return self.lens.focal * seen[:, :2] / seen[:, 2:] + middle, seen[:, 2]
 
 
 def marker_table() -> dict[str, Any]:
@@ -71,25 +82,36 @@ def write_video(file: Path, pictures: int = 40) -> list[Shot]:
     for number in range(pictures):
         part = number / (pictures - 1)
         angle, distance = -2.2 + 1.4 * part, 0.6 + 0.5 * part
-        shot = _looking(np.array(MIDDLE) + distance * np.array([0.7 * np.cos(angle), 0.7 * np.sin(angle), 0.7]))
-        picture = cv2.cvtColor(_drawn(shot, number, random), cv2.COLOR_GRAY2BGR)
+        shot = looking(np.array(MIDDLE) + distance * np.array([0.7 * np.cos(angle), 0.7 * np.sin(angle), 0.7]))
+        drawn = _drawn(shot, random)
+        for bit in range(BITS):
+            drawn[:FIELD, bit * FIELD : (bit + 1) * FIELD] = 255 if number >> bit & 1 else 0
+        picture = cv2.cvtColor(drawn, cv2.COLOR_GRAY2BGR)
         stream += cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 90])[1].tobytes()
         shots.append(shot)
     file.write_bytes(stream)
     return shots
 
 
-def _looking(eye: Array) -> Shot:
+def picture_url(shot: Shot, seed: int = 3) -> str:
+    """Return the picture of a shot as a URL with its content."""
+    picture = cv2.imencode(".png", _drawn(shot, np.random.default_rng(seed)))[1].tobytes()
+    return f"data:image/png;base64,{base64.b64encode(picture).decode()}"
+
+
+def looking(eye: Array, lens: Lens = Lens()) -> Shot:
+    """Return the shot of a camera that looks at the middle of the markers, upright."""
     forward = (np.array(MIDDLE) - eye) / np.linalg.norm(np.array(MIDDLE) - eye)
     right = np.cross(forward, [0, 0, 1])
     right /= np.linalg.norm(right)
     turn = np.stack([right, np.cross(forward, right), forward])
-    return Shot(turn, -turn @ eye)
+    return Shot(turn, -turn @ eye, lens)
 
 
-def _drawn(shot: Shot, number: int, random: np.random.Generator) -> npt.NDArray[np.uint8]:
-    size = (WIDTH * _FINER, HEIGHT * _FINER)
-    coarse = random.normal(125, 14, (HEIGHT // 20, WIDTH // 20)).astype(np.float32)
+def _drawn(shot: Shot, random: np.random.Generator) -> npt.NDArray[np.uint8]:
+    width, height = shot.lens.width, shot.lens.height
+    size = (width * _FINER, height * _FINER)
+    coarse = random.normal(125, 14, (height // 20, width // 20)).astype(np.float32)
     picture = cv2.resize(coarse, size, interpolation=cv2.INTER_CUBIC)
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
     for marker, (x, y, angle) in MARKERS.items():
@@ -108,9 +130,6 @@ def _drawn(shot: Shot, number: int, random: np.random.Generator) -> npt.NDArray[
         paper = cv2.warpPerspective(drawing.astype(np.float32) * 0.7 + 40, to, size, flags=cv2.INTER_AREA)
         mask = cv2.warpPerspective(np.ones_like(drawing), to, size, flags=cv2.INTER_NEAREST)
         picture = np.where(mask > 0, paper, picture)
-    reduced = cv2.resize(picture, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
+    reduced = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
     soft = cv2.GaussianBlur(reduced, (0, 0), 0.7)
-    final = np.clip(soft + random.normal(0, 2.5, soft.shape), 0, 255).astype(np.uint8)
-    for bit in range(BITS):
-        final[:FIELD, bit * FIELD : (bit + 1) * FIELD] = 255 if number >> bit & 1 else 0
-    return final
+    return np.clip(soft + random.normal(0, 2.5, soft.shape), 0, 255).astype(np.uint8)

@@ -26,6 +26,7 @@ from tests.e2e.harness import Cell, scene_state, until
 from tests.editor import texts
 from tests.editor.reset import place_robot
 from tests.editor.screen import Screen, screen_of
+from tests.editor.xr import Controller, emulate
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
@@ -402,3 +403,39 @@ async def test_hand_guiding_is_active_while_held(place: Place) -> None:
     await place.screen.sees("Hand teaching is on")
     await page.mouse.up()
     await place.screen.sees("Hand teaching is off")
+
+
+async def test_headset_moves_the_robot_only_while_a_tracked_controller_holds(place: Place, browser: Browser) -> None:
+    async with screen_of(browser, place.cell.url) as screen:
+        page = screen.page
+        await emulate(page, headset=True)
+        await screen.join("Ida")
+        await screen.item(place.robot)
+        await page.get_by_role("button", name="AR", exact=True).click()
+        await page.get_by_role("button", name="Camera only").wait_for()
+        await screen.press("Start AR")
+        await screen.until("() => __ar?.headset?.reported")
+        hand = Controller(screen)
+
+        async def held(wanted: bool) -> None:
+            while (await place.client.next_event("RobotHold", timeout=30)).data.held is not wanted:
+                pass
+
+        await place.client.call("SubscribeEvents", rpc.SubscribeEventsArgs({"RobotHold"}))
+        await hand.button("z1")
+        before = await place.stands()
+        await hand.press(True)
+        await held(True)
+        await until(_higher(place, before.z + 0.005), "the arm moves", 20)
+        await hand.press(False)
+        await held(False)
+        await hand.press(True)
+        await held(True)
+        await page.evaluate("() => { __xr.state.lostController = true; }")
+        await held(False)
+        await page.evaluate("() => { __xr.state.lostController = false; }")
+        # Hands have no button for Stop: motion is barred. The panel has Stop, and says why.
+        await page.evaluate("() => { __xr.device.primaryInputMode = 'hand'; }")
+        await screen.until("() => __ar.headset.panel.content.buttons.find(({ id }) => id === 'z1').disabled")
+        assert "Motion needs a controller" in await page.evaluate("__ar.headset.panel.content.lines.join()")
+        assert await page.evaluate("__ar.headset.panel.middleOf('stop')")
