@@ -11,6 +11,7 @@ from benchmarks.metrics import Metric, Report, median, percentile
 from tests.editor.ar_probe import overlay_errors
 from tests.editor.camera_video import CAMERA, MIDDLE, marker_table, write_video
 from tests.editor.screen import Screen, running_browser, screen_of
+from tests.editor.test_editor_ar import DARKEN
 from tests.editor.test_editor_size import needed
 
 STARTS: Final = 3
@@ -21,15 +22,27 @@ LENS_WITHIN: Final = 60.0
 """Time in which the focal length must be found, s."""
 
 
+START: Final = {"src/ui/ar/StartAr.tsx", "src/ui/ar/ArView.tsx"}
+CAMERA_FILES: Final = {"src/ar/arSession.ts"}
+TABLET_FILES: Final = {"src/ar/xrSession.ts"}
+HEADSET_FILES: Final = TABLET_FILES | {"src/ar/headset.ts", "src/ui/ar/HeadsetPanel.tsx"}
+
+
 def size(report: Report) -> None:
-    """Measure the size of the files that are loaded when AR starts, compressed with gzip."""
+    """Measure the size of the files that each way of AR loads when it starts, compressed with gzip."""
+    sizes = {"camera": _size(CAMERA_FILES), "tablet": _size(TABLET_FILES), "headset": _size(HEADSET_FILES)}
+    note = "most that a device loads; " + ", ".join(f"{way} {total / 1e3:.1f} kB" for way, total in sizes.items())
+    report.add(Metric("ar_size_kb", max(sizes.values()) / 1e3, len(sizes), note))
+
+
+def _size(way: set[str]) -> int:
+    """Return the size of the files that a way of AR loads, without parts that others load, too, bytes."""
     manifest = json.loads((FILES / ".vite" / "manifest.json").read_text())
-    own = {"src/ui/ar/StartAr.tsx", "src/ui/ar/ArView.tsx"}
     loaded = {name for name, chunk in manifest.items() if chunk.get("isEntry") or chunk.get("isDynamicEntry")}
-    files = needed(manifest, *own) - needed(manifest, *(loaded - own))  # without parts that others load, too
-    files |= {str(file.relative_to(FILES)) for file in (FILES / "assets").glob("worker-*.js")}
-    total = sum((FILES / f"{name}.gz").stat().st_size for name in files)
-    report.add(Metric("ar_size_kb", total / 1e3, len(files), "files of AR with the worker"))
+    files = needed(manifest, *START, *way) - needed(manifest, *(loaded - START - CAMERA_FILES - HEADSET_FILES))
+    if way != HEADSET_FILES:  # headsets give pages no pictures
+        files |= {str(file.relative_to(FILES)) for file in (FILES / "assets").glob("worker-*.js")}
+    return sum((FILES / f"{name}.gz").stat().st_size for name in files)
 
 
 async def augmented(report: Report, directory: Path, url: str) -> None:
@@ -61,11 +74,23 @@ async def augmented(report: Report, directory: Path, url: str) -> None:
                     near += await overlay_errors(screen, shots, [MIDDLE])
                     aside += await overlay_errors(screen, shots, ASIDE)
                     took.append(shown["latency"])
+                regained = [await _regain(screen) for _ in range(STARTS)]
     report.add(Metric("ar_registration_s", max(starts), STARTS, "worst, with an unknown lens"))
+    report.add(Metric("ar_regained_s", max(regained), STARTS, "worst, after dark pictures"))
     for name, errors in (("near", near), ("aside", aside)):
         note = f"p95; p50 {1e3 * median(errors):.2f} mm"
         report.add(Metric(f"ar_{name}_mm", 1e3 * percentile(errors, 95), len(errors), note))
     report.add(Metric("ar_picture_ms", percentile(took, 95), PICTURES, f"p95; p50 {median(took):.0f} ms"))
+
+
+async def _regain(screen: Screen) -> float:
+    """Cover the camera until the registration is lost, and return the time until it is regained, s."""
+    await screen.page.evaluate(DARKEN)
+    await screen.until("() => __ar.phase === 'lost'")
+    began = time.perf_counter()
+    await screen.page.evaluate("() => { __ar.video.srcObject = __camera; __ar.video.play(); }")
+    await screen.until("() => __ar.phase === 'registered'")
+    return time.perf_counter() - began
 
 
 async def _next_picture(screen: Screen) -> dict[str, Any]:

@@ -134,6 +134,7 @@ GOALS: Final[dict[str, tuple[str, str]]] = {
     "editor_large_list_s": ("s", "<= 1"),
     "ar_size_kb": ("kB", "<= 25"),
     "ar_registration_s": ("s", "<= 3"),
+    "ar_regained_s": ("s", "<= 2"),
     "ar_near_mm": ("mm", "<= 1"),
     "ar_aside_mm": ("mm", "<= 2"),
     "ar_picture_ms": ("ms", "<= 250"),

@@ -24,7 +24,7 @@ import { Sharing } from "./sharing";
 import type { Touched } from "./touch";
 import type { Found } from "./tracker";
 import { type Taken, XrPictures } from "./xrPictures";
-import { cropped, inverseOf, lensIn, matrixOf, viewIn, workplaceIn, XrOutput } from "./xrView";
+import { cropped, inverseOf, lensIn, matrixOf, viewOf, workplaceIn, XrOutput } from "./xrView";
 import { XrWorkplace } from "./xrWorkplace";
 
 /** Time between two reports, and for which a correction is reported, ms. */
@@ -191,13 +191,13 @@ export class XrArSession implements ArMode {
     const { left, top } = this.options.engine.view.element.getBoundingClientRect();
     const lens = lensIn(projection, window.innerWidth, window.innerHeight);
     const onScreen = (points: readonly Point[]) => points.map(([x, y]): Point => [x + left - 0.5, y + top - 0.5]);
-    const movement = dragged(onScreen(from), onScreen(to), viewIn(pose, this.viewer), lens);
+    const movement = dragged(onScreen(from), onScreen(to), viewOf(pose, this.viewer), lens);
     if (movement) this.move(movement);
   }
 
   step(direction: Direction, size: { distance: number; angle: number }): void {
     const { pose } = this.workplace;
-    if (pose) this.move(stepTowards(direction, size, viewIn(pose, this.viewer)));
+    if (pose) this.move(stepTowards(direction, size, viewOf(pose, this.viewer)));
   }
 
   /** The device knows the vertical. */
@@ -341,7 +341,7 @@ export class XrArSession implements ArMode {
         seenAt: Date.now(),
       });
     }
-    const view = this.workplace.pose && viewIn(this.workplace.pose, taken.camera);
+    const view = this.workplace.pose && viewOf(this.workplace.pose, taken.camera);
     const count = (this.shown?.count ?? 0) + 1;
     this.shown = { found, view, lens: taken.lens, latency: performance.now() - taken.at, ms, count };
     this.options.report({ loss: found.loss ?? "unseen" });
@@ -364,7 +364,7 @@ export class XrArSession implements ArMode {
           : source === "markers" && now - at < FRESH
             ? "registered"
             : "tracked";
-    this.sharing.take(phase === "lost" || !pose ? null : viewIn(pose, this.viewer), now);
+    this.sharing.take(phase === "lost" || !pose ? null : viewOf(pose, this.viewer), now);
     if (phase === this.phase && now - this.reportedAt < REPORT) return;
     this.phase = phase;
     this.reportedAt = now;

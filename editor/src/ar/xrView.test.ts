@@ -2,7 +2,7 @@ import { Matrix4, PerspectiveCamera, Vector3 } from "three";
 import { expect, test } from "vitest";
 import { projected } from "./pose";
 import { looking } from "./testing";
-import { cropped, lensIn, viewIn, workplaceIn } from "./xrView";
+import { cropped, lensIn, viewOf, workplaceIn } from "./xrView";
 
 const CAMERA = new Matrix4().makeRotationY(0.4).setPosition(0.3, 1.5, 0.2);
 const VIEW = looking([1, -0.8, 0.9], [0.2, 0.1, 0]);
@@ -17,7 +17,7 @@ function camera(): PerspectiveCamera {
 
 test("the workplace is where the picture shows it", () => {
   const workplace = workplaceIn(VIEW, CAMERA);
-  const back = viewIn(workplace, CAMERA);
+  const back = viewOf(workplace, CAMERA);
   expect(back.turn.flat()).toEqual(VIEW.turn.flat().map((each) => expect.closeTo(each, 9)));
   expect(back.shift).toEqual(VIEW.shift.map((each) => expect.closeTo(each, 9)));
   // A point is drawn at the pixel at which the lens of the picture expects it.

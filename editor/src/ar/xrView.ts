@@ -25,7 +25,7 @@ export const matrixOf = (elements: ArrayLike<number>): Matrix4 => new Matrix4().
 export const inverseOf = (matrix: Matrix4): Matrix4 => matrix.clone().invert();
 
 /** Return the view of a camera. Both poses are in the frame of WebXR. */
-export function viewIn(workplace: Matrix4, camera: Matrix4): View {
+export function viewOf(workplace: Matrix4, camera: Matrix4): View {
   const e = inverseOf(camera.clone().multiply(FLIP)).multiply(workplace).elements;
   const row = (n: number): Vec3 => [e[n] as number, e[4 + n] as number, e[8 + n] as number];
   const turn: Mat3 = [row(0), row(1), row(2)];

@@ -4,7 +4,7 @@ import { Matrix4, Quaternion, Vector3 } from "three";
 import type { Vec3 } from "./geometry";
 import { type Movement, movedView } from "./placing";
 import { JUMP, jumpBetween } from "./registration";
-import { inverseOf, matrixOf, viewIn, workplaceIn } from "./xrView";
+import { inverseOf, matrixOf, viewOf, workplaceIn } from "./xrView";
 
 /** Drift that is expected of the device's tracking, relative to the distance that it moved. */
 const DRIFT = 0.01;
@@ -60,7 +60,7 @@ export class XrWorkplace {
    */
   register(pose: Matrix4, source: Source, error: number, camera: Matrix4): number {
     const before = this.pose;
-    const jump = before ? jumpBetween(viewIn(before, camera), viewIn(pose, camera), this.middles) : 0;
+    const jump = before ? jumpBetween(viewOf(before, camera), viewOf(pose, camera), this.middles) : 0;
     // A rough sighting does not replace a better registration, unless they contradict each other clearly.
     if (source === "markers" && this.source === "markers" && error > 2 * this.error && jump < 3 * error) return 0;
     const gradually = before && source === "markers" && this.source === "markers" && jump <= JUMP;
@@ -88,7 +88,7 @@ export class XrWorkplace {
 
   /** Move it as a movement in its own frame does. */
   move(by: Movement, camera: Matrix4): void {
-    if (this.pose) this.set(workplaceIn(movedView(viewIn(this.pose, camera), by), camera));
+    if (this.pose) this.set(workplaceIn(movedView(viewOf(this.pose, camera), by), camera));
   }
 
   forget(): void {
