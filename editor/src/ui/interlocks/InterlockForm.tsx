@@ -151,7 +151,7 @@ function RetractPath({ path, onChange }: RetractPathProps) {
       <legend>{t`Retract path`}</legend>
       <p className="quiet small">
         {path.length > 0
-          ? t`Points in the frame of the body, from inside to outside. A robot that may not stay in the zone leaves it on this path.`
+          ? t`Points in the frame of the body, from inside to outside. A robot that may not stay leaves on this path.`
           : t`A robot that may not stay in the zone leaves it on the shortest way.`}
       </p>
       {path.map((point, n) => (

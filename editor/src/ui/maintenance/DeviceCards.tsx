@@ -40,7 +40,7 @@ export default function DeviceCards({ first = "", onClose }: { first?: string; o
     <Window title={t`Device cards`} onClose={onClose}>
       {cards === null && <Waiting>{t`Loading…`}</Waiting>}
       {(cards?.length === 0 || (cards && opened)) && (
-        <p className="quiet">{t`A device has a card after it was online for the first time and reported its identity.`}</p>
+        <p className="quiet">{t`A device has a card once it was online and reported its identity.`}</p>
       )}
       <ul className="device-cards">
         {cards?.map((each) => {

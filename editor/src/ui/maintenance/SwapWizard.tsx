@@ -101,7 +101,7 @@ export function SwapWizard({ card: given, reload, onClose, onLeave }: Props) {
               </table>
             </div>
             <p className="quiet small">
-              {t`Compare the serial number with the label on the device. If the wrong device is connected, exchange it now.`}
+              {t`Compare the serial number with the label on the device. If it is the wrong one, exchange it now.`}
             </p>
           </>
         )}
@@ -122,7 +122,7 @@ export function SwapWizard({ card: given, reload, onClose, onLeave }: Props) {
           <>
             <p>
               {!other
-                ? t`The device is the same one. Its calibrations still hold; check them if the firmware changes its kinematics.`
+                ? t`It is the same device. Its calibrations hold; check them if the firmware changes its kinematics.`
                 : measured?.length === 0
                   ? t`No calibration of the previous device is recorded.`
                   : t`These calibrations of the previous device no longer hold. Measure them again.`}

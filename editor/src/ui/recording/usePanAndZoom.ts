@@ -1,4 +1,4 @@
-/** Moving and zooming the visible time: one finger or the mouse moves it, two fingers or the wheel zoom, a tap reads. */
+/** Move and zoom the visible time: one finger or the mouse moves it, two fingers or the wheel zoom, a tap reads. */
 
 import { type RefObject, useEffect, useRef } from "react";
 import { moved, type Range, zoomed } from "./layout";
