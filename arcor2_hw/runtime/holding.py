@@ -18,7 +18,8 @@ from arcor2_hw.runtime.calls import Calls, Post, error_data
 from arcor2_hw.runtime.cell import CONTROL_DEADLINE, Cell
 from arcor2_hw.runtime.clock import Clock
 from arcor2_hw.runtime.device import Device, describe
-from arcor2_hw.runtime.interlocks import JOG, Guard, Interlocks
+from arcor2_hw.runtime.guards import Guard
+from arcor2_hw.runtime.interlocks import JOG, Interlocks
 from arcor2_hw.runtime.jogging import Jog
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.teaching import SET_MODE, Teaching

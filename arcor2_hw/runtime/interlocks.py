@@ -7,35 +7,31 @@ safety function.
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, Final
 
 from msgspec.structs import replace
 
-from arcor2_hw.collision.description import Obstacle
-from arcor2_hw.collision.lines import first_hit
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.geometry import Pose, Position
+from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.interlocks import Interlock, InterlockCondition, InterlockState, InterlockTarget, Unmet
-from arcor2_hw.data.project import ProjectRobotJoints
-from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Arcor2Error, Interlocked, Refused
 from arcor2_hw.messages import Message
-from arcor2_hw.objects import CollisionObject, MultiArmRobot, Robot
+from arcor2_hw.objects import MultiArmRobot, Robot
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import Device
+from arcor2_hw.runtime.guards import Guard, Obstruction, Track
 from arcor2_hw.runtime.messages import Lease
 from arcor2_hw.runtime.needs import Key, Seen, Verdict, key_of, read, verdict
 from arcor2_hw.runtime.retreat import Leaving, Retreat
 from arcor2_hw.runtime.stopping import send_stop
+from arcor2_hw.runtime.zone_motions import ZoneBodies, extrapolated, lines_over, targets_of, tips_of
 from arcor2_hw.runtime.zones import ZoneTokens
 
 READ_PERIOD: Final = 0.05
 """Period at which observations and positions are read, s."""
 POLL: Final = 0.02
 """Period at which a waiting action is checked, s."""
-POSITION_TIMEOUT: Final = 0.5
-"""Time in which a robot has to return its position, s."""
 LOOK_AHEAD: Final = 0.3
 """Time for which a motion with an unknown target is extrapolated, s: reading, stopping and braking."""
 FIRST_READING: Final = 1.0
@@ -46,52 +42,6 @@ JOG: Final = "jog"
 
 Wait = Callable[[float], float]
 """Waits for a time, s, and returns how long the program was paused meanwhile. It raises if the action is stopped."""
-
-
-class Guard:
-    """An action or hold-to-run motion that was admitted and has not ended.
-
-    Args:
-        device: its device.
-        what: its name, for messages.
-        zones: the zones that it has.
-        watched: ids of the interlocks whose conditions it needs until its end.
-        targets_known: whether the targets were known when it was admitted.
-        stop: stops it, with the reason.
-    """
-
-    def __init__(
-        self,
-        device: Device,
-        what: str,
-        zones: set[str],
-        watched: set[str],
-        targets_known: bool,
-        stop: Callable[[Interlocked], None],
-    ) -> None:
-        self.device, self.what, self.zones, self.watched = device, what, zones, watched
-        self.targets_known, self.stop = targets_known, stop
-        self.broken: Interlocked | None = None
-        """Why it was stopped."""
-        self.leaving: Leaving | None = None
-        """Set if it may only leave the zones in which the robot is."""
-        self.retracts = False
-        """Whether it follows the retract paths of these zones."""
-
-
-class _Obstruction(NamedTuple):
-    """Why an action may not start. patience: how long it may wait, s."""
-
-    reason: Message
-    patience: float
-
-
-class _Track(NamedTuple):
-    """The positions of the end effectors of a robot. inside: the zones in which they are."""
-
-    at: float
-    tips: list[Position]
-    inside: frozenset[str]
 
 
 class Interlocks:
@@ -111,8 +61,9 @@ class Interlocks:
         """What is read of each device; nothing but the position of a robot."""
         self._threads: dict[str, threading.Thread] = {}
         self._seen: dict[Key, Seen] = {}
-        self._tracks: dict[str, _Track] = {}
+        self._tracks: dict[str, Track] = {}
         self._tokens = ZoneTokens()
+        self._bodies = ZoneBodies(cell, lambda: self._zones)
         self._guards: dict[str, Guard] = {}
         self._waiting: dict[str, set[str]] = {}
         """The interlocks for which devices wait."""
@@ -169,27 +120,13 @@ class Interlocks:
             self._check_guards()
             self._closed.wait(READ_PERIOD)
 
-    def _tips(self, device: Device) -> list[Position]:
-        """Return the positions of the end effectors of a robot in the world. Raises Arcor2Error."""
-        robot = device.require()
-
-        def read_tips() -> list[Position]:
-            if isinstance(robot, MultiArmRobot):
-                pairs = [(each, arm) for arm in robot.get_arm_ids() for each in robot.get_end_effectors_ids(arm)]
-                return [robot.get_end_effector_pose(each, arm).position for each, arm in pairs]
-            assert isinstance(robot, Robot)
-            return [robot.get_end_effector_pose(each).position for each in robot.get_end_effectors_ids()]
-
-        found: list[Position] = device.watch_lane.call("get_end_effector_pose", read_tips, deadline=POSITION_TIMEOUT)
-        return found
-
     def _follow(self, device: Device) -> None:
         """Read the position of a robot: it releases zones that it has left, and enters others only if it may."""
         before = self._tracks.get(device.id)
         now = time.monotonic()
-        tips = self._tips(device)
-        inside = self._touched((tip, tip) for tip in tips)
-        self._tracks[device.id] = _Track(now, tips, frozenset(inside))
+        tips = tips_of(device)
+        inside = self._bodies.touched((tip, tip) for tip in tips)
+        self._tracks[device.id] = Track(now, tips, frozenset(inside))
         guard, error = self._guards.get(device.id), None
         if guard is None:
             with self._lock:
@@ -211,7 +148,9 @@ class Interlocks:
                     guard.leaving.left(self._name(zone))
         elif before is not None and not guard.targets_known and len(tips) == len(before.tips) and now > before.at:
             share = LOOK_AHEAD / max(now - before.at, READ_PERIOD)
-            entered |= self._touched((b, _extrapolated(a, b, share)) for a, b in zip(before.tips, tips, strict=True))
+            entered |= self._bodies.touched(
+                (b, extrapolated(a, b, share)) for a, b in zip(before.tips, tips, strict=True)
+            )
         with self._lock:
             entered -= guard.zones
             if not entered or guard.broken is not None:
@@ -225,22 +164,6 @@ class Interlocks:
                 error = self._stopped(guard, found.reason)
         if error is not None:
             guard.stop(error)
-
-    def _touched(self, lines: Iterable[tuple[Position, Position]]) -> set[str]:
-        """Return the zones that straight lines enter, at the present poses of their bodies."""
-        found: set[str] = set()
-        bodies = list(self._bodies())
-        for start, end in lines:
-            found |= {key for key, body in bodies if first_hit(start, end, [(key, body)], 0.0) is not None}
-        return found
-
-    def _bodies(self) -> Iterator[tuple[str, Obstacle]]:
-        cell = self._cell()
-        for zone in self._zones:
-            with contextlib.suppress(Arcor2Error):
-                instance = cell[zone].require()
-                if isinstance(instance, CollisionObject) and instance.collision_model is not None:
-                    yield zone, Obstacle.of(instance.collision_model, instance.pose)
 
     # -------------------------------------------------------------------------------- checks
     def _verdicts(self, interlock: Interlock) -> Iterator[Verdict]:
@@ -268,7 +191,7 @@ class Interlocks:
     def _watched(self, object_id: str, method: str, zones: Iterable[str]) -> set[str]:
         return {one.id for one in self._concerned(object_id, method, zones) if one.during}
 
-    def _obstruction(self, object_id: str, method: str, zones: set[str], inside: Iterable[str]) -> _Obstruction | None:
+    def _obstruction(self, object_id: str, method: str, zones: set[str], inside: Iterable[str]) -> Obstruction | None:
         """Take zones for an action, unless a condition is not met or another robot has one of them.
 
         Args:
@@ -286,7 +209,7 @@ class Interlocks:
                 self._tokens.release(object_id, keep=inside)
                 self._waiting.setdefault(one.id, set()).add(object_id)
                 reason = Message.of("Interlock {interlock}: {reason}", interlock=one.name, reason=unmet.text)
-                return _Obstruction(reason, self._patience([one]))
+                return Obstruction(reason, self._patience([one]))
         busy = self._tokens.take(object_id, zones)
         if busy is None:
             return None
@@ -297,8 +220,8 @@ class Interlocks:
             self._waiting.setdefault(one.id, set()).add(object_id)
         if busy.deadlock:
             text = "Zone {zone}: {owner} is in it, and waits for a zone of {robot}. Neither can continue."
-            return _Obstruction(Message.of(text, zone=zone, owner=owner, robot=names.get(object_id, object_id)), 0.0)
-        return _Obstruction(Message.of("Zone {zone}: {owner} has it", zone=zone, owner=owner), self._patience(users))
+            return Obstruction(Message.of(text, zone=zone, owner=owner, robot=names.get(object_id, object_id)), 0.0)
+        return Obstruction(Message.of("Zone {zone}: {owner} has it", zone=zone, owner=owner), self._patience(users))
 
     def _patience(self, interlocks: Sequence[Interlock]) -> float:
         waits = [one.within if one.otherwise is Unmet.WAIT else 0.0 for one in interlocks]
@@ -399,9 +322,10 @@ class Interlocks:
     ) -> Guard:
         """Admit a motion that only leaves zones: those that the robot may not have, or all without `refused`."""
         robot = device.require()
-        tips = self._tips(device) if self._zones and not isinstance(robot, MultiArmRobot) else []
-        bodies = dict(self._bodies())
-        there = {zone: [n for n, tip in enumerate(tips) if zone in self._touched([(tip, tip)])] for zone in bodies}
+        tips = tips_of(device) if self._zones and not isinstance(robot, MultiArmRobot) else []
+        bodies = dict(self._bodies.present())
+        touched = [self._bodies.touched([(tip, tip)]) for tip in tips]
+        there = {zone: [n for n, zones in enumerate(touched) if zone in zones] for zone in bodies}
         inside = {zone for zone, found in there.items() if found}
         with self._lock:
             found = self._obstruction(device.id, what, set(), inside)
@@ -432,10 +356,10 @@ class Interlocks:
         """
         if guard.leaving is None:
             return lease, 1.0
-        device, tips = guard.device, self._tips(guard.device)
+        device, tips = guard.device, tips_of(guard.device)
         lease, scale = guard.leaving.steer(lease, tips)
         step = Position(*(LOOK_AHEAD * each for each in (lease.twist or ())[:3]))
-        ahead = self._touched((tip, tip + step) for tip in tips) - guard.zones
+        ahead = self._bodies.touched((tip, tip + step) for tip in tips) - guard.zones
         with self._lock:
             found = self._obstruction(device.id, "", ahead, guard.zones)
             for ids in self._waiting.values():
@@ -466,22 +390,22 @@ class Interlocks:
             while True:
                 zones: set[str] = set()
                 targets: list[Position] = []
-                found: _Obstruction | None = None
+                found: Obstruction | None = None
                 if self._zones and issubclass(device.recipe.cls, Robot):
                     try:
-                        tips = self._tips(device)
+                        tips = tips_of(device)
                     except Arcor2Error as error:
                         reason = Message.of(
                             "The position of {device} is unknown: {reason}", device=device.name, reason=error
                         )
-                        found = _Obstruction(reason, 0.0)
+                        found = Obstruction(reason, 0.0)
                     else:
-                        targets = list(_targets(device, arguments))
-                        inside = self._touched((tip, tip) for tip in tips)
+                        targets = list(targets_of(device, arguments))
+                        inside = self._bodies.touched((tip, tip) for tip in tips)
                         zones = (
                             inside
-                            | self._touched(_path(tips, targets))
-                            | self._touched((tip, tip + step) for tip in tips for step in ahead)
+                            | self._bodies.touched(lines_over(tips, targets))
+                            | self._bodies.touched((tip, tip + step) for tip in tips for step in ahead)
                         )
                 with self._lock:
                     for ids in self._waiting.values():
@@ -515,7 +439,7 @@ class Interlocks:
         keep = set(guard.zones)
         if keep:
             with contextlib.suppress(Arcor2Error):
-                keep = self._touched((tip, tip) for tip in self._tips(device))
+                keep = self._bodies.touched((tip, tip) for tip in tips_of(device))
         with self._lock:
             if self._guards.get(device.id) is guard:
                 del self._guards[device.id]
@@ -540,44 +464,3 @@ class Interlocks:
         if unmet is None or unmet.text is None:
             return state
         return replace(state, state=unmet.state, text=unmet.text.text, **unmet.text.translation())
-
-
-def _extrapolated(before: Position, now: Position, share: float) -> Position:
-    return now + Position(*(share * each for each in now - before))
-
-
-def _path(tips: Iterable[Position], targets: Sequence[Position]) -> Iterator[tuple[Position, Position]]:
-    """Return the straight lines from each end effector over all targets."""
-    for tip in tips:
-        last = tip
-        for target in targets:
-            yield last, target
-            last = target
-
-
-def _targets(device: Device, arguments: Iterable[Any]) -> Iterator[Position]:
-    """Return the positions to which an action moves a robot, as far as its arguments state them."""
-    for argument in arguments:
-        match argument:
-            case Pose():
-                yield argument.position
-            case ProjectRobotJoints():
-                yield from _reached(device, argument.joints)
-            case list() if argument and all(isinstance(each, Joint) for each in argument):
-                yield from _reached(device, argument)
-            case list() | tuple():
-                yield from _targets(device, argument)
-            case Mapping():
-                yield from _targets(device, argument.values())
-            case _:
-                pass
-
-
-def _reached(device: Device, joints: list[Joint]) -> Iterator[Position]:
-    """Return the positions of the end effectors for joint values; none if the driver cannot compute them."""
-    robot = device.require()
-    if not isinstance(robot, Robot) or isinstance(robot, MultiArmRobot):
-        return
-    for each in robot.get_end_effectors_ids():
-        with contextlib.suppress(Arcor2Error):
-            yield robot.forward_kinematics(each, joints).position

@@ -43,3 +43,41 @@ class DeviceStop(Struct, frozen=True):
     object_id: str
     reason: Message | None = None
     method: str = ""
+
+
+class ErrorData(Struct, frozen=True):
+    """An error on its way between processes: code and name of its class, texts, and the device that raised it.
+
+    fault: code of the device's fault, or kind of the safety stop. stamp: when it was raised, on the monotonic clock, s.
+    object_name, object_type: of the device, in the error that ended a program.
+    """
+
+    code: str
+    type: str
+    message: Message
+    detail: str = ""
+    object_id: str = ""
+    fault: str = ""
+    stamp: float = 0.0
+    object_name: str = ""
+    object_type: str = ""
+
+
+class TypeCode(Struct, frozen=True):
+    """Where the host finds an object type: entry point ("module:Class") if installed, else module and source code.
+
+    modules: sources of the modules that belong to this type only, by name.
+    """
+
+    name: str
+    entry_point: str = ""
+    module: str = ""
+    source: str = ""
+    modules: dict[str, str] = {}
+
+
+class ForceStarted(Struct, frozen=True):
+    """The value of CallDone for ForcePoint. before: value of the output before. unit: of both values."""
+
+    before: bool | float
+    unit: str

@@ -16,8 +16,7 @@ from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, NotConnected, NotF
 from arcor2_hw.messages import Message
 from arcor2_hw.objects import Generic
 from arcor2_hw.runtime.own_process import state
-from arcor2_hw.runtime.own_process.peer import Kind, Peer
-from arcor2_hw.runtime.own_process.peer import Message as PeerMessage
+from arcor2_hw.runtime.own_process.peer import Kind, Message as PeerMessage, Peer
 from arcor2_hw.runtime.own_process.stubs import object_stub, stub_class
 
 START_TIMEOUT: Final = 10.0
