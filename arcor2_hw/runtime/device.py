@@ -39,6 +39,8 @@ STOP_GRACE: Final = 2.0
 """Time that a stopped call has to return before it is reported as cancelled, s."""
 CLOSE_DEADLINE: Final = 1.2
 """Time limit of `disconnect`, s. Object types must return within 1 s."""
+_IDENTIFY: Final = "identify"
+"""Name of the call that reads the identity."""
 
 
 def connect_timeout(cls: type[Generic]) -> float:
@@ -114,18 +116,24 @@ class Device:
         """
         if self.identification is None:
             return None
-        job = Job("identify", self._require_confirmed)
+        job = Job(_IDENTIFY, self._require_confirmed)
         return job if self.lane.submit_or_fail(job) else None
 
     def require_confirmed(self, lane: Lane) -> None:
         """Raise DifferentDevice or Refused unless the device may be commanded. It reads after a connection loss."""
         if self.identification is not None and not self.identification.confirmed:
-            lane.call("identify", self._require_confirmed)
+            lane.call(_IDENTIFY, self._require_confirmed)
 
     def _require_confirmed(self) -> None:
         """Raise DifferentDevice or Refused unless the device may be commanded. Call it on the lane."""
         if self.identification is not None and self.instance is not None and not self.closing:
             self.identification.require_confirmed(self.instance)
+
+    @property
+    def busy_with(self) -> str:
+        """Return the name of the running call; empty if there is none, or if it only reads the identity."""
+        busy = self.lane.busy_with
+        return "" if busy == _IDENTIFY else busy
 
     @property
     def up(self) -> bool:

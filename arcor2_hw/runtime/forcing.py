@@ -70,7 +70,7 @@ class Forces:
         """Force an output. CallDone or CallFailed answers it."""
         try:
             device = self._cell()[message.object_id]
-            if busy := device.lane.busy_with:
+            if busy := device.busy_with:
                 raise Refused("{device} executes {method}. Wait until it has ended.", device=device.name, method=busy)
             force = self._register(device, message)
         except Arcor2Error as error:

@@ -140,7 +140,7 @@ class Recovery:
         Raises:
             ProgramStopped: the program was stopped.
         """
-        if device.lane.busy_with or device.moving:
+        if device.busy_with or device.moving:
             wait_stopped([send_stop(device)])
         self._settle()
         found = metadata_of(method)
