@@ -18,7 +18,7 @@ from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.messages import DeviceChanged
 from arcor2_hw.runtime.methods import overrides
-from arcor2_hw.runtime.ring import Ring
+from arcor2_hw.runtime.ring import INTERRUPTED, Ring
 from arcor2_hw.runtime.ring_records import (
     ActionEnded,
     ActionStarted,
@@ -39,8 +39,6 @@ LONGEST_EVENT: Final = 4096
 """Length of the events whose results are recorded, bytes."""
 SHOWN_BINARY: Final = frozenset({"gripped", "red", "amber", "green", "blue", "white"})
 """Names of shown values (`Generic.shown_values`) that are on or off."""
-INTERRUPTED: Final = "run-{run}.ring"
-"""Name of the file with the ring of a run that the end of the server interrupted."""
 
 
 class _Source:

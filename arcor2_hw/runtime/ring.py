@@ -14,6 +14,9 @@ SEGMENT_SIZE: Final = 512 * 1024
 """Size of a segment, bytes. If values need more space, the ring contains a shorter time."""
 SIZE: Final = SEGMENTS * SEGMENT_SIZE
 
+INTERRUPTED: Final = "run-{run}.ring"
+"""Name of the file with the ring of a run that the end of the server interrupted."""
+
 _HEAD: Final = struct.Struct("<QQ")
 """Generation of a segment, 0 for an unused one, and the length of its records."""
 _LENGTH: Final = struct.Struct("<I")

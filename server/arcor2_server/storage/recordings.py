@@ -18,7 +18,7 @@ import structlog
 
 from arcor2_hw.data.recordings import RecordedValues, RecordingInfo
 from arcor2_hw.exceptions import NotFound, StorageError
-from arcor2_hw.runtime.recorder import INTERRUPTED
+from arcor2_hw.runtime.ring import INTERRUPTED
 from arcor2_server.files import DIRECTORY_MODE, replace_file
 
 log = structlog.get_logger(__name__)
