@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from arcor2_hw.exceptions import DeviceTimeout
-from arcor2_hw.keep_alive_process import FROZEN_AFTER as FROZEN_AFTER
-from arcor2_hw.keep_alive_process import PULSE
+from arcor2_hw.keep_alive_process import FROZEN_AFTER as FROZEN_AFTER, PULSE
 from arcor2_hw.messages import Message
 
 PULSE_PERIOD: Final = 0.05

@@ -328,8 +328,7 @@ def _ranges(node: FunctionNode) -> dict[str, _Limits]:
 def described_parameters(docstring: str | None) -> Mapping[str, str]:
     """Return the description of each parameter in a docstring, in any of the usual styles."""
     # Imported here: a start of the server that restores its stored analysis does without.
-    from docstring_parser import DocstringStyle, ParseError
-    from docstring_parser import parse as parse_docstring
+    from docstring_parser import DocstringStyle, ParseError, parse as parse_docstring
 
     if not docstring:
         return {}

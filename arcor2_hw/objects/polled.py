@@ -6,8 +6,7 @@ from typing import TypeVar
 from arcor2_hw.exceptions import DeviceError
 from arcor2_hw.messages import Message
 from arcor2_hw.objects.observing import GoOn as GoOn
-from arcor2_hw.objects.state_observer import Snapshot as Snapshot
-from arcor2_hw.objects.state_observer import StateObserver
+from arcor2_hw.objects.state_observer import Snapshot as Snapshot, StateObserver
 
 T = TypeVar("T")
 

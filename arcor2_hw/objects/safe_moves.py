@@ -13,8 +13,7 @@ from arcor2_hw.objects.motion_path import MotionPath
 from arcor2_hw.objects.obstacle_snapshot import ObstacleSnapshot
 from arcor2_hw.objects.path_monitor import PathMonitor, PlannedPath
 from arcor2_hw.objects.robot import Robot
-from arcor2_hw.objects.robot_kinematics import RobotKinematics
-from arcor2_hw.objects.robot_kinematics import Tool as Tool
+from arcor2_hw.objects.robot_kinematics import RobotKinematics, Tool as Tool
 
 if TYPE_CHECKING:
     from arcor2_hw.collision.sweep import Sweep

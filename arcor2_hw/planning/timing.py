@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from ruckig import InputParameter, Result, Ruckig
-from ruckig import Trajectory as RuckigTrajectory
+from ruckig import InputParameter, Result, Ruckig, Trajectory as RuckigTrajectory
 
 from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.kinematics.arm import Arm

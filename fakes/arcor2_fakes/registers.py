@@ -19,8 +19,7 @@ from typing import Any, ClassVar, Protocol
 from arcor2_fakes.modbus import ExceptionCode, ModbusRefusal, ModbusTables, serial_line, tcp_wire
 from arcor2_fakes.register_map import MapTables, Place, Refusal, RegisterMap
 from arcor2_fakes.serial_line import Line, PtyLine, TcpLine
-from arcor2_fakes.serving import Fake, Wire, address_of
-from arcor2_fakes.serving import serve as run_fake
+from arcor2_fakes.serving import Fake, Wire, address_of, serve as run_fake
 from arcor2_fakes.wire import Connection, TcpWire
 
 __all__ = ["Device", "MappedDevice", "Refusal", "Registers", "serve", "serve_device"]

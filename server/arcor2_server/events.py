@@ -1,7 +1,6 @@
 """Creation of protocol events, and the interface through which parts of the server publish them."""
 
-from collections.abc import Callable
-from collections.abc import Set as AbstractSet
+from collections.abc import Callable, Set as AbstractSet
 from typing import Any, Final, Protocol
 
 import msgspec

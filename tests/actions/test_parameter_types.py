@@ -5,8 +5,7 @@ import math
 
 import msgspec
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from arcor2_hw.actions import PARAMETER_TYPES, IntEnum, StrEnum, by_annotation
 from arcor2_hw.actions.json_values import decode_json, encode

@@ -5,8 +5,7 @@ import tokenize
 from io import StringIO
 
 import msgspec
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 
 from arcor2_hw.analysis import Library, SourceFile
 

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from arcor2_hw.calibration.rigid import apart, crossed, inverted, mean_rotation, motion, moved, rotation_vector, turned
 from arcor2_hw.data.geometry import Orientation

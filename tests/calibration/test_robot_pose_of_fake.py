@@ -12,8 +12,7 @@ from arcor2_fakes.cell import arm
 from arcor2_fakes.cell.layout import Pose as Place
 from arcor2_fakes.oak_d.optics import Lens
 from arcor2_fakes.oak_d.render import Renderer
-from arcor2_fakes.oak_d.scene import Pose as Look
-from arcor2_fakes.oak_d.scene import Thing
+from arcor2_fakes.oak_d.scene import Pose as Look, Thing
 from arcor2_fakes.oak_d.sensor import Sensor
 from arcor2_hw.calibration.robot_pose import find_robot_pose
 from arcor2_hw.calibration.surface import surface_of

@@ -11,9 +11,7 @@ import pytest
 import pytest_asyncio
 
 from arcor2_hw.calibration.refusals import CalibrationRefused
-from arcor2_hw.compute import calibration_tasks as t
-from arcor2_hw.compute import messages as m
-from arcor2_hw.compute import task as task_module
+from arcor2_hw.compute import calibration_tasks as t, messages as m, task as task_module
 from arcor2_hw.compute.dry_run_tasks import DryRunTask
 from arcor2_hw.compute.program_walk import END_STEP, Edge, Graph, Step
 from arcor2_hw.compute.task import ComputeBusy, ComputeStopped, ComputeTimeout, WorkerKind
@@ -23,8 +21,7 @@ from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound
 from arcor2_hw.messages import Message
-from arcor2_server.compute import process
-from arcor2_server.compute import workers as compute_module
+from arcor2_server.compute import process, workers as compute_module
 from arcor2_server.compute.process import ComputeProcess, error_of
 from arcor2_server.compute.workers import Compute
 

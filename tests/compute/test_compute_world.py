@@ -21,8 +21,7 @@ from arcor2_hw.collision.description import (
     WorldItem,
     WorldRobot,
 )
-from arcor2_hw.compute import kinematics_tasks as t
-from arcor2_hw.compute import messages as m
+from arcor2_hw.compute import kinematics_tasks as t, messages as m
 from arcor2_hw.compute.task import ComputeStopped, WorkerKind
 from arcor2_hw.data.editor import Reach
 from arcor2_hw.data.geometry import Orientation, Pose, Position

@@ -5,8 +5,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from arcor2_hw.data.geometry import Orientation, Pose, Position, make_pose_abs, make_pose_rel
 from arcor2_hw.data.object_type import Box, Model3dType, ObjectModel

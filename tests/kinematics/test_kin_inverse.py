@@ -5,8 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 from arcor2_drivers.dobot_magician import kinematics as dobot_kinematics
 from arcor2_drivers.two_axis_robot import kinematics as two_axis_kinematics

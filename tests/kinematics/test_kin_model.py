@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from arcor2_drivers.dobot_magician import kinematics as dobot_kinematics
 from arcor2_drivers.two_axis_robot import kinematics as two_axis_kinematics

@@ -6,8 +6,7 @@ import time
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.data import object_type

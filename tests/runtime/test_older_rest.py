@@ -16,8 +16,7 @@ from arcor2_hw.actions.decorator import DEFAULT_DEADLINE, OLDER_DEADLINE, StrEnu
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import ActionMetadata
 from arcor2_hw.exceptions import DeviceError
-from arcor2_hw.runtime.older import json as older_json
-from arcor2_hw.runtime.older import rest
+from arcor2_hw.runtime.older import json as older_json, rest
 
 
 class Service(ThreadingHTTPServer):

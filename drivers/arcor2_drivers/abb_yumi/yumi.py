@@ -8,8 +8,7 @@ from arcor2_hw.actions import StrEnum, action
 from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.project import ProjectRobotJoints
-from arcor2_hw.data.robot import Control as ControlMode
-from arcor2_hw.data.robot import Joint, MoveResult, RobotState, RobotType, Safety
+from arcor2_hw.data.robot import Control as ControlMode, Joint, MoveResult, RobotState, RobotType, Safety
 from arcor2_hw.exceptions import Refused
 from arcor2_hw.keep_alive import FROZEN_AFTER
 from arcor2_hw.objects import MultiArmRobot
@@ -26,8 +25,7 @@ from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 
 from .arms import JOINT_LIMITS, JOINTS, Arms, other_arm
 from .control import Control, log
-from .hands import ArmId as ArmId
-from .hands import Hands
+from .hands import ArmId as ArmId, Hands
 from .kinematics import Kinematics
 from .motion import Motion
 from .observer import Observer

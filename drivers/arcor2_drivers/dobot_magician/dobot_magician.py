@@ -6,8 +6,7 @@ from arcor2_hw.actions import StrEnum, action
 from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.project import ProjectRobotJoints
-from arcor2_hw.data.robot import Control as ControlMode
-from arcor2_hw.data.robot import Joint, Mode, Power, ProgramState, RobotState, RobotType, Safety
+from arcor2_hw.data.robot import Control as ControlMode, Joint, Mode, Power, ProgramState, RobotState, RobotType, Safety
 from arcor2_hw.exceptions import DeviceError, DeviceFault, NotFound, OutOfRange, Refused
 from arcor2_hw.keep_alive import once_within
 from arcor2_hw.objects import HoldsParts

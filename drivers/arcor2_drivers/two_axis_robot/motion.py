@@ -17,8 +17,7 @@ from arcor2_hw.objects.safe_moves import SafeMoves
 from arcor2_hw.objects.settings import within
 from arcor2_hw.objects.single_arm import MotionLog, move_around_obstacles
 
-from . import kinematics
-from . import registers as reg
+from . import kinematics, registers as reg
 from .bus import Bus
 from .control import GOALS, POLL, REST_WITHIN, Control, goal_block
 from .observer import Observer, State

@@ -7,8 +7,7 @@ from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.maintenance import DeviceParameter, ParameterFailure
 from arcor2_hw.data.project import ProjectRobotJoints
-from arcor2_hw.data.robot import Control as ControlMode
-from arcor2_hw.data.robot import Joint, Mode, Power, ProgramState, RobotState, RobotType, Safety
+from arcor2_hw.data.robot import Control as ControlMode, Joint, Mode, Power, ProgramState, RobotState, RobotType, Safety
 from arcor2_hw.exceptions import DeviceError, Refused
 from arcor2_hw.keep_alive import FROZEN_AFTER
 from arcor2_hw.objects.arm import TCP, check_end_effector, named_joints, refuse_acknowledgement

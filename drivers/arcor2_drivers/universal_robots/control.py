@@ -6,8 +6,7 @@ import threading
 from typing import Final
 
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.data.robot import Control as ControlMode
-from arcor2_hw.data.robot import ProgramState
+from arcor2_hw.data.robot import Control as ControlMode, ProgramState
 from arcor2_hw.exceptions import Cancelled, DeviceError, NotInControl, OutOfRange, Refused, SafetyStop
 from arcor2_hw.keep_alive import once_within
 from arcor2_hw.messages import Phrase

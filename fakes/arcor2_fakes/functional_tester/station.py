@@ -9,10 +9,7 @@ from collections.abc import Callable
 import msgspec
 
 from arcor2_fakes.functional_tester.board import Board, Measured, measure
-from arcor2_fakes.functional_tester.states import Answer as Answer
-from arcor2_fakes.functional_tester.states import Command as Command
-from arcor2_fakes.functional_tester.states import Fault as Fault
-from arcor2_fakes.functional_tester.states import State as State
+from arcor2_fakes.functional_tester.states import Answer as Answer, Command as Command, Fault as Fault, State as State
 
 
 class Refusal(ValueError):

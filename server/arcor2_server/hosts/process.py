@@ -18,8 +18,7 @@ from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.data.parts import ConfirmedPart
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout
 from arcor2_hw.messages import Message
-from arcor2_hw.runtime import messages as m
-from arcor2_hw.runtime import ring
+from arcor2_hw.runtime import messages as m, ring
 from arcor2_hw.runtime.ring import Ring
 from arcor2_server.child_process import ChildProcess, describe_exit
 

@@ -1,7 +1,6 @@
 """The hub of events: the connected clients and their subscriptions."""
 
-from collections.abc import Callable
-from collections.abc import Set as AbstractSet
+from collections.abc import Callable, Set as AbstractSet
 
 from arcor2_hw.data.events import EVENTS, Event, MainScreen, ShowMainScreenData
 from arcor2_server.events import Connection, encode, make_event

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 
 from arcor2_drivers.abb_yumi import nominal
 from arcor2_drivers.abb_yumi.arm_line import ArmLine

@@ -1,7 +1,6 @@
 """Lines of the reader: with any fragmentation or noise, only complete, valid lines are returned."""
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from arcor2_drivers.barcode_reader import lines
 from arcor2_drivers.barcode_reader.lines import MAX_CODE, MAX_LINE, LineBuffer

@@ -56,8 +56,7 @@ class Photographer:
     def __init__(self) -> None:
         from arcor2_fakes.oak_d.optics import Lens
         from arcor2_fakes.oak_d.render import Renderer
-        from arcor2_fakes.oak_d.scene import Pose as ScenePose
-        from arcor2_fakes.oak_d.scene import Scene
+        from arcor2_fakes.oak_d.scene import Pose as ScenePose, Scene
         from arcor2_fakes.oak_d.sensor import Sensor
 
         self._lens = Lens(960, 540)

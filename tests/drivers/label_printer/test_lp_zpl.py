@@ -1,8 +1,7 @@
 """ZPL answers byte for byte, and fields that cannot contain commands."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from arcor2_drivers.label_printer.zpl import BadLabel, check_label, field, identity, number, status, variable
 

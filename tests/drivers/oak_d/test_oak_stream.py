@@ -5,8 +5,7 @@ from typing import Any
 
 import msgspec
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from arcor2_drivers.oak_d import stream
 from arcor2_drivers.oak_d.stream import BadStream, Clock, FrameHeader, Hello, Kind, Refusal, Status

@@ -5,8 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from arcor2_drivers.robotiq_2f import scaling
 from arcor2_drivers.robotiq_2f.robotiq_2f import Robotiq2F

@@ -1,8 +1,7 @@
 """MT-SICS lines from the manual, and random bytes."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from arcor2_drivers.scale.sics import LONGEST_LINE, Answer, answers
 

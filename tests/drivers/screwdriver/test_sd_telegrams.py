@@ -3,8 +3,7 @@
 import re
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from arcor2_drivers.screwdriver import telegrams
 from arcor2_drivers.screwdriver.telegrams import AlarmReport, Mid, Result, Telegram, TelegramBuffer

@@ -4,8 +4,7 @@ import math
 import struct
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from arcor2_drivers.universal_robots import dashboard, timing
 from arcor2_drivers.universal_robots.geometry import from_vector, to_vector, world_from_base

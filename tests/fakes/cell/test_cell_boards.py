@@ -1,7 +1,6 @@
 """The boards of a run depend only on its seed."""
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from arcor2_fakes.cell.boards import draw_boards
 

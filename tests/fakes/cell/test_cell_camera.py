@@ -14,8 +14,7 @@ import arcor2_fakes.cell
 from arcor2_fakes.cell.layout import from_rotation_vector
 from arcor2_fakes.oak_d.optics import Lens
 from arcor2_fakes.oak_d.render import Renderer
-from arcor2_fakes.oak_d.scene import Pose as Look
-from arcor2_fakes.oak_d.scene import Scene
+from arcor2_fakes.oak_d.scene import Pose as Look, Scene
 
 EXAMPLE = json.loads(Path(arcor2_fakes.cell.__file__).with_name("example.json").read_text())
 MARKERS = [

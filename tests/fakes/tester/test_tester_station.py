@@ -1,7 +1,6 @@
 """The fake tester's behaviour over time, with a simulated clock."""
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from arcor2_fakes.functional_tester.board import Board
 from arcor2_fakes.functional_tester.station import (

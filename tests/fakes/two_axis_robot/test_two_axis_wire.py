@@ -12,8 +12,7 @@ from typing import Any
 
 import pytest
 from dynamixel_sdk import COMM_RX_CORRUPT, COMM_RX_TIMEOUT, COMM_SUCCESS, PacketHandler, PortHandler
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from arcor2_fakes.two_axis_robot.packet import BadCrc, Instruction, Receiver, packet, status
 from arcor2_fakes.two_axis_robot.servo import Servo

@@ -4,8 +4,7 @@ import math
 from itertools import pairwise
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from arcor2_fakes.trapezoid import Trapezoid
 from arcor2_fakes.ur.kinematics import Chain, from_pose

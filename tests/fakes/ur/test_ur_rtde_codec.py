@@ -3,8 +3,7 @@
 import struct
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from arcor2_fakes.ur.rtde import FORMATS, INPUTS, MAX_NAMES, OUTPUTS, Deframer, FramingError, Kind, pack, split_names
 

@@ -7,8 +7,7 @@ from types import FrameType
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.object_type import ObjectAction

@@ -5,8 +5,7 @@ from typing import Any
 
 import msgspec
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.geometry import Orientation, Pose, Position

@@ -13,8 +13,10 @@ from arcor2_hw.data.project import Action, ActionPoint, Flow, Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.errors import RequestRefused
-from arcor2_server.rpc import general as _general  # noqa: F401 - for its handlers
-from arcor2_server.rpc import operation as _operation  # noqa: F401 - for its handlers
+from arcor2_server.rpc import (
+    general as _general,  # noqa: F401 - for its handlers
+    operation as _operation,  # noqa: F401 - for its handlers
+)
 from tests.runtime.conftest import scene_object
 from tests.server.core.serving import until
 

@@ -10,11 +10,9 @@ from typing import Any
 
 from pymodbus.client import AsyncModbusTcpClient
 
-from arcor2_hw.data.packml import MachineCommand as C
-from arcor2_hw.data.packml import MachineState as S
+from arcor2_hw.data.packml import MachineCommand as C, MachineState as S
 from arcor2_server.packml.plc import Holding, Input, Status
-from arcor2_server.packml.record import JobEnd
-from arcor2_server.packml.record import RequestResult as R
+from arcor2_server.packml.record import JobEnd, RequestResult as R
 from tests.runtime.conftest import Package, scene_object
 from tests.server.cell.test_execution import LAMP, OBJ, PROJECT
 from tests.server.core.serving import Talker, running, talking

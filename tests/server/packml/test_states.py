@@ -1,8 +1,7 @@
 """The PackML state of the cell: any sequence of commands and states of a program."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from arcor2_hw.data.cell_state import CellMode, CellStateName
 from arcor2_hw.data.editor import RunEnd

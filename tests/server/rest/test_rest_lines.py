@@ -2,8 +2,7 @@
 
 import math
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from arcor2_hw.collision.description import Obstacle
 from arcor2_hw.collision.lines import Hit, first_hit
