@@ -1,5 +1,6 @@
 """What a run has produced: cycles and their durations, good and bad parts, counters."""
 
+import contextlib
 import time
 from collections.abc import Callable, Sequence, Set
 from typing import Final
@@ -11,6 +12,8 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.editor import CounterValue, RunStatistics, VariableValue
 from arcor2_hw.data.events import ActionStateAfterData, ActionStateBeforeData, PackageInfoData
 from arcor2_hw.data.scene import SceneObject
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.object_types.registry import ObjectTypes
 
 COUNTER: Final = "CounterActions"
 """The object type of counters."""
@@ -37,6 +40,18 @@ def _whole_number(text: str) -> int | None:
         return msgspec.json.decode(text.encode(), type=int)
     except msgspec.MsgspecError:
         return None
+
+
+def verdicts_of(info: PackageInfoData, types: ObjectTypes) -> set[str]:
+    """Return the ids of the actions whose result says that a part is good."""
+    objects = {each.id: each.type for each in info.scene.objects}
+    found = set()
+    for action in info.project.all_actions():
+        object_id, _, method = action.type.partition("/")
+        with contextlib.suppress(Arcor2Error):  # the type may be only in the package
+            if types.action(objects.get(object_id, ""), method).meta.verdict is True:
+                found.add(action.id)
+    return found
 
 
 class RunStatisticsCollector:

@@ -124,6 +124,13 @@ class How(Struct, frozen=True):
     values: Mapping[str, str] = MappingProxyType({})
     by_plc: bool = False
 
+    def continuing(self, former: Run) -> "How":
+        """Return these options for a run that continues an interrupted one: it keeps its recipe, values and order."""
+        order = self.order if isinstance(former.order, Unset) else former.order
+        if isinstance(former.recipe, Unset):
+            return replace(self, order=order)
+        return replace(self, recipe_id=former.recipe.id, recipe_values=former.recipe.values, order=order)
+
 
 class Runs:
     """All runs by number. They are stored in the database after `open` was called."""

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import time
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, Final
 
 import msgspec
@@ -11,10 +11,10 @@ import structlog
 from msgspec.structs import replace
 
 from arcor2_hw.data import events as e
-from arcor2_hw.data.base import UNSET, Unset
+from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.editor import RunEnd
 from arcor2_hw.data.events import Event, MainScreen, ProjectExceptionData
-from arcor2_hw.data.held import HoldDecidedData, OnError
+from arcor2_hw.data.held import OnError
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.position import ProgramStep
 from arcor2_hw.data.rpc import ConfirmPartsArgs, DecideHeldArgs
@@ -31,10 +31,12 @@ from arcor2_server.execution.packages import PackageLibrary
 from arcor2_server.execution.part_books import AllPartBooks
 from arcor2_server.execution.program_run import ProgramRun
 from arcor2_server.execution.run_message import RunMessages
+from arcor2_server.execution.run_observers import RunObservers
+from arcor2_server.execution.run_statistics import verdicts_of
 from arcor2_server.execution.runs import How, Runs
 from arcor2_server.hosts.devices import DeviceBoard, overlay_for
 from arcor2_server.hosts.process import CellHost, json_of
-from arcor2_server.hosts.session import HostSession
+from arcor2_server.hosts.session import HostSession, decoded_info
 from arcor2_server.hosts.streams import RobotStreams
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.online_scene import OnlineScene
@@ -55,7 +57,7 @@ RUN_STATES: Final = frozenset({S.RUNNING, S.PAUSING, S.PAUSED, S.RESUMING})
 _IDLE: Final = frozenset({S.UNDEFINED, S.STOPPED})
 
 
-class Execution(PackageLibrary):
+class Execution(PackageLibrary, RunObservers):
     """Runs one package at a time in its own cell host.
 
     Methods raise RequestRefused if the present state does not allow them.
@@ -76,6 +78,7 @@ class Execution(PackageLibrary):
         parts: AllPartBooks,
     ) -> None:
         super().__init__(hub, packages)
+        RunObservers.__init__(self)
         self.state = S.UNDEFINED
         self.stop_within = STOP_WITHIN
         self._reserved = False
@@ -92,28 +95,6 @@ class Execution(PackageLibrary):
         self._runs = runs
         self._secrets = secrets
         self._messages = messages
-        self.on_error: list[Callable[[m.ErrorData, int, str], None]] = []
-        """Called with the error that ends or holds a program, before its devices are gone, the run, and the action."""
-        self.on_failed: list[Callable[[int, m.ErrorData | None, CellHost | None], None]] = []
-        """Called with each run that has failed or was interrupted, the reason, and its host, which ends."""
-        self.on_decided: list[Callable[[HoldDecidedData], None]] = []
-        """Called with each decision about a held program."""
-        self.before_start: list[Callable[[How], None]] = []
-        """Called before a program is started, and again when it starts; each may raise RequestRefused."""
-        self.before_resume: list[Callable[[], None]] = []
-        """Called before a paused program is resumed or stepped; each may raise RequestRefused."""
-        self.before_run: list[Callable[[str, How], Awaitable[How]]] = []
-        """Called with a package and the options of its run, which it may change; may raise RequestRefused."""
-        self.on_begin: list[Callable[[int, str, str, How], None]] = []
-        """Called with the number of a new run, its package, its scene, and its options."""
-        self.on_state: list[Callable[[], None]] = []
-        """Called after each change of `state` and `hold`."""
-        self.on_part_step: list[Callable[[m.PartStep], None]] = []
-        """Called with each report that an action has concerned a part."""
-        self.on_action_end: list[Callable[[int], None]] = []
-        """Called with the number of each action that has ended or failed."""
-        self.on_device_action: list[Callable[[str], None]] = []
-        """Called with the id of the object of each action that starts."""
         self._over: asyncio.Future[None] | None = None
         self._killing: asyncio.TimerHandle | None = None
         self._background = BackgroundTasks()
@@ -243,7 +224,8 @@ class Execution(PackageLibrary):
         if how.continues:
             if how.on_error is not OnError.HOLD:
                 raise RequestRefused("A program can only continue if it is held on errors.")
-            how = self._as_before(await self.parts.require_continues(scene_id, package_id, how.continue_at), how)
+            former = self._runs.get(await self.parts.require_continues(scene_id, package_id, how.continue_at))
+            how = how if former is None else how.continuing(former)
         for prepare in self.before_run:
             how = await prepare(package_id, how)
         self.require_permitted(how)
@@ -262,17 +244,6 @@ class Execution(PackageLibrary):
             begin(program.number, package_id, scene_id, how)
         self._background.spawn(self._begin(message), "program start")
         self._background.spawn(program.describe(self.packages), "description of the run")
-
-    def _as_before(self, run: int, how: How) -> How:
-        """Return the options of a run that continues an interrupted one: it keeps its recipe, values and order."""
-        former = self._runs.get(run)
-        if former is None:
-            return how
-        order = how.order if isinstance(former.order, Unset) else former.order
-        if isinstance(former.recipe, Unset):
-            return replace(how, order=order)
-        used = former.recipe
-        return replace(how, recipe_id=used.id, recipe_values=used.values, order=order)
 
     def reserve(self) -> None:
         """Refuse other runs, since a document is closed only for the time of a run, or a project is about to run."""
@@ -473,22 +444,11 @@ class Execution(PackageLibrary):
 
     def _show_devices(self, package_info: bytes) -> None:
         self._host.package_info = package_info
-        info = msgspec.json.decode(package_info, type=_InfoEvent)
-        _, overlaid = overlay_for(self._settings.cell, self._secrets.is_secret, info.data.scene)
-        self.board.show(info.data.scene.objects, overlaid)
-        self.program.collect_statistics(info.data, self._verdicts(info.data))
+        info = decoded_info(package_info)
+        _, overlaid = overlay_for(self._settings.cell, self._secrets.is_secret, info.scene)
+        self.board.show(info.scene.objects, overlaid)
+        self.program.collect_statistics(info, verdicts_of(info, self._types))
         asyncio.get_running_loop().call_later(SPARE_AFTER, self._host.prepare)
-
-    def _verdicts(self, info: e.PackageInfoData) -> set[str]:
-        """Return the ids of the actions whose result says that a part is good."""
-        types = {each.id: each.type for each in info.scene.objects}
-        found = set()
-        for action in info.project.all_actions():
-            object_id, _, method = action.type.partition("/")
-            with contextlib.suppress(Arcor2Error):  # the type may be only in the package
-                if self._types.action(types.get(object_id, ""), method).meta.verdict is True:
-                    found.add(action.id)
-        return found
 
     def _held(self, message: m.ProgramHeld) -> None:
         if self.state is S.STOPPING:
@@ -562,7 +522,3 @@ class Execution(PackageLibrary):
         elif not self._over.done():
             self._over.set_result(None)
         self._host.prepare()
-
-
-class _InfoEvent(msgspec.Struct):
-    data: e.PackageInfoData

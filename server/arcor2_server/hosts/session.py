@@ -6,6 +6,7 @@ from typing import Any, Final
 import msgspec
 import structlog
 
+from arcor2_hw.data.events import PackageInfoData
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
@@ -181,3 +182,12 @@ class HostSession:
     async def stop_motion(self, object_id: str) -> None:
         """Stop a device, also while it executes a call."""
         await self.require_online().stop_motion(object_id)
+
+
+class _InfoEvent(msgspec.Struct):
+    data: PackageInfoData
+
+
+def decoded_info(event: bytes) -> PackageInfoData:
+    """Return the scene and project of a running program, from the encoded event PackageInfo."""
+    return msgspec.json.decode(event, type=_InfoEvent).data

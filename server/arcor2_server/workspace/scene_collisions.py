@@ -4,8 +4,6 @@ import functools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-import msgspec
-
 from arcor2_hw.collision.description import (
     Attachment,
     MeshShape,
@@ -19,7 +17,6 @@ from arcor2_hw.collision.description import (
 from arcor2_hw.collision.lines import Hit, first_hit
 from arcor2_hw.compute.kinematics_tasks import CheckLines, Line, PlaceInLink
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.events import PackageInfoData
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Mesh, Models
 from arcor2_hw.data.robot import Joint
@@ -30,7 +27,7 @@ from arcor2_hw.messages import Message
 from arcor2_hw.runtime.messages import HeldPart
 from arcor2_server.compute.workers import Compute
 from arcor2_server.documents import Session
-from arcor2_server.hosts.session import HostSession
+from arcor2_server.hosts.session import HostSession, decoded_info
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.storage import AssetStore
 from arcor2_server.workspace.obstacles import ObstacleRegistry
@@ -47,7 +44,7 @@ def _gripped(obstacle: Obstacle, robot: str, part: HeldPart) -> Obstacle:
 
 @functools.lru_cache(maxsize=1)
 def _of_program(encoded: bytes) -> tuple[tuple[str, str, Obstacle], ...]:
-    info = msgspec.json.decode(encoded, type=_InfoEvent).data
+    info = decoded_info(encoded)
     kinds = info.collision_models
     every: list[Models] = [*kinds.boxes, *kinds.spheres, *kinds.cylinders, *kinds.meshes]
     models = {one.id: one for one in every}
@@ -57,10 +54,6 @@ def _of_program(encoded: bytes) -> tuple[tuple[str, str, Obstacle], ...]:
         for obstacle in info.scene.objects
         if obstacle.type in models and obstacle.id not in zones and not isinstance(obstacle.pose, Unset)
     )
-
-
-class _InfoEvent(msgspec.Struct):
-    data: PackageInfoData
 
 
 @dataclass(frozen=True, slots=True)
