@@ -9,10 +9,11 @@ from arcor2_hw.testing import capabilities
 from arcor2_hw.testing.acting_cases import ActingCases
 from arcor2_hw.testing.connecting_cases import ConnectingCases
 from arcor2_hw.testing.loss_cases import LossCases
+from arcor2_hw.testing.maintenance_cases import MaintenanceCases
 from arcor2_hw.testing.written_cases import WrittenCases
 
 
-class Suite(ActingCases, LossCases, ConnectingCases, WrittenCases):
+class Suite(ActingCases, LossCases, MaintenanceCases, ConnectingCases, WrittenCases):
     """The cases of the conformance suite, without pytest."""
 
 
@@ -32,7 +33,7 @@ GROUPS: Final = (
             *("described", "translations_match", "alarms_declared", "types_complete", "long_actions_can_be_stopped"),
             *("capabilities_declared", "constructor_opens_nothing", "connect_is_idempotent"),
             *("disconnect_is_idempotent", "connecting_observes", "readings_can_be_read", "absent_device"),
-            "units_and_frames",
+            *("units_and_frames", "points_declared", "identity", "parameters"),
         ),
     ),
     Group(

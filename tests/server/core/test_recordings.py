@@ -252,7 +252,7 @@ async def test_csv_repeats_values_and_states_what_happened(bench: Bench) -> None
 def test_a_program_gets_absolute_paths_because_it_changes_its_directory(tmp_path: Path) -> None:
     world: Any = SimpleNamespace(shape_files=dict)
     unused: Any = None
-    messages = RunMessages(ServerSettings(data_dir=Path("data")), unused, unused, world)
+    messages = RunMessages(ServerSettings(data_dir=Path("data")), unused, unused, world, dict)
     message = messages.prepare("pkg_1", tmp_path, How())
     assert message.recordings == str(Path.cwd() / "data" / "recordings")
     assert message.records == str(Path.cwd() / "data" / "checkpoints")

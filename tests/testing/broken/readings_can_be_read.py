@@ -1,6 +1,4 @@
-"""identify() raises an error that is not a typed error."""
-
-from arcor2_hw.data.device import Identity
+"""permissives() raises an error that is not a typed error."""
 
 from .toy_press import ToyPress
 
@@ -8,5 +6,5 @@ from .toy_press import ToyPress
 class BrokenPress(ToyPress):
     """A press."""
 
-    def identify(self) -> Identity:
+    def permissives(self) -> list[tuple[str, bool]]:
         raise ValueError("invalid literal for int() with base 10: ''")
