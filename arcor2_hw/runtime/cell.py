@@ -248,10 +248,13 @@ class Cell:
         return device
 
     def _identification(self, how: Recipe) -> Identification | None:
-        """Return what recognises a device, None if its type has no identity."""
+        """Return what recognises a device, None if its type has no identity.
+
+        Commands of a type that continues without its connection, such as a service with an outbox, are not delayed.
+        """
         object_id = how.scene_object.id
         identified = self.identified
-        if identified is None or not overrides(how.cls, "identify"):
+        if identified is None or not overrides(how.cls, "identify") or not how.cls.loss_ends_program:
             return None
         return Identification(
             how.scene_object.name,

@@ -8,6 +8,7 @@ import pytest
 
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
+from arcor2_hw.runtime.ring import Ring
 from arcor2_server.hosts import process as host_module
 from arcor2_server.hosts.process import CellHost, _Connection
 
@@ -37,7 +38,7 @@ async def test_all_output_of_a_host_is_read_before_its_end_is_reported(
 
     process: Any = SimpleNamespace(pid=1, returncode=0, wait=wait, kill=lambda: None)
     wire, listener = _Connection(), Listener()
-    wire.host = host = CellHost(process, wire)
+    wire.host = host = CellHost(process, wire, Ring())
     host.user = listener
     watching = asyncio.create_task(host._watch_end())
     for n in range(4):

@@ -43,7 +43,8 @@ ADDED = {
     "SceneState.Data": TRANSLATION,
     "RemoveActionArgs": {"with_steps"},
     "RunPackage.Request.Args": {
-        *("checkpoints", "continue_at", "continues", "on_error", "order", "recipe_id", "recipe_values", "shared_breakpoints"),
+        *("checkpoints", "continue_at", "continues", "on_error", "order"),
+        *("recipe_id", "recipe_values", "shared_breakpoints"),
     },
     "TemporaryPackage.Request.Args": {"checkpoints", "on_error", "shared_breakpoints"},
 }
