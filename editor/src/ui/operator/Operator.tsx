@@ -258,7 +258,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
         )}
         <Production />
         <History />
-        {doc && serves("StreamPoints") && (
+        {!runs && doc && serves("StreamPoints") && (
           <Button onPress={() => (location.hash = location.hash.replace("#", "#/io"))}>{t`Inputs and outputs`}</Button>
         )}
       </main>
