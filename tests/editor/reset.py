@@ -9,6 +9,7 @@ from playwright.async_api import Browser
 
 from arcor2_hw.client import Client, RequestFailed
 from arcor2_hw.data import rpc
+from arcor2_hw.data.cell_state import CellAuthority, CellMode
 from arcor2_hw.data.editor import ViewScope
 from tests.e2e.harness import Cell, until
 from tests.editor.screen import USERS, Screen
@@ -60,6 +61,7 @@ async def _empty(cell: Cell) -> None:
         if uploaded:
             await client.delete_object_types(uploaded)
         await _clear_views(client, ViewScope.SHARED)
+        await _command_cell(client)
     for user in sorted(USERS):
         await until(partial(_is_forgotten, cell, user), f"{user} has left, and the user's settings are cleared", 30)
     async with httpx.AsyncClient(timeout=60, base_url=cell.url.replace("ws", "http", 1)) as rest:
@@ -89,6 +91,15 @@ async def _is_empty(client: Client) -> bool:
         for scene in scenes:
             await client.delete_scene(scene.id)
     return closed and not (packages or projects or scenes)
+
+
+async def _command_cell(client: Client) -> None:
+    """Set mode and authority of the cell to their defaults."""
+    status = await client.call("GetCell")
+    if status.mode is not CellMode.PRODUCE:
+        await client.call("SetCellMode", rpc.SetCellModeArgs(CellMode.PRODUCE))
+    if status.authority is not CellAuthority.HUB:
+        await client.call("SetCellAuthority", rpc.SetCellAuthorityArgs(CellAuthority.HUB))
 
 
 async def _is_forgotten(cell: Cell, user: str) -> bool:

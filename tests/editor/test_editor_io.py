@@ -1,4 +1,4 @@
-"""The page of inputs and outputs: live values, search, and a forced output that an operator sees and ends."""
+"""What the panel Devices opens: mode and authority of the cell, and the page of inputs and outputs."""
 
 import re
 from pathlib import Path
@@ -8,9 +8,10 @@ from playwright.async_api import Browser, expect
 
 from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
+from arcor2_hw.data.cell_state import CellMode
 from tests.e2e.harness import Cell
 from tests.editor import texts
-from tests.editor.screen import screen_of
+from tests.editor.screen import Screen, screen_of
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
@@ -28,12 +29,33 @@ async def with_lamp(client: Client, cell: Cell) -> None:
     await client.call("StartScene")
 
 
+async def changes_the_mode(screen: Screen, client: Client) -> None:
+    """Change the mode in the panel Devices and back, and read why the PLC cannot have the authority."""
+    await screen.press("Mode and authority")
+    dialog = screen.page.get_by_role("dialog", name="Mode and authority")
+    for mode in (CellMode.MAINTENANCE, CellMode.PRODUCE):
+        button = dialog.get_by_role("button", name=mode.value)
+        await button.click()
+        await expect(button).to_have_attribute("aria-pressed", "true")
+        assert (await client.call("GetCell")).mode is mode
+    await dialog.get_by_role("button", name=re.compile("^The PLC")).click()
+    await screen.press("Let the PLC command")
+    await expect(dialog.get_by_role("alert")).to_contain_text("Start it with --plc-modbus.")
+    await screen.settle()
+    assert await screen.faults() == []
+    assert await screen.barriers() == []
+    await screen.picture("mode-and-authority")
+    await dialog.get_by_role("button", name="Close").click()
+
+
 async def test_an_output_is_forced_and_an_operator_ends_it(cell: Cell, browser: Browser) -> None:
-    await with_lamp(await cell.client("colleague"), cell)
+    colleague = await cell.client("colleague")
+    await with_lamp(colleague, cell)
     async with screen_of(browser, cell.url, touch=True) as screen, screen_of(browser, cell.url, "phone") as phone:
         page, other = screen.page, phone.page
         await screen.join("Eva")
         await page.get_by_role("button", name=texts.DEVICES).click()
+        await changes_the_mode(screen, colleague)
         await screen.press("Inputs and outputs")
         tester = page.get_by_role("region", name="tester")
         row = tester.get_by_role("listitem").filter(has_text="door open")

@@ -12,6 +12,7 @@ from playwright.async_api import Browser, Error, Locator, expect
 
 from arcor2_hw.client import Client
 from arcor2_hw.data import rpc
+from arcor2_hw.data.cell_state import CellAuthority
 from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.package import PackageStateEnum, PackageSummary
 from arcor2_hw.data.project import START, ActionParameter, Flow, Project
@@ -72,6 +73,21 @@ async def built(cell: Cell, colleague: Client, message: str = "", method: str = 
     return next(each for each in await colleague.list_packages() if each.id == package_id)
 
 
+async def reads_who_commands(screen: Screen, technician: Client) -> None:
+    """Open the dialog from the note on the screen. An operator may only read it; it follows what a technician does."""
+    await technician.call("SetCellAuthority", rpc.SetCellAuthorityArgs(CellAuthority.NOBODY))
+    await screen.press("Nobody commands this cell.")
+    dialog = screen.page.get_by_role("dialog", name="Mode and authority")
+    hub = dialog.get_by_role("button", name=re.compile("^This server"))
+    await expect(hub).to_have_attribute("aria-disabled", "true")
+    await expect(hub).to_have_attribute("aria-pressed", "false")
+    await expect(dialog).to_contain_text("Your role does not allow this.")
+    await technician.call("SetCellAuthority", rpc.SetCellAuthorityArgs(CellAuthority.HUB))
+    await expect(hub).to_have_attribute("aria-pressed", "true")
+    await dialog.get_by_role("button", name="Close").click()
+    await expect(screen.page.get_by_role("button", name="Nobody commands this cell.")).to_have_count(0)
+
+
 async def test_built_package_appears_runs_and_its_error_is_shown(
     cell: Cell, colleague: Client, browser: Browser, token: str
 ) -> None:
@@ -80,6 +96,7 @@ async def test_built_package_appears_runs_and_its_error_is_shown(
         await at_the_machine(screen, kiosk=True, token=token)
         await screen.sees("No packages yet.")
         assert await page.get_by_role("button", name="Open the editor").count() == 0
+        await reads_who_commands(screen, colleague)
         # A package built by another user appears by itself.
         _, project = await cell.open(colleague)
         await cell.build(colleague, project)

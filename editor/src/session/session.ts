@@ -9,6 +9,7 @@ import { Refused } from "../protocol/errors";
 import {
   ADDITIONAL_EVENTS,
   type AlarmRecord,
+  type CellStatus,
   type ObjectObservationsData,
   type ObjectPointsData,
   type PartBooks,
@@ -49,6 +50,8 @@ declare module "../store/runtime" {
     takeRecording?: Set<(changed: RecordingChangedData) => void>;
     /** Receive changed books of parts, which bypass the store, while they are shown. */
     takeParts?: Set<(books: PartBooks) => void>;
+    /** Receive the changed state of the cell, which bypasses the store, while it is shown. */
+    takeCell?: Set<(cell: CellStatus) => void>;
     /** Receive changed interlocks and their states, which bypass the store, while they are shown. */
     takeInterlocks?: Set<(event: Extract<ServerEvent, { event: "InterlockStates" | "InterlockChanged" }>) => void>;
   }
@@ -120,6 +123,7 @@ export class Session {
     else if (event.event === "AlarmChanged") for (const take of now().runtime.takeAlarm ?? []) take(event.data);
     else if (event.event === "RecordingChanged") for (const take of now().runtime.takeRecording ?? []) take(event.data);
     else if (event.event === "PartsChanged") for (const take of now().runtime.takeParts ?? []) take(event.data);
+    else if (event.event === "CellChanged") for (const take of now().runtime.takeCell ?? []) take(event.data);
     else if (event.event === "LogOnChanged")
       void import("./logOn").then(({ changed }) => changed(event.data, () => this.onState("open", "", 0)));
     else if (event.event === "InterlockStates" || event.event === "InterlockChanged")

@@ -184,7 +184,7 @@ export interface Ui {
   /** Step of the guided tour; null while it is closed. */
   tour: number | null;
   /** The dialog that is open over the screen. */
-  overlay: "" | "search" | "about" | "messages" | "audit" | "interlocks" | "persons" | "pin" | "production";
+  overlay: "" | "search" | "about" | "messages" | "audit" | "interlocks" | "persons" | "pin" | "production" | "cell";
   /** Settings as typed, by the id of the object or, for a new device, by the name of its type. */
   forms: Record<string, FormDraft>;
   scriptDraft?: ScriptDraft | undefined;

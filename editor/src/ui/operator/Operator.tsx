@@ -22,6 +22,8 @@ import { useEditor } from "../../store/store";
 import { withNames } from "../../viewmodel/names";
 import { AlarmCard } from "../alarms/AlarmCard";
 import { useAlarms } from "../alarms/useAlarms";
+import { useCell } from "../cell/useCell";
+import { noteText } from "../cell/words";
 import { Icon, type IconName } from "../kit/icons";
 import { Button, Waiting } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
@@ -32,6 +34,7 @@ import type { Chosen } from "../production/Product";
 import { endName, History } from "../run/History";
 import { ICONS } from "../run/Result";
 import { Held, phaseName, RunButtons } from "../run/RunBar";
+import { openOverlay } from "../search/overlay";
 import { Settings } from "../settings/Settings";
 import { useTicking } from "../times";
 import { CurrentStep } from "./CurrentStep";
@@ -79,9 +82,12 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   const [listing, setListing] = useState(false);
   const listed = useAlarms("retained");
   const books = useBooks();
+  const cell = useCell();
+  const note = cell && noteText(cell);
   const alarms = listed ?? [];
   // The cards are shown together with what is below them: buttons do not move when something is loaded.
-  const loaded = (listed || !serves("ListAlarms")) && (books || !serves("GetParts"));
+  const loaded =
+    (listed || !serves("ListAlarms")) && (books || !serves("GetParts")) && (cell !== undefined || !serves("GetCell"));
   // Until a package is chosen, Start produces the product.
   const made = product && !packages.some((each) => each.id === chosen) ? product : null;
   const before = useRef("");
@@ -214,6 +220,11 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
         <Held />
         {!program.held && <PartsCard />}
         {!program.held && <Alarms alarms={alarms} />}
+        {note && (
+          <Button look="plain" icon="info" className="operator-note wraps" onPress={() => openOverlay("cell")}>
+            {note}
+          </Button>
+        )}
         {runs && doc && <Cell />}
         {!runs && (
           <section className="operator-start" aria-label={t`Start`}>

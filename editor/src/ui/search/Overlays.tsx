@@ -12,6 +12,7 @@ const OVERLAYS = {
   pin: lazyComponent(() => import("./more").then((more) => more.pin())),
   audit: lazyComponent(() => import("./more").then((more) => more.audit())),
   interlocks: lazyComponent(() => import("./more").then((more) => more.interlocks())),
+  cell: lazyComponent(() => import("./more").then((more) => more.cell())),
   production: lazyComponent(() => import("./more").then((more) => more.production())),
 };
 

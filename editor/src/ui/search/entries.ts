@@ -11,6 +11,7 @@ import { storeGeneralState } from "../../commands/viewstate";
 import { LANGUAGES, type Language } from "../../i18n/catalogue";
 import { translate } from "../../i18n/serverMessages";
 import { aimsAlways } from "../../session/aiming";
+import { serves } from "../../session/connection";
 import { theEngine } from "../../session/engine";
 import { remember } from "../../session/localStorage";
 import { theSession } from "../../session/session";
@@ -180,6 +181,9 @@ function everywhere(state: State): Entry[] {
         remember("hand", leftHanded ? "" : "left");
       },
     },
+    ...(serves("GetCell")
+      ? [{ id: "cell", words: t`Mode and authority`, detail: t`page`, why: "", act: () => openOverlay("cell") }]
+      : []),
     {
       id: "messages",
       words: t`Messages`,

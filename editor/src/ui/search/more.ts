@@ -4,4 +4,5 @@ export const persons = () => import("../persons/Persons");
 export const pin = () => import("../persons/ChangePin");
 export const audit = () => import("../audit/AuditTrail");
 export const interlocks = () => import("../interlocks/Interlocks");
+export const cell = () => import("../cell/CellDialog");
 export const production = () => import("../production/Production");

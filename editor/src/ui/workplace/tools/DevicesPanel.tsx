@@ -103,6 +103,7 @@ export default function Panel() {
       {doc && serves("ListInterlocks") && (
         <Button onPress={() => openOverlay("interlocks")}>{t`Interlocks and zones`}</Button>
       )}
+      {serves("GetCell") && <Button onPress={() => openOverlay("cell")}>{t`Mode and authority`}</Button>}
       {serves("ListAlarms") && <Alarms />}
     </>
   );
