@@ -26,6 +26,7 @@ from arcor2_hw.data.project import ActionParameter, Flow, Project
 from arcor2_server.web.editor import FILES
 from benchmarks import augmented
 from benchmarks.metrics import Metric, Report, median, percentile
+from benchmarks.task import task
 from tests.e2e.harness import Cell, running_cell, scene_state, until
 from tests.editor import texts
 from tests.editor.screen import Screen, running_browser, screen_of
@@ -302,6 +303,7 @@ async def measure(report: Report, directory: Path) -> None:
             await returning(report, screen, cell)
         # The first connection ended with the server, and the scene is offline since then.
         await large(report, browser, cell, await cell.client("colleague"), project)
+    await task(report, directory)
 
 
 async def main() -> int:

@@ -138,6 +138,10 @@ GOALS: Final[dict[str, tuple[str, str]]] = {
     "ar_near_mm": ("mm", "<= 1"),
     "ar_aside_mm": ("mm", "<= 2"),
     "ar_picture_ms": ("ms", "<= 250"),
+    "task_seat_taps": ("taps", "<= 32"),
+    "task_ar_taps": ("taps", "<= 34"),
+    "task_seat_s": ("s", ""),
+    "task_ar_s": ("s", ""),
     "kinematics_plans_found": ("of 20", ">= 20"),
     "kinematics_plan_ms": ("ms", "<= 50"),
 }
