@@ -313,6 +313,7 @@ async def run(
     from arcor2_server.web.http_server import Server, configuration
 
     async with running_server(settings) as running:
+        preparing: asyncio.TimerHandle | None = None
         for notice in running.damage.notices:
             sys.stderr.write(f"arcor2-hw serve: {notice}\n")
 
@@ -320,7 +321,8 @@ async def run(
             gc.freeze()
             gc.set_threshold(*GC_THRESHOLD)
             gc.enable()
-            loop.call_later(PREPARE_AFTER, prepare)
+            nonlocal preparing
+            preparing = loop.call_later(PREPARE_AFTER, prepare)
 
         def prepare() -> None:
             running.hosts.prepare()
@@ -348,8 +350,9 @@ async def run(
                 raise
             raise _no_port(settings.host, listeners[0].getsockname()[1], error) from error
         finally:
-            if renewal is not None:
-                renewal.cancel()
+            for pending in (renewal, preparing):
+                if pending is not None:
+                    pending.cancel()
 
 
 @contextlib.contextmanager
