@@ -9,6 +9,9 @@ import numpy as np
 from arcor2_fakes.cell.layout import Labelling, Matrix
 from arcor2_fakes.cell.things import Label, Printed, Thing
 
+Point = tuple[float, float, float]
+"""A position in the world, m."""
+
 
 class LabelNest:
     """The place for one board. `spilled` counts the labels without a bare board below."""
@@ -19,7 +22,7 @@ class LabelNest:
         self.spilled: list[str] = []
         self._last: int | None = None
         self._began = False
-        self.roller: tuple[float, float, float] | None = None
+        self.roller: Point | None = None
 
     def holds(self, world_from_board: Matrix) -> bool:
         """Return whether a board at a pose is in the nest."""
@@ -44,23 +47,26 @@ class LabelNest:
     def wiped(self, angles: tuple[float, float]) -> Thing | None:
         """Update the position of the roller; return the board whose label was pressed on now.
 
-        A label is pressed on when the roller has moved over it from one end to the other.
+        A label is pressed on when the roller has moved over it from one end to the other. Between two updates, which
+        are far apart on a busy computer, it has moved straight.
         """
         wipe = self.layout.press
-        self.roller = here = self._roller(angles)
+        here = self._roller(angles)
+        before, self.roller = self.roller or here, here
         label = None if self.thing is None else self.thing.label
         if label is None or label.pressed:
             self._began = False
             return None
-        begin, end = np.asarray(wipe.begin), np.asarray(wipe.end)
-        if math.dist(here, wipe.begin) <= wipe.tolerance:
-            self._began = True
-        elif self._began:
-            along = float(np.clip((here - begin) @ (end - begin) / ((end - begin) @ (end - begin)), 0.0, 1.0))
-            self._began = math.dist(here, begin + along * (end - begin)) <= wipe.tolerance
-        if self._began and math.dist(here, wipe.end) <= wipe.tolerance:
+        begins, began_at = _passes(before, here, wipe.begin, wipe.tolerance)
+        ends, ended_at = _passes(before, here, wipe.end, wipe.tolerance)
+        if ends and ((begins and began_at <= ended_at) or (self._began and not begins)):
             label.pressed, self._began = True, False
             return self.thing
+        if begins:
+            self._began = True
+        elif self._began:
+            _, along = _nearest(wipe.begin, wipe.end, here)
+            self._began = math.dist(here, along) <= wipe.tolerance
         return None
 
     def taken(self) -> str:
@@ -73,9 +79,24 @@ class LabelNest:
             return "taken from the label printer; the label, not pressed on, fell off"
         return "taken from the label printer"
 
-    def _roller(self, angles: tuple[float, float]) -> tuple[float, float, float]:
+    def _roller(self, angles: tuple[float, float]) -> Point:
         first, second = self.layout.arm.links
         x = first * math.cos(angles[0]) + second * math.cos(angles[0] + angles[1])
         y = first * math.sin(angles[0]) + second * math.sin(angles[0] + angles[1])
         world = self.layout.arm.base.matrix() @ np.array([x, y, 0.0, 1.0])
         return float(world[0]), float(world[1]), float(world[2])
+
+
+def _nearest(start: Point, end: Point, point: Point) -> tuple[float, Point]:
+    """Return the point of a line that is nearest to another point, and its share of the length of the line."""
+    first, way = np.asarray(start), np.subtract(end, start)
+    length = float(way @ way)
+    share = 0.0 if length == 0.0 else float(np.clip((np.asarray(point) - first) @ way / length, 0.0, 1.0))
+    x, y, z = first + share * way
+    return share, (float(x), float(y), float(z))
+
+
+def _passes(start: Point, end: Point, point: Point, tolerance: float) -> tuple[bool, float]:
+    """Return whether a straight motion passes a point, and at which share of its length."""
+    share, nearest = _nearest(start, end, point)
+    return math.dist(nearest, point) <= tolerance, share

@@ -245,6 +245,20 @@ async def test_a_label_stays_on_the_board_once_pressed() -> None:
     assert cell.world.truth()["spilled_labels"] == []
 
 
+@pytest.mark.parametrize(("first", "last", "pressed"), [(BEGIN, END, True), (END, BEGIN, False)])
+async def test_the_world_may_see_the_roller_only_before_and_after(
+    first: tuple[float, ...], last: tuple[float, ...], pressed: bool
+) -> None:
+    cell = Cell()
+    await in_nest(cell)
+    await cell.print("A")
+    way = last[0] - first[0], last[1] - first[1]
+    for share in (-0.3, 1.3):
+        cell.inputs.arm = joints(first[0] + share * way[0], first[1] + share * way[1])
+        await cell.wait(0.02)
+    assert cell.board("A")["label"] == {"code": "A", "pressed": pressed}
+
+
 async def test_a_label_that_was_not_pressed_falls_off() -> None:
     cell = Cell()
     await in_nest(cell)
