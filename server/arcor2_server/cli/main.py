@@ -53,6 +53,16 @@ app.command(
     "arcor2_server.cli.calibrate:app", name="calibrate", help="Calibrate the poses of cameras, robots and tools."
 )
 app.command(
+    "arcor2_server.cli.backup:backup",
+    help="Copy the data of a server, which may be running, into one file.\n\n"
+    "The file has the state of one moment, and contains the passwords of devices. `arcor2-hw restore` reads it.",
+)
+app.command(
+    "arcor2_server.cli.backup:restore",
+    help="Replace the data of a server, which must not be running, with a backup.\n\n"
+    "The whole file is checked first. The replaced data is kept in the data directory, in `before-restore-...`.",
+)
+app.command(
     "arcor2_server.cli.diagnosis:diagnosis",
     help="Write a diagnosis bundle of a running server.\n\n"
     "The zip file contains the open document, object types, versions, device states and the latest log lines. Secrets "

@@ -35,6 +35,8 @@ from arcor2_server.access.admission import PARAMETER, is_local, is_loopback
 from arcor2_server.access.tokens import TokenFile
 from arcor2_server.audit.command_line import note_command
 from arcor2_server.cli.exit_status import ExitStatus, fail
+from arcor2_server.deployment.backup import finish_restoration
+from arcor2_server.deployment.service_manager import ServiceManager
 from arcor2_server.log import setup as server_logging
 from arcor2_server.settings import DEVICE_FILES_NAME, LegacyListener, PlcListener, ServerSettings
 from arcor2_server.websocket.classic_ports import ports_from_environment
@@ -158,6 +160,7 @@ def serve(
             data_directory(settings.data_dir),
             contextlib.ExitStack() as sockets,
         ):
+            finish_restoration(settings.data_dir)
             listener = sockets.enter_context(contextlib.closing(listen(settings.host, settings.port)))
             settings, classic_listeners = _bind_classic(settings, sockets)
             settings, legacy_listener = _bind_legacy(settings, sockets)
@@ -312,12 +315,14 @@ async def run(
     from arcor2_server.app import create_app, running_server
     from arcor2_server.web.http_server import Server, configuration
 
+    manager = ServiceManager.from_environment()
     async with running_server(settings) as running:
         preparing: asyncio.TimerHandle | None = None
         for notice in running.damage.notices:
             sys.stderr.write(f"arcor2-hw serve: {notice}\n")
 
         def when_ready() -> None:
+            manager.ready()
             gc.freeze()
             gc.set_threshold(*GC_THRESHOLD)
             gc.enable()
@@ -350,6 +355,7 @@ async def run(
                 raise
             raise _no_port(settings.host, listeners[0].getsockname()[1], error) from error
         finally:
+            manager.stopping()
             for pending in (renewal, preparing):
                 if pending is not None:
                     pending.cancel()

@@ -1,0 +1,1 @@
+"""Deployment: the service manager, backups, installation and upgrades."""
