@@ -15,6 +15,7 @@ from typing import Final
 
 from benchmarks import (
     analysing,
+    backup,
     books,
     building,
     buses,
@@ -44,6 +45,7 @@ LONG: Final = "--long"
 GROUPS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
     "requests": requests.run,
     "documents": documents.run,
+    "backup": backup.run,
     "restart": restart.run,
     "listeners": listeners.run,
     "operation": operation.run,

@@ -2,9 +2,11 @@
 
 import os
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 from cyclopts import Parameter
 
@@ -13,6 +15,8 @@ from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.cli.serve import CannotServe, data_directory
 from arcor2_server.deployment.backup import Manifest, restore_backup, write_backup
 from arcor2_server.settings import ServerSettings, default_data_dir
+
+NICENESS: Final = 10
 
 DataDir = Annotated[Path | None, Parameter(help="Data directory of the server ($XDG_DATA_HOME/arcor2-hw).")]
 
@@ -38,7 +42,8 @@ def backup(
     if (problem := _owner_problem(directory)) is not None:
         return fail("backup", problem, ExitStatus.DATA_UNUSABLE)
     try:
-        manifest = write_backup(directory, file, version("arcor2-hw"))
+        with ThreadPoolExecutor(1, initializer=_lower_priority) as background:
+            manifest = background.submit(write_backup, directory, file, version("arcor2-hw")).result()
     except StorageError as error:
         return fail("backup", error, ExitStatus.DATA_UNUSABLE)
     sys.stdout.write(f"{file}: {_summary(manifest)}\n")
@@ -75,6 +80,11 @@ def restore(file: Path, *, data_dir: DataDir = None) -> int:
         return fail("restore", error, ExitStatus.DATA_UNUSABLE)
     sys.stdout.write(f"{directory}: {_summary(manifest)} of {manifest.host}, {manifest.created[:19]} UTC\n")
     return ExitStatus.OK
+
+
+def _lower_priority() -> None:
+    """Lower the priority of this thread, so that it does not delay the server."""
+    os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
 
 
 def _owner_problem(directory: Path) -> str | None:

@@ -136,7 +136,7 @@ def _write(data_dir: Path, file: IO[bytes], version: str, scratch: Path) -> Mani
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive, contextlib.ExitStack() as stack:
         first = [path for path in paths if path.endswith(_READ_FIRST)]
         for path in first:
-            entries[path] = _add(archive, path, data_dir / path)
+            entries[path] = _add(archive, file, path, data_dir / path)
         # The journal first: a document that is saved in between is then in both, as after a crash.
         databases.sort(key=lambda path: path != JOURNAL)
         snapshots = [
@@ -148,10 +148,10 @@ def _write(data_dir: Path, file: IO[bytes], version: str, scratch: Path) -> Mani
         ]
         for path in paths:
             if path not in entries and path not in databases:
-                entries[path] = _add(archive, path, data_dir / path)
+                entries[path] = _add(archive, file, path, data_dir / path)
         for path, snapshot in snapshots:
             copy = stack.enter_context(_copied(snapshot, scratch))
-            entries[path] = _add(archive, path, copy)
+            entries[path] = _add(archive, file, path, copy)
         manifest = Manifest(FORMAT, version, now(), socket.gethostname(), entries)
         archive.writestr(zipfile.ZipInfo(MANIFEST, _DATE), msgspec.json.format(msgspec.json.encode(manifest), indent=1))
     return manifest
@@ -248,8 +248,8 @@ def _copied(snapshot: sqlite3.Connection, directory: Path) -> Iterator[Path]:
         path.unlink(missing_ok=True)
 
 
-def _add(archive: zipfile.ZipFile, name: str, path: Path) -> BackupEntry:
-    """Add a file and return its size and digest."""
+def _add(archive: zipfile.ZipFile, file: IO[bytes], name: str, path: Path) -> BackupEntry:
+    """Add a file to an archive that is written into `file`; return its size and digest."""
     digest, size = hashlib.sha256(), 0
     info = zipfile.ZipInfo(name, _DATE)
     info.compress_type = zipfile.ZIP_DEFLATED
@@ -262,6 +262,9 @@ def _add(archive: zipfile.ZipFile, name: str, path: Path) -> BackupEntry:
             digest.update(chunk)
             size += len(chunk)
             target.write(chunk)
+            # Flushed in small parts, the backup does not delay the server, which flushes edits to the same disk.
+            file.flush()
+            os.fdatasync(file.fileno())
     return BackupEntry(size, digest.hexdigest())
 
 

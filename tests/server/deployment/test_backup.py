@@ -10,6 +10,7 @@ import zipfile
 from collections.abc import Callable
 from contextlib import ExitStack, closing
 from pathlib import Path
+from typing import IO
 
 import pytest
 from websockets.asyncio.client import connect
@@ -138,16 +139,16 @@ def test_a_file_that_is_deleted_meanwhile_is_left_out(
 ) -> None:
     original = backups._add
 
-    def add(archive: zipfile.ZipFile, name: str, path: Path) -> backups.BackupEntry:
+    def add(archive: zipfile.ZipFile, file: IO[bytes], name: str, path: Path) -> backups.BackupEntry:
         (data / "secrets.json").unlink(missing_ok=True)
-        return original(archive, name, path)
+        return original(archive, file, name, path)
 
     monkeypatch.setattr(backups, "_add", add)
     assert "secrets.json" not in write_backup(data, tmp_path / "backup.zip", "0.1.0").files
 
 
 def test_a_failed_backup_leaves_no_file(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def add(archive: zipfile.ZipFile, name: str, path: Path) -> backups.BackupEntry:
+    def add(archive: zipfile.ZipFile, file: IO[bytes], name: str, path: Path) -> backups.BackupEntry:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(backups, "_add", add)
