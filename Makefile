@@ -1,5 +1,5 @@
 # Two commands: `make run` and `make test`. Both do all the set-up; the second time they start at once.
-.PHONY: run test bench bench-compare bench-long bench-editor mutation lint types layers check-editor check lock clean
+.PHONY: run test bench bench-compare bench-long bench-editor mutation dist lint types layers check-editor check lock clean
 .DEFAULT_GOAL := run
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
@@ -53,6 +53,10 @@ bench-editor: .make/dev .make/editor .make/browser
 mutation: .make/mutation
 	$(BIN)/python -m tests.mutation $(ARGS)
 
+# Build a bundle that installs without a network, and a Debian package; sign them: make dist MINISIGN_KEY=FILE
+dist: .make/release .make/editor
+	$(BIN)/python .ci/release.py $(ARGS)
+
 check: lint types layers check-editor
 
 lint: .make/dev
@@ -101,6 +105,10 @@ LIBRARIES := libEGL.so.1:libegl1 libGL.so.1:libgl1 libusb-1.0.so.0:libusb-1.0-0 
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements/mutation.txt
 	@touch $@
 
+.make/release: requirements/release.txt | .make/dev
+	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements/release.txt
+	@touch $@
+
 # Node.js: the machine's, or the one from PyPI where it is missing or too old.
 .make/node: editor/node.txt editor/build.py | .make/venv
 	@mkdir -p .make
@@ -131,7 +139,8 @@ COMPILE := pip-compile --quiet --upgrade --generate-hashes --allow-unsafe --stri
 lock:
 	$(COMPILE) $(TESTED) --extra build --extra dev --output-file requirements/dev.txt pyproject.toml
 	$(COMPILE) $(FAMILIES) --extra build --constraint requirements/dev.txt --output-file requirements/run.txt pyproject.toml
+	echo cyclonedx-bom | $(COMPILE) --constraint requirements/dev.txt --output-file requirements/release.txt -
 	echo cosmic-ray | $(COMPILE) --constraint requirements/dev.txt --output-file requirements/mutation.txt -
 
 clean:
-	rm -rf $(VENV) .make editor/node_modules server/arcor2_server/editor_files .mypy_cache .ruff_cache .pytest_cache
+	rm -rf dist $(VENV) .make editor/node_modules server/arcor2_server/editor_files .mypy_cache .ruff_cache .pytest_cache

@@ -101,7 +101,7 @@ def _owner_problem(directory: Path) -> str | None:
         name = pwd.getpwuid(owner).pw_name
     except KeyError:
         name = str(owner)
-    return f"{directory} belongs to the user {name}; run the command as this user (sudo -u {name} ...)"
+    return f"{directory} belongs to the user {name}; run the command as this user (runuser -u {name} -- ...)"
 
 
 def _summary(manifest: Manifest) -> str:

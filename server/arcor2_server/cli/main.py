@@ -63,6 +63,16 @@ app.command(
     "The whole file is checked first. The replaced data is kept in the data directory, in `before-restore-...`.",
 )
 app.command(
+    "arcor2_server.cli.install:install",
+    help="Set up the service of this machine with this version, which is installed in /opt/arcor2-hw.\n\n"
+    "`install.sh` of a release installs it there and calls this command.",
+)
+app.command(
+    "arcor2_server.cli.install:upgrade",
+    help="Replace the installed version by that of a release, without a network.\n\n"
+    "The data is copied first. If the new version is not ready within a minute, the old version runs again with it.",
+)
+app.command(
     "arcor2_server.cli.diagnosis:diagnosis",
     help="Write a diagnosis bundle of a running server.\n\n"
     "The zip file contains the open document, object types, versions, device states and the latest log lines. Secrets "

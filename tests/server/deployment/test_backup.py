@@ -309,4 +309,4 @@ def test_root_does_not_write_the_data_of_the_service(
     os.chown(data, 65534, -1)
     assert backup(tmp_path / "backup.zip", data_dir=data) == ExitStatus.DATA_UNUSABLE
     assert restore(tmp_path, data_dir=data) == ExitStatus.NOT_FOUND
-    assert "sudo -u" in capsys.readouterr().err
+    assert "runuser -u" in capsys.readouterr().err

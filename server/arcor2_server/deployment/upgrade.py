@@ -1,0 +1,143 @@
+"""Upgrades of the installed service. If the new version does not start, the old one runs again with the old data."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final, Protocol
+
+import structlog
+from packaging.version import Version
+
+from arcor2_hw.exceptions import Arcor2Error, Conflict, NotFound
+from arcor2_server.deployment import bundle as bundles
+from arcor2_server.deployment.backup import BACKUPS
+from arcor2_server.deployment.installation import NAME, CommandFailed, Installation, run
+
+log = structlog.get_logger(__name__)
+
+READY_WITHIN: Final = 60.0
+"""Time limit for the start of the new version, s. Half of the two minutes in which a failed upgrade is undone."""
+STOPPED_WITHIN: Final = 30.0
+BACKUP_WITHIN: Final = 600.0
+
+
+class Service(Protocol):
+    """The service as the service manager sees it."""
+
+    def start(self, within: float) -> None:
+        """Start the service, and wait until it is ready. Raises CommandFailed."""
+
+    def stop(self, within: float) -> None:
+        """Stop the service. Raises CommandFailed."""
+
+
+class Systemd:
+    """The service of systemd."""
+
+    def start(self, within: float) -> None:
+        """Start the service, and wait until it is ready. Raises CommandFailed."""
+        run(["systemctl", "daemon-reload"])
+        # An earlier start that failed several times must not prevent this one.
+        run(["systemctl", "reset-failed", f"{NAME}.service"])
+        run(["systemctl", "start", f"{NAME}.service"], within)
+
+    def stop(self, within: float) -> None:
+        """Stop the service. Raises CommandFailed."""
+        run(["systemctl", "stop", f"{NAME}.service"], within)
+
+
+class UpgradeFailed(Arcor2Error):
+    """The new version does not work on this machine. The old one runs again."""
+
+
+def upgrade(
+    installation: Installation,
+    bundle: Path,
+    version: Version,
+    service: Service,
+    report: Callable[[str], None] = lambda _: None,
+    user: str | None = NAME,
+) -> None:
+    """Replace the running version by that of a checked bundle.
+
+    Args:
+        installation: what is installed.
+        bundle: the checked bundle.
+        version: its version.
+        service: the service.
+        report: is told each step.
+        user: the owner of the data; None: the present user.
+
+    Raises:
+        NotFound: nothing is installed.
+        Conflict: the bundle is not newer than what is installed.
+        CommandFailed: the new version cannot be installed. The old one was not stopped.
+        UpgradeFailed: the new version does not start. The old one runs again with its data.
+    """
+    old = installation.version()
+    if old is None:
+        raise NotFound("No version is installed in {path}.", path=installation.programs)
+    if version <= old:
+        raise Conflict("Version {old} is installed; {new} is not newer.", old=old, new=version)
+    report(f"installing version {version}")
+    installation.add_version(bundle, version, Path(sys.base_prefix, "bin", "python3"))
+    commands = {each: installation.path_of(each) / "bin" / NAME for each in (old, version)}
+    run([commands[version], "--version"])
+    report("stopping the service")
+    copy = installation.data / BACKUPS / f"before-{version}.zip"
+    stored = False
+    try:
+        service.stop(STOPPED_WITHIN)
+        report(f"copying the data to {copy}")
+        run(["install", "-d", "-m", "700", copy.parent], user=user)
+        data = ("--data-dir", installation.data)
+        run([commands[old], "backup", copy, "--force", *data], BACKUP_WITHIN, user)
+        stored = True
+        report(f"starting version {version}")
+        run([commands[version], "install", "--select-only", "--root", installation.root])
+        service.start(READY_WITHIN)
+    except CommandFailed as error:
+        report(f"{error}; going back to version {old}")
+        log.error("upgrade failed", version=str(version), reason=str(error))
+        _go_back(installation, service, old, copy if stored else None, user)
+        installation.remove(version)
+        raise UpgradeFailed(
+            "Version {new} did not start ({reason}). Version {old} runs again with its data.",
+            new=version,
+            reason=error,
+            old=old,
+        ) from error
+    for other in installation.versions():
+        if other not in (old, version):
+            installation.remove(other)
+
+
+def _go_back(installation: Installation, service: Service, old: Version, copy: Path | None, user: str | None) -> None:
+    try:
+        service.stop(STOPPED_WITHIN)
+    except CommandFailed as error:
+        log.warning("the service cannot be stopped", reason=str(error))
+    installation.select(old)
+    if copy is not None:
+        command = installation.path_of(old) / "bin" / NAME
+        run([command, "restore", copy, "--data-dir", installation.data], BACKUP_WITHIN, user)
+    service.start(READY_WITHIN)
+
+
+def checked(bundle: Path, key: Path, unsigned: bool) -> Version:
+    """Check a bundle with the stored key, and return its version.
+
+    Args:
+        bundle: the bundle.
+        key: the file of the public key.
+        unsigned: accept a bundle without checking its signature.
+
+    Raises:
+        InvalidData: the bundle was changed, or there is no key.
+        StorageError: a file cannot be read.
+    """
+    from arcor2_server.deployment import minisign
+
+    if unsigned:
+        return bundles.check(bundle, None)
+    return bundles.check(bundle, minisign.read_public_key(key.read_text()))
