@@ -20,7 +20,7 @@ from arcor2_hw.analysis.source import SourceFile
 from arcor2_hw.analysis.templates import LIBRARY, sources, templates
 from arcor2_hw.analysis.translations import FOLDER, file_of, read, texts_of
 
-ENGLISH: Final = frozenset({"cli", "client", "demo", "exchange", "testing"})
+ENGLISH: Final = frozenset({"cli", "client", "demo", "deployment", "exchange", "testing"})
 """Packages whose texts are only shown by the command line, by scripts or in logs."""
 _FIELD: Final = re.compile(r"\{\w+\}")
 

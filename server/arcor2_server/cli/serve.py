@@ -35,7 +35,6 @@ from arcor2_server.access.admission import PARAMETER, is_local, is_loopback
 from arcor2_server.access.tokens import TokenFile
 from arcor2_server.audit.command_line import note_command
 from arcor2_server.cli.exit_status import ExitStatus, fail
-from arcor2_server.deployment.backup import finish_restoration
 from arcor2_server.deployment.service_manager import ServiceManager
 from arcor2_server.log import setup as server_logging
 from arcor2_server.settings import DEVICE_FILES_NAME, LegacyListener, PlcListener, ServerSettings
@@ -160,7 +159,7 @@ def serve(
             data_directory(settings.data_dir),
             contextlib.ExitStack() as sockets,
         ):
-            finish_restoration(settings.data_dir)
+            _finish_restoration(settings.data_dir)
             listener = sockets.enter_context(contextlib.closing(listen(settings.host, settings.port)))
             settings, classic_listeners = _bind_classic(settings, sockets)
             settings, legacy_listener = _bind_legacy(settings, sockets)
@@ -209,6 +208,14 @@ def welcome(settings: ServerSettings, port: int) -> None:
     note_command(settings.audit_file, "serve", FIRST_DEVICE)
     here = server_addresses(settings, port).addresses or ["http://ADDRESS-OF-THE-PROXY"]
     sys.stderr.write(f"arcor2-hw serve: first start. Add an administrator at {here[0]}/?{PARAMETER}={secret}\n")
+
+
+def _finish_restoration(data_dir: Path) -> None:
+    """Complete a restoration of a backup that was interrupted. Raises StorageError."""
+    if any(data_dir.glob(".restore-*")):
+        from arcor2_server.deployment.backup import finish_restoration
+
+        finish_restoration(data_dir)
 
 
 def _address(option: str, address: str) -> tuple[str, int]:

@@ -71,6 +71,8 @@ def build_wheel(folder: Path, version: str, dependencies: Path, replaced: dict[s
 
 def complete(bundle: Path, signer: Signer | None) -> None:
     """Add the other files of a bundle to its wheels."""
+    for made in ("SHA256SUMS", "SHA256SUMS.minisig"):
+        (bundle / made).unlink(missing_ok=True)
     lines = []
     for wheel in (bundle / "wheels").iterdir():
         version = wheel.name.split("-")[1]
