@@ -35,7 +35,8 @@ def run(*command: str | Path, **options: Any) -> str:
     )
     if done.returncode:
         sys.exit(f"{' '.join(map(str, command[:4]))} failed with status {done.returncode}")
-    return done.stdout
+    output: str = done.stdout
+    return output
 
 
 def environment() -> dict[str, str]:
@@ -64,7 +65,7 @@ def write_requirements(bundle: Path) -> str:
 
 
 def write_components(bundle: Path) -> None:
-    """Install the bundle into an empty environment, and list its components and those of the editor (CycloneDX)."""
+    """Install the bundle into an empty environment, run the demo, and list the components (CycloneDX)."""
     with tempfile.TemporaryDirectory() as folder:
         run(sys.executable, "-m", "venv", folder)
         python = Path(folder, "bin", "python")
