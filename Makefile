@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 ARGS ?=
 FAMILIES := --extra ur --extra modbus --extra serial --extra can --extra dynamixel --extra depthai --extra vision --extra kinematics
 # Drivers beyond the demo are tested too.
-TESTED := $(FAMILIES) --extra opcua
+TESTED := $(FAMILIES) --extra opcua --extra postgresql
 
 # Compiled modules are kept, whatever the environment says: a test run starts some hundred Python processes, and each of
 # them would compile all of ours again.
@@ -25,7 +25,7 @@ ALONE = $(shell grep -rl --include='test_*.py' mark.alone tests)
 # each and run afterwards, in two workers. Failed tests run once more without others, since a few still depend on tenths
 # of a second; both results are shown. Exit code 5 means that ARGS selected no test of that kind.
 AGAIN := --last-failed --last-failed-no-failures none
-test: .make/dev .make/editor .make/browser
+test: .make/dev .make/editor .make/browser .make/postgresql
 	$(BIN)/python -m pytest --collect-only -qq >/dev/null & $(BIN)/python editor/build.py test; status=$$?; wait; exit $$status
 	$(BIN)/python -m pytest --numprocesses 5 --dist loadgroup --no-loadscope-reorder -m "not alone" $(ARGS) || \
 	test $$? = 5 || $(BIN)/python -m pytest $(AGAIN) -m "not alone" $(ARGS)
@@ -129,6 +129,18 @@ EDITOR := $(shell find editor -name node_modules -prune -o -name __pycache__ -pr
 	    apt-get install -y -qq --no-install-recommends chromium-headless-shell >/dev/null || \
 	    apt-get install -y -qq --no-install-recommends chromium >/dev/null; \
 	  else echo "please install: chromium-headless-shell or chromium" >&2; exit 1; fi; \
+	}
+	@touch $@
+
+# The tests start a PostgreSQL server of their own. The package alone would create and start another one.
+.make/postgresql:
+	@mkdir -p .make
+	@ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || { \
+	  if test "$$(id -u)" = 0; then apt-get update -qq && \
+	    apt-get install -y -qq --no-install-recommends postgresql-common >/dev/null && \
+	    sed -i 's/^#\?create_main_cluster.*/create_main_cluster = false/' /etc/postgresql-common/createcluster.conf && \
+	    apt-get install -y -qq --no-install-recommends postgresql >/dev/null; \
+	  else echo "please install: postgresql" >&2; exit 1; fi; \
 	}
 	@touch $@
 

@@ -274,6 +274,18 @@ class StorageError(Arcor2Error):
     code = "storage"
 
 
+class DatabaseUnreachable(StorageError):
+    """The database server does not answer. Unsaved edits are stored in the journal."""
+
+    code = "database_unreachable"
+
+
+class DatabaseInUse(StorageError):
+    """Another server uses the database."""
+
+    code = "database_in_use"
+
+
 class Arcor2NotImplemented(Arcor2Error):
     """This object type does not implement the optional method."""
 

@@ -6,7 +6,7 @@ from typing import Any
 import hypothesis
 import pytest
 
-pytest_plugins = ["pytester", "tests.leaks"]
+pytest_plugins = ["pytester", "tests.leaks", "tests.postgresql"]
 
 
 # On a busy machine any example may take long; times are measured in benchmarks.

@@ -156,7 +156,7 @@ _KINDS: Final[dict[type[RequestFailed], tuple[str, ...]]] = {
         *("stale", "no_depth", "overexposed", "device_fault", "safety_stop", "cancelled", "kinematics", "cell"),
         "path_blocked",
     ),
-    ServerFault: ("internal", "storage"),
+    ServerFault: ("internal", "storage", "database_unreachable", "database_in_use"),
 }
 REASONS: Final[dict[str, type[RequestFailed]]] = {code: kind for kind, codes in _KINDS.items() for code in codes}
 """Error class by code of a refusal; other codes are RequestFailed."""

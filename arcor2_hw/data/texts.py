@@ -1,11 +1,11 @@
-"""Length limits of the texts in requests, and the check that enforces them."""
+"""Length limits of the texts in requests, and the check that enforces them. No text contains the character NUL."""
 
 from collections.abc import Mapping
 from typing import Any, Final
 
 import msgspec
 
-from arcor2_hw.exceptions import TextTooLong
+from arcor2_hw.exceptions import InvalidData, TextTooLong
 
 NAME: Final = 200
 """Limit of the names of users, scenes, projects, objects, points, actions, parameters and packages, in characters."""
@@ -26,10 +26,17 @@ LIMITS: Final[Mapping[str, int | None]] = (
 """Limit by field name; None for content whose size is limited elsewhere."""
 SHORTEST: Final = NAME
 """A message of at most this size, in bytes, cannot contain a text that is too long."""
+NUL: Final = b"\\u0000"
+"""The character NUL in JSON; also a part of an escaped backslash with `u0000`, which is allowed."""
+
+
+def needs_check(message: bytes) -> bool:
+    """Return whether a request in JSON may contain a text that `check_texts` refuses."""
+    return len(message) > SHORTEST or NUL in message
 
 
 def check_texts(value: Any, field: str = "") -> None:
-    """Check the length of every text in a decoded request.
+    """Check the length of every text in a decoded request, and that it does not contain NUL.
 
     Args:
         value: The request, or a part of it.
@@ -37,6 +44,7 @@ def check_texts(value: Any, field: str = "") -> None:
 
     Raises:
         TextTooLong: A text is longer than the limit of its field.
+        InvalidData: A text contains NUL, which not every database can store.
     """
     if isinstance(value, str):
         limit = LIMITS.get(field, OTHER)
@@ -47,6 +55,8 @@ def check_texts(value: Any, field: str = "") -> None:
                 count=len(value),
                 limit=limit,
             )
+        if "\0" in value:
+            raise InvalidData("{field} contains the character NUL. Remove it.", field=field or "A text")
     elif isinstance(value, msgspec.Struct):
         for name in value.__struct_fields__:
             check_texts(getattr(value, name), name)

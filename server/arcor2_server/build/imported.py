@@ -14,7 +14,7 @@ from arcor2_hw.data.object_type import Model3dType, ObjectModel, ObjectTypeSourc
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.data.texts import check_texts
-from arcor2_hw.exceptions import InvalidPackage, TextTooLong
+from arcor2_hw.exceptions import InvalidData, InvalidPackage
 from arcor2_hw.parsing import parse
 from arcor2_hw.runtime.documents import decode_document
 from arcor2_hw.runtime.type_files import own_modules, sibling_modules
@@ -76,7 +76,7 @@ def _document(files: Mapping[str, bytes], path: str, kind: type[T]) -> T:
         raise InvalidPackage("{path} of the package is damaged: {reason}", path=path, reason=error) from error
     try:
         check_texts(found)
-    except TextTooLong as error:
+    except InvalidData as error:
         raise InvalidPackage("{path} of the package: {reason}", path=path, reason=error) from error
     return found
 

@@ -17,9 +17,9 @@ class ExitStatus(enum.IntEnum):
     DATA_UNUSABLE = 4
     """The data directory cannot be created or written."""
     DATABASE_UNUSABLE = 5
-    """The database is damaged, or was written by a newer version."""
+    """The database is damaged, was written by a newer version, or cannot be reached."""
     DATA_IN_USE = 6
-    """Another server uses the data directory."""
+    """Another server uses the data directory or the database."""
     NO_SERVER = 7
     """No server answers at the address."""
     PROGRAM_FAILED = 8

@@ -48,6 +48,9 @@ app.command("arcor2_server.cli.person:app", name="person", help="Manage the pers
 app.command("arcor2_server.cli.alarms:app", name="alarms", help="List, acknowledge and shelve alarms; statistics.")
 app.command("arcor2_server.cli.cell:app", name="cell", help="Mode and authority of the cell, and jobs of its PLC.")
 app.command("arcor2_server.cli.audit:app", name="audit", help="Check and export who changed or commanded what.")
+app.command(
+    "arcor2_server.cli.database:app", name="database", help="Move the documents of a data directory to PostgreSQL."
+)
 app.command("arcor2_server.cli.device:app", name="device", help="List, find and check devices; create a driver.")
 app.command(
     "arcor2_server.cli.calibrate:app", name="calibrate", help="Calibrate the poses of cameras, robots and tools."

@@ -142,7 +142,7 @@ def _run(data_dir: Path | None, work: Callable[[Persons], Awaitable[str]], comma
     """Call a function with the persons of a data directory; note what it changed if `command` is not empty."""
 
     async def opened(settings: ServerSettings) -> str:
-        storage = await Storage.open(settings)
+        storage = await Storage.open(settings, exclusive=False)  # the server may run
         try:
             return await work(Persons(PersonStore(storage), CardHashes(settings.data_dir)))
         finally:

@@ -29,7 +29,7 @@ from arcor2_hw.calibration.configuration import (
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.cell import Cell, read_cell
 from arcor2_hw.data.role import Role
-from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound, StorageError
+from arcor2_hw.exceptions import Arcor2Error, DatabaseInUse, InvalidData, NotFound, StorageError
 from arcor2_server.access.addresses import certified_hosts, server_addresses
 from arcor2_server.access.admission import PARAMETER, is_local, is_loopback
 from arcor2_server.access.tokens import TokenFile
@@ -172,6 +172,8 @@ def serve(
                 runner.run(run(settings, [listener, *classic_listeners], legacy_listener, certificate, plc))
     except CannotServe as error:
         return fail("serve", error, error.status)
+    except DatabaseInUse as error:
+        return fail("serve", error, ExitStatus.DATA_IN_USE)
     except StorageError as error:
         return fail("serve", error, ExitStatus.DATABASE_UNUSABLE)
     return ExitStatus.OK

@@ -13,7 +13,7 @@ from arcor2_hw.data.object_type import Mesh, Model3dType, ObjectModel, ObjectTyp
 from arcor2_hw.data.project import Project, ProjectParameter
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
 from arcor2_hw.data.texts import check_texts
-from arcor2_hw.exceptions import InvalidPackage, NotFound, StorageError, TextTooLong
+from arcor2_hw.exceptions import InvalidData, InvalidPackage, NotFound, StorageError
 from arcor2_hw.runtime.type_files import shared_modules
 from arcor2_server.build import imported, package
 from arcor2_server.files import replace_file
@@ -162,7 +162,7 @@ def _document(files: Mapping[str, bytes], path: str, kind: type[T]) -> T:
         if b"\\u" in files[path]:
             msgspec.json.encode(found)  # fails for a lone surrogate, which can be decoded but not encoded
         return found
-    except TextTooLong as error:
+    except InvalidData as error:
         raise InvalidPackage("{path}: {reason}", path=path, reason=error) from error
     except UnicodeError as error:
         raise InvalidPackage("{path}: it contains an invalid character: {reason}", path=path, reason=error) from error

@@ -66,7 +66,9 @@ _STATUS: Final[dict[type[Arcor2Error], tuple[int, str]]] = {
     InvalidProject: (409, "InvalidProject"),
 }
 """Status and `type` of the answer by error class, first match. Existing clients distinguish errors by the type."""
-_UNAVAILABLE: Final = frozenset({"not_installed", "compute_stopped", "compute_timeout", "compute_busy"})
+_UNAVAILABLE: Final = frozenset(
+    {"not_installed", "compute_stopped", "compute_timeout", "compute_busy", "database_unreachable", "database_in_use"}
+)
 """Codes of errors of an unavailable part of the system."""
 _BY_CODE: Final = {"calibration_refused": (409, "Invalid")}
 """Status and type by error code, as in the Calibration service of ARCOR2 (protocol, section 15)."""

@@ -39,6 +39,6 @@ class AlarmStore:
         """Store records, and delete those with the given numbers."""
         async with self._storage.writing(documents=False) as session:
             for record in records:
-                await session.merge(AlarmRow(number=record.number, document=_encode(record)))
+                await self._storage.upsert(session, AlarmRow(number=record.number, document=_encode(record)))
             if deleted:
                 await session.execute(delete(AlarmRow).where(AlarmRow.number.in_(deleted)))

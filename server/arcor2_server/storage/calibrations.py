@@ -28,14 +28,15 @@ class Calibrations:
     async def put(self, record: CalibrationRecord) -> None:
         """Store a record."""
         async with self._storage.writing() as session:
-            await session.merge(
+            await self._storage.upsert(
+                session,
                 CalibrationRow(
                     id=record.id,
                     date=record.date,
                     kind=record.kind.value,
                     object_id=record.object_id,
                     document=_encode(record),
-                )
+                ),
             )
             await session.flush()
             count = await session.scalar(select(func.count()).select_from(CalibrationRow)) or 0

@@ -35,7 +35,7 @@ class MaintenanceStore:
         async with self._storage.writing(documents=False) as session:
             for card in cards:
                 stored = msgspec.structs.replace(card, backups=[], found=UNSET, differing=[])
-                await session.merge(DeviceRow(object_id=card.object_id, document=_encode(stored)))
+                await self._storage.upsert(session, DeviceRow(object_id=card.object_id, document=_encode(stored)))
 
     async def backups(self) -> list[BackupInfo]:
         """Return all backups, without the parameters."""
@@ -53,8 +53,9 @@ class MaintenanceStore:
     async def put_backup(self, info: BackupInfo, backup: ParameterBackup, superseded: Iterable[str]) -> None:
         """Store a backup, and delete others by their ids."""
         async with self._storage.writing(documents=False) as session:
-            await session.merge(
-                ParameterBackupRow(id=info.id, object_id=info.object_id, info=_encode(info), document=_encode(backup))
+            await self._storage.upsert(
+                session,
+                ParameterBackupRow(id=info.id, object_id=info.object_id, info=_encode(info), document=_encode(backup)),
             )
             await session.execute(delete(ParameterBackupRow).where(ParameterBackupRow.id.in_(list(superseded))))
 

@@ -1,7 +1,45 @@
 """The database tables. Documents are stored as JSON; columns contain the fields for lists and look-ups."""
 
-from sqlalchemy import BigInteger, Boolean, Double, ForeignKey, Integer, LargeBinary, String, Text
+from sqlalchemy import (
+    BigInteger,
+    Boolean,
+    Dialect,
+    Double,
+    ForeignKey,
+    Integer,
+    LargeBinary,
+    String,
+    Text,
+    TypeDecorator,
+)
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+from arcor2_hw.exceptions import InvalidData
+
+
+class StoredText(TypeDecorator[str]):
+    """A text without the character NUL, which PostgreSQL cannot store. SQLite refuses it too, so that both do the same.
+
+    Args:
+        length: Maximum length in characters; None: not limited.
+    """
+
+    impl = String
+    cache_ok = True
+    field = ""
+    """The column and its table, for messages."""
+
+    def __init__(self, length: int | None = None) -> None:
+        super().__init__(length)
+        self.length = length
+        if length is None:
+            self.impl = Text()
+
+    def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:  # noqa: ARG002
+        """Return the value. Raise InvalidData if it contains NUL."""
+        if value is not None and "\0" in value:
+            raise InvalidData("{field} contains the character NUL. Remove it.", field=self.field or "A text")
+        return value
 
 
 class Base(DeclarativeBase):
@@ -13,11 +51,11 @@ class SceneRow(Base):
 
     __tablename__ = "scene"
 
-    id: Mapped[str] = mapped_column(String(255), primary_key=True)
-    name: Mapped[str] = mapped_column(Text, index=True)
-    description: Mapped[str] = mapped_column(Text, default="")
-    created: Mapped[str] = mapped_column(String(40))
-    modified: Mapped[str] = mapped_column(String(40))
+    id: Mapped[str] = mapped_column(StoredText(255), primary_key=True)
+    name: Mapped[str] = mapped_column(StoredText(), index=True)
+    description: Mapped[str] = mapped_column(StoredText(), default="")
+    created: Mapped[str] = mapped_column(StoredText(40))
+    modified: Mapped[str] = mapped_column(StoredText(40))
     document: Mapped[bytes] = mapped_column(LargeBinary)
 
 
@@ -26,13 +64,13 @@ class ProjectRow(Base):
 
     __tablename__ = "project"
 
-    id: Mapped[str] = mapped_column(String(255), primary_key=True)
-    scene_id: Mapped[str] = mapped_column(String(255), index=True)
-    name: Mapped[str] = mapped_column(Text, index=True)
-    description: Mapped[str] = mapped_column(Text, default="")
+    id: Mapped[str] = mapped_column(StoredText(255), primary_key=True)
+    scene_id: Mapped[str] = mapped_column(StoredText(255), index=True)
+    name: Mapped[str] = mapped_column(StoredText(), index=True)
+    description: Mapped[str] = mapped_column(StoredText(), default="")
     has_logic: Mapped[bool] = mapped_column(Boolean, default=True)
-    created: Mapped[str] = mapped_column(String(40))
-    modified: Mapped[str] = mapped_column(String(40))
+    created: Mapped[str] = mapped_column(StoredText(40))
+    modified: Mapped[str] = mapped_column(StoredText(40))
     document: Mapped[bytes] = mapped_column(LargeBinary)
 
 
@@ -42,7 +80,7 @@ class ProjectSourceRow(Base):
     __tablename__ = "project_source"
 
     id: Mapped[str] = mapped_column(ForeignKey("project.id", ondelete="CASCADE"), primary_key=True)
-    script: Mapped[str] = mapped_column(Text)
+    script: Mapped[str] = mapped_column(StoredText())
 
 
 class ObjectTypeRow(Base):
@@ -53,12 +91,12 @@ class ObjectTypeRow(Base):
 
     __tablename__ = "object_type"
 
-    id: Mapped[str] = mapped_column(String(255), primary_key=True)
-    description: Mapped[str | None] = mapped_column(Text)
-    source: Mapped[str] = mapped_column(Text)
-    model_kind: Mapped[str | None] = mapped_column(String(20))
-    created: Mapped[str] = mapped_column(String(40))
-    modified: Mapped[str] = mapped_column(String(40))
+    id: Mapped[str] = mapped_column(StoredText(255), primary_key=True)
+    description: Mapped[str | None] = mapped_column(StoredText())
+    source: Mapped[str] = mapped_column(StoredText())
+    model_kind: Mapped[str | None] = mapped_column(StoredText(20))
+    created: Mapped[str] = mapped_column(StoredText(40))
+    modified: Mapped[str] = mapped_column(StoredText(40))
     modules: Mapped[bytes | None] = mapped_column(LargeBinary)
 
 
@@ -67,8 +105,8 @@ class ModelRow(Base):
 
     __tablename__ = "model"
 
-    id: Mapped[str] = mapped_column(String(255), primary_key=True)
-    kind: Mapped[str] = mapped_column(String(20))
+    id: Mapped[str] = mapped_column(StoredText(255), primary_key=True)
+    kind: Mapped[str] = mapped_column(StoredText(20))
     document: Mapped[bytes] = mapped_column(LargeBinary)
 
 
@@ -87,8 +125,8 @@ class ExecutionTokenRow(Base):
 
     __tablename__ = "execution_token"
 
-    id: Mapped[str] = mapped_column(String(255), primary_key=True)
-    name: Mapped[str] = mapped_column(Text)
+    id: Mapped[str] = mapped_column(StoredText(255), primary_key=True)
+    name: Mapped[str] = mapped_column(StoredText())
     access: Mapped[bool] = mapped_column(Boolean, default=False)
 
 
@@ -97,7 +135,7 @@ class BreakpointsRow(Base):
 
     __tablename__ = "breakpoints"
 
-    package_id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    package_id: Mapped[str] = mapped_column(StoredText(255), primary_key=True)
     ids: Mapped[bytes] = mapped_column(LargeBinary)
 
 
@@ -106,9 +144,9 @@ class ViewValueRow(Base):
 
     __tablename__ = "view_value"
 
-    user: Mapped[str] = mapped_column(String(255), primary_key=True)
-    document: Mapped[str] = mapped_column(String(255), primary_key=True, index=True)
-    key: Mapped[str] = mapped_column(String(255), primary_key=True)
+    user: Mapped[str] = mapped_column(StoredText(255), primary_key=True)
+    document: Mapped[str] = mapped_column(StoredText(255), primary_key=True, index=True)
+    key: Mapped[str] = mapped_column(StoredText(255), primary_key=True)
     value: Mapped[bytes] = mapped_column(LargeBinary)
     revision: Mapped[int] = mapped_column(BigInteger)
 
@@ -118,9 +156,9 @@ class SharedBreakpointsRow(Base):
 
     __tablename__ = "shared_breakpoints"
 
-    project_id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    project_id: Mapped[str] = mapped_column(StoredText(255), primary_key=True)
     ids: Mapped[bytes] = mapped_column(LargeBinary)
-    user: Mapped[str] = mapped_column(Text, default="")
+    user: Mapped[str] = mapped_column(StoredText(), default="")
 
 
 class RunRow(Base):
@@ -155,10 +193,10 @@ class CalibrationRow(Base):
 
     __tablename__ = "calibration"
 
-    id: Mapped[str] = mapped_column(String(255), primary_key=True)
-    date: Mapped[str] = mapped_column(String(40), index=True)
-    kind: Mapped[str] = mapped_column(String(40))
-    object_id: Mapped[str] = mapped_column(String(255), index=True)
+    id: Mapped[str] = mapped_column(StoredText(255), primary_key=True)
+    date: Mapped[str] = mapped_column(StoredText(40), index=True)
+    kind: Mapped[str] = mapped_column(StoredText(40))
+    object_id: Mapped[str] = mapped_column(StoredText(255), index=True)
     document: Mapped[bytes] = mapped_column(LargeBinary)
 
 
@@ -167,7 +205,7 @@ class RecipeRow(Base):
 
     __tablename__ = "recipe"
 
-    id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    id: Mapped[str] = mapped_column(StoredText(255), primary_key=True)
     document: Mapped[bytes] = mapped_column(LargeBinary)
 
 
@@ -186,12 +224,12 @@ class UnitRow(Base):
     __tablename__ = "unit"
 
     number: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=False)
-    serial: Mapped[str] = mapped_column(String(255), index=True)
-    order_id: Mapped[str] = mapped_column(String(255), index=True)
-    product: Mapped[str] = mapped_column(String(255))
-    state: Mapped[str] = mapped_column(String(20))
-    entered: Mapped[str] = mapped_column(String(40), index=True)
-    left: Mapped[str | None] = mapped_column(String(40), index=True)
+    serial: Mapped[str] = mapped_column(StoredText(255), index=True)
+    order_id: Mapped[str] = mapped_column(StoredText(255), index=True)
+    product: Mapped[str] = mapped_column(StoredText(255))
+    state: Mapped[str] = mapped_column(StoredText(20))
+    entered: Mapped[str] = mapped_column(StoredText(40), index=True)
+    left: Mapped[str | None] = mapped_column(StoredText(40), index=True)
     planned_rate: Mapped[float | None] = mapped_column(Double)
     document: Mapped[bytes] = mapped_column(LargeBinary)
 
@@ -212,7 +250,7 @@ class CellTimeRow(Base):
 
     start: Mapped[float] = mapped_column(Double, primary_key=True)
     end: Mapped[float] = mapped_column(Double, index=True)
-    activity: Mapped[str] = mapped_column(String(20))
+    activity: Mapped[str] = mapped_column(StoredText(20))
 
 
 class PersonRow(Base):
@@ -220,7 +258,7 @@ class PersonRow(Base):
 
     __tablename__ = "person"
 
-    id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    id: Mapped[str] = mapped_column(StoredText(255), primary_key=True)
     document: Mapped[bytes] = mapped_column(LargeBinary)
 
 
@@ -232,8 +270,8 @@ class PersonLockOutRow(Base):
 
     __tablename__ = "person_lock_out"
 
-    person: Mapped[str] = mapped_column(String(255), primary_key=True)
-    device: Mapped[str] = mapped_column(String(255), primary_key=True)
+    person: Mapped[str] = mapped_column(StoredText(255), primary_key=True)
+    device: Mapped[str] = mapped_column(StoredText(255), primary_key=True)
     wrong: Mapped[int] = mapped_column(Integer)
     until: Mapped[float] = mapped_column(Double)
 
@@ -243,7 +281,7 @@ class DeviceRow(Base):
 
     __tablename__ = "device"
 
-    object_id: Mapped[str] = mapped_column(String(255), primary_key=True)
+    object_id: Mapped[str] = mapped_column(StoredText(255), primary_key=True)
     document: Mapped[bytes] = mapped_column(LargeBinary)
 
 
@@ -252,7 +290,13 @@ class ParameterBackupRow(Base):
 
     __tablename__ = "parameter_backup"
 
-    id: Mapped[str] = mapped_column(String(255), primary_key=True)
-    object_id: Mapped[str] = mapped_column(String(255), index=True)
+    id: Mapped[str] = mapped_column(StoredText(255), primary_key=True)
+    object_id: Mapped[str] = mapped_column(StoredText(255), index=True)
     info: Mapped[bytes] = mapped_column(LargeBinary)
     document: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+for _table in Base.metadata.tables.values():
+    for _column in _table.columns:
+        if isinstance(_column.type, StoredText):
+            _column.type.field = f"{_column.name} of {_table.name}"

@@ -57,7 +57,7 @@ class PersonStore:
     async def put(self, person: StoredPerson) -> None:
         """Store a person."""
         async with self._storage.writing(documents=False) as session:
-            await session.merge(PersonRow(id=person.id, document=_encode(person)))
+            await self._storage.upsert(session, PersonRow(id=person.id, document=_encode(person)))
 
     async def delete(self, key: str) -> None:
         """Delete a person with their lock-outs."""
@@ -75,7 +75,7 @@ class PersonStore:
         """Store a lock-out."""
         row = PersonLockOutRow(person=person, device=device, wrong=lock_out.wrong, until=lock_out.until)
         async with self._storage.writing(documents=False) as session:
-            await session.merge(row)
+            await self._storage.upsert(session, row)
 
     async def delete_lock_outs(self, person: str, device: str | None = None) -> None:
         """Delete the lock-outs of a person at a device, None: at all devices."""

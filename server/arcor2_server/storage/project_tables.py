@@ -82,7 +82,7 @@ class ProjectTables:
     async def put_token(self, token: ExecutionToken) -> None:
         """Store a token."""
         async with self._storage.writing() as session:
-            await session.merge(ExecutionTokenRow(**msgspec.structs.asdict(token)))
+            await self._storage.upsert(session, ExecutionTokenRow(**msgspec.structs.asdict(token)))
 
     async def delete_token(self, key: str) -> None:
         """Delete a token."""
@@ -99,8 +99,8 @@ class ProjectTables:
     async def put_breakpoints(self, package_id: str, ids: Iterable[str]) -> None:
         """Replace the breakpoints of a package."""
         async with self._storage.writing() as session:
-            await session.merge(
-                BreakpointsRow(package_id=package_id, ids=msgspec.json.encode(list(dict.fromkeys(ids))))
+            await self._storage.upsert(
+                session, BreakpointsRow(package_id=package_id, ids=msgspec.json.encode(list(dict.fromkeys(ids))))
             )
 
     async def delete_breakpoints(self, package_id: str) -> None:

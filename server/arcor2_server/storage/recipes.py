@@ -39,7 +39,7 @@ class RecipeStore:
     async def put(self, recipe: Recipe) -> None:
         """Store a recipe."""
         async with self._storage.writing(documents=False) as session:
-            await session.merge(RecipeRow(id=recipe.id, document=_encode(recipe)))
+            await self._storage.upsert(session, RecipeRow(id=recipe.id, document=_encode(recipe)))
 
     async def delete(self, key: str) -> None:
         """Delete a recipe."""

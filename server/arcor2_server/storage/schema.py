@@ -32,26 +32,38 @@ async def create_or_migrate(engine: AsyncEngine, place: str) -> None:
     """
     try:
         async with engine.begin() as connection:
-            found = await connection.run_sync(_examine)
-            if found is None:
-                await connection.run_sync(_create)
-                return
-        if found == REVISION:
-            return
-        if found not in KNOWN:
-            raise StorageError(
-                "The database {place} has the schema {found!r}, which this version does not know. Update arcor2-hw.",
-                place=place,
-                found=found,
-            )
-        async with engine.begin() as connection:
-            await connection.run_sync(migrate)
+            await connection.run_sync(_create_or_migrate, place)
     except SQLAlchemyError as error:
+        if engine.dialect.name == "postgresql":
+            from arcor2_server.storage.postgresql import unreachable
+
+            if (lost := unreachable(error, place)) is not None:
+                raise lost from error
         raise StorageError(
             "The database {place} cannot be used: {reason}.", detail=str(error), place=place, reason=_reason(error)
         ) from error
     except OSError as error:
         raise StorageError("The database {place} cannot be used: {reason}.", place=place, reason=error) from error
+
+
+def _create_or_migrate(connection: Connection, place: str) -> None:
+    if connection.dialect.name == "postgresql":
+        from arcor2_server.storage import postgresql
+
+        postgresql.check_collation(connection, place)
+        # A command may start at the same time as the server.
+        connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": postgresql.LOCK + 1})
+    found = _examine(connection)
+    if found is None:
+        _create(connection)
+    elif found not in KNOWN | {REVISION}:
+        raise StorageError(
+            "The database {place} has the schema {found!r}, which this version does not know. Update arcor2-hw.",
+            place=place,
+            found=found,
+        )
+    elif found != REVISION:
+        migrate(connection)
 
 
 def _reason(error: SQLAlchemyError) -> str:

@@ -41,7 +41,7 @@ class SharedData:
             for key, value in values.items():
                 if value is not None:
                     row = ViewValueRow(user=user, document=document, key=key, value=value, revision=revision)
-                    await session.merge(row)
+                    await self._storage.upsert(session, row)
             if deleted:
                 where = (ViewValueRow.user == user, ViewValueRow.document == document, ViewValueRow.key.in_(deleted))
                 await session.execute(delete(ViewValueRow).where(*where))
@@ -76,8 +76,8 @@ class SharedData:
     async def put_breakpoints(self, project_id: str, ids: set[str], user: str) -> None:
         """Replace the breakpoints of a project."""
         async with self._storage.writing(documents=False) as session:
-            await session.merge(
-                SharedBreakpointsRow(project_id=project_id, ids=msgspec.json.encode(sorted(ids)), user=user)
+            await self._storage.upsert(
+                session, SharedBreakpointsRow(project_id=project_id, ids=msgspec.json.encode(sorted(ids)), user=user)
             )
 
     # ------------------------------------------------------------------------------------------------ runs
@@ -91,7 +91,7 @@ class SharedData:
     async def put_run(self, run: Run, oldest: int) -> None:
         """Store a run, and delete those with a number below `oldest`."""
         async with self._storage.writing(documents=False) as session:
-            await session.merge(RunRow(number=run.number, document=msgspec.json.encode(run)))
+            await self._storage.upsert(session, RunRow(number=run.number, document=msgspec.json.encode(run)))
             await session.execute(delete(RunRow).where(RunRow.number < oldest))
             await session.execute(delete(RunTraceRow).where(RunTraceRow.run < oldest))
 
@@ -106,7 +106,7 @@ class SharedData:
         """Store the trace of a run."""
         document = await asyncio.to_thread(lambda: zlib.compress(msgspec.json.encode(trace)))
         async with self._storage.writing(documents=False) as session:
-            await session.merge(RunTraceRow(run=trace.run, document=document))
+            await self._storage.upsert(session, RunTraceRow(run=trace.run, document=document))
 
 
 def _trace(document: bytes) -> RunTrace:

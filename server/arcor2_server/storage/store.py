@@ -6,7 +6,6 @@ from typing import Final, Self
 import msgspec
 from msgspec import UNSET
 from sqlalchemy import delete, select
-from sqlalchemy.ext.asyncio import AsyncEngine
 
 from arcor2_hw.data.base import Data, now
 from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Model3dType, Models, ObjectModel, ObjectTypeSource, Sphere
@@ -14,7 +13,7 @@ from arcor2_hw.data.project import BareProject, Project
 from arcor2_hw.data.scene import BareScene, Scene
 from arcor2_hw.exceptions import StorageError
 from arcor2_server.settings import ServerSettings
-from arcor2_server.storage.database import Database, open_engine
+from arcor2_server.storage.database import Database, Engines, open_engines
 from arcor2_server.storage.models import ModelRow, ObjectTypeRow, ProjectRow, ProjectSourceRow, SceneRow
 from arcor2_server.storage.setting_secrets import SettingSecrets
 
@@ -38,21 +37,22 @@ class Storage(Database):
     """The data of the Project service. All methods may raise StorageError, which names the database.
 
     Args:
-        engine: the database.
-        place: names the database in messages.
+        engines: the connections of the database.
         secrets: moves secrets out of documents before they are saved; None: documents are saved unchanged.
     """
 
-    def __init__(self, engine: AsyncEngine, place: str, secrets: SettingSecrets | None) -> None:
-        super().__init__(engine, place)
+    def __init__(self, engines: Engines, secrets: SettingSecrets | None = None) -> None:
+        super().__init__(engines)
         self.secrets = secrets
         self.on_deleted: list[Callable[[str], Awaitable[None]]] = []
         """Called with the id of a deleted scene or project."""
 
     @classmethod
-    async def open(cls, settings: ServerSettings, secrets: SettingSecrets | None = None) -> Self:
-        """Open or create the database. Raise StorageError if it is damaged, not writable or of a newer version."""
-        return cls(*await open_engine(settings), secrets)
+    async def open(
+        cls, settings: ServerSettings, secrets: SettingSecrets | None = None, *, exclusive: bool = True
+    ) -> Self:
+        """Open or create the database; the arguments and errors are those of `open_engines`."""
+        return cls(await open_engines(settings, exclusive=exclusive), secrets)
 
     # ------------------------------------------------------------------------------------------------ scenes
     async def scenes(self) -> list[BareScene]:
@@ -84,7 +84,7 @@ class Storage(Database):
                 before = None if row is None else self.decoded(_decode_scene, row)
                 saved = await self.secrets.extract_from_scene(saved, before)
             columns = {name: getattr(saved, name) for name in _SCENE_COLUMNS}
-            await session.merge(SceneRow(document=_encode(saved), **columns))
+            await self.upsert(session, SceneRow(document=_encode(saved), **columns))
         return saved
 
     async def delete_scene(self, key: str) -> None:
@@ -125,7 +125,7 @@ class Storage(Database):
                 before = None if row is None else self.decoded(_decode_project, row)
                 saved = await self.secrets.extract_from_project(saved, self.decoded(_decode_scene, scene), before)
             columns = {name: getattr(saved, name) for name in _PROJECT_COLUMNS}
-            await session.merge(ProjectRow(document=_encode(saved), **columns))
+            await self.upsert(session, ProjectRow(document=_encode(saved), **columns))
         return saved
 
     async def delete_project(self, key: str) -> None:
@@ -152,7 +152,7 @@ class Storage(Database):
         """Save the script of a project. Raise NotFound if there is no such project."""
         async with self.writing() as session:
             await self.one(session, ProjectRow, key, "project")
-            await session.merge(ProjectSourceRow(id=key, script=script))
+            await self.upsert(session, ProjectSourceRow(id=key, script=script))
 
     # ------------------------------------------------------------------------------------------------ object types
     async def object_types(self) -> list[ObjectTypeSource]:
@@ -186,8 +186,9 @@ class Storage(Database):
             model = None
             if not isinstance(saved.model, msgspec.UnsetType) and saved.model.type is not Model3dType.NONE:
                 model = saved.model.model()
-                await session.merge(_model_row(model))
-            await session.merge(
+                await self.upsert(session, _model_row(model))
+            await self.upsert(
+                session,
                 ObjectTypeRow(
                     id=saved.id,
                     description=None if isinstance(saved.description, msgspec.UnsetType) else saved.description,
@@ -196,7 +197,7 @@ class Storage(Database):
                     created=saved.created,
                     modified=saved.modified,
                     modules=modules,
-                )
+                ),
             )
         self.types_revision += 1
         return saved
@@ -222,7 +223,7 @@ class Storage(Database):
     async def put_model(self, model: Models) -> None:
         """Create or replace a collision model."""
         async with self.writing() as session:
-            await session.merge(_model_row(model))
+            await self.upsert(session, _model_row(model))
             if (row := await session.get(ObjectTypeRow, model.id)) is not None and row.model_kind is not None:
                 row.model_kind = model.type().value
                 row.modified = now()
@@ -278,7 +279,7 @@ class Storage(Database):
             raise StorageError(
                 "the model {id!r} in the database {place} has the unknown kind {type!r}",
                 id=row.id,
-                place=self._place,
+                place=self.place,
                 type=row.kind,
             )
         model: Models = self.decoded(_MODEL_DECODERS[row.kind], row)

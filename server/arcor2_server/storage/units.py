@@ -59,7 +59,8 @@ class UnitStore:
                 rate = None if isinstance(recipe, Unset) or isinstance(recipe.planned_rate, Unset) else (
                     recipe.planned_rate
                 )  # fmt: skip
-                await session.merge(
+                await self._storage.upsert(
+                    session,
                     UnitRow(
                         number=record.number,
                         serial=record.serial,
@@ -70,10 +71,10 @@ class UnitStore:
                         left=None if isinstance(record.left, Unset) else record.left,
                         planned_rate=rate,
                         document=_packed(record),
-                    )
+                    ),
                 )
                 for run in record.runs:
-                    await session.merge(UnitRunRow(unit=record.number, run=run))
+                    await self._storage.upsert(session, UnitRunRow(unit=record.number, run=run))
             for number in deleted:
                 await session.execute(delete(UnitRow).where(UnitRow.number == number))
                 await session.execute(delete(UnitRunRow).where(UnitRunRow.unit == number))
@@ -119,7 +120,7 @@ class UnitStore:
     async def put_time(self, start: float, end: float, activity: CellActivity) -> None:
         """Store what the cell did in a time, s since the epoch; the same start replaces it."""
         async with self._storage.writing(documents=False) as session:
-            await session.merge(CellTimeRow(start=start, end=end, activity=activity.value))
+            await self._storage.upsert(session, CellTimeRow(start=start, end=end, activity=activity.value))
 
     async def delete_times(self, before: float) -> None:
         """Delete times that ended before a time, s since the epoch."""

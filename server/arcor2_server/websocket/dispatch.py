@@ -14,8 +14,8 @@ from msgspec import UNSET
 from arcor2_hw.data.audit import AuditOutcome
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import Request, Rpc
-from arcor2_hw.data.texts import SHORTEST, check_texts
-from arcor2_hw.exceptions import Arcor2Error, TextTooLong
+from arcor2_hw.data.texts import check_texts, needs_check
+from arcor2_hw.exceptions import Arcor2Error, InvalidData
 from arcor2_hw.messages import Message
 from arcor2_server.access.admission import LOG_ON_NEEDED
 from arcor2_server.audit import commands
@@ -101,9 +101,9 @@ class Dispatcher:
             if not isinstance(request.args, msgspec.UnsetType):
                 try:
                     args = route.decode(request.args)
-                    if len(request.args) > SHORTEST:
+                    if needs_check(bytes(request.args)):
                         check_texts(args)
-                except TextTooLong as error:
+                except InvalidData as error:
                     wrong = Message.of("The arguments of {request} are wrong: {reason}", request=rpc.name, reason=error)
                     refuse(client, request, wrong, error.code)
                     return

@@ -15,6 +15,7 @@ from typing import IO, Any
 from websockets.asyncio.client import ClientConnection, connect
 
 from tests.forking import Forked, Forker, ended, readable
+from tests.postgresql import variables
 
 COMMAND = [sys.executable, "-m", "arcor2_server.cli.main"]
 READY_WITHIN = 60.0
@@ -64,7 +65,7 @@ class ServerProcess:
         self.data_dir = data_dir
         self.url = ""
         self._arguments = arguments
-        self._environment = os.environ | environment
+        self._environment = os.environ | variables(data_dir) | environment
         self._process: Forked | subprocess.Popen[bytes] | None = None
         self.log = data_dir.with_suffix(".log")
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import os
 import signal
 import sqlite3
 import sys
@@ -19,10 +20,13 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.object_type import Box, ObjectModel, ObjectTypeSource, Sphere
 from arcor2_hw.data.project import ActionPoint, Position, Project
 from arcor2_hw.data.scene import Scene, SceneObject
-from arcor2_hw.exceptions import NotFound, StorageError
+from arcor2_hw.exceptions import InvalidData, NotFound, StorageError, TextTooLong
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import DocumentId, Storage, schema
 from arcor2_server.storage.models import Base
+from arcor2_server.storage.project_tables import ExecutionToken, ProjectTables
+from arcor2_server.storage.shared_data import SharedData
+from tests import postgresql
 
 
 @pytest.fixture
@@ -31,7 +35,16 @@ def settings(tmp_path: Path) -> ServerSettings:
 
 
 @pytest.fixture
-async def storage(settings: ServerSettings) -> AsyncIterator[Storage]:
+async def sqlite_storage(settings: ServerSettings) -> AsyncIterator[Storage]:
+    opened = await Storage.open(settings)
+    yield opened
+    await opened.close()
+
+
+@pytest.fixture(params=["postgresql"] if postgresql.CHOSEN in os.environ else ["sqlite", "postgresql"])
+async def storage(settings: ServerSettings, request: pytest.FixtureRequest) -> AsyncIterator[Storage]:
+    if request.param == "postgresql":
+        settings = replace(settings, database_url=request.getfixturevalue("databases").url(settings.data_dir))
     opened = await Storage.open(settings)
     yield opened
     await opened.close()
@@ -143,6 +156,52 @@ async def test_concurrent_writes_all_arrive(storage: Storage) -> None:
     assert len(await storage.scenes()) == 20
 
 
+async def test_ten_first_saves_of_one_key_all_succeed(storage: Storage) -> None:
+    tables, shared = ProjectTables(storage), SharedData(storage)
+    await asyncio.gather(*(storage.scenes() for _ in range(10)))  # all connections are open
+    saved = await asyncio.gather(*(storage.put_scene(SCENE) for _ in range(10)))
+    assert {scene.created for scene in saved} == {(await storage.scene("scn_1")).created}
+    await asyncio.gather(
+        *(storage.put_object_type(ObjectTypeSource("New", "x = 1")) for _ in range(10)),
+        *(storage.put_model(Box("box", 1, 1, 1)) for _ in range(10)),
+        *(tables.put_token(ExecutionToken("t", "n")) for _ in range(10)),
+        *(tables.put_breakpoints("pkg_1", [f"{n}"]) for n in range(10)),
+        *(shared.put_view("u", "d", dict.fromkeys(("k", "l") if n % 2 else ("l", "k"), b"1"), n) for n in range(10)),
+    )
+    assert [model.id for model in await storage.models()] == ["box"]
+    assert [token.id for token in await tables.tokens()] == ["t"]
+    assert await shared.view("u", "d") == {"k": b"1", "l": b"1"}
+
+
+async def test_a_write_is_visible_in_its_own_transaction(storage: Storage) -> None:
+    async with storage.transaction():
+        await storage.put_scene(SCENE)
+        await storage.put_scene(replace(SCENE, name="Cell 2"))
+        assert (await storage.scene("scn_1")).name == "Cell 2"
+
+
+async def test_texts_that_do_not_fit_are_refused_by_field(storage: Storage) -> None:
+    limit = 255
+    await storage.put_scene(SCENE)
+    with pytest.raises(InvalidData, match=r"^name of scene contains the character NUL"):
+        await storage.put_scene(replace(SCENE, name="a\0b"))
+    with pytest.raises(InvalidData, match=r"^source of object_type contains the character NUL"):
+        await storage.put_object_type(ObjectTypeSource("Nul", "x = '\0'"))
+    with pytest.raises(TextTooLong, match=rf"^id of scene has {limit + 1} characters; at most {limit} are allowed"):
+        await storage.put_scene(replace(SCENE, id="i" * (limit + 1)))
+    await storage.put_scene(replace(SCENE, id="č" * limit))
+    for missing in ("a\0b", "i" * 1000):
+        with pytest.raises((NotFound, InvalidData)):
+            await storage.scene(missing)
+    assert [scene.name for scene in await storage.scenes()] == ["Cell 1", "Cell 1"]
+
+
+async def test_names_are_sorted_by_code_point(storage: Storage) -> None:
+    for name in ("b", "A", "č", "a", "B", "z"):
+        await storage.put_scene(replace(SCENE, id=f"scn_{name}", name=name))
+    assert [scene.name for scene in await storage.scenes()] == ["A", "B", "a", "b", "z", "č"]
+
+
 WRITER = """
 import asyncio, sys
 from pathlib import Path
@@ -163,6 +222,7 @@ asyncio.run(main())
 """
 
 
+@pytest.mark.sqlite
 async def test_what_was_acknowledged_survives_a_kill(settings: ServerSettings) -> None:
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-c", WRITER, str(settings.data_dir), stdout=asyncio.subprocess.PIPE
@@ -181,8 +241,9 @@ async def test_what_was_acknowledged_survives_a_kill(settings: ServerSettings) -
     assert kept >= {f"scn_{n}" for n in range(acknowledged + 1)}
 
 
-async def test_every_commit_is_flushed(storage: Storage) -> None:
-    async with storage.reading() as session:
+@pytest.mark.sqlite
+async def test_every_commit_is_flushed(sqlite_storage: Storage) -> None:
+    async with sqlite_storage.reading() as session:
         connection = await session.connection()
         synchronous = (await connection.exec_driver_sql("PRAGMA synchronous")).scalar()
         journal = (await connection.exec_driver_sql("PRAGMA journal_mode")).scalar()
@@ -190,6 +251,7 @@ async def test_every_commit_is_flushed(storage: Storage) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ schema
+@pytest.mark.sqlite
 async def test_created_schema_is_the_migrated_one(tmp_path: Path) -> None:
     from sqlalchemy import create_engine
 
@@ -229,6 +291,7 @@ async def test_migrations_run_only_on_an_older_schema(
 
 
 # ------------------------------------------------------------------------------------------------ faults
+@pytest.mark.sqlite
 async def test_a_file_that_is_not_a_database_is_named(settings: ServerSettings) -> None:
     settings.documents_database.write_bytes(b"this is no database " * 500)
     with pytest.raises(StorageError, match=str(settings.documents_database)):
@@ -236,6 +299,7 @@ async def test_a_file_that_is_not_a_database_is_named(settings: ServerSettings) 
     assert settings.documents_database.read_bytes().startswith(b"this is no database"), "nothing is overwritten"
 
 
+@pytest.mark.sqlite
 async def test_damaged_pages_are_found_at_start(settings: ServerSettings) -> None:
     storage = await Storage.open(settings)
     for n in range(50):
@@ -248,6 +312,7 @@ async def test_damaged_pages_are_found_at_start(settings: ServerSettings) -> Non
         await Storage.open(settings)
 
 
+@pytest.mark.sqlite
 async def test_a_newer_schema_is_refused_and_unchanged(settings: ServerSettings) -> None:
     await (await Storage.open(settings)).close()
     with contextlib.closing(sqlite3.connect(settings.documents_database)) as connection:
@@ -257,6 +322,7 @@ async def test_a_newer_schema_is_refused_and_unchanged(settings: ServerSettings)
         await Storage.open(settings)
 
 
+@pytest.mark.sqlite
 async def test_another_programs_database_is_refused(settings: ServerSettings) -> None:
     with contextlib.closing(sqlite3.connect(settings.documents_database)) as connection:
         connection.execute("CREATE TABLE pictures (id)")
@@ -264,16 +330,18 @@ async def test_another_programs_database_is_refused(settings: ServerSettings) ->
         await Storage.open(settings)
 
 
+@pytest.mark.sqlite
 async def test_missing_directory_is_named(tmp_path: Path) -> None:
     settings = ServerSettings(data_dir=tmp_path / "nowhere")
     with pytest.raises(StorageError, match=str(settings.documents_database)):
         await Storage.open(settings)
 
 
-async def test_damaged_document_is_named(storage: Storage, settings: ServerSettings) -> None:
-    await storage.put_scene(SCENE)
+@pytest.mark.sqlite
+async def test_damaged_document_is_named(sqlite_storage: Storage, settings: ServerSettings) -> None:
+    await sqlite_storage.put_scene(SCENE)
     with contextlib.closing(sqlite3.connect(settings.documents_database)) as connection:
         connection.execute("UPDATE scene SET document = '{'")
         connection.commit()
     with pytest.raises(StorageError, match="scn_1"):
-        await storage.scene("scn_1")
+        await sqlite_storage.scene("scn_1")

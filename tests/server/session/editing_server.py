@@ -1,6 +1,7 @@
 """A process that adds actions and prints the name of each acknowledged one, until the test kills it."""
 
 import asyncio
+import os
 import sys
 from pathlib import Path
 
@@ -10,7 +11,7 @@ USERS = 8
 
 
 async def main(directory: Path) -> None:
-    async with open_server(directory) as server:
+    async with open_server(directory, database_url=os.environ.get("ARCOR2_HW_DATABASE_URL", "")) as server:
         people = [await server.person(f"user{number}") for number in range(USERS)]
         first = people[0]
         await first.ask("NewScene", name="scene")

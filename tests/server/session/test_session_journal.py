@@ -14,6 +14,7 @@ from msgspec.structs import replace
 from arcor2_hw.exceptions import StorageError
 from arcor2_server.documents import journal_file
 from arcor2_server.documents.changes import Kind
+from tests.postgresql import variables
 from tests.server.session.session_server import Person, Refused, SessionServer, open_server
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -47,7 +48,7 @@ async def test_acknowledged_edits_survive_a_kill(tmp_path: Path, moment: float) 
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.DEVNULL,
         cwd=REPOSITORY,
-        env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
+        env=os.environ | variables(tmp_path) | {"PYTHONPATH": str(REPOSITORY)},
     )
     assert process.stdout is not None
     acknowledged = []
@@ -227,7 +228,7 @@ async def test_a_damaged_journal_is_renamed_and_reported(tmp_path: Path, damage:
 async def test_a_second_server_on_the_same_data_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(journal_file, "BUSY_TIMEOUT", 0.05)
     async with open_server(tmp_path):
-        with pytest.raises(StorageError, match=r"journal\.sqlite"):
+        with pytest.raises(StorageError, match=r"journal\.sqlite|is in use by"):
             async with open_server(tmp_path):
                 pass
 

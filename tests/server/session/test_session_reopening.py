@@ -77,6 +77,7 @@ async def test_a_project_that_was_never_saved_leaves_no_history(
     assert len(list(server.services.settings.history_dir.iterdir())) == 1, "the history of the scene"
 
 
+@pytest.mark.sqlite
 @pytest.mark.parametrize("killed", [False, True])
 async def test_history_of_a_closed_project_survives_a_restart(tmp_path: Path, killed: bool) -> None:
     (tmp_path / "before").mkdir()
@@ -264,6 +265,7 @@ async def test_a_project_with_a_damaged_history_opens(
     assert "nothing" in await refused(alice)
 
 
+@pytest.mark.sqlite
 async def test_data_of_an_earlier_version_is_migrated(tmp_path: Path) -> None:
     """The files were written by the version before histories of closed documents were stored."""
     for name in ("documents", "journal"):
