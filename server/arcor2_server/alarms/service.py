@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from collections import Counter
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -9,7 +10,7 @@ from zlib import crc32
 
 import structlog
 
-from arcor2_hw.data.alarms import AcknowledgeRole, AlarmCategory, AlarmFilter, AlarmRecord
+from arcor2_hw.data.alarms import AcknowledgeRole, AlarmCategory, AlarmFilter, AlarmRecord, Priority
 from arcor2_hw.data.base import UNSET, Timestamp, Unset, now
 from arcor2_hw.data.device import Alarm, Connection
 from arcor2_hw.data.held import HoldDecidedData
@@ -212,6 +213,10 @@ class Alarms:
             ):
                 found.append(record)
         return found
+
+    def active_by_priority(self) -> Counter[Priority]:
+        """Return the number of alarms whose condition persists, without shelved ones."""
+        return Counter(each.priority for each in self._book.records(AlarmFilter.RETAINED) if each.active)
 
     async def acknowledge(self, number: int, by: str, role: Role, note: str) -> None:
         """Acknowledge an alarm. It changes nothing at the device."""

@@ -3,6 +3,7 @@
 import asyncio
 import shutil
 import time
+from collections import deque
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -29,6 +30,8 @@ LONGEST_DELAY: Final = 3.0
 """Delay of a check that shows that the server is overloaded, s."""
 RECOVERED_AFTER: Final = 30.0
 """Time without such a delay after which the overload counts as ended, s."""
+LAG_OF: Final = 60
+"""Number of checks whose largest delay is shown as the lag of the event loop."""
 CERTIFICATE_EXPIRES: Final = 14.0
 """Time before the certificate expires at which it is reported, days."""
 
@@ -55,8 +58,14 @@ class SystemAlarms:
         self._lost_user = ""
         self._slow_until: float | None = None
         self._offset = time.time() - time.monotonic()
+        self._late: deque[float] = deque([0.0], maxlen=LAG_OF)
         self._background = BackgroundTasks()
         hub.on_leave.append(self._left)
+
+    @property
+    def lag(self) -> float:
+        """The largest delay of the event loop in the last minute, s."""
+        return max(self._late)
 
     def start(self) -> None:
         """Start the checks."""
@@ -101,6 +110,7 @@ class SystemAlarms:
 
     def check_load(self, late: float) -> None:
         """Check by how much a check was late, s."""
+        self._late.append(max(0.0, late))
         moment = time.monotonic()
         if late > LONGEST_DELAY:
             self._slow_until = moment + RECOVERED_AFTER

@@ -14,6 +14,7 @@ from arcor2_server.access.route_options import ROLE
 from arcor2_server.app.adapters import request_handlers, rest_groups
 from arcor2_server.app.parts import Server
 from arcor2_server.rest import routes as rest_routes
+from arcor2_server.rest.metrics import Metrics, metrics_route
 from arcor2_server.rest.responses import http_refusal
 from arcor2_server.web.editor import editor_routes
 from arcor2_server.web.response_headers import add_headers
@@ -73,11 +74,25 @@ def endpoints(server: Server) -> tuple[Endpoint, Endpoint]:
     return endpoint(Service(table, server.greeting)), endpoint(execution)
 
 
+def metrics_of(s: Server, served: dict[str, Endpoint]) -> Metrics:
+    """Return what reads the metrics of the parts."""
+    hosts = {"scene": s.scene_host, "program": s.program_host}
+    requests = {service: endpoint.durations for service, endpoint in served.items()}
+    return Metrics(
+        s.settings, s.hub, s.storage, s.execution, s.online, s.cell, s.units, s.alarms, s.system_alarms, hosts, requests
+    )
+
+
 def create_app(server: Server) -> Litestar:
     """Return the application that serves the running parts."""
     endpoint, execution_endpoint = endpoints(server)
     app = Application(
-        route_handlers=[sockets, *rest_routes(rest_groups(server), server.tasks, server.audit), *editor_routes()],
+        route_handlers=[
+            sockets,
+            *rest_routes(rest_groups(server), server.tasks, server.audit),
+            metrics_route(metrics_of(server, {"arserver": endpoint, "execution": execution_endpoint})),
+            *editor_routes(),
+        ],
         guards=[own_pages_only, role_needed],
         before_send=[add_headers],
         openapi_config=None,

@@ -136,8 +136,8 @@ class Server:
         type_notifications = self.type_notifications = closed(TypeNotifications(types, hub))
         compute = self.compute = closed(Compute(settings.compute_idle))
         hosts = self.hosts = CellHosts(settings.device_files_dirs)
-        scene_host = HostSession(hub, hosts, "scene")
-        program_host = HostSession(hub, hosts, "program", to_all_clients=True)
+        scene_host = self.scene_host = HostSession(hub, hosts, "scene")
+        program_host = self.program_host = HostSession(hub, hosts, "program", to_all_clients=True)
 
         installations = InstallationWatch(types, type_notifications, hosts.renew)
         installations.start()
@@ -255,7 +255,7 @@ class Server:
                 run, None if error is None else error.message, None if host is None else host.ring
             )
         )
-        system_alarms = closed(
+        system_alarms = self.system_alarms = closed(
             SystemAlarms(
                 alarms,
                 hub,

@@ -44,6 +44,7 @@ app.command(
     "arcor2_server.cli.object_type:app", name="object-type", help="Upload, list, check and compare object types."
 )
 app.command("arcor2_server.cli.token:app", name="token", help="Manage the access tokens of a server.")
+app.command("arcor2_server.cli.metrics:app", name="metrics", help="Manage the token for the metrics of a server.")
 app.command("arcor2_server.cli.person:app", name="person", help="Manage the persons who log on at shared devices.")
 app.command("arcor2_server.cli.alarms:app", name="alarms", help="List, acknowledge and shelve alarms; statistics.")
 app.command("arcor2_server.cli.cell:app", name="cell", help="Mode and authority of the cell, and jobs of its PLC.")

@@ -43,6 +43,8 @@ class HostSession:
         """The encoded event PackageInfo while a program runs. Set by the owner of the session."""
         self.board = DeviceBoard(hub)
         self.streams = RobotStreams(hub, self.send, to_all_clients=to_all_clients)
+        self.deaths = 0
+        """Number of hosts that have ended by themselves since the start of the server."""
         self.on_death: list[Callable[[Message], None]] = []
         """Called with the reason when the host has ended by itself, before the devices are gone."""
         self._on_message: Callable[[CellHost, m.ServerBound], None] = lambda _host, _message: None
@@ -113,6 +115,7 @@ class HostSession:
     def host_ended(self, host: CellHost, reason: Message) -> None:
         """Report that the host has ended."""
         if host is self.host:
+            self.deaths += 1
             for notify in self.on_death:
                 notify(reason)
             self._on_end(reason)

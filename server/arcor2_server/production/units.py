@@ -55,6 +55,8 @@ class Units:
         """By scene and number of the part."""
         self._recent: OrderedDict[int, UnitRecord] = OrderedDict()
         """The last units that have left the cell, by number."""
+        self.left: Counter[UnitState] = Counter()
+        """Number of units that have left the cell since the start of the server, by where they went."""
         self._next = 1
         self._books: dict[str, PartBooks] = {}
         """The last known books of each scene."""
@@ -92,6 +94,11 @@ class Units:
         """Wait until all records are stored."""
         while self._writing is not None:
             await asyncio.gather(self._writing, return_exceptions=True)
+
+    @property
+    def in_cell(self) -> int:
+        """Number of units in the cell."""
+        return len(self._in_cell)
 
     # -------------------------------------------------------------------------------- a run
     def begin_run(self, number: int, package_id: str, scene_id: str, how: How) -> None:
@@ -211,6 +218,7 @@ class Units:
                 self._delete(record)
                 return
         del self._in_cell[record.scene_id, record.part]
+        self.left[state] += 1
         self._recent[record.number] = record
         if len(self._recent) > RECENT:
             self._recent.popitem(last=False)

@@ -13,6 +13,7 @@ from sqlalchemy.exc import DataError, SQLAlchemyError
 from sqlalchemy.ext.asyncio import AsyncEngine, AsyncSession, async_sessionmaker, create_async_engine
 
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, NotFound, StorageError, TextTooLong
+from arcor2_server.durations import Durations
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage.models import Base
 from arcor2_server.storage.schema import create_or_migrate
@@ -76,6 +77,8 @@ class Database:
     def __init__(self, engines: Engines) -> None:
         self.revision = 0
         self.types_revision = 0
+        self.durations = Durations()
+        """Durations of the transactions that write."""
         self._engines = engines
         self.place = engines.place
         """Names the database in messages."""
@@ -135,8 +138,9 @@ class Database:
                 yield session
                 await session.flush()
                 return
-            async with self._writers() as session, session.begin():
-                yield session
+            with self.durations.measure("write"):
+                async with self._writers() as session, session.begin():
+                    yield session
         except SQLAlchemyError as error:
             raise self._failed("write", error) from error
         if documents:

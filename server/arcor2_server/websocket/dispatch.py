@@ -4,6 +4,7 @@ import asyncio
 import logging
 import secrets
 from collections.abc import Sequence
+from time import perf_counter
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -22,6 +23,7 @@ from arcor2_server.audit import commands
 from arcor2_server.audit.changes import Change, collecting
 from arcor2_server.audit.trail import ENDED_EARLY, AuditTrail
 from arcor2_server.collaboration.log_ons import LogOns
+from arcor2_server.durations import Durations
 from arcor2_server.errors import RequestRefused
 from arcor2_server.websocket.answers import Head, answer, refusal, shortened
 from arcor2_server.websocket.client import Client
@@ -44,6 +46,8 @@ class Dispatcher:
     """Calls the handlers of requests and answers them."""
 
     def __init__(self, hub: Hub, audit: AuditTrail, log_ons: LogOns) -> None:
+        self.durations = Durations()
+        """Durations of the handled requests, without answers from the cache."""
         self._hub = hub
         self._audit = audit
         self._log_ons = log_ons
@@ -66,8 +70,9 @@ class Dispatcher:
 
     async def handle(self, client: Client, request: Request, route: Route) -> None:
         """Handle a request and send its answer."""
+        started, done = perf_counter(), False
         try:
-            await self._run(client, request, route)
+            done = await self._run(client, request, route)
         except Exception:
             reference = secrets.token_hex(4)
             log.exception("request failed", request=request.request, reference=reference, user=client.user)
@@ -82,8 +87,11 @@ class Dispatcher:
                     address=client.address,
                     reason=message.text,
                 )
+        finally:
+            self.durations.add(route.rpc.name, perf_counter() - started, failed=not done)
 
-    async def _run(self, client: Client, request: Request, route: Route) -> None:
+    async def _run(self, client: Client, request: Request, route: Route) -> bool:
+        """Return whether the request was granted."""
         rpc = route.rpc
         if client.role < rpc.role and not (client.logged_off and commands.needs_person(rpc)):
             needed = Message.of(
@@ -91,11 +99,11 @@ class Dispatcher:
             )
             refuse(client, request, needed, "forbidden")
             self._note(AuditOutcome.FORBIDDEN, client, rpc, UNSET)
-            return
+            return False
         if client.logged_off and commands.needs_person(rpc):
             refuse(client, request, LOG_ON_NEEDED, "log_on_needed")
             self._note(AuditOutcome.FORBIDDEN, client, rpc, UNSET)
-            return
+            return False
         args = route.default
         if route.decode is not None:
             if not isinstance(request.args, msgspec.UnsetType):
@@ -106,21 +114,21 @@ class Dispatcher:
                 except InvalidData as error:
                     wrong = Message.of("The arguments of {request} are wrong: {reason}", request=rpc.name, reason=error)
                     refuse(client, request, wrong, error.code)
-                    return
+                    return False
                 except (msgspec.DecodeError, RecursionError) as error:
                     wrong = Message.of(
                         "The arguments of {request} are wrong: {reason}.", request=rpc.name, reason=error
                     )
                     refuse(client, request, wrong, "invalid_arguments")
-                    return
+                    return False
             elif args is UNSET:
                 missing = Message.of("The arguments of {request} are missing.", request=rpc.name)
                 refuse(client, request, missing, "invalid_arguments")
-                return
+                return False
         if route.handler is None:
             missing = Message.of("{request} is not available in this version.", request=rpc.name)
             refuse(client, request, missing, "not_available")
-            return
+            return False
         if client.person is not None and commands.is_command(rpc) and not self._is_renewal(client, rpc, args):
             self._log_ons.touch(client)
         context = Context(client, request.dry_run and rpc.dry_run, rpc.name, request.codes, request.step)
@@ -136,7 +144,7 @@ class Dispatcher:
                     refuse(client, request, error.message, error.code)
                 if not context.dry_run:
                     self._note(AuditOutcome.REFUSED, client, rpc, args, str(error), changes)
-                return
+                return False
             except asyncio.CancelledError:
                 if changes:
                     self._note(AuditOutcome.REFUSED, client, rpc, args, ENDED_EARLY, changes)
@@ -144,6 +152,7 @@ class Dispatcher:
         self._send(client, answer(request, UNSET if data is None else data), context)
         if not context.dry_run:
             self._note(AuditOutcome.DONE, client, rpc, args, changes=changes)
+        return True
 
     def _note(
         self,

@@ -15,6 +15,7 @@ from arcor2_server.audit.trail import AuditTrail
 from arcor2_server.background import BackgroundTasks
 from arcor2_server.collaboration.log_ons import LogOns
 from arcor2_server.collaboration.users import Users
+from arcor2_server.durations import Durations
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage.damage_notices import DataDamage
 from arcor2_server.web.websocket_transport import EXTENSION, WireProtocol
@@ -79,6 +80,11 @@ class Endpoint:
         self._dispatcher = Dispatcher(hub, audit, log_ons)
         self._requests = BackgroundTasks()
         self._watch: asyncio.Task[None] | None = None
+
+    @property
+    def durations(self) -> Durations:
+        """Durations of the handled requests."""
+        return self._dispatcher.durations
 
     async def serve(self, socket: WebSocket[Any, Any, Any]) -> None:
         """Serve a connection until it ends."""
