@@ -5,7 +5,9 @@ from typing import Final
 ROLE: Final = "role"
 """Option of a route: the lowest role that may use it."""
 OPEN: Final = "open"
-"""Option of a route: whether it needs no token, since it reveals nothing."""
+"""Option of a route: whether it needs no token of a client, since it reveals nothing; or OWN_TOKEN."""
+OWN_TOKEN: Final = "a token of its own"  # noqa: S105
+"""Value of the option OPEN of a route that checks another token itself."""
 STOPS: Final = "stops"
 """Option of a route: whether a shared device may use it while nobody is logged on, since it stops something."""
 PERSON: Final = "person"

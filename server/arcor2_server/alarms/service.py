@@ -49,6 +49,8 @@ class Alarms:
         self._book = AlarmBook()
         self._seen: dict[tuple[str, str], set[str]] = {}
         self._unwritten: dict[int, AlarmRecord] = {}
+        self._refused: tuple[dict[int, AlarmRecord], set[int]] = ({}, set())
+        """Changed and deleted records that the database could not store, for the next write."""
         self._writing: asyncio.Task[None] | None = None
         self._shelved: dict[int, asyncio.TimerHandle] = {}
         self.on_raised: list[Callable[[AlarmRecord, float], None]] = []
@@ -72,7 +74,9 @@ class Alarms:
         await self.flush()
 
     async def flush(self) -> None:
-        """Wait until all changes are stored."""
+        """Wait until all changes are stored, or could not be stored."""
+        if self._writing is None and any(self._refused):
+            self._writing = asyncio.get_running_loop().create_task(self._write(), name="alarms")
         if self._writing is not None:
             await asyncio.gather(self._writing, return_exceptions=True)
 
@@ -282,15 +286,20 @@ class Alarms:
 
     async def _write(self) -> None:
         """Store changes until none is left, and publish them. A change that cannot be stored is published too."""
-        while self._unwritten or self._book.deleted:
-            records, self._unwritten = [*self._unwritten.values()], {}
+        while self._unwritten or self._book.deleted or any(self._refused):
+            records, self._unwritten = self._unwritten, {}
             deleted, self._book.deleted = self._book.deleted, set()
+            changed, removed = self._refused[0] | records, self._refused[1] | deleted
+            self._refused = ({}, set())
             try:
-                await self._store.put(records, deleted)
+                await self._store.put(changed.values(), removed)
             except StorageError as error:
                 log.warning("alarms not stored", reason=str(error))
-            for record in records:
+                self._refused = changed, removed
+            for record in records.values():
                 self._hub.broadcast(make_event("AlarmChanged", record))
+            if any(self._refused) and not (self._unwritten or self._book.deleted):
+                break
         self._writing = None
 
 

@@ -8,7 +8,7 @@ from litestar import Litestar
 from arcor2_hw.data.events import EVENTS
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS, WITHOUT_PERSON
-from arcor2_server.access.route_options import OPEN, ROLE
+from arcor2_server.access.route_options import OPEN, OWN_TOKEN, ROLE
 
 _HEAD = """# Roles
 
@@ -36,9 +36,11 @@ def _routes(app: Litestar) -> Iterable[tuple[str, Role]]:
     for route in app.routes:
         for handler in cast("Any", route).route_handlers if hasattr(route, "route_handlers") else ():
             role = handler.opt.get(ROLE)
+            open_to = handler.opt.get(OPEN)
+            needed = "" if not open_to else f" ({open_to if open_to == OWN_TOKEN else 'no token'})"
             for method in sorted(handler.http_methods - {"OPTIONS", "HEAD"}):
                 if isinstance(role, Role):
-                    yield f"`{method} {route.path}`{' (no token)' if handler.opt.get(OPEN) else ''}", role
+                    yield f"`{method} {route.path}`{needed}", role
 
 
 def page(app: Litestar) -> str:

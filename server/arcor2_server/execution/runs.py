@@ -32,6 +32,8 @@ log = structlog.get_logger(__name__)
 
 MAX_RUNS: Final = 1000
 """Maximum number of stored runs."""
+MOST_TRACES: Final = 10
+"""Number of traces that are kept in memory while the database cannot be reached."""
 TRACE: Final = "ExecutionTrace"
 """The additional event with the start and end of actions."""
 STATISTICS: Final = "RunStatistics"
@@ -162,7 +164,9 @@ class Runs:
                 self._put(lost)
 
     async def close(self) -> None:
-        """Wait until all runs are stored."""
+        """Wait until all runs are stored, or could not be stored."""
+        if self._writing is None and self._unwritten and self._data is not None:
+            self._writing = asyncio.create_task(self._write(self._data), name="runs")
         if self._writing is not None:
             await asyncio.gather(self._writing, return_exceptions=True)
 
@@ -347,14 +351,16 @@ class Runs:
         """Store changed runs until none is left. Only the newest state of a run is stored."""
         try:
             while self._unwritten:
-                run = self._unwritten.pop(next(iter(self._unwritten)))
+                number, run = next(iter(self._unwritten.items()))
                 await data.put_run(run, next(iter(self._runs)))
-                if (trace := self._unwritten_traces.get(run.number)) is not None:
-                    try:
-                        await data.put_run_trace(trace)
-                    finally:
-                        del self._unwritten_traces[run.number]
-        except StorageError as error:
+                if (trace := self._unwritten_traces.get(number)) is not None:
+                    await data.put_run_trace(trace)
+                    del self._unwritten_traces[number]
+                if self._unwritten.get(number) is run:
+                    del self._unwritten[number]
+        except StorageError as error:  # try again with the next change
             log.warning("run not stored", reason=str(error))
+            for old in list(self._unwritten_traces)[:-MOST_TRACES]:
+                del self._unwritten_traces[old]
         finally:
             self._writing = None

@@ -13,7 +13,7 @@ from arcor2_hw.data.editor import TraceEntry
 from arcor2_hw.data.parts import Part, PartBooks, PlaceKind
 from arcor2_hw.data.rpc import ListUnitsArgs
 from arcor2_hw.data.units import Unit, UnitRecord, UnitState, UnitStep, UsedCalibration
-from arcor2_hw.exceptions import Arcor2Error, StorageError
+from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
 from arcor2_hw.runtime.messages import PartStep
 from arcor2_server.background import BackgroundTasks
 from arcor2_server.events import EventHub, make_event
@@ -88,6 +88,8 @@ class Units:
         """Store what is not stored yet."""
         async with self._describing:  # a query is not interrupted
             await self._background.cancel()
+        if self._unwritten or self._deleted:
+            self._write_later()
         await self.flush()
 
     async def flush(self) -> None:
@@ -263,8 +265,13 @@ class Units:
             while self._unwritten or self._deleted:
                 records, self._unwritten = list(self._unwritten.values()), {}
                 deleted, self._deleted = self._deleted, set()
-                await self._store.put(records, deleted)
-        except StorageError as error:
+                try:
+                    await self._store.put(records, deleted)
+                except StorageError:  # try again with the next change
+                    self._unwritten = {record.number: record for record in records} | self._unwritten
+                    self._deleted |= deleted
+                    raise
+        except (StorageError, InvalidData) as error:
             log.warning("records of units not stored", reason=str(error))
         finally:
             self._writing = None

@@ -17,13 +17,13 @@ from litestar.handlers import HTTPRouteHandler
 
 from arcor2_hw.data.alarms import Priority
 from arcor2_hw.data.device import Connection
-from arcor2_hw.data.events import PackageStateEnum
+from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.packml import MachineState, UnitMode
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.units import UnitState
 from arcor2_hw.messages import translatable
 from arcor2_server.access.metrics_token import MetricsToken
-from arcor2_server.access.route_options import OPEN, ROLE
+from arcor2_server.access.route_options import OPEN, OWN_TOKEN, ROLE
 from arcor2_server.alarms.service import Alarms
 from arcor2_server.alarms.system import SystemAlarms
 from arcor2_server.durations import BOUNDS, Durations
@@ -210,7 +210,7 @@ def metrics_route(metrics: Metrics) -> HTTPRouteHandler:
     """Return the route. It has a token of its own; a token of a client is not accepted."""
     token = MetricsToken(metrics.settings.data_dir)
 
-    @get("/metrics", opt={ROLE: Role.OPERATOR, OPEN: True}, include_in_schema=False)
+    @get("/metrics", opt={ROLE: Role.OPERATOR, OPEN: OWN_TOKEN}, include_in_schema=False)
     async def read(request: Request[Any, Any, Any]) -> Response[bytes]:
         """Return the metrics. Answer 404 without a metrics token, and 401 if the request has another one."""
         kind, _, secret = request.headers.get("authorization", "").partition(" ")

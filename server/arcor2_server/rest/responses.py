@@ -10,6 +10,8 @@ from arcor2_hw.data.base import TranslatableData
 from arcor2_hw.exceptions import (
     Arcor2Error,
     Conflict,
+    DatabaseInUse,
+    DatabaseUnreachable,
     InvalidData,
     InvalidPackage,
     InvalidProject,
@@ -57,6 +59,8 @@ class Unsupported(Arcor2Error):
 _STATUS: Final[dict[type[Arcor2Error], tuple[int, str]]] = {
     TooLarge: (413, "Argument"),
     Unsupported: (415, "Argument"),
+    DatabaseUnreachable: (503, "General"),
+    DatabaseInUse: (503, "General"),
     StorageError: (500, "General"),
     InternalError: (500, "General"),
     NotFound: (404, "NotFound"),
@@ -66,9 +70,7 @@ _STATUS: Final[dict[type[Arcor2Error], tuple[int, str]]] = {
     InvalidProject: (409, "InvalidProject"),
 }
 """Status and `type` of the answer by error class, first match. Existing clients distinguish errors by the type."""
-_UNAVAILABLE: Final = frozenset(
-    {"not_installed", "compute_stopped", "compute_timeout", "compute_busy", "database_unreachable", "database_in_use"}
-)
+_UNAVAILABLE: Final = frozenset({"not_installed", "compute_stopped", "compute_timeout", "compute_busy"})
 """Codes of errors of an unavailable part of the system."""
 _BY_CODE: Final = {"calibration_refused": (409, "Invalid")}
 """Status and type by error code, as in the Calibration service of ARCOR2 (protocol, section 15)."""

@@ -1,5 +1,7 @@
 """The database tables. Documents are stored as JSON; columns contain the fields for lists and look-ups."""
 
+from typing import Any
+
 from sqlalchemy import (
     BigInteger,
     Boolean,
@@ -13,6 +15,7 @@ from sqlalchemy import (
     TypeDecorator,
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+from sqlalchemy.types import TypeEngine
 
 from arcor2_hw.exceptions import InvalidData
 
@@ -24,7 +27,7 @@ class StoredText(TypeDecorator[str]):
         length: Maximum length in characters; None: not limited.
     """
 
-    impl = String
+    impl: TypeEngine[Any] | type[TypeEngine[Any]] = String
     cache_ok = True
     field = ""
     """The column and its table, for messages."""
