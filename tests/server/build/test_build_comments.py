@@ -97,6 +97,21 @@ programs = st.builds(
 )
 
 
+def test_comments_survive_an_edit_of_parallel_work() -> None:
+    rng = random.Random(0)
+    scene, project = with_parallel_work(without_doubles(random_draft(rng, 17, 0.0, 0.0, 3)).project(), rng)
+    assert any(action.is_parallel for point in project.action_points for action in point.actions)
+    source = from_logic(scene, project, TYPES).replace("    while True:", "    # forever\n    while True:")
+    imported = read_with_text(source, scene, project, TYPES)
+    assert replace(imported, script=UNSET) == project
+    parallel = next(action for point in project.action_points for action in point.actions if action.is_parallel)
+    actions = [
+        replace(action, name="renamed") if action is parallel else action
+        for action in imported.action_points[0].actions
+    ]
+    assert "    # forever\n    while True:" in from_logic(scene, with_actions(imported, actions), TYPES)
+
+
 def with_actions(project: Project, actions: list[Action]) -> Project:
     return replace(project, action_points=[replace(project.action_points[0], actions=actions)])
 

@@ -171,6 +171,8 @@ class _DeclaredParameters:
 
     def __call__(self, name: str) -> list[Declared]:
         action = self._actions[name]
+        if action.is_parallel:
+            return []
         if action.type not in self._found:
             object_id, type_name, method, meta = self._frame.resolve(action)
             names = References(self._frame, object_id, self._frame.types_of(type_name).enumerations, method)

@@ -23,8 +23,8 @@ def completed(project: Project, scene: Scene, facts: Mapping[str, TypeFacts]) ->
 
     def with_defaults(action: Action) -> Action:
         object_id, method = action.parse_type()
-        if object_id in functions:
-            return action  # a call states all parameters
+        if action.is_parallel or object_id in functions:
+            return action  # parallel work has no parameters, and a call states all of them
         return complete_parameters(action, facts[type_of[object_id]].actions[method])
 
     points, changed = (
