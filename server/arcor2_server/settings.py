@@ -21,6 +21,8 @@ API_VERSION: Final = "1.1.0"
 MIB: Final = 1024 * 1024
 LONGEST_LIFE_TIMEOUT: Final = 60.0
 """Longest time limit of the PLC's life counter, s."""
+DATABASE_URL: Final = "ARCOR2_HW_DATABASE_URL"
+"""The variable with the address of the database."""
 DEVICE_FILES_NAME: Final = "device-files"
 """Folder of the data directory with the files that settings of devices may name."""
 
@@ -244,7 +246,7 @@ _VARIABLES: Final = {
     "ARCOR2_SCENE_INFLATION": "scene_inflation",
     "ARCOR2_HW_COMPUTE_IDLE": "compute_idle",
     "ARCOR2_HW_HOST": "host",
-    "ARCOR2_HW_DATABASE_URL": "database_url",
+    DATABASE_URL: "database_url",
     "ARCOR2_HW_ALLOWED_HOSTS": "allowed_hosts",
     "ARCOR2_HW_TRUSTED_PROXIES": "trusted_proxies",
     DEVICE_FILES: "device_files",

@@ -37,7 +37,7 @@ from arcor2_server.audit.command_line import note_command
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.deployment.service_manager import ServiceManager
 from arcor2_server.log import setup as server_logging
-from arcor2_server.settings import DEVICE_FILES_NAME, LegacyListener, PlcListener, ServerSettings
+from arcor2_server.settings import DATABASE_URL, DEVICE_FILES_NAME, LegacyListener, PlcListener, ServerSettings
 from arcor2_server.websocket.classic_ports import ports_from_environment
 
 if TYPE_CHECKING:
@@ -152,6 +152,7 @@ def serve(
             classic_ports=ports_from_environment() if classic_ports else None,
         )
         server_logging.set_up(log_level)
+        os.environ.pop(DATABASE_URL, None)  # may contain a password, which devices and programs must not see
     except (InvalidData, KeyError) as error:
         return fail("serve", error, ExitStatus.USAGE)
     try:
