@@ -10,8 +10,7 @@ import { Fitting } from "./fitting";
 import { Floor, lowest } from "./floor";
 import { Frames } from "./frames";
 import type { Item } from "./items";
-import { labelsOf, placeConditions } from "./labelling";
-import { type Label, Labels, type Rect } from "./labels";
+import { type Arrange, Labelling } from "./labelling";
 import { LazyDrop } from "./lazyDrop";
 import { LazyGizmo } from "./lazyGizmo";
 import { LazyPath } from "./lazyPath";
@@ -54,8 +53,6 @@ export class Engine {
   /** Number of drawn frames. */
   frames = 0;
   onTap: (hits: Hit[], floor: Vector3 | null) => void = () => {};
-  /** Return the labels that are drawn, and places that they leave free, pixels. */
-  arrange: (labels: Label[]) => [Label[], Rect[]] = (labels) => [labels, []];
 
   /** Draws the items: on the canvas, or for each eye of a headset. */
   output = (scene: Scene, camera: Camera): void => this.renderer.render(scene, camera);
@@ -63,7 +60,7 @@ export class Engine {
   readonly renderer: Renderer;
   private readonly things = new Map<string, Thing>();
   private readonly batches: Batches;
-  private readonly labels: Labels;
+  private readonly labelling: Labelling;
   private readonly context: Context;
   private readonly floorGrid: Floor;
   private readonly animation: Animation;
@@ -76,11 +73,7 @@ export class Engine {
   private readonly movedRobots = new Set<RobotThing>();
   private width = 1;
   private height = 1;
-  private hovered = "";
   private readonly fitting: Fitting;
-  private readonly notes = new Map<string, string>();
-  /** Text shown next to an item while it is moved, instead of its height. */
-  private messageLog = { id: "", text: "" };
   private readonly drop: LazyDrop;
   /** Lines from points to their parents. */
   readonly parentLines: ParentLines;
@@ -100,7 +93,7 @@ export class Engine {
     this.view = new View(canvas, () => this.draw());
     this.fitting = new Fitting(this.view, this.things);
     this.batches = new Batches(this.scene, low, () => this.draw());
-    this.labels = new Labels(options.labels, () => this.draw());
+    this.labelling = new Labelling(options.labels, () => this.draw());
     this.animation = new Animation(
       quality,
       () => this.draw(),
@@ -182,7 +175,7 @@ export class Engine {
 
   /** Show a text next to the name of an item; an empty text removes it. */
   note(id: string, text: string): void {
-    this.messageLog = { id: text ? id : "", text };
+    this.labelling.moved = { id: text ? id : "", text };
     this.draw();
   }
 
@@ -197,8 +190,8 @@ export class Engine {
 
   /** Show the label of the item under the pointer. */
   hover(id: string): void {
-    if (id === this.hovered) return;
-    this.hovered = id;
+    if (id === this.labelling.hovered) return;
+    this.labelling.hovered = id;
     this.draw();
   }
 
@@ -232,6 +225,13 @@ export class Engine {
   watch(by: () => void): () => void {
     this.watchers.add(by);
     return () => this.watchers.delete(by);
+  }
+
+  /** Choose the labels and their free places by this function from now on. Only a changed scene needs a frame. */
+  arrangeBy(arrange: Arrange): void {
+    this.labelling.arrange = arrange;
+    const { things, view, width, height } = this;
+    if (!this.requests.pending && this.labelling.place(things, view.camera, width, height)) this.draw();
   }
 
   /** Return the point on the floor, or on a level above it, m, at a position in the view. */
@@ -288,7 +288,7 @@ export class Engine {
     this.resolution.dispose();
     for (const [id, thing] of [...this.things]) this.remove(id, thing);
     this.batches.dispose();
-    this.labels.dispose();
+    this.labelling.dispose();
     this.gizmo.dispose();
     this.drop.dispose();
     this.parentLines.dispose();
@@ -323,8 +323,9 @@ export class Engine {
 
   private resize(): void {
     const host = this.options.canvas.parentElement ?? this.options.canvas;
-    this.width = Math.max(1, host.clientWidth);
-    this.height = Math.max(1, host.clientHeight);
+    const [width, height] = [Math.max(1, host.clientWidth), Math.max(1, host.clientHeight)];
+    if (width === this.width && height === this.height) return;
+    [this.width, this.height] = [width, height];
     this.resolution.resize(this.width, this.height);
     this.batches.links.height = this.height;
     this.view.resize(this.width, this.height);
@@ -388,11 +389,8 @@ export class Engine {
     if (!this.resolution.moving) for (const thing of this.things.values()) if (thing.resized()) this.dirty = true;
     this.place();
     this.gizmo.place();
-    this.drop.tell(this.things.values(), this.palette, this.notes);
-    if (this.messageLog.id) this.notes.set(this.messageLog.id, this.messageLog.text);
-    const labels = labelsOf(this.things, this.hovered, this.notes, camera.position, this.width);
-    this.labels.show(...this.arrange(labels), camera, this.width, this.height);
-    placeConditions(this.things, this.labels, camera, this.width, this.height);
+    this.drop.tell(this.things.values(), this.palette, this.labelling.notes);
+    this.labelling.place(this.things, camera, this.width, this.height);
     this.output(this.scene, camera);
     this.frames++;
     if (this.movedRobots.size > 0) this.draw();

@@ -2,7 +2,7 @@
 
 import { type PerspectiveCamera, Vector3 } from "three";
 import type { Item } from "./items";
-import type { Label, Labels } from "./labels";
+import { type Label, Labels, type Rect } from "./labels";
 import type { Thing } from "./thing";
 import { LinkThing } from "./things/link";
 
@@ -21,14 +21,46 @@ const NARROW = 600;
 const NEAR = 0.9;
 const place = new Vector3();
 
-/** Show the conditions of steps where they cover neither a name nor another condition. */
-export function placeConditions(
+/** Returns the labels that are drawn, and places that they leave free, pixels. */
+export type Arrange = (labels: Label[]) => [Label[], Rect[]];
+
+/** Places the labels of items on the page, and those of conditions in the scene. */
+export class Labelling {
+  arrange: Arrange = (labels) => [labels, []];
+  /** The item under the pointer. */
+  hovered = "";
+  /** Texts next to the names of items. */
+  readonly notes = new Map<string, string>();
+  /** Text shown next to an item while it is moved, instead of its height. */
+  moved = { id: "", text: "" };
+  private readonly labels: Labels;
+
+  constructor(host: HTMLElement, draw: () => void) {
+    this.labels = new Labels(host, draw);
+  }
+
+  /** Place all labels; return whether those in the scene changed. */
+  place(things: Map<string, Thing>, camera: PerspectiveCamera, width: number, height: number): boolean {
+    if (this.moved.id) this.notes.set(this.moved.id, this.moved.text);
+    const labels = labelsOf(things, this.hovered, this.notes, camera.position, width);
+    this.labels.show(...this.arrange(labels), camera, width, height);
+    return placeConditions(things, this.labels, camera, width, height);
+  }
+
+  dispose(): void {
+    this.labels.dispose();
+  }
+}
+
+/** Show the conditions of steps where they cover neither a name nor another one; return whether that changed. */
+function placeConditions(
   things: Map<string, Thing>,
   labels: Labels,
   camera: PerspectiveCamera,
   width: number,
   height: number,
-): void {
+): boolean {
+  let changed = false;
   for (const thing of things.values()) {
     const plate = thing instanceof LinkThing ? thing.plate : null;
     if (!plate) continue;
@@ -37,8 +69,11 @@ export function placeConditions(
     place.copy(at).project(camera);
     const [x, y] = [((place.x + 1) / 2) * width, ((1 - place.y) / 2) * height];
     const [w, h] = [(label.scale.x * pixels) / 2, (label.scale.y * pixels) / 2];
-    label.visible = labels.reserve({ left: x - w, right: x + w, top: y - h, bottom: y + h });
+    const visible = labels.reserve({ left: x - w, right: x + w, top: y - h, bottom: y + h });
+    changed ||= visible !== label.visible;
+    label.visible = visible;
   }
+  return changed;
 }
 
 /**

@@ -17,7 +17,7 @@ export function Clusters({ engine }: { engine: Engine }) {
   useEffect(() => {
     const radii = new Radii();
     let shown = "";
-    engine.arrange = (labels) => {
+    engine.arrangeBy((labels) => {
       const spots = spotsOf(engine, radii);
       const view = engine.view.element.getBoundingClientRect();
       const controls = taken(view);
@@ -27,11 +27,8 @@ export function Clusters({ engine }: { engine: Engine }) {
       shown = next;
       const inside = new Set(found.flatMap(({ ids }) => ids));
       return [labels.filter(({ id }) => !inside.has(id)), [...controls, ...found.map(boxOf)]];
-    };
-    engine.invalidate();
-    return () => {
-      engine.arrange = (labels) => [labels, []];
-    };
+    });
+    return () => engine.arrangeBy((labels) => [labels, []]);
   }, [engine]);
   return clusters.map((cluster) => {
     const names = cluster.ids.map((id) => engine.item(id)?.name).slice(0, MOST_NAMES);
