@@ -161,6 +161,33 @@ async def until_fitting(
     raise AssertionError(f"the overlay is {1000 * worst:.2f} mm off")
 
 
+async def check_carrying(screen: Screen, box: str, server: ServerProcess) -> None:
+    """While its button is held, the selected item moves with the tablet; then it is one edit on the server."""
+    page = screen.page
+    await page.get_by_role("navigation").get_by_role("button", name=texts.OBJECTS, exact=True).click()
+    await page.get_by_role("row", name="box").first.click()
+    start = (await screen.item(box))["pose"]["position"]
+    button = page.get_by_role("button", name="Hold to move box with the tablet")
+    await button.scroll_into_view_if_needed()
+    at = await button.bounding_box()
+    assert at is not None
+    async with Client(server.url, "Ada", reconnect=False) as ada:
+        await page.mouse.move(at["x"] + at["width"] / 2, at["y"] + at["height"] / 2)
+        await page.mouse.down()
+        far = "([id, at]) => Math.hypot(...['x', 'y'].map((k) => __engine.item(id).pose.position[k] - at[k])) > 0.005"
+        await screen.until(far, [box, start])
+        await screen.picture("ar carried")
+        await page.mouse.up()
+        edited = (await ada.next_event("SceneObjectChanged")).data
+        assert edited.id == box
+        shown = (await screen.item(box))["pose"]["position"]
+        assert [edited.pose.position.x, edited.pose.position.y] == pytest.approx([shown["x"], shown["y"]], abs=1e-6)
+    await page.get_by_role("button", name=re.compile("^Undo")).click()
+    moved_back = "([id, at]) => Math.abs(__engine.item(id).pose.position.x - at.x) < 1e-6"
+    await screen.until(moved_back, [box, start])
+    await screen.close_panels()
+
+
 @pytest.mark.asyncio(loop_scope="session")
 async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp_path: Path) -> None:
     shots = write_video(tmp_path / "camera.mjpeg")
@@ -250,6 +277,7 @@ async def test_ar_follows_the_camera_freezes_and_ends(server: ServerProcess, tmp
         await check_stop(screen)
         await screen.picture("ar phone")
         await page.set_viewport_size(VIEWPORTS["ipad"])  # type: ignore[arg-type]
+        await check_carrying(screen, box, server)
         # Leaving stops the camera and restores the view, and other users no longer see the camera.
         async with Client(server.url, "Adam", reconnect=False) as adam:
             await adam.call("SubscribeEvents", rpc.SubscribeEventsArgs({"UserPresence"}))

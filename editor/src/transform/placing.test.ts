@@ -2,6 +2,7 @@ import { describe, expect, it } from "vitest";
 import { composed, ORIGIN, relativeTo, turn } from "../viewmodel/frames";
 import {
   angles,
+  carried,
   fromAngles,
   moved,
   onGrid,
@@ -85,5 +86,30 @@ describe("a pose as text", () => {
     expect(poseFrom("[0, 0, 0, 1]", POSE)).toEqual({ ...POSE, orientation: ORIGIN.orientation });
     expect(angles(poseFrom("0 0 0 0 0 90", POSE)?.orientation ?? ORIGIN.orientation)[2]).toBeCloseTo(Math.PI / 2, 9);
     for (const wrong of ["", "1 2", "0.5 0 0 0", "1 2 3 4 5", "here"]) expect(poseFrom(wrong, POSE)).toBeNull();
+  });
+});
+
+describe("an item that the tablet carries", () => {
+  const from = { position: { x: 1, y: 0, z: 0.5 }, orientation: fromAngles({ x: -1, y: 0, z: 0.3 }) };
+  const to = { position: { x: 1.2, y: 0.1, z: 0.4 }, orientation: fromAngles({ x: -1.2, y: 0.1, z: 0.5 }) };
+
+  it("keeps its place in the picture, and its orientation in the world", () => {
+    const after = carried(POSE, from, to, false);
+    expect(after.orientation).toEqual(POSE.orientation);
+    const [seen, before] = [relativeTo(to, after).position, relativeTo(from, POSE).position];
+    for (const axis of ["x", "y", "z"] as const) expect(seen[axis]).toBeCloseTo(before[axis], 3);
+  });
+
+  it("turns with the tablet where it is", () => {
+    const after = carried(POSE, from, to, true);
+    expect(after.position).toEqual(POSE.position);
+    expect(same(relativeTo(to, after), { ...relativeTo(from, POSE), position: relativeTo(to, after).position })).toBe(
+      true,
+    );
+  });
+
+  it("stays where it is while the tablet does not move", () => {
+    expect(carried(POSE, from, from, false).position.x).toBeCloseTo(POSE.position.x, 6);
+    expect(same(carried(POSE, from, from, true), POSE)).toBe(true);
   });
 });

@@ -32,6 +32,17 @@ export function turnedAbout(pose: Pose, axis: Position, by: number): Pose {
   return { ...pose, orientation: normal(times(turn(axis, by), pose.orientation)) };
 }
 
+/**
+ * Return the pose of an item that a camera carries from one pose to another: it keeps its place in the picture, or, if
+ * it turns, its orientation there. Positions are rounded to 0.1 mm.
+ */
+export function carried(start: Pose, from: Pose, to: Pose, turns: boolean): Pose {
+  const { position, orientation } = composed(to, relativeTo(from, start));
+  if (turns) return { ...start, orientation: normal(orientation) };
+  const { x, y, z } = position;
+  return { ...start, position: { x: rounded(x, 1e-4), y: rounded(y, 1e-4), z: rounded(z, 1e-4) } };
+}
+
 /** Set one coordinate in a frame. */
 export function placedAt(pose: Pose, frame: Pose, axis: Axis, value: number): Pose {
   const seen = relativeTo(frame, pose);

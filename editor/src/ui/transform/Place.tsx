@@ -2,7 +2,7 @@
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
-import { useState } from "react";
+import { Suspense, useState } from "react";
 import { moving, place, step } from "../../commands/move";
 import { storeGeneralState } from "../../commands/viewstate";
 import type { GizmoMode } from "../../engine/gizmo/handles";
@@ -40,10 +40,13 @@ import { relativeTo } from "../../viewmodel/frames";
 import { nameOf } from "../../viewmodel/names";
 import { Amount, OneOf, Pick } from "../kit/fields";
 import { Button } from "../kit/kit";
+import { lazyComponent } from "../kit/lazy";
 import { NumberPad } from "./NumberPad";
 import { Row } from "./Row";
 import { toolFrame, useGizmo } from "./useGizmo";
 import "./transform.css";
+
+const Carry = lazyComponent(() => import("./Carry"));
 
 const SNAPS: readonly (readonly [Snap, MessageDescriptor])[] = [
   ["none", msg`none`],
@@ -73,6 +76,7 @@ function Placing({ selection, target }: { selection: Selection; target: Target }
   const settings = useEditor(toolSettings);
   const whyNot = useEditor((state) => notMovable(state, target));
   const whySize = useEditor((state) => notSizable(state, target));
+  const tablet = useEditor(({ ui }) => ui.ar !== null && ui.ar.mode !== "headset");
   const [wanted, setMode] = useState<GizmoMode>(target.moves ? "move" : "turn");
   const [open, setOpen] = useState("");
   const [before, setBefore] = useState<{ pose: Pose; model?: ObjectModel }>({ pose: target.pose, model: target.model });
@@ -108,6 +112,11 @@ function Placing({ selection, target }: { selection: Selection; target: Target }
               />
             ))}
       </div>
+      {tablet && mode !== "size" && (
+        <Suspense fallback={null}>
+          <Carry selection={selection} turns={mode === "turn"} why={why} />
+        </Suspense>
+      )}
       <div className="tool-settings">
         <Steps settings={settings} turn={mode === "turn"} />
         {mode !== "size" && (
