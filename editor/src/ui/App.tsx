@@ -44,12 +44,15 @@ function useHash(): string {
 
 export function App() {
   const hash = useHash();
+  const operator = hash.startsWith("#/operator");
   const language = useLanguage();
   useScreenSettings();
   const { status, shared } = useEditor((state) => state.connection);
   const open = useEditor((state) => state.doc !== null);
   const live = useEditor(isLive);
-  const touring = useEditor((state) => state.ui.tour !== null && state.doc !== null);
+  const touring = useEditor(({ ui, doc, connection }) =>
+    ui.tour === null ? false : connection.role === ROLES.operator ? operator : doc !== null && !operator,
+  );
   const forced = useEditor((state) => state.forces.length > 0);
   const limited = useEditor((state) => uncontrolledOnline(state).length > 0);
   const document = useEditor((state) =>
@@ -82,7 +85,6 @@ export function App() {
       </div>
     );
   }
-  const operator = hash.startsWith("#/operator");
   const io = hash.startsWith("#/io");
   return (
     <>
@@ -96,7 +98,11 @@ export function App() {
         <Suspense fallback={null}>
           {limited && <ControlBanner />}
           <ResultBanner />
-          {touring && <Tour />}
+        </Suspense>
+      )}
+      {touring && (
+        <Suspense fallback={null}>
+          <Tour />
         </Suspense>
       )}
       <div className="screen">

@@ -7,6 +7,7 @@ import { Input, Label, SearchField } from "react-aria-components";
 import { type AuditEntry, type AuditOutcome, checkTrail, exportTrail, loadEntries, PAGE } from "../../commands/audit";
 import { refusal } from "../../commands/requests";
 import { dateAndTime } from "../../formats";
+import { ROLE_NAMES, type RoleName } from "../../i18n/roles";
 import { Window } from "../kit/dialogs";
 import { OneOf } from "../kit/fields";
 import { Button, Waiting } from "../kit/kit";
@@ -105,7 +106,7 @@ export default function AuditTrail({ onClose }: { onClose: () => void }) {
 }
 
 function Row({ entry }: { entry: AuditEntry }) {
-  const sender = [entry.role === "none" ? "" : entry.role, entry.address].filter(Boolean).join(", ");
+  const role = ROLE_NAMES[entry.role as RoleName];
   return (
     <li>
       <span>
@@ -117,7 +118,8 @@ function Row({ entry }: { entry: AuditEntry }) {
       <span className="quiet small">
         <time dateTime={entry.time}>{dateAndTime(entry.time)}</time>{" "}
         {entry.user ? <span data-name={entry.user}>{entry.user}</span> : t`unknown user`}
-        {sender && <span data-name={sender}> ({sender})</span>}
+        {role && `, ${i18n._(role)}`}
+        {entry.address && <span data-name={entry.address}> ({entry.address})</span>}
       </span>
       {entry.reason && (
         <span className="small" data-name={entry.reason}>

@@ -1,17 +1,19 @@
 /** The first thing on the home screen: continue, start with an example, or create the first workplace. */
 
-import { t } from "@lingui/core/macro";
+import { plural, t } from "@lingui/core/macro";
 import * as documents from "../../commands/documents";
 import { proposalOf } from "../../home/start";
 import { whyUnavailable } from "../../store/permissions";
 import { setUi, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
+import { stepsOf } from "../tour/steps";
 import { recentOf } from "./recent";
 
 export function Start() {
   const lists = useEditor((state) => state.lists);
   const recent = useEditor(recentOf);
   const cannotAdd = useEditor((state) => whyUnavailable(state, "NewScene"));
+  const steps = useEditor((state) => stepsOf(state.connection.role).length);
   const proposal = proposalOf(lists, recent);
   if (!proposal) return null;
   if (proposal.kind === "empty")
@@ -38,7 +40,12 @@ export function Start() {
         </Button>
       ) : (
         <>
-          <p>{t`“${name}” is a complete program. A guided tour of ten steps shows how it works.`}</p>
+          <p>
+            {plural(steps, {
+              one: `“${name}” is a complete program. A guided tour of # step shows how it works.`,
+              other: `“${name}” is a complete program. A guided tour of # steps shows how it works.`,
+            })}
+          </p>
           <Button
             look="primary"
             icon="play"

@@ -1,11 +1,12 @@
 /** The persons who log on at shared devices, for administrators; a separate chunk. */
 
-import { i18n, type MessageDescriptor } from "@lingui/core";
-import { msg, t } from "@lingui/core/macro";
+import { i18n } from "@lingui/core";
+import { t } from "@lingui/core/macro";
 import { useCallback, useEffect, useState } from "react";
 import { refusal } from "../../commands/requests";
 import { dateAndTime } from "../../formats";
-import type { AddPersonArgs, Person } from "../../protocol/types";
+import { ROLE_NAMES, type RoleName } from "../../i18n/roles";
+import type { Person } from "../../protocol/types";
 import { call } from "../../session/connection";
 import { Window } from "../kit/dialogs";
 import { Field } from "../kit/Field";
@@ -15,16 +16,6 @@ import { Confirm } from "../kit/lazyControls";
 import { RefusedText, useRefusal } from "../points/Refusal";
 import { useCards } from "./useCards";
 import "./persons.css";
-
-type RoleName = AddPersonArgs["role"];
-
-const ROLE_NAMES: Record<RoleName, MessageDescriptor> = {
-  operator: msg`Operator`,
-  standard_user: msg`Standard user`,
-  advanced_user: msg`Advanced user`,
-  technician: msg`Technician`,
-  programmer: msg`Programmer (administrator)`,
-};
 
 export default function Persons({ onClose }: { onClose: () => void }) {
   const [persons, setPersons] = useState<readonly Person[] | null>(null);

@@ -20,7 +20,7 @@ export function Remove({
   return (
     <div className="remove">
       <Button
-        look="danger"
+        icon="close"
         why={why}
         isDisabled={busy}
         onPress={() =>

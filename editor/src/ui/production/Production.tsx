@@ -13,7 +13,7 @@ type Page = "recipes" | "units";
 export default function Production({ onClose }: { onClose: () => void }) {
   const [page, setPage] = useState<Page>("recipes");
   return (
-    <Window title={t`Production`} onClose={onClose}>
+    <Window title={t`Recipes and units`} onClose={onClose}>
       <OneOf
         label={t`Page`}
         quiet

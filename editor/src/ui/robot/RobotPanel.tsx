@@ -4,6 +4,7 @@ import { msg, t } from "@lingui/core/macro";
 import { useState } from "react";
 import { chosenRobot, notReady } from "../../commands/robot";
 import { translated } from "../../i18n/choices";
+import { robotsOf } from "../../session/streams";
 import { setUi, useEditor } from "../../store/store";
 import { nameOf } from "../../viewmodel/names";
 import { LeaveZone } from "../interlocks/LeaveZone";
@@ -30,6 +31,8 @@ export default function RobotPanel() {
   const chosen = useEditor(chosenRobot);
   const name = useEditor((state) => (chosen ? nameOf(state, chosen.robotId) : ""));
   const why = useEditor((state) => notReady(state, chosen));
+  // With several robots, the choice below names it.
+  const several = useEditor((state) => robotsOf(state).length > 1);
   const tab = useEditor((state) => state.ui.robotTab);
   const [place, setPlace] = useState<HTMLElement | null>(null);
   if (!chosen) return <p className="quiet">{t`The scene has no robot.`}</p>;
@@ -37,10 +40,12 @@ export default function RobotPanel() {
     <PadPlace value={place}>
       <div className="robot-scroll">
         <div className="robot-head">
-          <h3>
-            {name}
-            {chosen.effector && <span className="quiet"> · {chosen.effector}</span>}
-          </h3>
+          {!several && (
+            <h3>
+              {name}
+              {chosen.effector && <span className="quiet"> · {chosen.effector}</span>}
+            </h3>
+          )}
           {why && <p className="quiet small">{why}</p>}
         </div>
         <RobotChooser />

@@ -35,7 +35,7 @@ export function Check({ type, values, id = "" }: CheckProps) {
   const shown = result?.of === of ? result : null;
   if (connected) return null;
   return (
-    <div className="check">
+    <div className="connection-check">
       <Button icon="plug" className="wraps" why={why} isDisabled={busy} onPress={() => void check()}>
         {busy ? t`Connecting…` : t`Test connection`}
       </Button>

@@ -12,7 +12,7 @@ export function SaveDiagnosis() {
   const why = useEditor((state) => whyUnavailable(state, "SaveScene"));
   const { refused, busy, ask } = useRefusal();
   return (
-    <section aria-label={t`Diagnosis`}>
+    <section className="diagnosis" aria-label={t`Diagnosis`}>
       <h3>{t`Something went wrong?`}</h3>
       <p className="quiet small">
         {t`Saves the open document, devices, versions and the end of the log in a file, without secrets.`}

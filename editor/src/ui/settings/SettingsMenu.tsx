@@ -5,6 +5,7 @@ import { msg, t } from "@lingui/core/macro";
 import { chooseLanguage } from "../../commands/language";
 import { ask } from "../../commands/requests";
 import { LANGUAGES, type Language, useLanguage } from "../../i18n/catalogue";
+import { ROLES } from "../../protocol/types";
 import { remember } from "../../session/localStorage";
 import { theSession } from "../../session/session";
 import { whyUnavailable } from "../../store/permissions";
@@ -27,6 +28,9 @@ export default function SettingsMenu({ defaultOpen }: { defaultOpen: boolean }) 
   const language = useLanguage();
   // It needs the role that edits scenes.
   const noAudit = useEditor((state) => whyUnavailable(state, "SaveScene"));
+  // Operators tour their screen, the others a program.
+  const operates = useEditor((state) => state.connection.role === ROLES.operator);
+  const noTour = useEditor((state) => !operates && (!state.doc?.project || location.hash !== ""));
   const choices: Choice[] = [
     { id: "find", label: t`Find a command or an object ( / )`, icon: "search", act: () => openOverlay("search") },
     ...(Object.keys(THEMES) as Ui["theme"][])
@@ -51,6 +55,16 @@ export default function SettingsMenu({ defaultOpen }: { defaultOpen: boolean }) 
       act: () => {
         setUi({ leftHanded: !leftHanded });
         remember("hand", leftHanded ? "" : "left");
+      },
+    },
+    {
+      id: "tour",
+      label: t`Guided tour`,
+      icon: "play",
+      not: noTour ? t`Open a project first.` : "",
+      act: () => {
+        if (operates) location.hash = "#/operator";
+        setUi({ tour: 0 });
       },
     },
     { id: "messages", label: t`Messages`, icon: "list", act: () => openOverlay("messages") },

@@ -5,17 +5,18 @@ import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { now, setUi, useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
-import { STEPS } from "./steps";
+import { stepsOf } from "./steps";
 import "./tour.css";
 
 export default function Tour() {
   const at = useEditor((state) => state.ui.tour) ?? 0;
+  const steps = useEditor((state) => stepsOf(state.connection.role));
   const [began, setBegan] = useState(now);
-  const done = useEditor((state) => STEPS[at]?.done?.(state, began) ?? false);
-  const step = STEPS[at];
+  const done = useEditor((state) => steps[at]?.done?.(state, began) ?? false);
+  const step = steps[at];
   const next = () => {
     setBegan(now());
-    setUi({ tour: at + 1 < STEPS.length ? at + 1 : null });
+    setUi({ tour: at + 1 < steps.length ? at + 1 : null });
   };
   useEffect(() => {
     if (done) next();
@@ -24,7 +25,7 @@ export default function Tour() {
   return (
     <section className="tour" aria-label={t`Guided tour`}>
       <p aria-live="polite">
-        <strong>{`${at + 1}/${STEPS.length}`}</strong> {i18n._(step.text)}
+        <strong>{`${at + 1}/${steps.length}`}</strong> {i18n._(step.text)}
       </p>
       <div className="row">
         <Button look="plain" onPress={() => setUi({ tour: null })}>

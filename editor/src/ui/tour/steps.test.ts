@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
+import { ROLES } from "../../protocol/types";
 import type { State } from "../../store/state";
-import { STEPS } from "./steps";
+import { STEPS, stepsOf } from "./steps";
 
 const state = (change: object = {}): State =>
   ({
@@ -41,4 +42,42 @@ test("what was there before the step does not count as done", () => {
   expect(point?.done?.(full, full)).toBe(false);
   expect(action?.done?.(full, full)).toBe(false);
   expect(point?.done?.(state({ doc: null }), state())).toBe(false);
+});
+
+test("each role has a tour of what its users do", () => {
+  const texts = (role: number) => stepsOf(role).map(({ text }) => text.message ?? text.id);
+  expect(stepsOf(ROLES.advanced_user)).toBe(STEPS);
+  expect(stepsOf(ROLES.programmer)).toBe(STEPS);
+  const tours = [ROLES.operator, ROLES.standard_user, ROLES.advanced_user, ROLES.technician].map(texts);
+  expect(new Set(tours.map((each) => each.join())).size).toBe(4);
+});
+
+test("an operator starts, pauses and resumes; each step waits for it", () => {
+  const [, start, pause, resume] = stepsOf(ROLES.operator);
+  const at = (phase: string) => state({ program: { state: phase } });
+  const began = at("stopped");
+  for (const [step, phase] of [
+    [start, "running"],
+    [pause, "paused"],
+    [resume, "running"],
+  ] as const) {
+    expect(step?.done?.(at(phase), began)).toBe(true);
+    expect(step?.done?.(at(phase === "paused" ? "running" : "stopped"), began)).toBe(false);
+  }
+});
+
+test("a technician adds and selects an object, a standard user changes a value", () => {
+  const [, , add, select] = stepsOf(ROLES.technician);
+  const [, , choose, change] = stepsOf(ROLES.standard_user);
+  const began = state({ doc: { objects: { a: {} }, actions: {} }, ui: { selection: null } });
+  const after = state({
+    doc: { objects: { a: {}, b: {} }, actions: { x: {} } },
+    ui: { selection: { kind: "object" } },
+  });
+  for (const step of [add, select, change]) {
+    expect(step?.done?.(began, began)).toBe(false);
+    expect(step?.done?.(after, began)).toBe(true);
+  }
+  expect(choose?.done?.(after, began)).toBe(false);
+  expect(choose?.done?.(state({ ui: { selection: { kind: "action" } } }), began)).toBe(true);
 });
