@@ -7,7 +7,7 @@ import { Input, Label, SearchField } from "react-aria-components";
 import { type AuditEntry, type AuditOutcome, checkTrail, exportTrail, loadEntries, PAGE } from "../../commands/audit";
 import { refusal } from "../../commands/requests";
 import { dateAndTime } from "../../formats";
-import { ROLE_NAMES, type RoleName } from "../../i18n/roles";
+import { ROLE_NAMES, type RoleName } from "../../viewmodel/roles";
 import { Window } from "../kit/dialogs";
 import { OneOf } from "../kit/fields";
 import { Button, Waiting } from "../kit/kit";

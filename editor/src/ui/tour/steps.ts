@@ -17,7 +17,7 @@ const grown = (of: "objects" | "points" | "actions") => (state: State, began: St
   Object.keys(state.doc?.[of] ?? {}).length > Object.keys(began.doc?.[of] ?? {}).length;
 const opens = (tool: string) => (state: State) => state.ui.tool === tool;
 const selects = (kind: Selection["kind"]) => (state: State) => state.ui.selection?.kind === kind;
-const isPaused = ({ program }: State) => program.state === "paused";
+const isPaused = ({ program }: State) => program.state === "paused" && !program.held;
 
 const LOOK: TourStep = { text: msg`This is the workplace. Drag to look around, pinch or scroll to zoom.` };
 const OBJECTS: TourStep = {
