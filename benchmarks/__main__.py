@@ -1,15 +1,19 @@
 """Measure all metrics: JSON lines on standard output, a table on standard error (`make bench`).
 
 `python -m benchmarks [--long] [GROUP ...]` measures the named groups, or all. `--long` increases the number of samples:
-recovery 50 cycles (3 without it), recorder 6 pairs of runs (2), stops 500 for each driver in a busy process (100), demo
-5 runs (1), books 10 seeds (1), calibration 2,000 pictures of each kind (200), robot_pose 300 views (30).
+recovery 50 cycles (3 without it), stops 500 for each driver in a busy process (100), demo 5 runs (1), calibration 2,000
+pictures of each kind (200), robot_pose 300 views (30). The group `books` runs 10 seeds if it is named, otherwise one;
+`--seeds`, `--boards` and `--faults` change this. The exit code is 1 if a group failed, or if a metric with the goal
+"<= 0", which counts errors, misses it.
 """
 
+import argparse
 import asyncio
 import sys
 import tempfile
 import traceback
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -39,55 +43,82 @@ from benchmarks import (
     stops,
     unresponsive_devices,
 )
+from benchmarks.books import Size
 from benchmarks.metrics import Report
 
-LONG: Final = "--long"
-GROUPS: Final[dict[str, Callable[[Report, Path], Awaitable[None]]]] = {
-    "requests": requests.run,
-    "documents": documents.run,
-    "backup": backup.run,
-    "restart": restart.run,
-    "listeners": listeners.run,
-    "operation": operation.run,
-    "running": running.run,
-    "building": lambda report, _: building.build(report),
-    "analysing": lambda report, _: analysing.analyse(report),
-    "robot": robot.run,
-    "buses": buses.run,
-    "camera": camera.run,
-    "calibration": lambda report, _: calibration.run(report, LONG in sys.argv),
-    "robot_pose": lambda report, _: asyncio.to_thread(robot_pose.run, report, LONG in sys.argv),
-    "computing": lambda report, _: computing.run(report),
-    "meshes": lambda report, _: meshes.run(report),
-    "unresponsive_devices": unresponsive_devices.run,
-    "kinematics": lambda report, _: kinematics.run(report),
-    "stops": lambda report, _: stops.run(report, LONG in sys.argv),
-    "demo": lambda report, folder: demo.run(report, folder, LONG in sys.argv),
-    "books": lambda report, folder: books.run(report, folder, LONG in sys.argv),
-    "dry_run": dry_run.run,
-    "recorder": lambda report, folder: recorder.run(report, folder, LONG in sys.argv),
-    "recovery": lambda report, _: recovery.run(report, LONG in sys.argv),
-}
+
+@dataclass(frozen=True)
+class Options:
+    """The options of the command line."""
+
+    long: bool = False
+    books: Size = field(default_factory=Size)
 
 
-async def main(groups: list[str]) -> int:
-    """Measure the named groups, or all; return the number of groups that failed."""
+def measurements(options: Options) -> dict[str, Callable[[Report, Path], Awaitable[None]]]:
+    """Return what measures each group."""
+    return {
+        "requests": requests.run,
+        "documents": documents.run,
+        "backup": backup.run,
+        "restart": restart.run,
+        "listeners": listeners.run,
+        "operation": operation.run,
+        "running": running.run,
+        "building": lambda report, _: building.build(report),
+        "analysing": lambda report, _: analysing.analyse(report),
+        "robot": robot.run,
+        "buses": buses.run,
+        "camera": camera.run,
+        "calibration": lambda report, _: calibration.run(report, options.long),
+        "robot_pose": lambda report, _: asyncio.to_thread(robot_pose.run, report, options.long),
+        "computing": lambda report, _: computing.run(report),
+        "meshes": lambda report, _: meshes.run(report),
+        "unresponsive_devices": unresponsive_devices.run,
+        "kinematics": lambda report, _: kinematics.run(report),
+        "stops": lambda report, _: stops.run(report, options.long),
+        "demo": lambda report, folder: demo.run(report, folder, options.long),
+        "books": lambda report, folder: books.run(report, folder, options.books),
+        "dry_run": dry_run.run,
+        "recorder": recorder.run,
+        "recovery": lambda report, _: recovery.run(report, options.long),
+    }
+
+
+GROUPS: Final = tuple(measurements(Options()))
+
+
+async def main(groups: list[str], options: Options) -> bool:
+    """Measure the named groups, or all; return whether a group failed or a metric that counts errors is not 0."""
     report = Report()
-    broken = 0
+    broken = False
     with tempfile.TemporaryDirectory(prefix="arcor2-hw-bench-", ignore_cleanup_errors=True) as name:
-        for group, measure in GROUPS.items():
+        for group, measure in measurements(options).items():
             if not groups or group in groups:
                 try:
                     await measure(report, Path(name))
                 except Exception:  # noqa: BLE001 - a failed group must not stop the others
-                    broken += 1
+                    broken = True
                     sys.stderr.write(f"Measuring group {group} failed:\n{traceback.format_exc()}")
     report.table()
-    return broken
+    return broken or report.errors()
+
+
+def arguments() -> tuple[list[str], Options]:
+    """Return the named groups and the options of the command line."""
+    parser = argparse.ArgumentParser(prog="benchmarks")
+    parser.add_argument("groups", nargs="*", metavar="GROUP", help=f"{', '.join(GROUPS)}; default: all")
+    parser.add_argument("--long", action="store_true", help="take more samples")
+    in_books = parser.add_argument_group("group books")
+    in_books.add_argument("--seeds", type=int, help=f"default: {books.SEEDS} if the group is named, otherwise 1")
+    in_books.add_argument("--boards", type=int, default=books.BOARDS, help="boards of a seed (%(default)s)")
+    in_books.add_argument("--faults", type=int, default=books.FAULTS, help="faults of a seed (%(default)s)")
+    parsed = parser.parse_args()
+    if unknown := set(parsed.groups) - set(GROUPS):
+        parser.error(f"Unknown group: {', '.join(sorted(unknown))}. Choose from: {', '.join(GROUPS)}.")
+    seeds = parsed.seeds or (books.SEEDS if parsed.long or "books" in parsed.groups else 1)
+    return parsed.groups, Options(parsed.long, Size(seeds, parsed.boards, parsed.faults))
 
 
 if __name__ == "__main__":
-    named = [argument for argument in sys.argv[1:] if argument != LONG]
-    if unknown := set(named) - set(GROUPS):
-        sys.exit(f"Unknown group: {', '.join(sorted(unknown))}. Choose from: {', '.join(GROUPS)}.")
-    sys.exit(1 if asyncio.run(main(named)) else 0)
+    sys.exit(asyncio.run(main(*arguments())))
