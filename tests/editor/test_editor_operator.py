@@ -75,7 +75,11 @@ async def built(cell: Cell, colleague: Client, message: str = "", method: str = 
 
 async def reads_who_commands(screen: Screen, technician: Client) -> None:
     """Open the dialog from the note on the screen. An operator may only read it; it follows what a technician does."""
+    start = screen.page.get_by_role("button", name=re.compile("^Start"))
     await technician.call("SetCellAuthority", rpc.SetCellAuthorityArgs(CellAuthority.NOBODY))
+    await expect(start).to_have_attribute("aria-disabled", "true")
+    await screen.sees("No program starts until a technician gives the authority")
+    await pictures(screen, "operator, nobody commands")
     await screen.press("Nobody commands this cell.")
     dialog = screen.page.get_by_role("dialog", name="Mode and authority")
     hub = dialog.get_by_role("button", name=re.compile("^This server"))
@@ -86,6 +90,7 @@ async def reads_who_commands(screen: Screen, technician: Client) -> None:
     await expect(hub).to_have_attribute("aria-pressed", "true")
     await dialog.get_by_role("button", name="Close").click()
     await expect(screen.page.get_by_role("button", name="Nobody commands this cell.")).to_have_count(0)
+    await expect(start).not_to_have_attribute("aria-disabled", "true")
 
 
 async def test_built_package_appears_runs_and_its_error_is_shown(
@@ -96,11 +101,11 @@ async def test_built_package_appears_runs_and_its_error_is_shown(
         await at_the_machine(screen, kiosk=True, token=token)
         await screen.sees("No packages yet.")
         assert await page.get_by_role("button", name="Open the editor").count() == 0
-        await reads_who_commands(screen, colleague)
         # A package built by another user appears by itself.
         _, project = await cell.open(colleague)
         await cell.build(colleague, project)
         await page.get_by_role("radio", name=project.name).wait_for()
+        await reads_who_commands(screen, colleague)
         await screen.press("Start")
         await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=BEGUN)
         # Without a board, the reader finds no code. The operator enters it.

@@ -1,5 +1,6 @@
 """A recipe is added, signed and chosen; the operator produces it, and the record of the unit is found by its number."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ from playwright.async_api import Browser, Page, expect
 from arcor2_hw.client import Client
 from arcor2_hw.data.project import ProjectParameter
 from arcor2_hw.data.recipes import RecipeState
-from tests.editor.screen import Screen, screen_of
+from tests.editor.screen import VIEWPORTS, Screen, screen_of
 from tests.runtime.test_host_parts import BODY, PROJECT, write_package
 from tests.server.core.serving import running
 
@@ -18,7 +19,7 @@ pytestmark = pytest.mark.asyncio(loop_scope="session")
 PIN = "2580"
 SCRIPT = (
     BODY.replace("\narm =", "\narm: object =", 1)
-    + 'serial = "A-1"\n'
+    + 'serial = "A-1"\nlabels: int = 2\n'
     + 'arm.scan(serial, an="scan")\narm.pick(stop, an="pick")\narm.place(inside, an="insert")\n'
     + 'arm.test(True, an="test")\narm.pick(inside, an="take")\narm.place(box, an="into_box")\n'
 )
@@ -47,7 +48,7 @@ async def checked(screen: Screen, name: str) -> None:
 async def test_a_product_is_released_produced_and_found(tmp_path: Path, built_editor: Path, browser: Browser) -> None:
     data = tmp_path / "data"
     constant = ProjectParameter("serial", "string", '"A-1"', id="prm_serial")
-    project = replace(PROJECT, parameters=[constant])
+    project = replace(PROJECT, parameters=[constant, ProjectParameter("labels", "integer", "2", id="prm_labels")])
     write_package(data / "packages" / "pkg_1", tmp_path, SCRIPT, project)
     async with (
         running(data) as server,
@@ -67,6 +68,8 @@ async def test_a_product_is_released_produced_and_found(tmp_path: Path, built_ed
         await page.get_by_label("Product", exact=True).fill("Board")
         await page.get_by_label("Planned parts per hour").fill("60")
         await page.get_by_label("serial, This recipe").fill("B-7")
+        for field, text in (("This recipe", "3"), ("Lowest", "1"), ("Highest", "4")):
+            await page.get_by_label(f"labels, {field}").fill(text)
         await checked(screen, "recipe-form")
         await screen.press("Save")
         await screen.press("Sign as tested")
@@ -88,9 +91,20 @@ async def test_a_product_is_released_produced_and_found(tmp_path: Path, built_ed
         await page.goto(f"{screen.url}/?q=low#/operator")
         await expect(page.get_by_role("radio", name="Board, revision 2")).to_be_checked()
         await page.get_by_label("Order").fill("O-17")
-        await checked(screen, "operator-product")
+        await screen.sees("B-7")  # fixed by the recipe
+        labels = page.get_by_label("labels")
+        await expect(labels).to_have_attribute("placeholder", "3")
+        await labels.fill("5")
+        await screen.sees("labels must be a number: 1 to 4.")
+        await expect(page.get_by_role("button", name=re.compile("^Start"))).to_have_attribute("aria-disabled", "true")
+        await labels.fill("4")
+        for size in VIEWPORTS.values():
+            await page.set_viewport_size(size)  # type: ignore[arg-type]
+            await checked(screen, f"operator-product {size['width']}")
         await screen.press("Start")
         await screen.sees("Finished")
+        (run,) = (await client.call("ListRuns")).runs
+        assert run.recipe.values == {"serial": '"B-7"', "labels": "4"}
         await open_production(page, screen)
         await page.get_by_text("Units", exact=True).click()
         await page.get_by_placeholder("Serial number").fill("b-7")

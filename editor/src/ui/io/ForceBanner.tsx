@@ -6,6 +6,7 @@ import { RENEW, renewForces } from "../../commands/forces";
 import { useEditor } from "../../store/store";
 import { Icon } from "../kit/icons";
 import { Button } from "../kit/kit";
+import { openPoints } from "./address";
 import { EndForce } from "./EndForce";
 import { valueText } from "./points";
 import "../run/banner.css";
@@ -42,9 +43,7 @@ export default function ForceBanner() {
         {more > 0 && (
           <li>
             <p>{plural(more, { one: "and # more output", other: "and # more outputs" })}</p>
-            {!page && (
-              <Button onPress={() => (location.hash = location.hash.replace("#", "#/io") || "#/io")}>{t`Show`}</Button>
-            )}
+            {!page && <Button onPress={openPoints}>{t`Show`}</Button>}
           </li>
         )}
       </ul>

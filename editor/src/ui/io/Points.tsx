@@ -13,6 +13,7 @@ import { Pick } from "../kit/fields";
 import { Button, Waiting } from "../kit/kit";
 import { Notices } from "../notices/Notices";
 import { People } from "../people/People";
+import { closePoints } from "./address";
 import { EndForce } from "./EndForce";
 import { ForceForm } from "./ForceForm";
 import { type ShownDevice, type ShownPoint, shownDevices } from "./points";
@@ -68,7 +69,7 @@ export default function Points() {
   return (
     <div className="io-page">
       <header className="bar">
-        <Button look="plain" icon="left" aria-label={t`Back`} onPress={() => (location.hash = back(location.hash))} />
+        <Button look="plain" icon="left" aria-label={t`Back`} onPress={closePoints} />
         <h1>{t`Inputs and outputs`}</h1>
         <People />
       </header>
@@ -101,9 +102,6 @@ export default function Points() {
     </div>
   );
 }
-
-/** Return the hash of the page from which this one was opened: `#/io/operator` for the operator's screen. */
-const back = (hash: string): string => hash.replace("/io", "").replace(/^#$/, "");
 
 interface DeviceProps {
   device: ShownDevice;

@@ -6,7 +6,8 @@ import { isLate, type Step, stepsOf } from "../../program/step";
 import { useEditor } from "../../store/store";
 import { useTicking } from "../times";
 
-export function CurrentStep() {
+/** `whyNoResume`: why the paused program cannot be resumed here; an empty string if it can. */
+export function CurrentStep({ whyNoResume }: { whyNoResume: string }) {
   const state = useEditor((each) => each);
   const paused = state.program.state === "paused";
   const steps = stepsOf(state);
@@ -23,7 +24,7 @@ export function CurrentStep() {
         {late
           ? t`This takes longer than usual. Check ${late.device}.`
           : paused
-            ? t`Press Resume to continue, or Step for one action.`
+            ? whyNoResume || t`Press Resume to continue, or Step for one action.`
             : state.program.state === "running"
               ? t`The program runs by itself. Press Pause to wait before the next action.`
               : null}

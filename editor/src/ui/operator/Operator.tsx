@@ -15,7 +15,6 @@ import { type AlarmRecord, ROLES } from "../../protocol/types";
 import { serves } from "../../session/connection";
 import { theSession } from "../../session/session";
 import { usersOfDocument } from "../../store/absentUsers";
-import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";
@@ -24,6 +23,7 @@ import { AlarmCard } from "../alarms/AlarmCard";
 import { useAlarms } from "../alarms/useAlarms";
 import { useCell } from "../cell/useCell";
 import { noteText } from "../cell/words";
+import { openPoints } from "../io/address";
 import { Icon, type IconName } from "../kit/icons";
 import { Button, Waiting } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
@@ -39,6 +39,7 @@ import { Settings } from "../settings/Settings";
 import { useTicking } from "../times";
 import { CurrentStep } from "./CurrentStep";
 import { Production } from "./Production";
+import { whyNoResume, whyNoStart } from "./starting";
 import "../run/run.css";
 import "./operator.css";
 
@@ -53,8 +54,11 @@ interface Shown {
   icon: IconName;
 }
 
-/** Return what the state area shows. A result takes precedence over "Ready" until it is dismissed. */
-function shownState(state: State, starting: boolean, result: Result | null): Shown {
+/**
+ * Return what the state area shows. A result takes precedence over "Ready" until it is dismissed. `refused`: whether the
+ * server would refuse a start.
+ */
+function shownState(state: State, starting: boolean, result: Result | null, refused: boolean): Shown {
   const { state: phase } = state.program;
   if (starting) return { tone: "idle", word: t`Starting…`, icon: "play" };
   if (isRunning(state))
@@ -65,6 +69,7 @@ function shownState(state: State, starting: boolean, result: Result | null): Sho
   if (state.live.state === "started" && usersOfDocument(state).length > 0)
     return { tone: "idle", word: t`Devices are in use by the editor`, icon: "plug" };
   if (state.lists.packages?.length === 0) return { tone: "idle", word: t`No program yet`, icon: "info" };
+  if (refused) return { tone: "idle", word: t`Not ready`, icon: "info" };
   return { tone: "idle", word: t`Ready`, icon: "check" };
 }
 
@@ -106,7 +111,6 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   // The card about the parts says that the run was interrupted.
   const asked = result?.tone === "warn" && books?.some((each) => each.run);
   useTicking();
-  const { tone, word, icon } = shownState(state, starting, result);
   // The shown screen is not part of the state, so the session does not notice the change by itself.
   useEffect(() => {
     theSession().reportPresence();
@@ -114,6 +118,8 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   }, []);
   const opened = doc && !runs ? (doc.project?.name ?? doc.scene.name) : "";
   const users = usersOfDocument(state);
+  const refused = whyNoStart(state, cell);
+  const { tone, word, icon } = shownState(state, starting, result, refused !== "");
   const why =
     onlyReleased && !made
       ? t`Choose a product first.`
@@ -121,7 +127,9 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
         ? t`No packages yet. Build one in the editor.`
         : opened && users.length > 0
           ? t`${opened} is open in the editor (${users.join(", ")}). Ask them to close it.`
-          : whyUnavailable(state, "RunPackage");
+          : books?.some((each) => each.run?.package_id === known.id && !each.run.confirmed)
+            ? t`First confirm where the parts are.`
+            : refused || (made?.problem ?? "");
   const start = async () => {
     if (!known) return;
     setStarting(true);
@@ -129,7 +137,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
       known.id,
       false,
       false,
-      made ? { recipe_id: made.recipe.id, ...(made.order && { order: made.order }) } : {},
+      made ? { recipe_id: made.recipe.id, recipe_values: made.values, ...(made.order && { order: made.order }) } : {},
     );
     setStarting(false);
   };
@@ -163,7 +171,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
       {/* Above everything that comes and goes, so that these buttons keep their places. */}
       <div className="operator-buttons">
         {runs ? (
-          <RunButtons />
+          <RunButtons whyNoResume={whyNoResume(cell)} />
         ) : (
           <>
             <Button
@@ -175,7 +183,10 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
             >
               {t`Start`}
             </Button>
-            {known && <p data-name>{made ? shownRecipe(made.recipe) : known.package_meta.name}</p>}
+            <div>
+              {known && <p data-name>{made ? shownRecipe(made.recipe) : known.package_meta.name}</p>}
+              {known && why && <p className="operator-why">{why}</p>}
+            </div>
           </>
         )}
       </div>
@@ -192,7 +203,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
             <Icon name={icon} size={56} />
             <div>
               <p className="operator-word">{word}</p>
-              {runs && <CurrentStep />}
+              {runs && <CurrentStep whyNoResume={whyNoResume(cell)} />}
               {message && <p className="operator-message">{message}</p>}
               {run && result && (
                 <p>
@@ -218,7 +229,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
           </section>
         )}
         <Held />
-        {!program.held && <PartsCard />}
+        {!program.held && <PartsCard whyNoStart={refused} />}
         {!program.held && <Alarms alarms={alarms} />}
         {note && (
           <Button look="plain" icon="info" className="operator-note wraps" onPress={() => openOverlay("cell")}>
@@ -258,20 +269,16 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
                 <p className="quiet">{t`No packages yet. Build one in the editor, under Run.`}</p>
               )}
             </div>
-            {opened && known && (
+            {opened && known && users.length === 0 && (
               <p className="quiet">
-                {users.length > 0
-                  ? why
-                  : t`${opened} is open in the editor. It is closed during the run and keeps unsaved changes.`}
+                {t`${opened} is open in the editor. It is closed during the run and keeps unsaved changes.`}
               </p>
             )}
           </section>
         )}
         <Production />
         <History />
-        {!runs && doc && serves("StreamPoints") && (
-          <Button onPress={() => (location.hash = location.hash.replace("#", "#/io"))}>{t`Inputs and outputs`}</Button>
-        )}
+        {!runs && doc && serves("StreamPoints") && <Button onPress={openPoints}>{t`Inputs and outputs`}</Button>}
       </main>
       <Notices />
     </div>

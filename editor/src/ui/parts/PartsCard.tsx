@@ -69,15 +69,23 @@ export function useBooks(): PartBooks[] | null {
 /**
  * Show the first scene with a question; without one, the parts that a stopped program has left in the cell. With `all`,
  * all parts can be corrected, because the program is held. With `folded`, the card is folded as long as all parts are
- * confirmed.
+ * confirmed. `whyNoStart`: why no program can be started or continued now.
  */
-export default function PartsCard({ all = false, folded = false }: { all?: boolean; folded?: boolean }) {
+export default function PartsCard({
+  all = false,
+  folded = false,
+  whyNoStart = "",
+}: {
+  all?: boolean;
+  folded?: boolean;
+  whyNoStart?: string;
+}) {
   const books = useBooks() ?? [];
   const runs = useEditor(isRunning);
   const open = books.find((each) => askedParts(each, all).length > 0 || each.run !== undefined);
   if (open) {
     const asks = !folded || askedParts(open, false).length > 0;
-    return asks ? <Books books={open} all={all} /> : <Folded books={open} />;
+    return asks ? <Books books={open} all={all} whyNoStart={whyNoStart} /> : <Folded books={open} />;
   }
   if (runs) return null;
   return books
@@ -101,10 +109,10 @@ function Folded({ books, note }: { books: PartBooks; note?: string }) {
   );
 }
 
-function Books({ books, all }: { books: PartBooks; all: boolean }) {
+function Books({ books, all, whyNoStart = "" }: { books: PartBooks; all: boolean; whyNoStart?: string }) {
   const [chosen, setChosen] = useState<number>();
   const why = useEditor((state) => whyUnavailable(state, "ConfirmParts"));
-  const whyContinue = useEditor((state) => whyUnavailable(state, "RunPackage"));
+  const whyContinue = useEditor((state) => whyUnavailable(state, "RunPackage")) || whyNoStart;
   const parts = askedParts(books, all);
   const part = parts.find((each) => each.number === chosen) ?? (all ? undefined : parts[0]);
   const packages = useEditor((state) => state.lists.packages) ?? [];

@@ -8,12 +8,13 @@ import { call } from "../../session/connection";
 import { useEditor } from "../../store/store";
 import { Button } from "../kit/kit";
 import { openOverlay, useOverlay } from "../search/overlay";
+import { canDiffer, limitsOf, type RunValues, runValues, shownValue } from "./runValues";
 import "./product.css";
 
 /** Time after which the product is loaded again, ms: another client may have changed over. */
 const PERIOD = 10_000;
 
-export interface Chosen {
+export interface Chosen extends RunValues {
   recipe: Recipe;
   order: string;
 }
@@ -31,6 +32,8 @@ export default function Product({ selected, onSelect, onFound }: Props) {
   const [recipe, setRecipe] = useState<Recipe | null>();
   const [releasedOnly, setReleasedOnly] = useState(false);
   const [order, setOrder] = useState("");
+  /** What was entered in place of the values of the recipe, by name. */
+  const [texts, setTexts] = useState<Record<string, string>>({});
   useEffect(() => {
     if (!ready || overlay) return;
     let current = true;
@@ -51,8 +54,11 @@ export default function Product({ selected, onSelect, onFound }: Props) {
     };
   }, [ready, overlay]);
   useEffect(() => {
-    if (recipe !== undefined) onFound(recipe && { recipe, order: order.trim() }, releasedOnly);
-  }, [recipe, order, releasedOnly]);
+    if (recipe === undefined) return;
+    onFound(recipe && { recipe, order: order.trim(), ...runValues(recipe, texts) }, releasedOnly);
+  }, [recipe, order, releasedOnly, texts]);
+  const id = recipe?.id;
+  useEffect(() => setTexts({}), [id]);
   if (!recipe && !releasedOnly) return null;
   return (
     <div className="product">
@@ -64,6 +70,31 @@ export default function Product({ selected, onSelect, onFound }: Props) {
         </label>
       ) : (
         <p>{t`Choose a product first.`}</p>
+      )}
+      {recipe && selected && recipe.values.length > 0 && (
+        <dl className="product-values">
+          {recipe.values.map((each) => (
+            <div key={each.name}>
+              <dt data-name={each.name}>{each.name}</dt>
+              <dd className="field">
+                {canDiffer(each) ? (
+                  <>
+                    <input
+                      aria-label={each.name}
+                      inputMode="decimal"
+                      placeholder={shownValue(each)}
+                      value={texts[each.name] ?? ""}
+                      onChange={(event) => setTexts((known) => ({ ...known, [each.name]: event.target.value }))}
+                    />{" "}
+                    <span className="quiet small">{limitsOf(each)}</span>
+                  </>
+                ) : (
+                  <span data-name>{shownValue(each)}</span>
+                )}
+              </dd>
+            </div>
+          ))}
+        </dl>
       )}
       <div className="product-row">
         {recipe && selected && (

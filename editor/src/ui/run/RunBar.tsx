@@ -71,11 +71,12 @@ export function Held() {
   ) : null;
 }
 
-/** Pause, resume, step and stop, as far as the state allows. */
-export function RunButtons() {
+/** Pause, resume, step and stop, as far as the state allows. `whyNoResume`: why the program cannot be resumed here. */
+export function RunButtons({ whyNoResume = "" }: { whyNoResume?: string }) {
   const phase = useEditor((state) => state.program.state);
   const held = useEditor((state) => state.program.held !== null);
   const why = useEditor((state) => whyUnavailable(state, "StopPackage"));
+  const whyNot = why || whyNoResume;
   const inside = useEditor((state) => innermost(state).some((id) => stackOf(state, id).length > 1));
   const beforeCall = useEditor(({ doc, program }) => {
     const last = doc && anyAction(doc, program.running.at(-1) ?? "");
@@ -90,19 +91,19 @@ export function RunButtons() {
       )}
       {phase === "paused" && !held && (
         <>
-          <Button icon="play" look="primary" why={why} onPress={() => void commands.resume()}>
+          <Button icon="play" look="primary" why={whyNot} onPress={() => void commands.resume()}>
             {t`Resume`}
           </Button>
-          <Button icon="step" why={why} onPress={() => void commands.step()}>
+          <Button icon="step" why={whyNot} onPress={() => void commands.step()}>
             {t`Step`}
           </Button>
           {beforeCall && (
-            <Button why={why} onPress={() => void commands.step("into")}>
+            <Button why={whyNot} onPress={() => void commands.step("into")}>
               {t`Step into`}
             </Button>
           )}
           {inside && (
-            <Button why={why} onPress={() => void commands.step("out")}>
+            <Button why={whyNot} onPress={() => void commands.step("out")}>
               {t`Step out`}
             </Button>
           )}

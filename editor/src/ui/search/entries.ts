@@ -21,6 +21,7 @@ import type { State } from "../../store/state";
 import { now, select, setUi } from "../../store/store";
 import { kindName, selectionOf } from "../../viewmodel/names";
 import { allOf, thingsOf } from "../../viewmodel/things";
+import { openPoints } from "../io/address";
 import { TOOLS } from "../workplace/tools";
 import type { Entry } from "./matches";
 import { openOverlay } from "./overlay";
@@ -85,7 +86,7 @@ function ofWorkplace(state: State): Entry[] {
           cannotSwitch || (live.state === "stopped" ? "" : t`Wait until the change of state is complete.`),
           goOnline,
         ),
-    entry("io", t`Inputs and outputs`, "", () => (location.hash = "#/io"), t`page`),
+    entry("io", t`Inputs and outputs`, "", openPoints, t`page`),
     ...(state.doc?.project ? [entry("dry-run", t`Dry run`, notPredictable(state), predict)] : []),
     entry("cross", aimsAlways(state) ? t`Close the crosshair` : t`Select with crosshair`, "", () =>
       storeGeneralState({ aiming: !aimsAlways(state) || null }),

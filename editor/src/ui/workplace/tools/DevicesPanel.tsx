@@ -10,6 +10,7 @@ import { serves } from "../../../session/connection";
 import { whyUnavailable } from "../../../store/permissions";
 import { derivesFrom } from "../../../store/selectors";
 import { useEditor } from "../../../store/store";
+import { openPoints } from "../../io/address";
 import { Button } from "../../kit/kit";
 import { openOverlay } from "../../search/overlay";
 import { stateName, TONE } from "../sections/about";
@@ -91,9 +92,7 @@ export default function Panel() {
           );
         })}
       </ul>
-      {doc && serves("StreamPoints") && (
-        <Button onPress={() => (location.hash = "#/io")}>{t`Inputs and outputs`}</Button>
-      )}
+      {doc && serves("StreamPoints") && <Button onPress={openPoints}>{t`Inputs and outputs`}</Button>}
       {serves("ListDeviceCards") && <Button onPress={() => setCard("")}>{t`Device cards`}</Button>}
       {card !== null && (
         <Suspense fallback={null}>
