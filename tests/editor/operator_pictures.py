@@ -81,7 +81,12 @@ class Operator:
         await self._parts.get_by_role("button", name="Do not continue").click()
 
     async def _nest_occupied(self) -> None:
-        """Start the program from its beginning, with boards in the cell."""
+        """Start the program from its beginning, with a board in the nest."""
+        if "tester" not in {board["place"] for board in await self._cell.boards()}:
+            await self._start()
+            await self._at("test")
+            await self._screen.press("Stop")
+            await expect(self._screen.page.get_by_role("button", name="Start", exact=True)).to_be_visible()
         await self._start()
         await self._is_held("is occupied")
         await self._take("nest-occupied")
@@ -92,14 +97,18 @@ class Operator:
         await expect(self._screen.page.get_by_role("button", name="Stop", exact=True)).to_be_visible()
 
     async def _confirm_parts(self) -> None:
-        """Answer where each part is."""
+        """Answer where each part is. One in the gripper is taken out."""
         await self._screen.settle()
         while question := re.search(
             r"Where is part (\S+)\?", await self._parts.inner_text() if await self._parts.count() else ""
         ):
             boards = {board["code"]: board["place"] for board in await self._cell.boards()}
             place = boards.get(question[1]) or "stop"  # without a code, it has not been read
-            await self._parts.get_by_role("button", name=NAMES[place], exact=True).click()
+            answer = NAMES[place]
+            if place == "gripper":
+                await self._cell.command("world", "remove_board", code=question[1])
+                answer = "I have taken it out of the cell"
+            await self._parts.get_by_role("button", name=answer, exact=True).click()
             await expect(self._parts.get_by_text(question[0])).to_have_count(0)
 
     async def _at(self, action: str) -> None:
