@@ -118,13 +118,14 @@ class Operator:
                 self._see(event)
         async with asyncio.timeout(3.0 * SLOW):
             while True:
-                event = await self._client.next_event(timeout=SLOW)
-                self._see(event)
-                if event.event == "Held" and await self._held.count():  # another effect of the last fault
+                with contextlib.suppress(DeviceTimeout):
+                    event = await self._client.next_event(timeout=1.0)
+                    self._see(event)
+                    if event.event == "ActionStateBefore" and self._names.get(event.data.action_id) == action:
+                        return
+                if await self._held.count():  # another effect of the last fault
                     await self._acknowledge()
                     await self._try_again()
-                if event.event == "ActionStateBefore" and self._names.get(event.data.action_id) == action:
-                    return
 
     def _see(self, event: Any) -> None:
         if event.event == "PackageInfo":
