@@ -93,6 +93,7 @@ class DeviceCard(TranslatableData, frozen=True):
         restores: Whether it can write them.
         hours: Hours for which the device was connected since `counted_since`.
         cycles: Number of actions that it executed since then.
+        counters: What the device itself counts, by name, when its identity was last read.
         counted_since: When this device, by its serial number, was put into operation here.
         problem: Why the identity could not be read at the last connection; `key` and `values` translate it.
         backups: The backups of its parameters, newest first.
@@ -113,5 +114,6 @@ class DeviceCard(TranslatableData, frozen=True):
     restores: bool = False
     hours: float = 0.0
     cycles: int = 0
+    counters: dict[str, int] = field(default_factory=dict)
     problem: str | Unset = UNSET
     backups: list[BackupInfo] = field(default_factory=list)

@@ -152,6 +152,10 @@ class Generic(abc.ABC):
         """Read the identity of the device. It is called after each connection and acts on nothing."""
         raise Arcor2NotImplemented("identify")
 
+    def counters(self) -> dict[str, int]:
+        """Read what the device itself counts, by name in plain words, such as "labels printed". It acts on nothing."""
+        raise Arcor2NotImplemented("counters")
+
     def parameters_dump(self) -> list[DeviceParameter]:
         """Read the parameters that the device stores, for a backup. It acts on nothing.
 

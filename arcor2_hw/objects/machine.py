@@ -72,10 +72,6 @@ class Machine(abc.ABC):
         """
         raise Arcor2NotImplemented("wait_for")
 
-    def counters(self) -> dict[str, int]:
-        """Return the unit's counters by name."""
-        raise Arcor2NotImplemented("counters")
-
     def stop_reason(self) -> str:
         """Return why the unit stopped or aborted, empty when it did not."""
         raise Arcor2NotImplemented("stop_reason")

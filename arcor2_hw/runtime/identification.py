@@ -1,5 +1,6 @@
 """Recognition of a device: another device than the confirmed one is observed, but not commanded."""
 
+import logging
 import threading
 from collections.abc import Callable
 from typing import Final, NamedTuple
@@ -9,6 +10,8 @@ from arcor2_hw.data.device import Alarm, Identity, Severity
 from arcor2_hw.exceptions import Arcor2Error, Arcor2NotImplemented, DifferentDevice, Refused, message_of
 from arcor2_hw.messages import Message, translatable
 from arcor2_hw.objects import Generic
+
+log = logging.getLogger(__name__)
 
 ALARM: Final = DifferentDevice.code
 """Code of the alarm of a device that is not the confirmed one."""
@@ -27,10 +30,11 @@ _REMEDY: Final = "Call a technician, who confirms the device."
 
 
 class Reported(NamedTuple):
-    """What was read: the identity, or why it cannot be read."""
+    """What was read: the identity, or why it cannot be read; and the counters of the device, None if it has none."""
 
     identity: Identity | None
-    problem: Message | None
+    problem: Message | None = None
+    counters: dict[str, int] | None = None
 
 
 class Identification:
@@ -95,7 +99,7 @@ class Identification:
             return  # it may be that of the device before the loss; the command fails, or the next one reads again
         self._found = found
         self._compare()
-        self._report(Reported(found, None))
+        self._report(Reported(found, counters=_counters(instance)))
 
     def require_confirmed(self, instance: Generic) -> None:
         """Read the identity if necessary.
@@ -147,3 +151,13 @@ class Identification:
             changed = (before is None) != (self.alarm is None)
         if changed:
             self._changed()
+
+
+def _counters(instance: Generic) -> dict[str, int] | None:
+    try:
+        return instance.counters()
+    except Arcor2NotImplemented:
+        return None
+    except Exception as error:  # noqa: BLE001 - a device that cannot count can be used
+        log.warning("counters of %s cannot be read: %s", instance.name, error)
+        return None

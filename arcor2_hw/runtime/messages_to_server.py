@@ -201,8 +201,8 @@ class DeviceChanged(ToServer, frozen=True):
 class DeviceIdentified(ToServer, frozen=True):
     """The identity of a device was read after it connected.
 
-    name, object_type: of the object. identity: None if it cannot be read; problem: why. parameters, restores: whether
-    the type can read its parameters, and write them.
+    name, object_type: of the object. identity: None if it cannot be read; problem: why. counters: of the device; None
+    if it has none. parameters, restores: whether the type can read its parameters, and write them.
     """
 
     object_id: str
@@ -210,6 +210,7 @@ class DeviceIdentified(ToServer, frozen=True):
     object_type: str
     identity: Identity | None = None
     problem: Message | None = None
+    counters: dict[str, int] | None = None
     parameters: bool = False
     restores: bool = False
 

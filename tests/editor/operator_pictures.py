@@ -67,6 +67,7 @@ class Operator:
         await self._state_of_tester("Execute")
         await self._cell.command("tester", "push_door", opening=True)
         await self._is_held()
+        await expect(self._held.get_by_role("button", name="Acknowledge")).to_be_visible()
         await self._take("door-open")
         await self._cell.command("tester", "push_door", opening=False)
         await self._acknowledge()
@@ -179,6 +180,7 @@ class Operator:
     async def _take(self, name: str) -> None:
         await expect(self._screen.page.get_by_text("for the editor")).to_have_count(0)  # models are prepared
         await self._dismiss()
+        await self._screen.page.mouse.move(0, 0)  # off the buttons, which are marked under it
         await self._screen.settle()
         (self._to / f"recover-{name}.png").write_bytes(await self._screen.page.screenshot())
 

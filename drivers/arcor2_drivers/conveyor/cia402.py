@@ -78,6 +78,8 @@ _STATES: Final = (
     (0x4F, 0x08, Power.FAULT),
 )
 FAULTY: Final = frozenset({Power.FAULT, Power.FAULT_REACTION})
+SWITCHED_OFF: Final = frozenset({Power.SWITCH_ON_DISABLED, Power.READY, Power.SWITCHED_ON, Power.FAULT})
+"""States without torque."""
 
 TARGET_REACHED: Final = 1 << 10
 SETPOINT_ACKNOWLEDGE: Final = 1 << 12

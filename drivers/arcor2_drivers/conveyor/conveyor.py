@@ -4,6 +4,7 @@ from typing import ClassVar, Final
 
 from arcor2_hw.actions import action, observation
 from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction, Reading
+from arcor2_hw.data.maintenance import DeviceParameter, ParameterFailure
 from arcor2_hw.exceptions import ConnectionLost, NotFound, NotInControl, OutOfRange, Refused
 from arcor2_hw.messages import Phrase
 from arcor2_hw.objects import Axis, Machine, MachineCommand, MachineState
@@ -11,11 +12,12 @@ from arcor2_hw.objects.observing import GoOn
 from arcor2_hw.objects.polled_control import NOBODY, US, PolledControl
 
 from . import cia402
-from .cia402 import FAULTY, Power, State
+from .cia402 import FAULTY, SWITCHED_OFF, Power, State
 from .emergencies import fault_of
 from .motion import Motion
 from .observer import Observer
 from .packml import STATES, Unit
+from .parameters import dump, restore
 from .settings import LONGEST_HEARTBEAT, LONGEST_MOVE, LONGEST_RAMP, ConveyorSettings
 
 MARGIN: Final = 30.0
@@ -75,6 +77,21 @@ class Conveyor(PolledControl[State], Machine, Axis):
         entries = (cia402.VENDOR, cia402.PRODUCT, cia402.SERIAL, cia402.REVISION)
         vendor, product, serial, revision = (self._observer.link.read(entry) for entry in entries)
         return Identity(f"CANopen vendor {vendor:X}h", f"product {product:X}h", str(serial), f"{revision:X}h")
+
+    def parameters_dump(self) -> list[DeviceParameter]:
+        """Read the setup of the drive; objects that the model does not have are left out."""
+        self.observing.check()
+        return dump(self._observer.link)
+
+    def parameters_restore(self, parameters: list[DeviceParameter]) -> list[ParameterFailure]:
+        """Write the setup of the drive, which stores it. Raise Refused while the drive is enabled."""
+        if (power := self.fresh().power) not in SWITCHED_OFF:
+            raise Refused(
+                "{device}: parameters can be written only while the drive is switched off; its state is {state}",
+                device=self.who,
+                state=power,
+            )
+        return restore(self._observer.link, parameters)
 
     def alarms(self) -> list[Alarm]:
         """Return the present fault, or the emergency that was not cancelled."""

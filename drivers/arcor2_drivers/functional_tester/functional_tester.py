@@ -89,7 +89,11 @@ class FunctionalTester(Tester, Machine, CollisionObject):
     def counters(self) -> dict[str, int]:
         """Return the boards tested, passed and failed since power-on."""
         inputs = self.current()
-        return {"tested": inputs.tested, "passed": inputs.passed, "failed": inputs.failed}
+        return {
+            translatable("tested"): inputs.tested,
+            translatable("passed"): inputs.passed,
+            translatable("failed"): inputs.failed,
+        }
 
     def observations(self) -> list[Observation]:
         """Return the measurements of the last tested board and the counters since power-on."""

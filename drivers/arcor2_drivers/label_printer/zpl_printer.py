@@ -9,7 +9,7 @@ from arcor2_hw.actions import action, observation
 from arcor2_hw.data.device import Health, Identity, LossReaction
 from arcor2_hw.data.maintenance import DeviceParameter, ParameterFailure
 from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused
-from arcor2_hw.messages import Message
+from arcor2_hw.messages import Message, translatable
 from arcor2_hw.objects import Printer
 from arcor2_hw.objects.connected import AlarmText
 from arcor2_hw.objects.line_device import LineDevice
@@ -82,6 +82,10 @@ class ZplPrinter(LineDevice, Printer):
             model, firmware = self.ask(zpl.IDENTIFY, zpl.identity, "~HI")
             serial = self.ask(zpl.getvar(zpl.UNIQUE_ID), zpl.variable, f"getvar {zpl.UNIQUE_ID}")
         return Identity("", model, serial, firmware)
+
+    def counters(self) -> dict[str, int]:
+        """Read the number of labels that the printer has ever printed."""
+        return {translatable("labels printed"): self.counter()}
 
     # -------------------------------------------------------------------------------- parameters
     def parameters_dump(self) -> list[DeviceParameter]:

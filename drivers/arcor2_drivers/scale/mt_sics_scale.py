@@ -9,6 +9,7 @@ from typing import ClassVar, Final
 from arcor2_hw.actions import action
 from arcor2_hw.data.base import now
 from arcor2_hw.data.device import Health, Identity, LossReaction, Observation, Quality, Reading, Severity
+from arcor2_hw.data.maintenance import DeviceParameter, ParameterFailure
 from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotFound, OutOfRange, Refused, Stale
 from arcor2_hw.messages import Message, translatable
 from arcor2_hw.objects import Scale
@@ -90,6 +91,47 @@ class MtSicsScale(LineDevice, Scale):
         with self.held():
             model, firmware, serial = (self._ask(command).text for command in ("I2", "I3", "I4"))
         return Identity("", model, serial, firmware)
+
+    # -------------------------------------------------------------------------------- parameters
+    def parameters_dump(self) -> list[DeviceParameter]:
+        """Read the settings of the scale; those that the model does not have are left out."""
+        with self.held():
+            found = {name: self._setting(command) for command, name in sics.PARAMETERS.items()}
+        return [DeviceParameter(name, number) for name, number in found.items() if number is not None]
+
+    def parameters_restore(self, parameters: list[DeviceParameter]) -> list[ParameterFailure]:
+        """Write settings, and read each one again."""
+        with self.held():
+            reasons = {each.name: self._write_setting(each) for each in parameters}
+        return [
+            ParameterFailure(name, reason.text, **reason.translation())
+            for name, reason in reasons.items()
+            if reason is not None
+        ]
+
+    def _setting(self, command: str) -> int | None:
+        """Return the value of a setting, None if the model does not have it."""
+        try:
+            return self._ask(command).number
+        except DeviceFault as error:
+            if error.fault_code not in sics.ERRORS:
+                raise
+            return None
+
+    def _write_setting(self, parameter: DeviceParameter) -> Message | None:
+        """Write a setting; return why the scale does not use it, None if it does."""
+        commands = {name: command for command, name in sics.PARAMETERS.items()}
+        command, value = commands.get(parameter.name), parameter.value
+        if command is None or self._setting(command) is None:
+            return Message.of("The scale has no setting {parameter}.", parameter=parameter.name)
+        if type(value) is not int or not 0 <= value <= 999:
+            return Message.of("{value} cannot be sent to the scale.", value=value)
+        request = f"{command} {value}\r\n".encode("ascii")
+        self.ask(request, lambda data: self._found(data, command, command), command)
+        stored = self._setting(command)
+        if stored == value:
+            return None
+        return Message.of("The scale did not accept {value} and keeps {stored}.", value=value, stored=stored)
 
     # -------------------------------------------------------------------------------- weighing
     def weigh(self, stable: bool = True) -> Reading[float]:

@@ -9,6 +9,15 @@ KILOGRAMS: Final = {"kg": Decimal(1), "g": Decimal("1e-3"), "mg": Decimal("1e-6"
 ERRORS: Final = {"ES": "does not know the command", "ET": "received a damaged command", "EL": "refuses its parameter"}
 LONGEST_LINE: Final = 80
 _VALUE: Final = re.compile(r"-?\d{1,9}(\.\d{1,6})?")
+PARAMETERS: Final = {
+    "M01": "weighing mode (M01)",
+    "M02": "environment (M02)",
+    "M03": "automatic zero (M03)",
+    "M31": "mode after restart (M31)",
+    "M35": "zeroing at restart (M35)",
+}
+"""Settings by the command of level 2 that reads and writes them. A scale keeps them when it is switched off."""
+_PARAMETER: Final = re.compile(r"(M\d\d) A (\d{1,3})")
 _TEXT: Final = re.compile(r'(I[0-4]) A "([^"]*)"')
 
 
@@ -16,7 +25,8 @@ _TEXT: Final = re.compile(r'(I[0-4]) A "([^"]*)"')
 class Answer:
     """A line: the command it answers (or ES, ET, EL), its mark, and a value in kg or a text if it has one.
 
-    mark: S stable, D dynamic, A done, I not executable now, + above and - below the range. unit: as sent.
+    mark: S stable, D dynamic, A done, I not executable now, L wrong parameter, + above and - below the range. unit: as
+    sent. number: value of a setting.
     """
 
     command: str
@@ -24,6 +34,7 @@ class Answer:
     value: float | None = None
     unit: str = ""
     text: str = ""
+    number: int | None = None
 
 
 def answers(data: bytes) -> list[Answer]:
@@ -38,8 +49,14 @@ def answer(line: str) -> Answer | None:
         return Answer(line)
     if match := _TEXT.fullmatch(line):
         return Answer(match[1], "A", text=match[2])
+    if match := _PARAMETER.fullmatch(line):
+        return Answer(match[1], "A", number=int(match[2]))
     parts = line.split()
-    if len(parts) == 2 and parts[0] in ("S", "T", "Z", "TA", "ZI", "TI") and parts[1] in ("A", "I", "+", "-", "L"):
+    if (
+        len(parts) == 2
+        and parts[0] in ("S", "T", "Z", "TA", "ZI", "TI", *PARAMETERS)
+        and parts[1] in ("A", "I", "+", "-", "L")
+    ):
         return Answer(parts[0], parts[1])
     if len(parts) == 4 and parts[0] in ("S", "T", "TI", "TA") and parts[1] in ("S", "D", "A"):
         if not _VALUE.fullmatch(parts[2]) or not parts[3].isalpha():

@@ -201,6 +201,12 @@ class Controller(StateObserver[State]):
         text = "{device} refused {request}: {reason} (error {code})"
         return kind(text, device=self.who, request=telegrams.title(mid), reason=why, code=code)
 
+    def tool_counters(self) -> dict[str, int]:
+        """Request the counters of the tool. Raises Unsupported, DeviceTimeout, ConnectionLost."""
+        deadline = time.monotonic() + self.answers_within
+        data = self._negotiate(Mid.TOOL_DATA_REQUEST, telegrams.TOOL_DATA_REVISIONS, deadline)
+        return self._decoded(telegrams.tool_counters, data)
+
     def enable(self, on: bool) -> None:
         """Enable or disable the tool."""
         asked = time.monotonic()
@@ -240,6 +246,8 @@ class Controller(StateObserver[State]):
         match telegram.mid:
             case Mid.START_ACKNOWLEDGE:
                 self._match(Mid.START, telegram)
+            case Mid.TOOL_DATA:
+                self._match(Mid.TOOL_DATA_REQUEST, telegram)
             case Mid.ACCEPTED:
                 self._match(self._decoded(telegrams.accepted, telegram), telegram)
             case Mid.ERROR:

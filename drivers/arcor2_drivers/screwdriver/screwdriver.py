@@ -13,7 +13,7 @@ from arcor2_hw.objects import Generic
 from arcor2_hw.objects.observing import GoOn
 from arcor2_hw.objects.polled_control import PolledControl
 
-from .controller import Controller, State
+from .controller import Controller, State, Unsupported
 from .settings import OpenProtocolScrewdriverSettings
 from .telegrams import Mid, Result
 
@@ -50,6 +50,14 @@ class OpenProtocolScrewdriver(PolledControl[State], Generic):
         """Return the identity that the controller reported at the start of communication, if it still answers."""
         self.fresh()
         return self._controller.identity
+
+    def counters(self) -> dict[str, int]:
+        """Read the tightenings of the tool, and those since its service if the controller reports them."""
+        self.fresh()
+        try:
+            return self._controller.tool_counters()
+        except Unsupported:
+            return {}
 
     def condition(self) -> Health:
         """Return whether alarms are active, and whether they block the controller or the tool."""

@@ -27,6 +27,8 @@ class Mid(enum.IntEnum):
     ACCEPTED = 5
     SELECT_PROGRAM = 18
     SELECT_JOB = 38
+    TOOL_DATA_REQUEST = 40
+    TOOL_DATA = 41
     DISABLE_TOOL = 42
     ENABLE_TOOL = 43
     SUBSCRIBE_RESULTS = 60
@@ -53,6 +55,8 @@ RESULT_REVISIONS: Final = (2, 1)
 ALARM_REVISIONS: Final = (2, 1)
 FIRST_LIGHT_REVISION: Final = 900
 """First revision of a result whose layout is not that of revision 2 with more fields at its end."""
+
+TOOL_DATA_REVISIONS: Final = (2, 1)
 
 ALREADY_SUBSCRIBED: Final = (9, 11)
 CLIENT_CONNECTED: Final = (16, 96)
@@ -181,6 +185,23 @@ def identity(telegram: Telegram) -> Identity:
     _, _, name, *rest = (_text(each) for each in fields(telegram.data, lengths, more=telegram.revision > 4))
     supplier, _, firmware, _, _, serial = [*rest, *[""] * (6 - len(rest))]
     return Identity(VENDORS.get(supplier, supplier), name, serial, firmware)
+
+
+_TOOL: Final = (14, 10, 19, 10, 6, 19, 10)
+_TOOL_FIELDS: Final = {1: 4}
+
+
+def tool_counters(telegram: Telegram) -> dict[str, int]:
+    """Return the tightenings of the tool from MID 0041, and from revision 2 on those since its service.
+
+    The fields are serial number of the tool, tightenings, last calibration, serial number of the controller (1);
+    calibration value, last service, tightenings since then (2). Raises ValueError.
+    """
+    values = fields(telegram.data, _TOOL[: _TOOL_FIELDS.get(telegram.revision, len(_TOOL))], more=True)
+    found = {translatable("tightenings"): _number(values[1], "number of tightenings")}
+    if len(values) == len(_TOOL):
+        found[translatable("tightenings since service")] = _number(values[6], "tightenings since the service")
+    return found
 
 
 # ------------------------------------------------------------------------------------------------ results

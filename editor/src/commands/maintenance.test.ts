@@ -15,6 +15,7 @@ const card = (more: Partial<DeviceCard> = {}): DeviceCard => ({
   restores: false,
   hours: 0,
   cycles: 0,
+  counters: {},
   backups: [],
   ...more,
 });

@@ -842,6 +842,7 @@ export interface DeviceArgs {
  *     restores: Whether it can write them.
  *     hours: Hours for which the device was connected since `counted_since`.
  *     cycles: Number of actions that it executed since then.
+ *     counters: What the device itself counts, by name, when its identity was last read.
  *     counted_since: When this device, by its serial number, was put into operation here.
  *     problem: Why the identity could not be read at the last connection; `key` and `values` translate it.
  *     backups: The backups of its parameters, newest first.
@@ -862,6 +863,7 @@ export interface DeviceCard {
   restores: boolean;
   hours: number;
   cycles: number;
+  counters: Record<string, number>;
   problem?: string;
   backups: BackupInfo[];
   key?: string;

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from arcor2_fakes.conveyor.drive import Drive, Mode
 
 NO_OBJECT, NO_SUBINDEX, NO_DATA = 0x06020000, 0x06090011, 0x08000024
+NOT_STORED = 0x08000020
 READ_ONLY, TOO_LONG, TOO_SHORT, BAD_VALUE = 0x06010002, 0x06070012, 0x06070013, 0x06090030
 
 
@@ -80,6 +81,60 @@ _PARAMETERS = {
     0x609A: ("I", "homing_acceleration", 1),
     0x60FF: ("i", "target_velocity", -(1 << 31)),
 }
+_SETUP = {
+    (0x605B, 0): ("h", 0, 0, 1),
+    (0x605C, 0): ("h", 1, 0, 1),
+    (0x605D, 0): ("h", 1, 1, 4),
+    (0x605E, 0): ("h", 2, 0, 2),
+    (0x6065, 0): ("I", 2000, 0, (1 << 32) - 1),
+    (0x6066, 0): ("H", 100, 0, 0xFFFF),
+    (0x6072, 0): ("H", 1200, 0, 3000),
+    (0x6073, 0): ("H", 1500, 0, 2000),
+    (0x607E, 0): ("B", 0, 0, 0xFF),
+    (0x607F, 0): ("I", 20000, 1, (1 << 32) - 1),
+    (0x6080, 0): ("I", 3000, 1, 6000),
+    (0x608F, 1): ("I", 10000, 1, (1 << 32) - 1),
+    (0x608F, 2): ("I", 1, 1, (1 << 32) - 1),
+    (0x6091, 1): ("I", 5, 1, (1 << 32) - 1),
+    (0x6091, 2): ("I", 1, 1, (1 << 32) - 1),
+}
+"""Format, value as delivered, lowest and highest value of each part of the setup. The motion does not use them."""
+_SAVE = int.from_bytes(b"save", "little")
+
+
+class Setup:
+    """The setup of the drive: its present values, and those that it has stored."""
+
+    def __init__(self) -> None:
+        self.present = {key: value for key, (_, value, _, _) in _SETUP.items()}
+        self._stored = dict(self.present)
+
+    def add_to(self, dictionary: Dictionary) -> None:
+        """Add its entries."""
+        entries = dictionary.entries
+        for key, (form, _, lowest, highest) in _SETUP.items():
+
+            def write(value: int, key: tuple[int, int] = key, lowest: int = lowest, highest: int = highest) -> None:
+                if not lowest <= value <= highest:
+                    raise ValueError
+                self.present[key] = value
+
+            entries[key] = Entry(form, lambda key=key: self.present[key], write)  # type: ignore[misc]
+        for index in {index for index, subindex in _SETUP if subindex}:
+            entries[index, 0] = Entry("B", lambda: 2)
+        entries[0x1010, 0] = Entry("B", lambda: 1)
+        entries[0x1010, 1] = Entry("I", lambda: 1, self._save)
+
+    def _save(self, value: int) -> None:
+        if value != _SAVE:
+            raise Abort(NOT_STORED)
+        self._stored = dict(self.present)
+
+    def power_cycle(self) -> None:
+        """Load the stored values."""
+        self.present = dict(self._stored)
+
+
 _MODES_HAD = 1 << 0 | 1 << 2 | 1 << 5  # 6502h: bits of pp, pv, hm
 
 

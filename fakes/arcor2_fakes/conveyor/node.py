@@ -8,7 +8,7 @@ import struct
 from collections import deque
 from typing import Any
 
-from arcor2_fakes.conveyor.dictionary import BAD_VALUE, NO_DATA, Abort, Dictionary, Entry, add_drive
+from arcor2_fakes.conveyor.dictionary import BAD_VALUE, NO_DATA, Abort, Dictionary, Entry, Setup, add_drive
 from arcor2_fakes.conveyor.drive import HEARTBEAT_ERROR, Drive
 from arcor2_fakes.conveyor.hub import Hub
 from arcor2_fakes.conveyor.pdo import Rpdo, Tpdo
@@ -36,6 +36,7 @@ class Node:
         self._booted_at = 0.0
         self.writes: deque[dict[str, Any]] = deque(maxlen=400)
         self.drive = Drive(self._emergency)
+        self._setup = Setup()
         self._reset_communication()
         hub.listen(self._received)
 
@@ -63,6 +64,7 @@ class Node:
         for subindex, value in enumerate((4, 0x3E7, 0x48, 0x307, 1000 + number)):
             entries[0x1018, subindex] = Entry("I" if subindex else "B", lambda value=value: value)  # type: ignore[misc]
         add_drive(dictionary, self.drive)
+        self._setup.add_to(dictionary)
         self.pdos = (
             Tpdo(0, number, (0x6041,), dictionary, self._send_pdo),
             Tpdo(1, number, (0x6041, 0x6064), dictionary, self._send_pdo),
@@ -139,6 +141,7 @@ class Node:
     def power_cycle(self, belt: float | None = None) -> None:
         """Switch off and on: volatile values are lost; the belt is stopped, or was moved to `belt` counts."""
         self.drive.power_on(self.drive.belt if belt is None else float(belt))
+        self._setup.power_cycle()
         self.writes.clear()
         self._hub.frames.clear()
         self._boot()

@@ -1,7 +1,8 @@
 """The balance without its port: MT-SICS commands and answers in time.
 
-Source: Mettler Toledo, "Standard Interface Command Set" (MT-SICS 0 version 2.3x, MT-SICS 1 version 2.2x): all commands
-of the levels 0 and 1. A wrong parameter is answered by L behind the command, or by EL where none is allowed.
+Source: Mettler Toledo, "Standard Interface Command Set" (MT-SICS 0 version 2.3x, MT-SICS 1 version 2.2x): all
+commands of the levels 0 and 1, and some settings of level 2. A wrong parameter is answered by L behind the command,
+or by EL where none is allowed.
 """
 
 from __future__ import annotations
@@ -17,9 +18,12 @@ UNITS: Final = {"g": 1e3, "kg": 1.0, "mg": 1e6, "lb": 2.20462262}
 DECIMALS: Final = {"g": 2, "kg": 5, "mg": 0, "lb": 4}
 ZERO_RANGE: Final = 0.02
 """Zero range around the zero point at power-on, relative to the capacity."""
+SETTINGS: Final = {"M01": (0, 3), "M02": (2, 2), "M03": (1, 1), "M35": (0, 1)}
+"""Some settings of level 2: value as delivered, and highest value. They do not change how it weighs."""
 LEVELS: Final = (
     ("I0", "I1", "I2", "I3", "I4", "I5", "S", "SI", "SIR", "Z", "ZI", "@"),
     ("D", "DW", "K", "SR", "T", "TA", "TAC", "TI"),
+    tuple(SETTINGS),
 )
 KEYS: Final = {"zero": 1, "tare": 2}
 """Codes of the keys; those of real balances differ from model to model."""
@@ -61,6 +65,7 @@ class Balance:
     ) -> None:
         self._send = send
         self._loop = asyncio.get_running_loop()
+        self.settings = {word: value for word, (value, _) in SETTINGS.items()}
         self._settling, self._stability_timeout = settling, stability_timeout
         self._from, self._changed = 0.0, -math.inf
         self._buffer = bytearray()
@@ -178,6 +183,8 @@ class Balance:
         if self.next_error:
             error, self.next_error = self.next_error, None
             return error
+        if word in SETTINGS:
+            return self._setting(word, argument)
         if word == "@" or not any(word in level for level in LEVELS):
             return "ES"
         if argument and word not in _WITH_PARAMETER:
@@ -190,6 +197,17 @@ class Balance:
         if word in ("D", "DW", "K", "TA", "TAC"):
             return self._set(word, argument)
         return self._excuse(command) or self._measured(word, argument)
+
+    def _setting(self, word: str, argument: str) -> str:
+        """Read a setting, or write it."""
+        if not argument:
+            return f"{word} A {self.settings[word]}"
+        if self.busy:
+            return f"{word} I"
+        if not argument.isdigit() or int(argument) > SETTINGS[word][1]:
+            return f"{word} L"
+        self.settings[word] = int(argument)
+        return f"{word} A"
 
     def _set(self, word: str, argument: str) -> str:
         """Execute a command that does not depend on the load."""
@@ -297,6 +315,7 @@ class Balance:
         self.received.clear()
         self.vibrating = self.busy = False
         self.unit, self.next_error = "g", None
+        self.settings = {word: value for word, (value, _) in SETTINGS.items()}
         self.display, self.keys = None, KEYS_ACT
         self.load = self.zero = self.tare = self._from = 0.0
         self._changed = -math.inf

@@ -72,12 +72,17 @@ def register_commands(fake: Fake, controller: Controller, wire: TcpWire) -> None
         wire.reset()
         tool.renew()
         controller.received.clear()
-        controller.deaf, controller.commands_disabled = 0, False
+        controller.deaf, controller.commands_disabled, controller.tool_data_revision = 0, False, 2
+
+    def tool_data_revision(revision: int) -> None:
+        controller.tool_data_revision = int(revision)
 
     fake.switches(controller, disable_commands="commands_disabled")
     fake.commands(
         pull=pull,
         tighten=tighten,
+        service=tool.service,
+        tool_data_revision=tool_data_revision,
         plan=lambda torque, angle: tool.plan(float(torque), int(angle)),
         alarm=alarm,
         clear_alarm=tool.clear_alarm,

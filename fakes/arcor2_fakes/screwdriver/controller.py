@@ -53,6 +53,8 @@ class Controller:
         self.deaf = 0
         """Number of acknowledgements that get lost."""
         self.commands_disabled = False
+        self.tool_data_revision = 2
+        """Highest revision of MID 0041; 0: not supported."""
         tool.finished = self._finished
         tool.alarm_raised = self._alarm_raised
         tool.alarm_cleared = self._alarm_cleared
@@ -87,6 +89,7 @@ class Controller:
         """Return the error code that refuses a message; 0 if it is accepted."""
         limits = _PLAIN | {
             1: self.options.start_revision,
+            40: self.tool_data_revision,
             38: self.options.job_revision,
             60: self.options.result_revision,
             70: self.options.alarm_revision,
@@ -159,6 +162,15 @@ class Controller:
         values = ["0001", "01", _NAME.ljust(25)]
         for more in later[: revision - 1]:
             values += more
+        return numbered(*values)
+
+    def tool_data(self, revision: int) -> bytes:
+        """Return the data field of MID 0041."""
+        made = self.tool.made
+        values = ["TOOL0000012345", f"{made:010d}", "2026-01-05:08:00:00", "SN00012345"]
+        if revision == 2:
+            values += ["001200", "2026-02-01:12:00:00", f"{made - self.tool.serviced:010d}"]
+            values += ["01", "01", "000", "1.4.0".ljust(19)]
         return numbered(*values)
 
     def result_data(self, result: Tightening, revision: int) -> bytes:

@@ -92,6 +92,8 @@ class Session:
         elif message.mid == 1:
             self.started = True
             self._send(build(2, self._controller.introduction(message.revision), message.revision))
+        elif message.mid == 40:
+            self._send(build(41, self._controller.tool_data(message.revision), message.revision))
         else:
             self._send(build(5, f"{message.mid:04d}"))
             self._controller.execute(self, message)

@@ -95,7 +95,7 @@ class Tool:
         """Return to the state after the start."""
         self.power_on()
         self._random = random.Random(self._seed)
-        self.program, self.job, self.made = 1, 0, 0
+        self.program, self.job, self.made, self.serviced = 1, 0, 0, 0
         self.last: Tightening | None = None
         self.planned: deque[tuple[float, int]] = deque()
 
@@ -147,6 +147,10 @@ class Tool:
         self.alarm_cleared(alarm)
         self._start()
         return True
+
+    def service(self) -> None:
+        """Record that the tool was serviced."""
+        self.serviced = self.made
 
     # ------------------------------------------------------------------------------------------------ the controller
 

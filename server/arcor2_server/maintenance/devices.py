@@ -111,6 +111,8 @@ class Devices:
             log.warning("different device", object=message.name, identity=found, confirmed=before.identity)
         else:  # fields that were not reported before are completed
             card = replace(before, identity=_completed(before.identity, found), found=UNSET, differing=[])
+        if message.counters is not None and not card.differing:
+            known["counters"] = message.counters
         self._changed(replace(card, seen=at, **known))
 
     def _reported(self, key: tuple[str, str], report: m.DeviceChanged) -> None:
@@ -176,7 +178,7 @@ class Devices:
         before, at = card.identity, now()
         if set(card.differing) - {"firmware"}:
             self._count_hours()  # of the previous device
-            card = replace(card, hours=0.0, cycles=0, counted_since=at)
+            card = replace(card, hours=0.0, cycles=0, counters={}, counted_since=at)
         card = replace(card, identity=identity, found=UNSET, differing=[], confirmed_at=at, confirmed_by=by)
         await self._store.put([card])
         audit.record([AuditedDevice("device_identity", object_id, before, identity)])

@@ -315,3 +315,20 @@ def test_parameters_out_of_range_send_nothing(
     with pytest.raises(AssertionError):
         call(screwdriver)
     assert set(fake.truth()["received"]) <= OBSERVING
+
+
+@pytest.mark.parametrize("revision", [2, 1])
+def test_the_counters_of_the_tool_are_read(
+    fake: FakeProcess, screwdriver: OpenProtocolScrewdriver, wait_for: Callable[..., Any], revision: int
+) -> None:
+    fake.control.do("tool_data_revision", revision=revision)
+    assert screwdriver.counters()["tightenings"] == 0
+    for made in (1, 2):
+        fake.control.do("tighten")
+        wait_for(lambda made=made: screwdriver.counters()["tightenings"] == made)
+        if made == 1:
+            fake.control.do("service")
+    assert screwdriver.counters().get("tightenings since service") == (1 if revision == 2 else None)
+    fake.control.do("tool_data_revision", revision=0)
+    assert screwdriver.counters() == {}  # a controller without this message
+    assert screwdriver.connection is Connection.ONLINE

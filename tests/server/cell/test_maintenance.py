@@ -56,6 +56,8 @@ class Unit(Generic):
     def connection(self): return Connection.ONLINE
     def identify(self) -> Identity:
         return Identity(**self.state()["identity"])
+    def counters(self):
+        return {"gain adjusted": self.state()["parameters"]["gain"]}
     def parameters_dump(self):
         return [DeviceParameter(name, value) for name, value in self.state()["parameters"].items()]
     def parameters_restore(self, parameters):
@@ -287,3 +289,20 @@ async def test_files_of_backups_are_checked(tmp_path: Path) -> None:
         assert backups[0] == newest
         with pytest.raises(Arcor2Error, match="does not exist"):
             await place.ask("GetParameterBackup", object_id="obj_unit", backup_id=info.id)
+
+
+async def test_the_card_shows_what_the_confirmed_device_counts(tmp_path: Path) -> None:
+    async with workplace(tmp_path) as place:
+        await place.restart()
+        assert (await place.card()).counters == {"gain adjusted": 5}
+        place.device({"gain": 6})
+        await place.restart()
+        assert (await place.card()).counters == {"gain adjusted": 6}
+        place.device({"gain": 700}, serial="B2")
+        await place.restart()
+        card = await place.card()
+        assert card.counters == {"gain adjusted": 6}  # those of the other device are not taken for them
+        await place.ask("ConfirmDevice", object_id=card.object_id, identity=card.found)
+        assert (await place.card()).counters == {}
+        await place.restart()
+        assert (await place.card()).counters == {"gain adjusted": 700}

@@ -32,6 +32,7 @@ export function Card({ card, reload, onReplace }: Props) {
   const object = useEditor((all) => all.doc?.objects[card.object_id]);
   const technician = useEditor((all) => whyUnavailable(all, "ConfirmDevice") === "");
   const shown = state?.state ?? "offline";
+  const counters = Object.entries(card.counters ?? {});
   const facts: [string, string][] = [
     ...IDENTITY_FIELDS.filter((field) => card.identity[field]).map((field): [string, string] => [
       i18n._(IDENTITY_NAMES[field]),
@@ -41,6 +42,8 @@ export function Card({ card, reload, onReplace }: Props) {
     [t`Hours of operation`, decimal(card.hours, 1)],
     [t`Actions executed`, decimal(card.cycles)],
     [t`Counted since`, dateAndTime(card.counted_since)],
+    ...counters.map(([name, value]): [string, string] => [words(translate({ text: name })), decimal(value)]),
+    ...(counters.length > 0 ? [[t`Counters of the device read`, dateAndTime(card.seen)] as [string, string]] : []),
     ...(card.confirmed_at
       ? [[t`Confirmed`, `${dateAndTime(card.confirmed_at)}, ${card.confirmed_by ?? ""}`] as [string, string]]
       : []),
