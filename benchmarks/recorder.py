@@ -54,10 +54,10 @@ def demo() -> None:
     """Run the command line; the server of the demo is a process of its own, which runs this module."""
     from arcor2_server.cli.main import main
     from arcor2_server.demo import run as demo_run
+    from arcor2_server.demo.processes import python_module
 
-    python_module = demo_run.python_module
     modules = {"arcor2_server.cli.main": __name__}
-    demo_run.python_module = lambda name, *arguments: python_module(modules.get(name, name), *arguments)
+    vars(demo_run)["python_module"] = lambda name, *arguments: python_module(modules.get(name, name), *arguments)
     main()
 
 
