@@ -56,8 +56,10 @@ def demo() -> None:
     from arcor2_server.demo import run as demo_run
     from arcor2_server.demo.processes import python_module
 
-    modules = {"arcor2_server.cli.main": __name__}
-    vars(demo_run)["python_module"] = lambda name, *arguments: python_module(modules.get(name, name), *arguments)
+    def replaced(name: str, *arguments: str) -> list[str]:
+        return python_module(__name__ if name == "arcor2_server.cli.main" else name, *arguments)
+
+    vars(demo_run)["python_module"] = replaced
     main()
 
 

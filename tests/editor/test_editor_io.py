@@ -91,3 +91,11 @@ async def test_an_output_is_forced_and_an_operator_ends_it(cell: Cell, browser: 
         await other.get_by_role("alertdialog").get_by_role("button", name="End force").click()
         await expect(banner).to_have_count(0)
         await expect(lamp.locator(".io-value")).to_have_text("off")
+
+        # Back leads to where the page was opened from.
+        await phone.press("Inputs and outputs")
+        await expect(other.get_by_role("heading", name="Inputs and outputs")).to_be_visible()
+        await phone.press("Back")
+        await expect(other.get_by_role("heading", name="Operator")).to_be_visible()
+        await screen.press("Back")
+        await expect(page.get_by_role("button", name=texts.DEVICES)).to_be_visible()
