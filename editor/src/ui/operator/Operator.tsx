@@ -55,8 +55,8 @@ interface Shown {
 }
 
 /**
- * Return what the state area shows. A result takes precedence over "Ready" until it is dismissed. `refused`: whether the
- * server would refuse a start.
+ * Return what the state area shows. A result takes precedence over "Ready" until it is dismissed. `refused`: whether
+ * the server would refuse to start a program.
  */
 function shownState(state: State, starting: boolean, result: Result | null, refused: boolean): Shown {
   const { state: phase } = state.program;
