@@ -32,9 +32,46 @@ function compressed(): Plugin {
   };
 }
 
+/** Leave the chunks of the shell, which are loaded before any other, out of the dependencies that lazy chunks preload. */
+function preloadWithoutShell(): Plugin {
+  const shell = new Set<string>();
+  return {
+    name: "preload-without-shell",
+    apply: "build",
+    config: () => ({
+      build: {
+        modulePreload: {
+          polyfill: false,
+          resolveDependencies: (_, names, { hostType }) =>
+            hostType === "html" ? names : names.filter((name) => !shell.has(name)),
+        },
+      },
+    }),
+    generateBundle: {
+      order: "pre", // before Vite writes the dependencies
+      handler(_, bundle) {
+        const add = (name: string) => {
+          const chunk = bundle[name];
+          if (chunk?.type !== "chunk" || shell.has(name)) return;
+          shell.add(name);
+          for (const style of chunk.viteMetadata?.importedCss ?? []) shell.add(style);
+          chunk.imports.forEach(add);
+        };
+        for (const chunk of Object.values(bundle)) if (chunk.type === "chunk" && chunk.isEntry) add(chunk.fileName);
+      },
+    },
+  };
+}
+
 export default defineConfig({
   base: "/editor/",
-  plugins: [lingui({ macroTransform: true, failOnCompileError: true }), react(), lean(), compressed()],
+  plugins: [
+    lingui({ macroTransform: true, failOnCompileError: true }),
+    react(),
+    lean(),
+    preloadWithoutShell(),
+    compressed(),
+  ],
   // From its sources, so that unused parts are left out.
   resolve: { alias: [{ find: /^three$/, replacement: "three/src/Three.js" }] },
   build: {
@@ -43,7 +80,6 @@ export default defineConfig({
     manifest: true,
     target: "es2022",
     assetsInlineLimit: 0,
-    modulePreload: { polyfill: false },
     reportCompressedSize: true,
   },
   server: {

@@ -7,6 +7,7 @@ import { type Mat3, mean, norm, type Point, sub, type Vec3 } from "./geometry";
 import { Gyro, turnedView } from "./gyro";
 import { type FocalLength, KNOWN, lensOf } from "./lens";
 import type { ArMode, Shown } from "./mode";
+import type { Bitmap, FromWorker, Start } from "./pictureWorker";
 import type { Layout } from "./places";
 import {
   combined,
@@ -27,7 +28,6 @@ import { JUMP, jumpBetween } from "./registration";
 import { Sharing } from "./sharing";
 import { ArProblem, obstacleOfError } from "./support";
 import type { Found } from "./tracker";
-import type { FromWorker, ToWorker } from "./worker";
 
 /** Time for which the orientation sensor replaces the markers, and the time without it, ms. */
 const BRIDGE = 1500;
@@ -53,7 +53,7 @@ const WANTED: MediaTrackConstraints = {
   frameRate: { ideal: 30 },
 };
 
-interface Options {
+export interface CameraOptions {
   engine: Engine;
   layout: Layout;
   /** The known focal length of a camera by its name; null if it is not known. */
@@ -81,6 +81,8 @@ export function releaseCamera(stream: MediaStream): void {
 }
 
 export class ArSession implements ArMode {
+  readonly mode = "camera";
+
   get places(): Layout["places"] {
     return this.options.layout.places;
   }
@@ -121,7 +123,7 @@ export class ArSession implements ArMode {
 
   constructor(
     private readonly stream: MediaStream,
-    private readonly options: Options,
+    private readonly options: CameraOptions,
   ) {
     const [track] = stream.getVideoTracks();
     const { width = 0, height = 0 } = track?.getSettings() ?? {};
@@ -263,7 +265,7 @@ export class ArSession implements ArMode {
     this.send({ setup: { codes, places, focal } });
   }
 
-  private send(message: ToWorker, transfer: Transferable[] = []): void {
+  private send(message: Start | Bitmap, transfer: Transferable[] = []): void {
     this.worker?.postMessage(message, transfer);
   }
 

@@ -1,22 +1,10 @@
 /** The picture of the camera behind the items of the 3D view, and in front of them as a veil that dims them. */
 
-import {
-  CanvasTexture,
-  DoubleSide,
-  Matrix4,
-  Mesh,
-  MeshBasicMaterial,
-  type Object3D,
-  PlaneGeometry,
-  type Scene,
-  SRGBColorSpace,
-} from "three";
+import { type CanvasTexture, Matrix4, type Object3D } from "three";
 import type { Engine } from "../engine/engine";
 import type { Point } from "./geometry";
 import { eyeOf, type Lens, type View } from "./pose";
-
-/** Depth of the picture in the view: behind everything. */
-const DEPTH = 0.999;
+import { DEPTH, discard, type Sheet, sheetOf, textureOf } from "./sheet";
 
 const inverse = new Matrix4();
 const plane = new Matrix4();
@@ -59,9 +47,7 @@ export class Backdrop {
     private readonly engine: Engine,
     private readonly canvas: HTMLCanvasElement,
   ) {
-    this.texture = new CanvasTexture(canvas);
-    this.texture.colorSpace = SRGBColorSpace;
-    this.texture.generateMipmaps = false;
+    this.texture = textureOf(canvas);
     this.hidden = engine.scene.children.filter((each) => each.userData.ground && each.visible);
     for (const each of this.hidden) each.visible = false;
     this.fog = engine.scene.fog;
@@ -100,59 +86,6 @@ export class Backdrop {
   private sheet(order: number, opacity: number): Sheet {
     return sheetOf(this.engine.scene, this.texture, order, opacity);
   }
-}
-
-/** A picture that stays behind the items in an XR session. */
-export class FrozenPicture {
-  private readonly texture: CanvasTexture;
-  private readonly sheet: Sheet;
-
-  constructor(scene: Scene, canvas: HTMLCanvasElement) {
-    this.texture = new CanvasTexture(canvas);
-    this.texture.colorSpace = SRGBColorSpace;
-    this.texture.generateMipmaps = false;
-    this.sheet = sheetOf(scene, this.texture, -1000, 1);
-  }
-
-  /** Fill the view of a camera. */
-  follow(camera: Matrix4, projection: Matrix4): void {
-    plane.makeTranslation(0, 0, DEPTH);
-    this.sheet.matrixWorld.multiplyMatrices(camera, inverse.copy(projection).invert()).multiply(plane);
-  }
-
-  dispose(): void {
-    discard(this.sheet);
-    this.texture.dispose();
-  }
-}
-
-type Sheet = Mesh<PlaneGeometry, MeshBasicMaterial>;
-
-function sheetOf(scene: Scene, map: CanvasTexture, order: number, opacity: number): Sheet {
-  const material = new MeshBasicMaterial({
-    map,
-    side: DoubleSide, // the projection mirrors it
-    depthTest: false,
-    depthWrite: false,
-    fog: false,
-    toneMapped: false,
-    transparent: opacity < 1,
-    opacity,
-  });
-  const sheet = new Mesh(new PlaneGeometry(2, 2), material);
-  sheet.renderOrder = order;
-  sheet.frustumCulled = false;
-  sheet.matrixAutoUpdate = sheet.matrixWorldAutoUpdate = false;
-  sheet.raycast = () => {};
-  sheet.userData.ground = true; // nothing to select
-  scene.add(sheet);
-  return sheet;
-}
-
-function discard(sheet: Sheet): void {
-  sheet.removeFromParent();
-  sheet.geometry.dispose();
-  sheet.material.dispose();
 }
 
 /** Return the pose of a camera of three.js (x right, y up, z backward) in the workplace. */

@@ -19,7 +19,7 @@ import type { Ar } from "../store/ui";
 import { mean, norm, sub, type Vec3 } from "./geometry";
 import { Panel, type PanelButton } from "./panel";
 import type { Layout } from "./places";
-import { fitTouched, type Known, knownPoints, type Touched } from "./touch";
+import type { Known } from "./touch";
 import { inverseOf, matrixOf } from "./xrView";
 
 /** Buttons of xr-standard gamepads that stop motion: A or X, and B or Y. */
@@ -46,6 +46,8 @@ export interface HeadsetHost {
   /** End a motion that is held. */
   release: () => void;
   stopMotion: () => void;
+  /** Called when no button stops motion any more. */
+  stopOutOfReach: () => void;
   /** Start to move an item; null if it is not selected or cannot be moved. */
   grab: (id: string, at: Vector3) => Grab | null;
 }
@@ -53,7 +55,7 @@ export interface HeadsetHost {
 /** What a controller or hand does from press to release. */
 interface Press {
   source: XRInputSource;
-  end: () => void;
+  end: () => unknown;
   /** The item that it moves, and its distance along the ray, m. */
   grab?: Grab;
   distance?: number;
@@ -62,15 +64,16 @@ interface Press {
 }
 
 interface Touching {
+  known: readonly Known[];
   points: Vec3[];
-  next: (count: number) => void;
-  done: (result: Touched) => void;
+  /** Called before the next touch with its number, from 1. */
+  next: (number: number) => void;
+  /** Called with the touched points. */
+  done: (points: readonly Vec3[]) => void;
 }
 
 export class Headset {
   readonly panel: Panel;
-  /** The points that can be touched. */
-  readonly known: readonly Known[];
   private readonly rays = new Map<XRInputSource, Mesh<PlaneGeometry, MeshBasicMaterial>>();
   private readonly poses = new Map<XRInputSource, Matrix4>();
   private readonly tips = new Map<XRInputSource, Vec3>();
@@ -87,7 +90,6 @@ export class Headset {
     private readonly host: HeadsetHost,
   ) {
     this.panel = new Panel(scene);
-    this.known = knownPoints(host.layout.places);
     this.camera = host.engine.view.camera.clone();
     this.camera.fov = (4 * CONE * 180) / Math.PI;
     const { signal } = this.forget;
@@ -100,30 +102,21 @@ export class Headset {
     });
   }
 
-  /**
-   * Let the user touch the known points. `next`: called with the number of touched points; `done`: with the pose of the
-   * workplace, or why there is none. Without them, cancel.
-   */
-  touch(next?: Touching["next"], done?: Touching["done"]): void {
-    this.touching = next && done ? { points: [], next, done } : null;
+  /** Let the user touch known points; null cancels it. */
+  touch(touching: Omit<Touching, "points"> | null): void {
+    this.touching = touching && { ...touching, points: [] };
   }
 
   /** Take the poses of controllers and hands in a frame. */
   frame(frame: XRFrame, space: XRReferenceSpace, viewer: Matrix4, tracked: boolean): void {
     this.panel.follow(viewer);
-    let stops = false;
-    let pressed = false;
+    this.readButtons();
     let hovered = "";
     for (const source of this.session.inputSources) {
       const pose = frame.getPose(source.targetRaySpace, space);
       if (!pose || pose.emulatedPosition) {
         this.lose(source);
         continue;
-      }
-      const { gamepad } = source;
-      if (gamepad?.mapping === "xr-standard" && STOP_BUTTONS.some((n) => gamepad.buttons[n])) {
-        stops = true;
-        pressed ||= STOP_BUTTONS.some((n) => gamepad.buttons[n]?.pressed);
       }
       const ray = matrixOf(pose.transform.matrix);
       this.poses.set(source, ray);
@@ -133,16 +126,14 @@ export class Headset {
       this.drawRay(source, ray, hit?.distance ?? this.itemAt(ray)?.distance ?? LENGTH);
     }
     this.panel.hover(hovered);
-    // By its press, as every Stop.
-    if (pressed && !this.pressedStop) this.host.stopMotion();
-    this.pressedStop = pressed;
     if (!tracked) this.end();
-    if (stops !== this.reported) {
-      this.reported = stops;
-      if (!stops) this.host.release();
-      this.host.report({ stopButton: stops });
-    }
     this.hold();
+  }
+
+  /** The user can reach neither the panel nor the buttons. */
+  hide(): void {
+    this.end();
+    this.reach(false);
   }
 
   dispose(): void {
@@ -150,6 +141,27 @@ export class Headset {
     this.end();
     for (const source of [...this.rays.keys()]) this.lose(source);
     this.panel.dispose();
+  }
+
+  /** Stop by the buttons of controllers. They work where the headset does not see the controller, too. */
+  private readButtons(): void {
+    const stops = [...this.session.inputSources].flatMap(({ gamepad }) =>
+      gamepad?.mapping === "xr-standard" ? STOP_BUTTONS.flatMap((n) => gamepad.buttons[n] ?? []) : [],
+    );
+    const pressed = stops.some((each) => each.pressed);
+    // By its press, as every Stop.
+    if (pressed && !this.pressedStop) this.host.stopMotion();
+    this.pressedStop = pressed;
+    // Browsers pass no buttons to a session that is covered.
+    this.reach(stops.length > 0 && this.session.visibilityState === "visible");
+  }
+
+  /** Report whether a button stops motion. */
+  private reach(stopButton: boolean): void {
+    if (stopButton === this.reported) return;
+    this.reported = stopButton;
+    if (!stopButton) this.host.stopOutOfReach();
+    this.host.report({ stopButton });
   }
 
   private start(source: XRInputSource): void {
@@ -167,7 +179,7 @@ export class Headset {
   private pressButton(source: XRInputSource, button: PanelButton | null): void {
     if (!button || button.disabled) return;
     const end = button.press();
-    this.press = { source, end: () => end?.() };
+    this.press = { source, end: () => typeof end === "function" && end() };
   }
 
   /** Select the item at a ray; the selected one is moved instead. */
@@ -198,21 +210,16 @@ export class Headset {
   }
 
   private touched(): void {
-    const { touching, press, known } = this;
+    const { touching, press } = this;
     const tips = press?.tips ?? [];
     if (!touching || tips.length < FRAMES) return;
     const middle = mean(tips);
     if (Math.max(...tips.map((each) => norm(sub(each, middle)))) > STILL) return;
-    touching.points.push(middle);
-    touching.next(touching.points.length);
-    if (touching.points.length < known.length) return;
+    const { points, known, next, done } = touching;
+    points.push(middle);
+    if (points.length < known.length) return next(points.length);
     this.touching = null;
-    touching.done(
-      fitTouched(
-        known.map(({ at }) => at),
-        touching.points,
-      ),
-    );
+    done(points);
   }
 
   private end(): void {

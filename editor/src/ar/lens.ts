@@ -39,14 +39,40 @@ export const lensOf = ({ relative }: FocalLength, width: number, height: number)
   cy: (height - 1) / 2,
 });
 
+type Learned = FocalLength & { contradicting: number[] };
+interface Size {
+  width: number;
+  height: number;
+}
+
 interface Shot {
   seen: readonly Sighting[];
   eye: Vec3;
   direction: Vec3;
 }
 
+/** Learns the focal length while the camera moves. */
+export class LensLearner {
+  private search: LensSearch | null = null;
+  private size = "";
+
+  constructor(private readonly places: Places) {}
+
+  /** Use a view. Return a better focal length, and the markers that contradict the others; null if there is none. */
+  learn(seen: readonly Sighting[], view: View, before: FocalLength, { width, height }: Size): Learned | null {
+    const size = `${Math.max(width, height)} × ${Math.min(width, height)}`;
+    if (size !== this.size || !this.search) {
+      this.size = size;
+      this.search = new LensSearch(this.places, width, height);
+    }
+    if (before.deviation <= KNOWN || !this.search.add(seen, view)) return null;
+    const result = this.search.result();
+    return result && result.deviation < before.deviation ? result : null;
+  }
+}
+
 /** Collects different views, and searches for the focal length that fits to all of them. */
-export class LensSearch {
+class LensSearch {
   private shots: Shot[] = [];
 
   constructor(
@@ -78,7 +104,7 @@ export class LensSearch {
    * Return the focal length, and the markers that contradict the others; null as long as it is not determined. A
    * marker contradicts if all views fit without it and not with it.
    */
-  result(): (FocalLength & { contradicting: number[] }) | null {
+  result(): Learned | null {
     if (this.shots.length < FEWEST) return null;
     const limit = WORST * Math.max(this.width, this.height);
     const all = this.search(this.places);

@@ -1,5 +1,6 @@
 /** What the user interface needs of a running AR view, whichever way it knows where the camera is. */
 
+import type { Ar } from "../store/ui";
 import type { Point } from "./geometry";
 import type { Layout } from "./places";
 import type { Direction } from "./placing";
@@ -19,6 +20,7 @@ export interface Shown {
 }
 
 export interface ArMode {
+  readonly mode: Ar["mode"];
   /** The configured markers. */
   readonly places: Layout["places"];
   /** What is shown; null before the first picture. */

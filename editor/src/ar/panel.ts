@@ -17,10 +17,10 @@ export interface PanelButton {
   label: string;
   /** Cells of a row of 12. */
   cells: number;
-  look?: "stop" | "primary";
+  look?: "stop";
   disabled?: boolean;
-  /** Called when it is pressed; what it returns is called on release. */
-  press: () => (() => void) | undefined;
+  /** Called when it is pressed; a function that it returns is called on release. */
+  press: () => unknown;
 }
 
 export interface PanelContent {
@@ -31,7 +31,7 @@ export interface PanelContent {
 
 /** Size, m, and pixels per m. */
 const WIDTH = 0.56;
-const HEIGHT = 0.44;
+const HEIGHT = 0.5;
 const DENSITY = 1400;
 const CELL = WIDTH / 12;
 const ROW = 0.066;
@@ -158,7 +158,7 @@ export class Panel {
     for (const { button, left, top, width } of this.placed) {
       const { look, disabled, id, label } = button;
       context.globalAlpha = disabled ? 0.4 : 1;
-      context.fillStyle = look === "stop" ? "#c62828" : look === "primary" ? "#1667b7" : "#2b3642";
+      context.fillStyle = look ? "#c62828" : "#2b3642";
       context.fillRect(pixels(left), pixels(top), pixels(width), pixels(ROW - GAP));
       if (id === this.hovered) {
         context.lineWidth = pixels(0.003);
@@ -166,7 +166,7 @@ export class Panel {
         context.strokeRect(pixels(left), pixels(top), pixels(width), pixels(ROW - GAP));
       }
       context.fillStyle = "#ffffff";
-      write(label, left + width / 2, top + (ROW - GAP) / 2, look === "stop" ? 0.026 : 0.02, width - 2 * GAP, "center");
+      write(label, left + width / 2, top + (ROW - GAP) / 2, look ? 0.026 : 0.02, width - 2 * GAP, "center");
     }
     context.globalAlpha = 1;
     this.texture.needsUpdate = true;

@@ -1,7 +1,7 @@
 import { expect, test, vi } from "vitest";
 import { detect } from "./detector";
 import type { Vec3 } from "./geometry";
-import { KNOWN, lensOf } from "./lens";
+import { KNOWN, LensLearner, lensOf } from "./lens";
 import { layoutOf, type MarkerTable } from "./places";
 import { fitView, type Lens, projected, type View } from "./pose";
 import { jumpBetween, register } from "./registration";
@@ -130,7 +130,7 @@ test("a misplaced marker is named and left out", () => {
 });
 
 test("the focal length is found while the camera moves, and unchecked before", () => {
-  const tracker = new Tracker({ ...LAYOUT, focal: null });
+  const tracker = new Tracker({ ...LAYOUT, focal: null }, new LensLearner(LAYOUT.places));
   const steps: [number, number][] = [
     [-1.9, 0.8],
     [-1.5, 0.9],
@@ -159,7 +159,7 @@ test("a misplaced marker does not spoil the focal length", () => {
       each.marker_id === 12 ? { ...each, pose: { ...each.pose, position: at(0.13, 0.34) } } : each,
     ),
   });
-  const tracker = new Tracker({ ...moved, focal: null });
+  const tracker = new Tracker({ ...moved, focal: null }, new LensLearner(moved.places));
   let last: Found | undefined;
   for (const [angle, distance] of [
     [-1.9, 0.8],
@@ -174,7 +174,10 @@ test("a misplaced marker does not spoil the focal length", () => {
 });
 
 test("the reason of a loss is known", () => {
-  const tracker = new Tracker({ ...LAYOUT, focal: { relative: RELATIVE, deviation: 0.001 } });
+  const tracker = new Tracker(
+    { ...LAYOUT, focal: { relative: RELATIVE, deviation: 0.001 } },
+    new LensLearner(LAYOUT.places),
+  );
   const view = from(-1.2, 1.1);
   expect(tracker.look(picture(view)).loss).toBeNull();
   expect(tracker.look(picture(view, { white: 24, black: 8, noise: 1 })).loss).toBe("dark");

@@ -2,7 +2,7 @@
 
 import { detect, type Sighting } from "./detector";
 import { type Grey, half } from "./grey";
-import { ASSUMED, type FocalLength, KNOWN, LensSearch, lensOf } from "./lens";
+import { ASSUMED, type FocalLength, KNOWN, type LensLearner, lensOf } from "./lens";
 import type { Lens, Places, View } from "./pose";
 import { markerErrors, type Registration, register } from "./registration";
 
@@ -41,14 +41,16 @@ export class Tracker {
   private focal: FocalLength;
   /** The lens of the picture, if the device states it. */
   private stated: Lens | null = null;
-  private search: LensSearch | null = null;
-  private size = "";
   private excluded: number[] = [];
   private last: View | undefined;
   /** Sharpness of the last pictures with markers. */
   private sharp = 0;
 
-  constructor(private readonly setup: Setup) {
+  /** `learner`: finds the focal length; without it, each picture needs its lens. */
+  constructor(
+    private readonly setup: Setup,
+    private readonly learner?: LensLearner,
+  ) {
     this.focal = setup.focal ?? ASSUMED;
   }
 
@@ -59,8 +61,12 @@ export class Tracker {
     if (lens) this.focal = { relative: lens.focal / Math.max(width, height), deviation: STATED };
     const seen = detect(picture, this.setup.codes);
     const registration = this.register(seen, width, height);
-    const learned = registration !== null && this.learn(seen, registration, width, height);
-    return this.found(picture, seen, learned ? this.register(seen, width, height) : registration);
+    const learned = registration && this.learner?.learn(seen, registration.view, this.focal, { width, height });
+    if (!learned) return this.found(picture, seen, registration);
+    const { contradicting, ...focal } = learned;
+    this.focal = focal;
+    this.excluded = contradicting;
+    return this.found(picture, seen, this.register(seen, width, height));
   }
 
   private register(seen: readonly Sighting[], width: number, height: number): Registration | null {
@@ -89,21 +95,6 @@ export class Tracker {
       focal: this.focal,
       checked: this.focal.deviation <= KNOWN,
     };
-  }
-
-  /** Use a new view for the search of the focal length. Return whether it changed. */
-  private learn(seen: readonly Sighting[], { view }: Registration, width: number, height: number): boolean {
-    const size = `${Math.max(width, height)} × ${Math.min(width, height)}`;
-    if (size !== this.size || !this.search) {
-      this.size = size;
-      this.search = new LensSearch(this.setup.places, width, height);
-    }
-    if (this.focal.deviation <= KNOWN || !this.search.add(seen, view)) return false;
-    const result = this.search.result();
-    if (!result || result.deviation >= this.focal.deviation) return false;
-    this.focal = { relative: result.relative, deviation: result.deviation };
-    this.excluded = result.contradicting;
-    return true;
   }
 }
 

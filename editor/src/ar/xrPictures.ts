@@ -2,11 +2,10 @@
 
 import { Matrix4 } from "three";
 import { CameraPixels, canvasOf } from "./cameraPixels";
-import type { FocalLength } from "./lens";
+import type { FromWorker, Start, WithLens } from "./pictureWorker";
 import type { Layout } from "./places";
 import type { Lens } from "./pose";
 import type { Found } from "./tracker";
-import type { FromWorker, ToWorker } from "./worker";
 import { type Eye, lensIn } from "./xrView";
 
 /** Time between two pictures, ms. Each of them costs the device a copy. */
@@ -50,13 +49,13 @@ export class XrPictures {
   ) {
     this.pixels = new CameraPixels(gl);
     this.binding = new XRWebGLBinding(session, gl) as unknown as CameraBinding;
-    this.worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+    this.worker = new Worker(new URL("./xrWorker.ts", import.meta.url), { type: "module" });
     this.worker.onmessage = ({ data: { found, ms } }: MessageEvent<FromWorker>) => {
       this.busy = false;
       if (this.taken) handlers.found(found, ms, this.taken);
     };
     this.worker.onerror = () => handlers.failed();
-    this.send({ setup: { codes, places, focal: null as FocalLength | null } });
+    this.send({ setup: { codes, places, focal: null } });
   }
 
   /** Keep the next picture. */
@@ -88,7 +87,7 @@ export class XrPictures {
     this.pixels.dispose();
   }
 
-  private send(message: ToWorker, transfer: Transferable[] = []): void {
+  private send(message: Start | WithLens, transfer: Transferable[] = []): void {
     this.worker.postMessage(message, transfer);
   }
 }

@@ -5,7 +5,7 @@
 
 import { Scene } from "three";
 import type { Ar } from "../store/ui";
-import { FrozenPicture } from "./backdrop";
+import { FrozenPicture } from "./frozenPicture";
 import { mean, norm, type Point, sub, type Vec3 } from "./geometry";
 import type { Headset, HeadsetHost } from "./headset";
 import type { ArMode, Shown } from "./mode";
@@ -58,6 +58,7 @@ export const hasOverlay = (session: XRSession): boolean => Boolean(session.domOv
 const suppress = (event: Event) => event.preventDefault();
 
 export class XrArSession implements ArMode {
+  readonly mode: "tablet" | "headset";
   shown: Shown | null = null;
   onPicture: () => void = () => {};
   readonly workplace: XrWorkplace;
@@ -90,6 +91,7 @@ export class XrArSession implements ArMode {
   ) {
     const { engine, layout } = options;
     const { scene, renderer } = engine;
+    this.mode = hasOverlay(session) ? "tablet" : "headset";
     this.output = new XrOutput(renderer, engine.view.camera.clone(), this.local);
     this.sharing = new Sharing((camera) => options.report({ camera }));
     this.middles = [...layout.places.values()].map(({ corners }) => mean(corners));
@@ -112,7 +114,7 @@ export class XrArSession implements ArMode {
     const { engine } = options;
     const gl = engine.renderer.getContext() as WebGL2RenderingContext;
     session.addEventListener("end", () => this.ended || options.ended());
-    session.addEventListener("visibilitychange", () => session.visibilityState === "visible" || options.release());
+    session.addEventListener("visibilitychange", () => session.visibilityState === "visible" || this.hide());
     await gl.makeXRCompatible();
     this.layer = new XRWebGLLayer(session, gl);
     await session.updateRenderState({ baseLayer: this.layer, depthNear: NEAR, depthFar: FAR });
@@ -120,7 +122,7 @@ export class XrArSession implements ArMode {
     this.space.addEventListener("reset", () => this.workplace.reset() && options.release());
     const viewer = await session.requestReferenceSpace("viewer");
     this.hits = (await session.requestHitTestSource?.({ space: viewer })?.catch(() => null)) ?? null;
-    const headset = hasOverlay(session) ? null : await import("./headset");
+    const headset = this.mode === "headset" ? await import("./headset") : null;
     if (this.ended) return;
     if (headset) {
       const host = { ...options, workplace: () => this.workplace.pose };
@@ -141,7 +143,7 @@ export class XrArSession implements ArMode {
     engine.renderer.setClearAlpha(0);
     engine.requests.driven = true;
     engine.output = (scene) => this.draw(scene);
-    options.report({ mode: headset ? "headset" : "tablet", pictures });
+    options.report({ pictures });
     session.requestAnimationFrame((time, frame) => this.frame(time, frame));
   }
 
@@ -181,7 +183,9 @@ export class XrArSession implements ArMode {
 
   placeByHand(): void {
     const { source, at } = this.workplace;
-    this.placesNext = source !== "hand" && !(source === "markers" && performance.now() - at < FRESH);
+    // Without the buttons of a tablet, a surface is chosen again by looking at it.
+    const again = source !== "hand" || this.headset !== null;
+    this.placesNext = again && !(source === "markers" && performance.now() - at < FRESH);
   }
 
   drag(from: readonly Point[], to: readonly Point[]): void {
@@ -218,18 +222,18 @@ export class XrArSession implements ArMode {
     return [((x + 0.5) / width) * window.innerWidth - left, ((y + 0.5) / height) * window.innerHeight - top];
   }
 
-  /** Let the user of a headset touch the known points; without `next`, cancel. */
-  touch(next?: (count: number) => void, done?: (result: Touched) => void): void {
-    this.headset?.touch(next, (result) => {
-      if ("workplace" in result) {
-        this.correct(this.workplace.register(result.workplace, "touch", result.error, this.viewer));
-        this.nudge = UNMOVED;
-        const { grade } = result;
-        const found = { grade, touched: 3, used: [], contradicting: [], undecided: false, nudge: null };
-        this.options.report({ ...found, checked: true, seenAt: Date.now() });
-      }
-      done?.(result);
-    });
+  /** Take the pose of the workplace by touched points. */
+  registerTouched({ workplace, error, grade }: Extract<Touched, { grade: unknown }>): void {
+    this.correct(this.workplace.register(workplace, "touch", error, this.viewer));
+    this.nudge = UNMOVED;
+    const found = { grade, touched: 3, used: [], contradicting: [], undecided: false, nudge: null };
+    this.options.report({ ...found, checked: true, seenAt: Date.now() });
+  }
+
+  /** Another view covers the session: the user can reach nothing of it. */
+  private hide(): void {
+    this.options.release();
+    this.headset?.hide();
   }
 
   private move(by: Movement): void {

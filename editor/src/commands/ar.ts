@@ -1,17 +1,14 @@
 /** Augmented reality on this device. Pictures of the camera are processed here and are not sent to the server. */
 
 import type { Vector3 } from "three";
-import { askForMotion } from "../ar/gyro";
 import type { Grab } from "../ar/headset";
-import type { FocalLength } from "../ar/lens";
 import type { ArMode } from "../ar/mode";
+import { askForMotion } from "../ar/motionSensor";
 import { type Layout, layoutOf, type MarkerTable } from "../ar/places";
-import type { Placement } from "../ar/placing";
 import { ArProblem, type Obstacle, obstacleOfError, type Way } from "../ar/support";
 import type { XrArSession } from "../ar/xrSession";
 import type { Engine } from "../engine/engine";
 import { theEngine } from "../session/engine";
-import { remember, remembered } from "../session/localStorage";
 import { rest } from "../session/rest";
 import { now, setUi } from "../store/store";
 import type { Ar } from "../store/ui";
@@ -25,6 +22,8 @@ declare module "../store/runtime" {
   interface Runtime {
     /** The running AR view; what users see of it is `ui.ar`. */
     ar?: ArMode | undefined;
+    /** The program that was started or continued from this headset, and whether Stop went out of reach since. */
+    startedHere?: { lost: boolean } | undefined;
   }
 }
 
@@ -49,13 +48,14 @@ export async function startAr(layout: Layout, way: Way, onEnd: (obstacle: Obstac
   leaveAr();
   const engine = theEngine();
   const ended = () => {
+    if (now().ui.ar?.mode === "headset") stopOutOfReach();
     leaveAr();
     onEnd("ended");
   };
   const mode = way === "xr" ? await xrMode(layout, engine, ended) : await cameraMode(layout, engine, ended);
   if (!mode) return;
   use(mode);
-  setUi({ ar: initialAr(layout.places.size) });
+  setUi({ ar: initialAr(mode.mode, layout.places.size) });
   await mode.start().catch(() => {
     leaveAr();
     throw new ArProblem(way === "xr" ? "session" : "busy");
@@ -64,26 +64,11 @@ export async function startAr(layout: Layout, way: Way, onEnd: (obstacle: Obstac
 
 async function cameraMode(layout: Layout, engine: Engine | null, ended: () => void): Promise<ArMode | null> {
   await askForMotion();
-  const { ArSession, openCamera, releaseCamera } = await loadWay("camera");
-  const stream = await openCamera();
-  if (!engine) {
-    releaseCamera(stream);
-    return null;
-  }
-  return new ArSession(stream, {
-    engine,
-    layout,
-    stored: (camera) => recordOf<FocalLength>("lenses")[camera] ?? null,
-    store: storeLens,
-    placement: (camera) => recordOf<Placement>("placements")[camera] ?? {},
-    storePlacement: (camera, placement) =>
-      remember("placements", JSON.stringify({ ...recordOf<Placement>("placements"), [camera]: placement })),
-    report,
-    ended,
-  });
+  const { openCameraAr } = await loadWay("camera");
+  return openCameraAr({ layout, report, ended }, engine);
 }
 
-const LOADS = { xr: () => import("../ar/xrSession"), camera: () => import("../ar/arSession") };
+const LOADS = { xr: () => import("../ar/xrSession"), camera: () => import("./cameraAr") };
 
 /** Load what a way of AR needs; before the tap that starts it, since browsers ask for the camera only then. */
 export const loadWay = <W extends Way>(way: W): ReturnType<(typeof LOADS)[W]> =>
@@ -107,8 +92,34 @@ async function xrMode(layout: Layout, engine: Engine | null, ended: () => void):
     ended,
     release: endHolds,
     stopMotion: () => void stopMotion(),
+    stopOutOfReach,
     grab,
   });
+}
+
+/** No button of a headset stops motion any more: end the motion that is held, and the program that was started here. */
+function stopOutOfReach(): void {
+  const { runtime } = now();
+  endHolds();
+  if (!runtime.startedHere) return;
+  runtime.startedHere.lost = true;
+  runtime.startedHere = undefined;
+  void stopMotion();
+}
+
+/** Start or continue the program from a headset; it runs only while a button stops it. */
+export async function startHere(start: () => Promise<unknown>): Promise<void> {
+  const { runtime } = now();
+  const program = { lost: false };
+  runtime.startedHere = program;
+  const started = await start();
+  if (started === false) runtime.startedHere = undefined;
+  else if (program.lost) void stopMotion(); // it was lost before the program had started
+}
+
+/** The program has ended; the next one may be started elsewhere. */
+export function programEnded(): void {
+  now().runtime.startedHere = undefined;
 }
 
 /** Move the selected item with a ray. `from`: the point at which it is held, m. */
@@ -132,6 +143,7 @@ export function leaveAr(stay = false): void {
   const { ar } = now().runtime;
   if (ar) endHolds();
   ar?.stop(stay);
+  now().runtime.startedHere = undefined; // Stop is on the page again
   use(undefined);
   if (now().ui.ar) setUi({ ar: null });
 }
@@ -150,7 +162,7 @@ export function recalibrateAr(): void {
 /** Return the running AR view of a headset or tablet that tracks itself. */
 export function xrView(): XrArSession | null {
   const { ar } = now().runtime;
-  return ar && "touch" in ar ? (ar as XrArSession) : null;
+  return ar && "registerTouched" in ar ? (ar as XrArSession) : null;
 }
 
 /** Open or close the controls for placing; without a registration, the workplace is placed by hand from now on. */
@@ -174,10 +186,10 @@ function report(change: Partial<Ar>): void {
   setUi({ ar: { ...ar, ...change } });
 }
 
-function initialAr(configured: number): Ar {
+function initialAr(mode: Ar["mode"], configured: number): Ar {
   return {
     phase: "starting",
-    mode: "camera",
+    mode,
     pictures: true,
     drifted: false,
     touched: 0,
@@ -200,21 +212,4 @@ function initialAr(configured: number): Ar {
     camera: null,
     startedAt: Date.now(),
   };
-}
-
-/** Return what this device stores for each of its cameras. */
-function recordOf<T>(key: "lenses" | "placements"): Record<string, T> {
-  try {
-    return (JSON.parse(remembered(key) || "{}") as Record<string, T> | null) ?? {};
-  } catch {
-    return {};
-  }
-}
-
-function storeLens(camera: string, focal: FocalLength | null): void {
-  const known = recordOf<FocalLength>("lenses");
-  const before = known[camera];
-  if (before?.relative === focal?.relative) return;
-  const { [camera]: _, ...others } = known;
-  remember("lenses", JSON.stringify(focal ? { ...others, [camera]: focal } : others));
 }

@@ -1,30 +1,14 @@
-/** Controls of AR over the picture of the camera: quality, freeze, markers, and the ways out. */
+/** The user interface of AR: controls on the page, or in space on a headset. */
 
-import { t } from "@lingui/core/macro";
 import { Suspense, useLayoutEffect } from "react";
-import { freezeAr, leaveAr, openPlacing, recalibrateAr, showMarkers } from "../../commands/ar";
+import { leaveAr } from "../../commands/ar";
 import type { Engine } from "../../engine/engine";
 import { useEditor } from "../../store/store";
-import { Button } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
 import { useTicking } from "../times";
-import { MarkerOutlines } from "./MarkerOutlines";
-import { PlaceByHand } from "./PlaceByHand";
-import { SelectList } from "./SelectList";
-import { adviceOf, gradeOf, qualityOf } from "./words";
-import "./ar.css";
 
+const ArControls = lazyComponent(() => import("./ArControls"));
 const HeadsetPanel = lazyComponent(() => import("./HeadsetPanel"));
-
-/** Time after which a rest is suggested, ms. */
-const REST = 30 * 60_000;
-/** Time after which a missing sight is worth a word, ms. */
-const NOTICED = 1000;
-
-/** The word of a button; on a phone, only its icon is visible. */
-function Word({ children }: { children: string }) {
-  return <span className="ar-word">{children}</span>;
-}
 
 export default function ArView({ engine }: { engine: Engine }) {
   const ar = useEditor((state) => state.ui.ar);
@@ -32,56 +16,9 @@ export default function ArView({ engine }: { engine: Engine }) {
   // Before the view is closed.
   useLayoutEffect(() => () => leaveAr(), []);
   if (!ar) return null;
-  const { word, shape, look } = gradeOf(ar);
-  const registered = ar.seenAt > 0 && ar.phase !== "hand";
-  const stale = ar.phase === "bridging" && Date.now() - ar.seenAt < NOTICED;
-  const advice = stale || ar.frozen ? "" : adviceOf(ar);
   return (
-    <>
-      {ar.mode === "headset" && (
-        <Suspense fallback={null}>
-          <HeadsetPanel ar={ar} />
-        </Suspense>
-      )}
-      {ar.mode === "tablet" && <SelectList />}
-      {ar.markers && <MarkerOutlines />}
-      <div className="view-controls ar-controls" role="group" aria-label={t`Augmented reality`}>
-        <Button icon="close" onPress={() => leaveAr()}>
-          <Word>{t`Leave AR`}</Word>
-        </Button>
-        {ar.pictures && (
-          <Button icon={ar.frozen ? "play" : "pause"} onPress={() => freezeAr(!ar.frozen)} aria-pressed={ar.frozen}>
-            <Word>{ar.frozen ? t`Continue` : t`Freeze`}</Word>
-          </Button>
-        )}
-        <Button icon="eye" onPress={() => leaveAr(true)}>
-          <Word>{t`Seat view`}</Word>
-        </Button>
-        <Button icon="zoom" onPress={() => showMarkers(!ar.markers)} aria-pressed={ar.markers}>
-          <Word>{t`Markers`}</Word>
-        </Button>
-        <Button icon="box" onPress={() => openPlacing(!ar.placing)} aria-pressed={ar.placing}>
-          <Word>{t`Place`}</Word>
-        </Button>
-        <Button icon="redo" onPress={recalibrateAr}>
-          <Word>{t`Recalibrate`}</Word>
-        </Button>
-      </div>
-      <div className="ar-corner">
-        {ar.placing && <PlaceByHand engine={engine} ar={ar} />}
-        <div className={`ar-status ${look}`} data-phase={ar.phase} role="group" aria-label={t`Quality of AR`}>
-          <p>
-            <span aria-hidden="true">{shape}</span> <strong role="status">{word}</strong>{" "}
-            {registered && <span className="ar-quality">{qualityOf(ar)}</span>}
-          </p>
-          {advice && <p className="small">{advice}</p>}
-          {Date.now() - ar.startedAt > REST && (
-            <p className="small">
-              {t`You have used AR for half an hour. Seat view continues here without the camera.`}
-            </p>
-          )}
-        </div>
-      </div>
-    </>
+    <Suspense fallback={null}>
+      {ar.mode === "headset" ? <HeadsetPanel ar={ar} /> : <ArControls engine={engine} ar={ar} />}
+    </Suspense>
   );
 }

@@ -5,7 +5,7 @@ import { useEffect, useState } from "react";
 import { Window } from "../kit/dialogs";
 import { Button } from "../kit/kit";
 
-export function SelectList() {
+export default function SelectList() {
   const [open, setOpen] = useState<HTMLSelectElement | null>(null);
   useEffect(() => {
     const press = (event: Event) => {

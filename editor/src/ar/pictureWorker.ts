@@ -1,0 +1,47 @@
+/** What the workers of AR have in common: they read pictures and report what they show. */
+
+import type { Pixels } from "./cameraPixels";
+import type { Lens } from "./pose";
+import type { Found, Setup, Tracker } from "./tracker";
+
+/** A picture, or the pixels of one with a known lens. */
+export interface Bitmap {
+  bitmap: ImageBitmap;
+}
+export interface WithLens {
+  pixels: Pixels;
+  lens: Lens;
+}
+/** What a picture shows, and the time that it took, ms. */
+export interface FromWorker {
+  found: Found;
+  ms: number;
+}
+
+/** The start. */
+export interface Start {
+  setup: Setup;
+}
+
+/** The part of the worker's scope that is used; the types of the page do not contain it. */
+interface Scope<Picture> {
+  onmessage: ((event: MessageEvent<Start | Picture>) => void) | null;
+  postMessage(message: FromWorker): void;
+}
+
+/** Answer the messages of the page. `look`: look for markers in the picture of a message; null if it has no pixels. */
+export function serve<Picture extends object>(
+  newTracker: (setup: Setup) => Tracker,
+  look: (tracker: Tracker, picture: Picture) => Found | null,
+): void {
+  const scope = globalThis as unknown as Scope<Picture>;
+  let tracker: Tracker | null = null;
+  scope.onmessage = ({ data }) => {
+    const began = performance.now();
+    if ("setup" in data) tracker = newTracker(data.setup);
+    else if (tracker) {
+      const found = look(tracker, data);
+      if (found) scope.postMessage({ found, ms: performance.now() - began });
+    }
+  };
+}
