@@ -2,17 +2,19 @@
 
 import asyncio
 import json
+import re
 import time
 from pathlib import Path
 from typing import Any, Final
 
 from arcor2_server.web.editor import FILES
 from benchmarks.metrics import Metric, Report, median, percentile
+from tests.editor import texts
 from tests.editor.ar_probe import overlay_errors
 from tests.editor.camera_video import CAMERA, MIDDLE, marker_table, write_video
 from tests.editor.screen import Screen, running_browser, screen_of
 from tests.editor.test_editor_ar import DARKEN
-from tests.editor.test_editor_size import needed
+from tests.editor.test_editor_size import AR_WAYS, ar_size
 
 STARTS: Final = 3
 PICTURES: Final = 60
@@ -22,27 +24,25 @@ LENS_WITHIN: Final = 60.0
 """Time in which the focal length must be found, s."""
 
 
-START: Final = {"src/ui/ar/StartAr.tsx", "src/ui/ar/ArView.tsx"}
-CAMERA_FILES: Final = {"src/ar/arSession.ts"}
-TABLET_FILES: Final = {"src/ar/xrSession.ts"}
-HEADSET_FILES: Final = TABLET_FILES | {"src/ar/headset.ts", "src/ui/ar/HeadsetPanel.tsx"}
+SELECTED: Final = 10
+"""Number of items selected in each way."""
+_IN_VIEW: Final = """(n) => {
+    const { left, top, width, height } = document.querySelector(".view canvas").getBoundingClientRect();
+    const free = ({ x, y }) => document.elementFromPoint(left + x, top + y)?.matches(".view canvas");
+    const found = __engine.ids().map((id) => __engine.item(id)).filter(({ visible, screen: at }) => (
+        visible && at && at.x > 0 && at.y > 0 && at.x < width && at.y < height && free(at)));
+    const at = found[n % found.length]?.screen;
+    return at && [left + at.x, top + at.y];
+}"""
+"""Return where one of the items in view is drawn."""
 
 
 def size(report: Report) -> None:
     """Measure the size of the files that each way of AR loads when it starts, compressed with gzip."""
-    sizes = {"camera": _size(CAMERA_FILES), "tablet": _size(TABLET_FILES), "headset": _size(HEADSET_FILES)}
+    manifest = json.loads((FILES / ".vite" / "manifest.json").read_text())
+    sizes = {way: ar_size(FILES, manifest, way) for way in AR_WAYS}
     note = "most that a device loads; " + ", ".join(f"{way} {total / 1e3:.1f} kB" for way, total in sizes.items())
     report.add(Metric("ar_size_kb", max(sizes.values()) / 1e3, len(sizes), note))
-
-
-def _size(way: set[str]) -> int:
-    """Return the size of the files that a way of AR loads, without parts that others load, too, bytes."""
-    manifest = json.loads((FILES / ".vite" / "manifest.json").read_text())
-    loaded = {name for name, chunk in manifest.items() if chunk.get("isEntry") or chunk.get("isDynamicEntry")}
-    files = needed(manifest, *START, *way) - needed(manifest, *(loaded - START - CAMERA_FILES - HEADSET_FILES))
-    if way != HEADSET_FILES:  # headsets give pages no pictures
-        files |= {str(file.relative_to(FILES)) for file in (FILES / "assets").glob("worker-*.js")}
-    return sum((FILES / f"{name}.gz").stat().st_size for name in files)
 
 
 async def augmented(report: Report, directory: Path, url: str) -> None:
@@ -74,13 +74,38 @@ async def augmented(report: Report, directory: Path, url: str) -> None:
                     near += await overlay_errors(screen, shots, [MIDDLE])
                     aside += await overlay_errors(screen, shots, ASIDE)
                     took.append(shown["latency"])
+                selected = await _select(screen)
                 regained = [await _regain(screen) for _ in range(STARTS)]
     report.add(Metric("ar_registration_s", max(starts), STARTS, "worst, with an unknown lens"))
     report.add(Metric("ar_regained_s", max(regained), STARTS, "worst, after dark pictures"))
+    for way, times in selected.items():
+        report.add(Metric(f"select_ar_{way}_ms", median(times), len(times), f"1 tap; worst {max(times):.0f} ms"))
     for name, errors in (("near", near), ("aside", aside)):
         note = f"p95; p50 {1e3 * median(errors):.2f} mm"
         report.add(Metric(f"ar_{name}_mm", 1e3 * percentile(errors, 95), len(errors), note))
     report.add(Metric("ar_picture_ms", percentile(took, 95), PICTURES, f"p95; p50 {median(took):.0f} ms"))
+
+
+async def _select(screen: Screen) -> dict[str, list[float]]:
+    """Select items while the camera moves; return the times from a tap until the panel of the item is shown, ms."""
+    page = screen.page
+    heading = page.get_by_role("complementary").get_by_role("heading").first
+    select = page.get_by_role("group", name=texts.AT_CROSSHAIR).get_by_role("button", name=re.compile("^Select ."))
+    took: dict[str, list[float]] = {"crosshair": [], "tap": []}
+    for number in range(SELECTED):
+        for way, times in took.items():
+            await screen.close_panels()
+            await select.wait_for()
+            x, y = await screen.until(_IN_VIEW, number)
+            began = time.perf_counter()
+            if way == "tap":
+                await page.mouse.click(x, y)
+            else:
+                await select.click()
+            await heading.wait_for()
+            times.append((time.perf_counter() - began) * 1e3)
+    await screen.close_panels()
+    return took
 
 
 async def _regain(screen: Screen) -> float:

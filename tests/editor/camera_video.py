@@ -99,9 +99,9 @@ def picture_url(shot: Shot, seed: int = 3) -> str:
     return f"data:image/png;base64,{base64.b64encode(picture).decode()}"
 
 
-def looking(eye: Array, lens: Lens = Lens()) -> Shot:
-    """Return the shot of a camera that looks at the middle of the markers, upright."""
-    forward = (np.array(MIDDLE) - eye) / np.linalg.norm(np.array(MIDDLE) - eye)
+def looking(eye: Array, lens: Lens = Lens(), at: tuple[float, float, float] = MIDDLE) -> Shot:
+    """Return the shot of a camera that looks at a point, by default at the middle of the markers, upright."""
+    forward = (np.array(at) - eye) / np.linalg.norm(np.array(at) - eye)
     right = np.cross(forward, [0, 0, 1])
     right /= np.linalg.norm(right)
     turn = np.stack([right, np.cross(forward, right), forward])

@@ -4,8 +4,23 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 MOST = 264_000
 """Largest size of shell and 3D view, compressed with gzip, bytes."""
+
+
+MOST_AR = 25_000
+"""Largest size of what AR adds when it starts, bytes."""
+_START = {"src/ui/ar/StartAr.tsx", "src/ui/ar/ArView.tsx"}
+_ON_DEMAND = {"src/ui/ar/touching.ts"}
+"""Parts of AR that are loaded when the user needs them: words and computations for touching points."""
+AR_WAYS = {
+    "camera": ({"src/commands/cameraAr.ts", "src/ui/ar/ArControls.tsx"}, "worker"),
+    "tablet": ({"src/ar/xrSession.ts", "src/ui/ar/ArControls.tsx"}, "xrWorker"),
+    "headset": ({"src/ar/xrSession.ts", "src/ar/headset.ts", "src/ui/ar/HeadsetPanel.tsx"}, "xrWorker"),
+}
+"""Modules and the worker of each way of AR. Headsets that give no pictures of the camera do not load the worker."""
 
 
 def needed(manifest: dict[str, Any], *names: str) -> set[str]:
@@ -21,6 +36,22 @@ def needed(manifest: dict[str, Any], *names: str) -> set[str]:
         found |= {chunk["file"], *chunk.get("css", [])}
         waiting += chunk.get("imports", [])
     return found
+
+
+def ar_size(files: Path, manifest: dict[str, Any], way: str) -> int:
+    """Return the size of what a way of AR loads when it starts, without what other parts of the editor load, bytes."""
+    modules, worker = AR_WAYS[way]
+    of_ar = _START.union(_ON_DEMAND, *(each for each, _ in AR_WAYS.values()))
+    others = {name for name, chunk in manifest.items() if chunk.get("isEntry") or chunk.get("isDynamicEntry")} - of_ar
+    found = needed(manifest, *_START, *modules) - needed(manifest, *others)
+    found |= {str(file.relative_to(files)) for file in (files / "assets").glob(f"{worker}-*.js")}
+    return sum((files / f"{name}.gz").stat().st_size for name in found)
+
+
+@pytest.mark.parametrize("way", AR_WAYS)
+def test_ar_is_small(built_editor: Path, way: str) -> None:
+    manifest = json.loads((built_editor / ".vite" / "manifest.json").read_text())
+    assert 10_000 < ar_size(built_editor, manifest, way) <= MOST_AR
 
 
 def test_shell_and_3d_view_are_small(built_editor: Path) -> None:

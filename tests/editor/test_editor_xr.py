@@ -1,5 +1,6 @@
 """AR with WebXR on an emulated tablet and an emulated headset, whose poses are known."""
 
+import contextlib
 import json
 import re
 from collections.abc import AsyncIterator
@@ -9,17 +10,22 @@ import numpy as np
 import pytest
 import pytest_asyncio
 from msgspec import to_builtins
-from playwright.async_api import Browser, expect
+from playwright.async_api import Browser, Locator, Page, expect
 
 from arcor2_hw.client import Client
-from arcor2_hw.data.events import SceneStateEnum
+from arcor2_hw.client.errors import RequestFailed
+from arcor2_hw.data import rpc
+from arcor2_hw.data.events import ChangeType, SceneStateEnum
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Box, Model3dType, ObjectModel
+from arcor2_hw.data.package import PackageStateEnum
+from arcor2_hw.data.project import ActionParameter, Flow
 from tests.e2e.harness import scene_state
-from tests.editor.camera_video import MIDDLE, marker_table
+from tests.editor import texts
+from tests.editor.camera_video import MIDDLE, looking, marker_table
 from tests.editor.screen import VIEWPORTS, Screen, screen_of
 from tests.editor.test_editor_ar import ASIDE, MAX_ASIDE, MAX_NEAR, check_stop
-from tests.editor.xr import SHOTS, Controller, emulate, in_xr, overlay_errors, place, until_fitting
+from tests.editor.xr import LENS, SHOTS, Controller, emulate, in_xr, overlay_errors, place, until_fitting
 from tests.server.core.serving import ServerProcess, running, talking
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
@@ -29,7 +35,7 @@ BOX = Position(0.19, 0.14, 0.02)
 
 @pytest_asyncio.fixture(scope="module", loop_scope="session")
 async def server(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -> AsyncIterator[ServerProcess]:
-    """A server with two markers and an open scene with a box between them."""
+    """A server with two markers and a scene with a box between them and an object with program flow."""
     directory = tmp_path_factory.mktemp("xr")
     (directory / "markers.yaml").write_text(json.dumps(marker_table()))  # YAML contains JSON
     box = ObjectModel(Model3dType.BOX, box=Box("box", 0.1, 0.06, 0.04))
@@ -39,7 +45,30 @@ async def server(tmp_path_factory: pytest.TempPathFactory, built_editor: Path) -
             await talker.granted(
                 "AddVirtualCollisionObjectToScene", to_builtins({"name": "box", "pose": Pose(BOX), "model": box})
             )
+            await talker.granted("AddObjectToScene", {"name": "flow", "type": "FlowActions"})
+            await talker.granted("SaveScene")
+            await talker.granted("CloseScene", {})
         yield process
+
+
+async def open_scene(client: Client) -> str:
+    """Close what an earlier test has left, open the scene, and return its id."""
+    for request in ("StopPackage", "StopScene"):
+        with contextlib.suppress(RequestFailed):
+            await client.call(request)
+    with contextlib.suppress(RequestFailed):
+        await client.call("CloseProject", rpc.CloseProjectArgs(force=True))
+    (scene,) = await client.list_scenes()
+    with contextlib.suppress(RequestFailed):  # it is open
+        await client.call("OpenScene", rpc.IdArgs(scene.id))
+    return scene.id
+
+
+async def open_project(client: Client, scene: str, name: str) -> None:
+    """Open a new project of the scene."""
+    await client.call("CloseScene", rpc.CloseSceneArgs(force=True))
+    await client.call("NewProject", rpc.NewProjectArgs(scene, name))
+    await client.next_event("OpenProject")
 
 
 async def joined(screen: Screen) -> str:
@@ -59,10 +88,17 @@ async def test_tablet_follows_itself_and_markers_correct_it(server: ServerProces
     ):
         page = screen.page
         await emulate(page)
+        scene = await open_scene(adam)
         await adam.call("StartScene")
         await scene_state(adam, SceneStateEnum.STARTED)
         box = await joined(screen)
         await screen.picture("xr start")
+        # Where the session does not start or hides the page, the reason and the next step are shown.
+        for change, reason in (("refuses", "The browser did not start AR."), ("covers", "does not show the controls")):
+            await page.evaluate("(change) => { __xr.state[change] = true; }", change)
+            await screen.press("Start AR")
+            await screen.sees(reason)
+            await page.evaluate("(change) => { __xr.state[change] = false; }", change)
         await place(screen, SHOTS[0])
         await screen.press("Start AR")
         quality = page.get_by_role("group", name="Quality of AR")
@@ -120,8 +156,14 @@ async def test_tablet_follows_itself_and_markers_correct_it(server: ServerProces
         assert await screen.faults() == []
         await screen.picture("xr phone")
         await page.set_viewport_size(VIEWPORTS["ipad"])  # type: ignore[arg-type]
+        # The seat view keeps the selection and the viewpoint.
+        await screen.tap(box)
+        await page.get_by_role("complementary").get_by_role("heading", name="box").wait_for()
+        eye = await page.evaluate("__engine.view.camera.position.toArray()")
         await screen.press("Seat view")
         await page.get_by_role("button", name="Show all").wait_for()
+        await page.get_by_role("complementary").get_by_role("heading", name="box").wait_for()
+        assert await page.evaluate("__engine.view.viewpoint.position") == pytest.approx(eye, abs=1e-3)
         assert await page.evaluate("__xr.state.session.ended ?? !document.body.classList.contains('xr')")
         assert await page.evaluate("__engine.scene.background !== null")
         # Without markers, the workplace is placed on the surface ahead and stays there.
@@ -137,6 +179,94 @@ async def test_tablet_follows_itself_and_markers_correct_it(server: ServerProces
         await screen.press("Leave AR")
         await adam.call("StopScene")
         await scene_state(adam, SceneStateEnum.STOPPED)
+        # A program by crosshair and one thumb: on a tablet with the right hand, and on a phone with the left one.
+        await page.unroute("**/api/calibration/markers")
+        await open_project(adam, scene, "Thumbs")
+        await page.get_by_role("heading", name="Thumbs", exact=True).wait_for()
+        await place(screen, SHOTS[0])
+        await page.get_by_role("button", name="AR", exact=True).click()
+        await screen.press("Start AR")
+        await until_fitting(screen, SHOTS[0], [MIDDLE], MAX_NEAR)
+        await check_programming(screen, adam)
+        await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
+        await screen.press(texts.SETTINGS)
+        await page.get_by_role("menuitem", name="Left-handed controls").click()
+        await check_programming(screen, adam)
+        await page.set_viewport_size(VIEWPORTS["ipad"])  # type: ignore[arg-type]
+        await screen.press("Leave AR")
+
+
+async def check_programming(screen: Screen, adam: Client) -> None:
+    """Add, select, move, rotate, undo, connect and run by taps on controls of the page over the session."""
+    page = screen.page
+    panel, rail = page.get_by_role("complementary"), page.get_by_role("navigation")
+
+    async def button(name: str | re.Pattern[str], within: Locator | Page = page) -> None:
+        await within.get_by_role("button", name=name, exact=isinstance(name, str)).first.tap()
+
+    await page.evaluate("() => __xr.see()")
+    await screen.close_panels()
+    await button(texts.POINTS, rail)
+    await panel.get_by_role("heading", name=texts.POINTS, exact=True).wait_for()
+    await screen.settle()
+    aimed = await page.evaluate(
+        """() => {
+            const { width, height } = document.querySelector(".view").getBoundingClientRect();
+            return __engine.pick(width / 2, height / 2, 0)[0]?.point ?? __engine.floor(width / 2, height / 2);
+        }"""
+    )
+    await button(texts.AT_CROSSHAIR, panel)
+    point = (await adam.next_event("ActionPointChanged")).data
+    assert tuple(point.position) == pytest.approx([aimed[axis] for axis in "xyz"], abs=1e-6)
+    orientation = (await adam.next_event("OrientationChanged")).data
+    await panel.get_by_role("heading", name=point.name, exact=True).wait_for()
+    await screen.close_panels()
+    await place(screen, looking(np.array((0.15, -0.55, 0.6)), LENS, tuple(point.position)))
+    await button(f"Select {point.name}", page.get_by_role("group", name=texts.AT_CROSSHAIR))
+    await panel.get_by_role("heading", name=point.name, exact=True).wait_for()
+    await button(re.compile("^Increase X by "), panel)
+    moved = (await adam.next_event("ActionPointChanged")).data.position
+    assert moved.x > point.position.x + 5e-4
+    await button(orientation.name, panel)
+    await button(re.compile("^Increase Yaw by "), panel)
+    turned = (await adam.next_event("OrientationChanged")).data.orientation
+    assert abs(np.dot(tuple(turned), tuple(orientation.orientation))) < 0.9999
+    await screen.picture("xr turned")
+    await button(re.compile("^Undo "))
+    back = (await adam.next_event("OrientationChanged")).data.orientation
+    assert tuple(back) == pytest.approx(tuple(orientation.orientation), abs=1e-9)
+    # Actions connect themselves; a connection is also replaced by hand.
+    await button(texts.PROGRAM, rail)
+    wait = panel.locator(".offer").filter(has=page.get_by_text("wait", exact=True)).last
+    for _ in range(2):
+        await wait.tap()
+        action = (await adam.next_event("ActionChanged")).data
+        await panel.get_by_role("status").filter(has_text=f"Added {action.name}.").wait_for()
+    await button("Set parameters", panel)
+    await panel.get_by_role("heading", name=action.name, exact=True).wait_for()
+    await button("Remove the connection to End", panel)
+    while (changed := await adam.next_event("LogicItemChanged")).change_type is not ChangeType.REMOVE:
+        pass
+    assert (changed.data.start, changed.data.end) == (action.id, "END")
+    await button("Connect", panel)
+    await button("End", panel.get_by_role("list", name="Possible next steps"))
+    added = (await adam.next_event("LogicItemChanged")).data
+    assert (added.start, added.end) == (action.id, "END")
+    await screen.picture("xr connected")
+    await button(texts.RUN, rail)
+    await button("Save and run", panel)
+    await package_state(adam, PackageStateEnum.RUNNING)
+    await check_stop(screen)
+    assert await screen.faults() == []
+    await button(re.compile(f"^{texts.STOP_MOTION}"))
+    await package_state(adam, PackageStateEnum.STOPPED)
+    await adam.next_event("OpenProject")
+
+
+async def package_state(client: Client, wanted: PackageStateEnum) -> None:
+    """Wait until the program is in a state."""
+    while (await client.next_event("PackageState")).data.state is not wanted:
+        pass
 
 
 HOLD = """() => {
@@ -194,16 +324,18 @@ async def test_headset_registers_by_touch_selects_and_moves(server: ServerProces
     ):
         page = screen.page
         await emulate(page, headset=True)
+        scene = await open_scene(adam)
         await joined(screen)
         await place(screen, SHOTS[0], picture=False)
         await screen.press("Start AR")
         hand = Controller(screen)
-        known = await screen.until("() => window.__ar?.headset?.known")
-        assert len(known) == 3
+        await screen.until("() => window.__ar?.headset")
 
         async def touch(off: dict[int, float]) -> None:
             await hand.button("touch")
             await hand.click()
+            known = await screen.until("() => __ar.headset.touching?.known")
+            assert len(known) == 3
             for number, each in enumerate(known):
                 await hand.touch(in_xr(each["at"], up=off.get(number, 0.0)))
                 await hand.click()
@@ -234,10 +366,87 @@ async def test_headset_registers_by_touch_selects_and_moves(server: ServerProces
         assert await page.evaluate("__ar.headset.reported")
         await page.evaluate("() => { __xr.device.primaryInputMode = 'hand'; }")
         await screen.until("() => __ar.headset.reported === false")
+        near = np.add(top, (0.05, 0.2, 0.15))
+        await hand.aim(top + shift, near + shift)
+        await hand.press(True)
+        await hand.aim(top, near)
+        await hand.press(False)
+        again = (await adam.next_event("SceneObjectChanged")).data.pose.position
+        assert tuple(again) == pytest.approx(tuple(BOX), abs=4e-3)
         await hand.button("undo")
         await hand.click()
         back = (await adam.next_event("SceneObjectChanged")).data.pose.position
-        assert tuple(back) == pytest.approx(tuple(BOX), abs=1e-6)
+        assert tuple(back) == pytest.approx(tuple(moved), abs=1e-6)
+        # By a pinch, the workplace is placed on the surface ahead, and again from another place.
+        placed = []
+        for shot in SHOTS[:2]:
+            await place(screen, shot, picture=False)
+            await hand.frames()
+            await hand.button("place")
+            await hand.click()
+            await hand.frames()
+            await screen.until("() => __ar.headset.panel.content.title.includes('Placed by hand')")
+            placed.append(await page.evaluate("__ar.workplace.pose.elements.slice(12, 15)"))
+        assert placed[0][1] == pytest.approx(0.7)  # height of the floor
+        assert np.linalg.norm(np.subtract(*placed)) > 0.05
         await hand.button("leave")
         await hand.click()
         await page.get_by_role("button", name="Show all").wait_for()
+        await check_program(screen, adam, scene, hand)
+
+
+async def check_program(screen: Screen, adam: Client, scene: str, hand: Controller) -> None:
+    """Run a program from the headset: only with a button for Stop, and it stops when the button is lost."""
+    page = screen.page
+    await open_project(adam, scene, "From a headset")
+    await adam.call("AddActionPoint", rpc.AddActionPointArgs("here", BOX))
+    point = (await adam.next_event("ActionPointChanged")).data
+    flow = next(each.id for each in (await adam.get_scene(scene)).objects if each.name == "flow")
+    given = [ActionParameter("seconds", "double", "300.0")]
+    await adam.call("AddAction", rpc.AddActionArgs(point.id, "long", f"{flow}/wait", given, [Flow()]))
+    action = (await adam.next_event("ActionChanged")).data
+    for start, end in (("START", action.id), (action.id, "END")):
+        await adam.call("AddLogicItem", rpc.AddLogicItemArgs(start, end))
+    await page.get_by_role("heading", name="From a headset", exact=True).wait_for()
+    await page.get_by_role("button", name="AR", exact=True).click()
+    await screen.press("Start AR")
+    disabled = "(id) => __ar.headset?.panel.content.buttons.find((each) => each.id === id)?.disabled"
+    await screen.until(f"() => ({disabled})('run') === true && ({disabled})('run paused') === true")
+    assert "needs a controller" in await page.evaluate("__ar.headset.panel.content.lines.join(' ')")
+    await hand.button("run")
+    await hand.click()
+
+    async def controlled() -> None:
+        await page.evaluate("() => { __xr.device.primaryInputMode = 'controller'; }")
+        await screen.until(f"() => ({disabled})('run') === false")
+
+    async def press(name: str, state: PackageStateEnum) -> None:
+        await hand.button(name)
+        await hand.click()
+        await package_state(adam, state)
+
+    await controlled()
+    await press("run", PackageStateEnum.RUNNING)
+    await press("pause", PackageStateEnum.PAUSING)  # until the action ends
+    await page.evaluate("__xr.see()")
+    await screen.picture("xr headset program")
+    # With hands alone, no button stops motion any more.
+    await page.evaluate("() => { __xr.device.primaryInputMode = 'hand'; }")
+    await package_state(adam, PackageStateEnum.STOPPED)
+    await adam.next_event("OpenProject")
+    await controlled()
+    await press("run paused", PackageStateEnum.PAUSED)
+    await press("resume", PackageStateEnum.RUNNING)
+    # A menu of the headset covers the session.
+    await page.evaluate("__xr.device.updateVisibilityState('visible-blurred')")
+    await package_state(adam, PackageStateEnum.STOPPED)
+    await adam.next_event("OpenProject")
+    await page.evaluate("__xr.device.updateVisibilityState('visible')")
+    await controlled()
+    await press("run paused", PackageStateEnum.PAUSED)
+    await press("step", PackageStateEnum.RUNNING)
+    await press("stop program", PackageStateEnum.STOPPED)
+    await adam.next_event("OpenProject")
+    await hand.button("leave")
+    await hand.click()
+    await page.get_by_role("button", name="Show all").wait_for()

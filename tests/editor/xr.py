@@ -40,6 +40,13 @@ _PROJECTED: Final = """(points) => {
 }"""
 
 
+_HAND_RAY: Final = """() => {
+    const rays = [...(window.__ar?.headset?.poses ?? [])];
+    const right = rays.find(([source]) => source.hand && source.handedness === "right");
+    return right && Array.from(right[1].elements);
+}"""
+
+
 async def emulate(page: Page, *, headset: bool = False, pictures: bool = True, overlay: bool = True) -> None:
     """Let the page find a device with WebXR. Call it before the page is opened."""
     options = {"headset": headset, "pictures": pictures, "overlay": overlay}
@@ -94,6 +101,16 @@ class Controller:
         self.screen = screen
 
     async def _at(self, position: Any, turn: Rotation) -> None:
+        """Let the ray start at a position."""
+        await self._put(position, turn)
+        if ray := await self.screen.page.evaluate(_HAND_RAY):
+            # The ray of a hand does not start in its frame.
+            seen = Rotation.from_matrix(np.reshape(ray, (4, 4)).T[:3, :3])
+            shift = turn.inv().apply(np.subtract(ray[12:15], position))
+            turned = turn * (turn.inv() * seen).inv()
+            await self._put(position - turned.apply(shift), turned)
+
+    async def _put(self, position: Any, turn: Rotation) -> None:
         script = """([position, turn]) => {
             for (const each of [__xr.device.controllers.right, __xr.device.hands.right]) {
                 each.position.set(...position);

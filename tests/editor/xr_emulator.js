@@ -56,6 +56,8 @@
     },
   };
   const state = { gl: null, framebuffer: null, emulated: false, lostController: false, session: null, shot: null };
+  // The browser refuses the session, or does not show the page over it.
+  Object.assign(state, { refuses: false, covers: false });
   const unbound = (gl, make) => {
     const bound = [gl.FRAMEBUFFER_BINDING, gl.RENDERBUFFER_BINDING, gl.TEXTURE_BINDING_2D].map((each) =>
       gl.getParameter(each),
@@ -71,6 +73,7 @@
     constructor(session, gl, init) {
       super(session, substitute, init);
       const [width, height] = [window.innerWidth, window.innerHeight];
+      if (state.gl !== gl) state.texture = null; // of the context before
       state.gl = gl;
       state.framebuffer = unbound(gl, () => {
         const made = gl.createFramebuffer();
@@ -129,12 +132,13 @@
 
   const ask = navigator.xr.requestSession.bind(navigator.xr);
   navigator.xr.requestSession = async (mode, options = {}) => {
+    if (state.refuses) throw new DOMException("AR is not installed", "NotSupportedError");
     const session = await ask(mode, { ...options, requiredFeatures: ["local-floor"] });
     state.session = session;
     // In the frame of the room, so that a test knows where things are.
     const space = session.requestReferenceSpace.bind(session);
     session.requestReferenceSpace = (type) => space(type === "local" ? "local-floor" : type);
-    const root = session.enabledFeatures.includes("dom-overlay") ? options.domOverlay?.root : undefined;
+    const root = !state.covers && session.enabledFeatures.includes("dom-overlay") ? options.domOverlay?.root : undefined;
     if (root) Object.defineProperty(session, "domOverlayState", { value: { type: "screen" } });
     return session;
   };
@@ -173,6 +177,8 @@
       context.drawImage(drawn, 0, 0);
       context.setTransform(1, 0, 0, 1, 0, 0);
       screen.parentElement.style.zIndex = "-1";
+      // A headset does not show the page, nor its 3D view.
+      if (headset) for (const each of document.querySelectorAll("#root, .view canvas")) each.style.opacity = "0";
       let count = 0;
       for (let i = 3; i < pixels.length; i += 4) if (pixels[i] > 0) count++;
       return { drawn: count, all: width * height };

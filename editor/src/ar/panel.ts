@@ -31,7 +31,7 @@ export interface PanelContent {
 
 /** Size, m, and pixels per m. */
 const WIDTH = 0.56;
-const HEIGHT = 0.5;
+const HEIGHT = 0.44;
 const DENSITY = 1400;
 const CELL = WIDTH / 12;
 const ROW = 0.066;

@@ -238,6 +238,16 @@ async def test_rest_requires_token_and_role(server: ServerProcess) -> None:
         assert refused.status_code == 403
         assert "programmer" in refused.text
         assert (await http.put("/object-types", json=body, headers=bearer(programmer))).status_code != 403
+        # Operators may register AR by the markers; only technicians may move them.
+        advanced, technician = token(server, "a", Role.ADVANCED_USER), token(server, "t", Role.TECHNICIAN)
+        markers, nowhere = "/api/calibration/markers", {"markers": []}
+        assert (await http.get(markers, headers=bearer(operator))).json()["markers"] == []
+        statuses = [
+            (await http.put(markers, json=nowhere, headers=bearer(secret))).status_code
+            for secret in (operator, advanced, technician)
+        ]
+        assert statuses[:2] == [403, 403]
+        assert statuses[2] < 300
 
 
 async def test_without_tokens_local_clients_have_all_rights(tmp_path: Path) -> None:

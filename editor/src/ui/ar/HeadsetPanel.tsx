@@ -76,6 +76,8 @@ export default function HeadsetPanel({ ar }: { ar: Ar }) {
     if (current) step(current, turnedAbout(current.pose, { x: 0, y: 0, z: 1 }, sign * TURN));
   };
   const turns = target?.turns && !notMovable(state, target);
+  // Both fit into one row, so that the panel hides little of the workplace.
+  const half = turns && state.doc?.project ? 3 : 6;
   const buttons: PanelButton[] = [
     ...(robot
       ? AXES.flatMap((axis) =>
@@ -90,11 +92,11 @@ export default function HeadsetPanel({ ar }: { ar: Ar }) {
       : []),
     ...(turns
       ? [
-          { id: "turn left", label: t`Turn left`, cells: 6, press: turn(1) },
-          { id: "turn right", label: t`Turn right`, cells: 6, press: turn(-1) },
+          { id: "turn left", label: t`Turn left`, cells: half, press: turn(1) },
+          { id: "turn right", label: t`Turn right`, cells: half, press: turn(-1) },
         ]
       : []),
-    ...programButtons(state, outOfReach !== ""),
+    ...programButtons(state, outOfReach !== "", half),
     { id: "undo", label: t`Undo`, cells: 2, press: undo },
     {
       id: "touch",
@@ -112,7 +114,7 @@ export default function HeadsetPanel({ ar }: { ar: Ar }) {
 }
 
 /** Return the buttons of the program. `barred`: it cannot move now; pause and stop are always possible. */
-function programButtons(state: State, barred: boolean): PanelButton[] {
+function programButtons(state: State, barred: boolean, half: number): PanelButton[] {
   const { doc, program } = state;
   const button = (id: string, label: string, cells: number, command: () => Promise<unknown>, disabled = false) => ({
     id,
@@ -127,8 +129,8 @@ function programButtons(state: State, barred: boolean): PanelButton[] {
     if (!doc?.project) return [];
     const unable = notRunnable(state) !== "";
     return [
-      moving("run", doc.unsaved ? t`Save and run` : t`Run`, 6, run, unable),
-      moving("run paused", t`Start paused`, 6, () => run({ paused: true }), unable),
+      moving("run", doc.unsaved ? t`Save and run` : t`Run`, half, run, unable),
+      moving("run paused", t`Start paused`, half, () => run({ paused: true }), unable),
     ];
   }
   const denied = whyUnavailable(state, "StopPackage") !== "";
