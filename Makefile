@@ -6,7 +6,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
-FAMILIES := --extra ur --extra modbus --extra serial --extra can --extra dynamixel --extra depthai --extra vision --extra kinematics
+FAMILIES := --extra ur --extra modbus --extra serial --extra can --extra dynamixel --extra depthai --extra vision --extra kinematics --extra nodes
 # Drivers beyond the demo are tested too.
 TESTED := $(FAMILIES) --extra opcua --extra postgresql
 
@@ -25,7 +25,7 @@ ALONE = $(shell grep -rl --include='test_*.py' mark.alone tests)
 # each and run afterwards, in two workers. Failed tests run once more without others, since a few still depend on tenths
 # of a second; both results are shown. Exit code 5 means that ARGS selected no test of that kind.
 AGAIN := --last-failed --last-failed-no-failures none
-test: .make/dev .make/editor .make/browser .make/postgresql
+test: .make/dev .make/editor .make/browser .make/postgresql .make/broker
 	$(BIN)/python -m pytest --collect-only -qq >/dev/null & $(BIN)/python editor/build.py test; status=$$?; wait; exit $$status
 	$(BIN)/python -m pytest --numprocesses 5 --dist loadgroup --no-loadscope-reorder -m "not alone" $(ARGS) || \
 	test $$? = 5 || $(BIN)/python -m pytest $(AGAIN) -m "not alone" $(ARGS)
@@ -141,6 +141,15 @@ EDITOR := $(shell find editor -name node_modules -prune -o -name __pycache__ -pr
 	    sed -i 's/^#\?create_main_cluster.*/create_main_cluster = false/' /etc/postgresql-common/createcluster.conf && \
 	    apt-get install -y -qq --no-install-recommends postgresql >/dev/null; \
 	  else echo "please install: postgresql" >&2; exit 1; fi; \
+	}
+	@touch $@
+
+# The broker between a server and its nodes.
+.make/broker:
+	@mkdir -p .make
+	@command -v nats-server >/dev/null || test -x /usr/sbin/nats-server || { \
+	  if test "$$(id -u)" = 0; then apt-get update -qq && apt-get install -y -qq --no-install-recommends nats-server >/dev/null; \
+	  else echo "please install: nats-server" >&2; exit 1; fi; \
 	}
 	@touch $@
 

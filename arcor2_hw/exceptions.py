@@ -63,6 +63,12 @@ class ConnectionLost(DeviceError):
     code = "connection_lost"
 
 
+class OutcomeUnknown(ConnectionLost):
+    """The connection broke before the answer arrived. It is not known whether the call was executed."""
+
+    code = "outcome_unknown"
+
+
 class DeviceTimeout(DeviceError):
     """The device did not answer, or did not finish, within the time limit."""
 
@@ -73,6 +79,12 @@ class Refused(DeviceError):
     """The device, or its driver, refuses the command in the present state."""
 
     code = "refused"
+
+
+class ArrivedLate(Refused):
+    """The command arrived too late and was not executed."""
+
+    code = "arrived_late"
 
 
 class NotInControl(Refused):

@@ -154,7 +154,7 @@ _KINDS: Final[dict[type[RequestFailed], tuple[str, ...]]] = {
     DeviceFailed: (
         *("device", "not_connected", "connection_lost", "device_timeout", "refused", "not_in_control", "out_of_range"),
         *("stale", "no_depth", "overexposed", "device_fault", "safety_stop", "cancelled", "kinematics", "cell"),
-        "path_blocked",
+        *("path_blocked", "outcome_unknown", "arrived_late"),
     ),
     ServerFault: ("internal", "storage", "database_unreachable", "database_in_use"),
 }

@@ -24,7 +24,7 @@ class CellDevice(Data, frozen=True, forbid_unknown_fields=True):
     bench: for the conformance suite, `module:Class` of a bench with knowledge that the settings don't contain. wire:
     for the suite, the settings with host and port, or the port alone, of the connection that it may interrupt; a number
     is a fixed port of the device. real: whether it is a real device, which the suite uses only when asked; default:
-    whether it is on another machine.
+    whether it is on another machine. node: the computer (`arcor2-hw node`) on which the devices of its scene run.
     """
 
     name: str
@@ -34,6 +34,7 @@ class CellDevice(Data, frozen=True, forbid_unknown_fields=True):
     bench: str | Unset = UNSET
     wire: list[str | int] | Unset = UNSET
     real: bool | Unset = UNSET
+    node: str | Unset = UNSET
 
     def __post_init__(self) -> None:
         if not is_valid_name(self.name):
@@ -104,6 +105,27 @@ def overlay(cell: Cell, scene: Scene) -> list[SceneObjectOverride]:
             )
         found.append(SceneObjectOverride(scene_object.id, parameters_of(device)))
     return found
+
+
+def node_of(cell: Cell | None, names: Collection[str]) -> str:
+    """Return the node on which the objects with these names run; empty for this computer.
+
+    All objects of a scene run in one process, so one that names no node runs on the node of the others.
+
+    Raises:
+        InvalidData: The objects are on different nodes.
+    """
+    found = {
+        device.node: device.name
+        for device in ([] if cell is None else cell.devices)
+        if device.name in names and not isinstance(device.node, Unset)
+    }
+    if len(found) > 1:
+        raise InvalidData(
+            "The devices of a scene must be on one node: {devices}.",
+            devices=", ".join(f"{name} ({node})" for node, name in found.items()),
+        )
+    return next(iter(found), "")
 
 
 def parameters_of(device: CellDevice) -> list[Parameter]:

@@ -57,6 +57,7 @@ from arcor2_hw.runtime.messages_to_server import (
     Heartbeat as Heartbeat,
     HeldChanged as HeldChanged,
     HoldEnded as HoldEnded,
+    HostLost as HostLost,
     InterlocksChanged as InterlocksChanged,
     LogLine as LogLine,
     PartsChanged as PartsChanged,
@@ -131,6 +132,7 @@ ServerBound = (
     | DeviceChanged
     | DeviceIdentified
     | LogLine
+    | HostLost
 )
 
 decode_host_bound: Any = msgspec.msgpack.Decoder(HostBound).decode

@@ -221,3 +221,9 @@ class LogLine(ToServer, frozen=True):
     level: str
     text: str
     object_id: str = ""
+
+
+class HostLost(ToServer, frozen=True):
+    """The relay of a host on another computer reports why the host has ended or cannot be reached. The last message."""
+
+    reason: Message

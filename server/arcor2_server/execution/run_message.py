@@ -9,7 +9,10 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.device import Identity
 from arcor2_hw.data.held import OnError
+from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_hw.exceptions import InvalidPackage
 from arcor2_hw.runtime import messages as m
+from arcor2_hw.runtime.documents import read_document
 from arcor2_server.execution.breakpoints import SharedBreakpoints
 from arcor2_server.execution.runs import How
 from arcor2_server.settings import ServerSettings
@@ -51,6 +54,16 @@ class RunMessages:
             values=dict(how.values),
             recordings=str(self._settings.recordings_dir.resolve()),
         )
+
+    async def objects(self, message: m.RunPackage) -> list[SceneObject]:
+        """Return the objects of a package, if some may be on nodes; none if it is damaged, which its host reports."""
+        if self._settings.cell is None:
+            return []
+        file = Path(message.directory) / "data" / "scene.json"
+        try:
+            return (await asyncio.to_thread(read_document, file, Scene)).objects
+        except InvalidPackage:
+            return []
 
     async def complete(self, message: m.RunPackage, shared_of: str) -> m.RunPackage:
         """Add secrets, shared breakpoints, collision models and robot calibrations. Send the message immediately.

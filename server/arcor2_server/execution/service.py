@@ -265,7 +265,7 @@ class Execution(PackageLibrary, RunObservers):
 
     async def _begin(self, message: m.RunPackage) -> None:
         try:
-            host = await self._host.take()
+            host = await self._host.take(await self._messages.objects(message))
             message = await self._messages.complete(message, self.program.shared_of)
         except Arcor2Error as error:
             self._fail(error.message, type(error).__name__)

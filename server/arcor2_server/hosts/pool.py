@@ -3,13 +3,16 @@
 import asyncio
 import contextlib
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
 import structlog
 
+from arcor2_hw.data.cell import Cell, node_of
 from arcor2_hw.data.device import DEVICE_FILES
+from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.hosts.process import CellHost, HostUser
 
@@ -26,9 +29,11 @@ class CellHosts:
 
     Args:
         device_files: directories of the files that settings of devices may name.
+        cell: names the nodes of devices that are not on this computer.
     """
 
-    def __init__(self, device_files: Sequence[Path]) -> None:
+    def __init__(self, device_files: Sequence[Path], cell: Cell | None = None) -> None:
+        self._cell = cell
         self._environment = os.environ | {DEVICE_FILES: os.pathsep.join(map(str, device_files))}
         self._spare: asyncio.Task[CellHost] | None = None
         self._taken: set[CellHost] = set()
@@ -40,8 +45,23 @@ class CellHosts:
             self._spare = asyncio.create_task(self._start(), name="spare cell host")
             self._spare.add_done_callback(_log_failure)
 
-    async def take(self, user: HostUser) -> CellHost:
-        """Return the spare host, or a new one. Raise Arcor2Error if no host can be started."""
+    async def take(self, user: HostUser, objects: Iterable[SceneObject] = ()) -> CellHost:
+        """Return the spare host, or a new one. Raise Arcor2Error if no host can be started.
+
+        Args:
+            user: receives the messages of the host.
+            objects: the objects that will run in it, which decide on which computer it runs.
+        """
+        node = node_of(self._cell, [each.name for each in objects])
+        if node and find_spec("nats") is None:
+            raise Arcor2Error("Devices on nodes need the extra `nodes` of arcor2-hw. Install it on the server.")
+        host = await (self._start(node) if node else self._take_local())
+        host.user = user
+        self._taken.add(host)
+        host.ended.add_done_callback(lambda _: self._taken.discard(host))
+        return host
+
+    async def _take_local(self) -> CellHost:
         while True:
             new = self._spare is None
             self.prepare()
@@ -55,12 +75,8 @@ class CellHosts:
                     raise
                 continue  # it failed earlier, for example because it was killed while it was starting
             if host.alive:
-                break
+                return host
             await host.wait_or_kill()
-        host.user = user
-        self._taken.add(host)
-        host.ended.add_done_callback(lambda _: self._taken.discard(host))
-        return host
 
     async def renew(self) -> None:
         """Replace the spare host, which does not find packages that were installed after its start."""
@@ -86,14 +102,16 @@ class CellHosts:
                 return {await spare}
         return set()
 
-    async def _start(self) -> CellHost:
-        host = await CellHost.start(self._environment)
+    async def _start(self, node: str = "") -> CellHost:
+        host = await CellHost.start(self._environment, node)
         try:
             async with asyncio.timeout(READY_TIMEOUT):
                 await asyncio.shield(host.ready)
         except BaseException as error:
             host.kill()
             await host.wait_or_kill()
+            if node and isinstance(error, Arcor2Error):
+                raise
             if isinstance(error, TimeoutError | Arcor2Error):
                 raise Arcor2Error("No cell host can be started.", str(error)) from error
             raise

@@ -16,7 +16,7 @@ from arcor2_hw.actions.json_values import encode
 from arcor2_hw.data.held import HoldChoice
 from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.data.parts import ConfirmedPart
-from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout
+from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, DeviceTimeout, OutcomeUnknown
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m, ring
 from arcor2_hw.runtime.ring import Ring
@@ -26,6 +26,8 @@ log = structlog.get_logger(__name__)
 T = TypeVar("T", bound=m.ToServer)
 
 COMMAND: Final = ("-P", "-m", "arcor2_hw.runtime.host")
+RELAY_COMMAND: Final = ("-P", "-m", "arcor2_server.nodes.relay")
+"""The process in place of a host that runs on a node."""
 EXIT_TIMEOUT: Final = 3.0
 """Time limit for a host to end by itself before it is killed, s."""
 DEVICE_EXIT_TIMEOUT: Final = 2.0
@@ -104,8 +106,10 @@ class _Connection(asyncio.Protocol):
 class CellHost:
     """A running cell host."""
 
-    def __init__(self, process: ChildProcess, connection: _Connection, ring: Ring) -> None:
+    def __init__(self, process: ChildProcess, connection: _Connection, ring: Ring, node: str = "") -> None:
         self.process = process
+        self.node = node
+        """Name of the node on which the host runs; empty for this computer."""
         self.ring = ring
         """The recent values of the devices, also after the end of the host."""
         self.user: HostUser | None = None
@@ -123,17 +127,25 @@ class CellHost:
         self._tasks: list[asyncio.Task[None]] = []
 
     @classmethod
-    async def start(cls, environment: Mapping[str, str] = os.environ) -> "CellHost":
-        """Start the process. It can be used when `ready` is done."""
+    async def start(cls, environment: Mapping[str, str] = os.environ, node: str = "") -> "CellHost":
+        """Start the process. It can be used when `ready` is done.
+
+        Args:
+            environment: its environment.
+            node: name of the node on which the host runs; empty for this computer.
+        """
         ours, theirs = socket.socketpair()
         connection = _Connection()
         memory = ring.create()
         try:
             # The connection first: nothing may be awaited between the start of the process and of its tasks.
             await asyncio.get_running_loop().create_unix_connection(lambda: connection, sock=ours)
-            process = await ChildProcess.start(
-                (*COMMAND, "--ring", str(memory)), theirs, environment, inherited=[memory]
-            )
+            if node:
+                process = await ChildProcess.start((*RELAY_COMMAND, "--node", node), theirs, environment)
+            else:
+                process = await ChildProcess.start(
+                    (*COMMAND, "--ring", str(memory)), theirs, environment, inherited=[memory]
+                )
         except BaseException:
             os.close(memory)
             if connection.transport is not None:
@@ -141,7 +153,7 @@ class CellHost:
             ours.close()
             theirs.close()
             raise
-        host = cls(process, connection, ring.Ring(memory))
+        host = cls(process, connection, ring.Ring(memory), node)
         connection.host = host
         host._tasks = [
             asyncio.create_task(host._read_output(), name=f"output of cell host {process.pid}"),
@@ -382,9 +394,16 @@ class CellHost:
             return
         self.reason = reason
         error = ConnectionLost(reason)
-        for future in [*self._calls.values(), *(future for _, future in self._waiting), self.ready]:
+        unanswered = error
+        if self.node:
+            unanswered = OutcomeUnknown(
+                "It is not known whether the call was executed: {reason}. Check the device before you repeat it.",
+                reason=reason,
+            )
+        failed: list[tuple[asyncio.Future[Any], ConnectionLost]] = [(each, unanswered) for each in self._calls.values()]
+        for future, why in [*failed, *((each, error) for _, each in self._waiting), (self.ready, error)]:
             if not future.done():
-                future.set_exception(error)
+                future.set_exception(why)
                 future.exception()  # marks it as retrieved, in case nothing awaits it
         self._waiting.clear()
         if self.user is not None:
@@ -397,6 +416,9 @@ class CellHost:
             self._report_silence(False)
         match message:
             case m.Heartbeat():
+                return
+            case m.HostLost():
+                self._report_end(message.reason)
                 return
             case m.Ready():
                 if not self.ready.done():

@@ -1,12 +1,13 @@
 """The use of a cell host by the online scene or a program: process, device states, calls and streams."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final
 
 import msgspec
 import structlog
 
 from arcor2_hw.data.events import PackageInfoData
+from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
@@ -63,13 +64,16 @@ class HostSession:
         self._on_message, self._on_end = on_message, on_end
 
     # -------------------------------------------------------------------------------- the process
-    async def take(self) -> CellHost:
+    async def take(self, objects: Iterable[SceneObject]) -> CellHost:
         """Take a host from the pool. The caller assigns it to `host`; its messages may arrive before.
+
+        Args:
+            objects: the objects that will run in it, which decide on which computer it runs.
 
         Raises:
             Arcor2Error: no host can be started.
         """
-        return await self._pool.take(self)
+        return await self._pool.take(self, objects)
 
     def prepare(self) -> None:
         """Start a spare host if there is none."""

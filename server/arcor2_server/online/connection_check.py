@@ -66,7 +66,7 @@ class ConnectionCheck:
         message, _ = await self._opening.prepare(Scene("", objects=[obj]), False)
         began = time.monotonic()
         outcome = _Outcome()
-        host = await self._pool.take(outcome)
+        host = await self._pool.take(outcome, [obj])
         try:
             host.send(message)
             try:

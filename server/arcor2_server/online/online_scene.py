@@ -205,7 +205,7 @@ class OnlineScene:
         message, overlaid = await self._opening.prepare(scene, keep_going)
         self.board.show(scene.objects, overlaid)
         self._answer = asyncio.get_running_loop().create_future()
-        host = self.host.host = await self.host.take()
+        host = self.host.host = await self.host.take(scene.objects)
         host.send(self._opening.with_workspace(message, scene))
         try:
             async with asyncio.timeout(START_WITHIN):

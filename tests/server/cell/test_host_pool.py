@@ -7,7 +7,10 @@ from collections.abc import Mapping
 from typing import cast
 
 import pytest
+from msgspec import UNSET, UnsetType
 
+from arcor2_hw.data.cell import Cell, CellDevice
+from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.hosts import pool
 from arcor2_server.hosts.process import CellHost, HostUser
@@ -23,8 +26,8 @@ def killed(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
 
     class Host(CellHost):
         @classmethod
-        async def start(cls, environment: Mapping[str, str] = os.environ) -> CellHost:
-            host = await CellHost.start(environment)
+        async def start(cls, environment: Mapping[str, str] = os.environ, node: str = "") -> CellHost:
+            host = await CellHost.start(environment, node)
             if kills and kills.pop(0):
                 os.kill(host.pid, signal.SIGKILL)
             return host
@@ -54,5 +57,23 @@ async def test_host_that_cannot_be_started_is_an_error(killed: list[bool]) -> No
     try:
         with pytest.raises(Arcor2Error, match="No cell host can be started"):
             await hosts.take(USER)
+    finally:
+        await hosts.close()
+
+
+def on_node(name: str, node: str | UnsetType = UNSET) -> CellDevice:
+    return CellDevice(name, "Arm", node=node)
+
+
+async def test_a_scene_with_a_device_on_a_node_needs_the_node(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ARCOR2_HW_NATS_URL", "nats://127.0.0.1:1")
+    hosts = pool.CellHosts([], Cell([on_node("arm", "press"), on_node("belt"), on_node("lamp", "oven")]))
+    arm, belt, lamp = (SceneObject(name, "Arm", id=f"obj_{name}") for name in ("arm", "belt", "lamp"))
+    try:
+        with pytest.raises(Arcor2Error, match=r"The broker at 127\.0\.0\.1:1 cannot be reached"):
+            await hosts.take(USER, [arm, belt])
+        with pytest.raises(Arcor2Error, match=r"must be on one node: arm \(press\), lamp \(oven\)"):
+            await hosts.take(USER, [arm, lamp])
+        assert (await hosts.take(USER, [belt])).node == ""
     finally:
         await hosts.close()

@@ -1,0 +1,184 @@
+"""Files of messages travel by the hash of their content, so that each is sent to a node only once.
+
+A message names a file of its sender's computer. The relay replaces the name by a reference, `sha256:HASH:NAME`, and a
+directory by a reference to the list of its files. The node replaces references by names of its own files.
+"""
+
+import hashlib
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+from msgspec.structs import replace
+
+from arcor2_hw.exceptions import InvalidData, NotFound, Refused
+from arcor2_hw.runtime import messages as m
+from arcor2_server.files import replace_file
+
+WITH_FILES: Final = frozenset({"AddBody", "AddObject", "OpenScene", "RunPackage"})
+"""Messages that name files."""
+HASH_SIZE: Final = 32
+"""Length of a hash, bytes."""
+_SCHEME: Final = "sha256:"
+
+
+class Content:
+    """The files that a message needs, by the hexadecimal hash of their content."""
+
+    def __init__(self) -> None:
+        self._sources: dict[str, Path | bytes] = {}
+
+    @property
+    def hashes(self) -> list[str]:
+        """Return the hashes of all files."""
+        return list(self._sources)
+
+    def read(self, digest: str) -> bytes:
+        """Return a file. Raise OSError if it cannot be read."""
+        source = self._sources[digest]
+        return source if isinstance(source, bytes) else source.read_bytes()
+
+    def packed(self, body: bytes) -> bytes:
+        """Replace the files of a message by references.
+
+        Raises:
+            NotFound: a file does not exist.
+            Refused: the message asks for what a node cannot do.
+        """
+        message = m.decode_host_bound(body)
+        if isinstance(message, m.RunPackage):
+            if message.continues:
+                raise Refused("An interrupted program cannot be continued on a node. Start it from the beginning.")
+            # What a run records stays on this computer, which the node cannot write.
+            message = replace(message, directory=self._add_directory(message.directory), records="", recordings="")
+        return msgspec.msgpack.encode(_mapped(message, self._add_named))
+
+    def _add_named(self, name: str) -> str:
+        return f"{_SCHEME}{self._add(Path(name))}:{Path(name).name}"
+
+    def _add(self, source: Path | bytes) -> str:
+        try:
+            content = source if isinstance(source, bytes) else source.read_bytes()
+        except OSError as error:
+            raise NotFound("{file} cannot be read: {reason}", file=source, reason=error.strerror) from error
+        digest = hashlib.sha256(content).hexdigest()
+        self._sources[digest] = source
+        return digest
+
+    def _add_directory(self, name: str) -> str:
+        top = Path(name)
+        files = sorted(path for path in top.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+        listed = {path.relative_to(top).as_posix(): self._add(path) for path in files}
+        return f"{_SCHEME}{self._add(msgspec.json.encode(listed))}:{top.name}"
+
+
+class ContentStore:
+    """The files that a node has received.
+
+    Args:
+        directory: is created when it is needed.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+
+    def missing(self, hashes: list[str]) -> list[str]:
+        """Return the hashes of files that the store does not have."""
+        return [digest for digest in hashes if not self._file(digest).exists()]
+
+    def add(self, received: bytes) -> None:
+        """Store a file that follows its hash.
+
+        Raises:
+            InvalidData: the content does not have this hash.
+            OSError: the file cannot be written.
+        """
+        digest, content = received[:HASH_SIZE], received[HASH_SIZE:]
+        if hashlib.sha256(content).digest() != digest:
+            raise InvalidData("A file was damaged on its way.")
+        self._directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+        replace_file(self._file(digest.hex()), content, durable=False)
+
+    def unpacked(self, body: bytes, folder: Path) -> bytes:
+        """Replace the references of a message by names of files.
+
+        Args:
+            body: the encoded message.
+            folder: for the files; it is removed at the end of the session.
+
+        Raises:
+            NotFound: the store does not have a file.
+            InvalidData: a reference is invalid.
+        """
+        message = m.decode_host_bound(body)
+        if isinstance(message, m.RunPackage):
+            message = replace(message, directory=str(self._directory_of(message.directory, folder)))
+        return msgspec.msgpack.encode(_mapped(message, lambda reference: str(self._named(reference, folder))))
+
+    def _named(self, reference: str, folder: Path) -> Path:
+        digest, name = _parts(reference)
+        return self._copy(digest, folder / digest / name)
+
+    def _directory_of(self, reference: str, folder: Path) -> Path:
+        digest, name = _parts(reference)
+        try:
+            listed = msgspec.json.decode(self._file(digest).read_bytes(), type=dict[str, str])
+        except (OSError, msgspec.MsgspecError) as error:
+            raise NotFound("The list of the files of a package is missing.", str(error)) from error
+        top = Path(tempfile.mkdtemp(dir=folder)) / name
+        for path, content in listed.items():
+            if Path(path).is_absolute() or ".." in Path(path).parts:
+                raise InvalidData("{path} is not a path in a package.", path=path)
+            self._copy(content, top / path)
+        return top
+
+    def _copy(self, digest: str, target: Path) -> Path:
+        """Copy a file, because whoever uses it may change it."""
+        source = self._file(digest)
+        if not target.exists():
+            try:
+                target.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+                shutil.copyfile(source, target)
+            except OSError as error:
+                raise NotFound("{file} cannot be copied: {reason}", file=target.name, reason=error.strerror) from error
+        return target
+
+    def _file(self, digest: str) -> Path:
+        if len(digest) != 2 * HASH_SIZE or not set(digest) <= set("0123456789abcdef"):
+            raise InvalidData("{digest!r} is not a hash.", digest=digest)
+        return self._directory / digest
+
+
+def default_store() -> Path:
+    """Return the directory of the files that a node has received."""
+    cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(cache) / "arcor2-hw" / "node-files"
+
+
+def _parts(reference: str) -> tuple[str, str]:
+    """Return hash and name of a reference. Raise InvalidData if it is invalid."""
+    digest, separator, name = reference.removeprefix(_SCHEME).partition(":")
+    if not reference.startswith(_SCHEME) or not separator or Path(name).name != name:
+        raise InvalidData("{reference!r} is not a reference to a file.", reference=reference)
+    return digest, name
+
+
+def _mapped(message: Any, convert: Callable[[str], str]) -> Any:
+    """Return a message with other names of its files."""
+
+    def body(given: m.AddedBody) -> m.AddedBody:
+        return replace(given, file=convert(given.file)) if given.file else given
+
+    match message:
+        case m.AddBody():
+            return replace(message, body=body(message.body))
+        case m.AddObject():
+            return replace(message, opening=_mapped(message.opening, convert))
+        case m.OpenScene() | m.RunPackage():
+            assets = {key: convert(file) for key, file in message.assets.items()}
+            return replace(message, assets=assets, bodies=[body(each) for each in message.bodies])
+    return message

@@ -1,0 +1,42 @@
+"""The request that opens a session at a node, and its answer."""
+
+from importlib.metadata import version
+
+import msgspec
+
+from arcor2_hw.messages import Message
+from arcor2_server.nodes.session import SILENCE
+
+
+class Opening(msgspec.Struct, frozen=True):
+    """A request of a server.
+
+    session: random id. version: of the server. silence: time without a beat after which both ends end the session, s.
+    """
+
+    session: str
+    version: str
+    silence: float = SILENCE
+
+
+class Opened(msgspec.Struct, frozen=True):
+    """The answer of a node. refusal: why it does not open a session; None if it does."""
+
+    refusal: Message | None = None
+
+
+def own_version() -> str:
+    """Return the version of this installation."""
+    return version("arcor2-hw")
+
+
+def refusal_of(node: str, opening: Opening) -> Message | None:
+    """Return why a node refuses a request, None if it accepts it."""
+    if opening.version == own_version():
+        return None
+    return Message.of(
+        "The node {node} runs version {node_version} and the server version {server_version}: install the same one.",
+        node=node,
+        node_version=own_version(),
+        server_version=opening.version,
+    )

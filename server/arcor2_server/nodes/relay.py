@@ -1,0 +1,176 @@
+"""The process that the server starts in place of a cell host that runs on a node.
+
+It passes the messages between the server's socket (`--fd N`) and the node on. Beats, and the detection of a lost node,
+do not depend on the load of the server. If the server ends, so does the session, and the node stops all motion.
+"""
+
+import argparse
+import asyncio
+import contextlib
+import os
+import secrets
+import socket
+import sys
+from typing import Final
+
+import msgspec
+import uvloop
+from nats.errors import Error as NatsError, NoRespondersError, TimeoutError as NatsTimeoutError
+
+from arcor2_hw.exceptions import Arcor2Error, message_of
+from arcor2_hw.messages import Message
+from arcor2_hw.runtime import messages as m
+from arcor2_server.nodes import connections as broker
+from arcor2_server.nodes.content import WITH_FILES, Content
+from arcor2_server.nodes.conversion import STOPS, for_server, outline
+from arcor2_server.nodes.lanes import Header, Lane
+from arcor2_server.nodes.opening import Opened, Opening, own_version
+from arcor2_server.nodes.session import SILENCE, Connections, SessionEnd
+from arcor2_server.nodes.stream import MessageStream
+
+OPEN_WITHIN: Final = 3.0
+"""Time limit for a node to answer the request to open a session, s."""
+ENDED_WITHIN: Final = 2.5
+"""Time limit for the host on the node to end after the server closed the connection, s."""
+NICENESS: Final = -5
+"""Niceness of this process: stops and beats pass through it."""
+
+
+class Relay:
+    """Passes the messages of one session on.
+
+    Args:
+        node: name of the node.
+        sock: socket to the server.
+    """
+
+    def __init__(self, node: str, sock: socket.socket) -> None:
+        self._node = node
+        self._socket = sock
+        self._name = Message.of("the node {node}", node=node)
+        self._stream = MessageStream(self._from_server, self._server_closed)
+        self._end: SessionEnd | None = None
+        self._over: asyncio.Future[Message] = asyncio.get_running_loop().create_future()
+        self._closing: asyncio.Task[None] | None = None
+        self._waiting: list[tuple[int, str, bytes]] = []
+        """Messages that wait until the files of the first one are sent: number, type, message."""
+        self._transfer: asyncio.Task[None] | None = None
+
+    async def run(self, url: str, authority: str, silence: float) -> None:
+        """Serve until the session ends. Report the reason to the server."""
+        await asyncio.get_running_loop().create_unix_connection(lambda: self._stream, sock=self._socket)
+        connections: Connections = {}
+        try:
+            connections = await broker.connect(url, self._broker_lost, authority)
+            await self._open(connections, silence)
+            reason = await self._over
+        except Arcor2Error as error:
+            reason = error.message
+        self._stream.send(msgspec.msgpack.encode(m.HostLost(reason)))
+        self._stream.close()
+        if self._end is not None:
+            await self._end.close()
+        await broker.close(connections)
+
+    async def _open(self, connections: Connections, silence: float) -> None:
+        """Open the session at the node. Raise Arcor2Error if that is impossible."""
+        opening = Opening(secrets.token_hex(8), own_version(), silence)
+        subject = broker.session_subject(self._node, opening.session)
+        end = self._end = SessionEnd(connections, subject, "server", "node", self._name, self, silence)
+        try:
+            await end.open()
+            answer = await connections[Lane.CALLS].request(
+                broker.open_subject(self._node), msgspec.json.encode(opening), OPEN_WITHIN
+            )
+        except (NoRespondersError, NatsTimeoutError) as error:
+            raise Arcor2Error("The node {node} is not connected.", str(error), node=self._node) from error
+        except (NatsError, OSError) as error:
+            raise Arcor2Error(
+                "The node {node} cannot be asked: the broker failed.", str(error), node=self._node
+            ) from error
+        opened = msgspec.json.decode(answer.data, type=Opened)
+        if opened.refusal is not None:
+            raise Arcor2Error(opened.refusal)
+        end.start()
+
+    # -------------------------------------------------------------------------------- between server and node
+    def _from_server(self, body: bytes) -> None:
+        if self._end is None:
+            return  # the server sends nothing before the host is ready
+        kind = outline(body).type
+        if kind in STOPS:
+            self._end.send(Lane.STOP, body)
+        elif kind in WITH_FILES or self._waiting:
+            self._waiting.append((self._end.next_number(), kind, body))
+            if len(self._waiting) == 1:
+                self._transfer = asyncio.create_task(self._send_waiting(self._end), name="transfer of files")
+        else:
+            self._end.send(Lane.CALLS, body)
+
+    async def _send_waiting(self, end: SessionEnd) -> None:
+        """Send the waiting messages, each after its files."""
+        while self._waiting:
+            number, kind, body = self._waiting[0]
+            if kind in WITH_FILES:
+                content = Content()
+                try:
+                    body = await asyncio.to_thread(content.packed, body)
+                    await end.send_files(content)
+                except (Arcor2Error, OSError) as error:
+                    reason = message_of(error)
+                    end.send_end(reason)
+                    self.ended(reason, False)
+                    return
+            end.send(Lane.CALLS, body, number=number)
+            del self._waiting[0]
+
+    def received(self, lane: Lane, header: Header, body: bytes) -> None:  # noqa: ARG002 - its order does not matter here
+        """Pass a message of the node on."""
+        assert self._end is not None
+        self._stream.send(for_server(outline(body).type, body, self._end.here))
+
+    # -------------------------------------------------------------------------------- end
+    def ended(self, reason: Message, by_peer: bool) -> None:  # noqa: ARG002
+        """Handle the end of the session."""
+        if not self._over.done():
+            self._over.set_result(reason)
+
+    def _broker_lost(self) -> None:
+        if self._end is not None:
+            self._end.connection_lost()
+
+    def _server_closed(self) -> None:
+        self._closing = asyncio.create_task(self._close(), name="end of the session")
+
+    async def _close(self) -> None:
+        """End the session; wait until the host on the node has ended."""
+        reason = Message.of("the server closed the connection")
+        if self._end is not None:
+            self._end.send_end(reason)
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(asyncio.shield(self._over), ENDED_WITHIN)
+        self.ended(reason, False)
+
+
+async def _main(node: str, sock: socket.socket, url: str, authority: str, silence: float) -> None:
+    await Relay(node, sock).run(url, authority, silence)
+
+
+def main() -> None:
+    """Serve the socket that was inherited as `--fd`."""
+    parser = argparse.ArgumentParser(description="Pass messages to a node on. The server starts this process.")
+    parser.add_argument("--fd", type=int, required=True, help="inherited socket to the server")
+    parser.add_argument("--node", required=True, help="name of the node")
+    parser.add_argument("--silence", type=float, default=SILENCE, help="time without a beat until the session ends, s")
+    options = parser.parse_args()
+    with contextlib.suppress(OSError):  # not permitted without LimitNICE in the service file
+        os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
+    # In the environment, because arguments are visible to all users and the address may contain a password.
+    url = os.environ.get("ARCOR2_HW_NATS_URL", "nats://127.0.0.1:4222")
+    authority = os.environ.get("ARCOR2_HW_NATS_CA", "")
+    uvloop.run(_main(options.node, socket.socket(fileno=options.fd), url, authority, options.silence))
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,124 @@
+"""A broker and a node, each a process of its own, and hosts on the node."""
+
+import asyncio
+import contextlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import AsyncIterator, Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from arcor2_hw.messages import Message
+from arcor2_hw.runtime import messages as m
+from arcor2_server.hosts.process import CellHost
+from tests.waiting import wait_for
+
+NODE = "press"
+NATS_SERVER = shutil.which("nats-server") or "/usr/sbin/nats-server"  # where users other than root do not look
+PATIENCE = 30.0  # time limit, s; the machine may be busy
+CLI = (sys.executable, "-P", "-m", "arcor2_server.cli.main")
+
+
+class Broker:
+    """A nats-server on a port that the operating system has chosen.
+
+    Args:
+        folder: for its files.
+        address: to listen on.
+        options: further options of the command.
+    """
+
+    def __init__(self, folder: Path, address: str = "127.0.0.1", options: tuple[str, ...] = ()) -> None:
+        command = (NATS_SERVER, "--addr", address, "--port", "-1", "--ports_file_dir", str(folder), *options)
+        self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+        with contextlib.suppress(PermissionError):  # as a service of a real broker should have it
+            os.setpriority(os.PRIO_PROCESS, self.process.pid, -5)
+
+        def read() -> str:
+            found = [each.read_text() for each in folder.glob("*.ports")]
+            return str(json.loads(found[0])["nats"][0]) if found and found[0].endswith("}") else ""
+
+        self.url = wait_for(read)
+
+    def end(self) -> None:
+        self.process.kill()
+        self.process.wait()
+
+
+class Node:
+    """A node service."""
+
+    def __init__(self, url: str, cache: Path, *options: str, name: str = NODE, wrapper: tuple[str, ...] = ()) -> None:
+        self.process = subprocess.Popen(
+            [*wrapper, *CLI, "node", "run", name, "--broker", url, *options],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            env=os.environ | {"XDG_CACHE_HOME": str(cache)},
+        )
+        assert self.process.stdout is not None
+        assert self.process.stdout.readline() == f"ready {name}\n"
+
+    def end(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+
+
+@pytest.fixture(scope="module")
+def broker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Broker]:
+    running = Broker(tmp_path_factory.mktemp("broker"))
+    yield running
+    running.end()
+
+
+@pytest.fixture(scope="module")
+def node(broker: Broker, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Node]:
+    running = Node(broker.url, tmp_path_factory.mktemp("cache"))
+    yield running
+    running.end()
+
+
+class Listener:
+    """Stores what a host reports."""
+
+    def __init__(self) -> None:
+        self.messages: list[m.ServerBound] = []
+        self.reasons: list[str] = []
+        self.ended_at = 0.0
+
+    def host_message(self, host: CellHost, message: m.ServerBound) -> None:
+        self.messages.append(message)
+
+    def host_silent(self, host: CellHost, silent: bool) -> None:
+        """Busy machines are silent now and then."""
+
+    def host_ended(self, host: CellHost, reason: Message) -> None:
+        self.reasons.append(reason.text)
+        self.ended_at = asyncio.get_running_loop().time()
+
+
+@pytest.fixture
+async def start_host(broker: Broker) -> AsyncIterator[Callable[..., Any]]:
+    """Start a host on a node, with its listener."""
+    hosts: list[CellHost] = []
+
+    async def start(url: str = broker.url, name: str = NODE) -> tuple[CellHost, Listener]:
+        host = await CellHost.start(os.environ | {"ARCOR2_HW_NATS_URL": url}, name)
+        hosts.append(host)
+        listener = Listener()
+        host.user = listener
+        async with asyncio.timeout(PATIENCE):
+            await asyncio.shield(host.ready)
+        return host, listener
+
+    yield start
+    for host in hosts:
+        await host.close()

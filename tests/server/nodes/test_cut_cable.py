@@ -1,0 +1,31 @@
+"""A cable that is cut and repaired between a server and a node, in network namespaces."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.server.nodes.cable import Cable, CannotIsolate
+from tests.server.nodes.conftest import NODE
+
+
+def cut_and_heal(cable: Cable, folder: Path) -> dict[str, object]:
+    words = [json.dumps(each) for each in (cable.cut(), cable.heal(), cable.at_node)]
+    command = [*cable.at_hub, sys.executable, "-m", "tests.server.nodes.cutting", str(folder), *words]
+    done = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True, timeout=200)
+    found: dict[str, object] = json.loads(done.stdout)
+    return found
+
+
+def test_motion_stops_after_a_cut_and_nothing_moves_after_the_repair(tmp_path: Path) -> None:
+    try:
+        with Cable() as cable:
+            found = cut_and_heal(cable, tmp_path)
+    except CannotIsolate as reason:
+        pytest.skip(f"no network namespaces: {reason}")
+    (why,) = found["reasons"]  # type: ignore[misc]
+    assert f"the connection to the node {NODE} was lost" in why
+    assert found["unknown"], "an answer that was lost"
+    assert not found["late"], "a command that was sent before the repair"
