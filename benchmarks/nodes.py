@@ -1,0 +1,224 @@
+"""Cell hosts on a node: calls, stops next to pictures, and a cut cable; the broker and a bare socket side by side."""
+
+import asyncio
+import contextlib
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable
+from pathlib import Path
+
+import nats
+from nats.aio.client import Client
+
+from arcor2_hw.runtime import messages as m
+from arcor2_server.access.authority import Authority
+from arcor2_server.hosts.process import CellHost
+from benchmarks.metrics import Metric, Report, percentile
+from benchmarks.node_echo import SUBJECT, Frames, context
+from tests.runtime.conftest import open_scene, scene_object, type_code
+from tests.server.nodes.cable import Cable, CannotIsolate
+from tests.server.nodes.conftest import NODE, Broker, Node
+from tests.server.nodes.test_cut_cable import cut_and_heal
+
+CALLS = 1000
+STOPS = 200
+PICTURE = 1_000_000
+"""Size of a picture, bytes."""
+PICTURE_RATE = 30.0
+"""Rate of the camera, 1/s."""
+CUTS = 3
+WITHIN = 60.0
+DEVICE = type_code(
+    "Device",
+    f"""
+    class Device(Generic):
+        _ABSTRACT = False
+        picture_ = "x" * {PICTURE}
+
+        def add(self, a: int, b: int) -> int:
+            return a + b
+
+        def picture(self) -> str:
+            return self.picture_
+
+        def stop(self) -> None:
+            pass
+""",
+)
+
+
+async def started(url: str, node: str) -> CellHost:
+    """Return a host with an arm and a camera, on a node or on this computer."""
+    host = await CellHost.start(os.environ | {"ARCOR2_HW_NATS_URL": url}, node)
+    await asyncio.wait_for(asyncio.shield(host.ready), WITHIN)
+    host.send(open_scene([DEVICE], scene_object("arm", "Device"), scene_object("camera", "Device")))
+    await host.expect(m.SceneOpened, WITHIN)
+    return host
+
+
+async def timed(call: Callable[[], Awaitable[object]]) -> float:
+    """Return the duration of a call, ms."""
+    begin = time.perf_counter()
+    await call()
+    return (time.perf_counter() - begin) * 1e3
+
+
+async def _calls(report: Report, local: CellHost, remote: CellHost) -> None:
+    samples: dict[CellHost, list[float]] = {local: [], remote: []}
+    for number in range(CALLS + 50):
+        for host, found in samples.items():
+            duration = await timed(lambda host=host: host.call("obj_arm", "add", {"a": b"1", "b": b"2"}))  # type: ignore[misc]
+            if number >= 50:
+                found.append(duration)
+    for percent in (50, 99):
+        here, there = (percentile(found, percent) for found in samples.values())
+        note = f"local {here:.2f} ms, on a node {there:.2f} ms"
+        report.add(Metric(f"node_call_added_p{percent}_ms", there - here, CALLS, note))
+
+
+async def _stops(report: Report, local: CellHost, remote: CellHost) -> None:
+    here, _ = await _stop_durations(local)
+    there, rate = await _stop_durations(remote)
+    note = f"median {percentile(there, 50):.1f} ms, next to {rate:.0f} pictures of 1 MB per second; 99th percentile "
+    note += f"without a node {percentile(here, 99):.1f} ms"
+    report.add(Metric("node_stop_beside_pictures_p99_ms", percentile(there, 99), STOPS, note))
+
+
+async def _stop_durations(host: CellHost) -> tuple[list[float], float]:
+    """Return the durations of stops of the arm while the camera is read, ms, and the number of pictures per second."""
+    taken = 0
+
+    async def take_pictures() -> None:
+        nonlocal taken
+        loop = asyncio.get_running_loop()
+        due = loop.time()
+        while True:
+            await host.call("obj_camera", "picture")
+            taken += 1
+            due = max(due + 1.0 / PICTURE_RATE, loop.time())
+            await asyncio.sleep(due - loop.time())
+
+    camera = asyncio.create_task(take_pictures())
+    try:
+        await asyncio.sleep(0.5)
+        begin, before, samples = time.perf_counter(), taken, []
+        for _ in range(STOPS):
+            samples.append(await timed(lambda: host.stop_motion("obj_arm")))
+            await asyncio.sleep(0.02)
+        return samples, (taken - before) / (time.perf_counter() - begin)
+    finally:
+        camera.cancel()
+
+
+async def _cuts(report: Report, folder: Path) -> None:
+    stopped: list[float] = []
+    named: list[float] = []
+    for number in range(CUTS):
+        place = folder / f"cut_{number}"
+        place.mkdir()
+        try:
+            with Cable() as cable:
+                found = await asyncio.to_thread(cut_and_heal, cable, place)
+        except CannotIsolate as reason:
+            print(f"no network namespaces: {reason}", file=sys.stderr)
+            return
+        stopped.append(float(str(found["stopped"])))
+        named.append(float(str(found["named"])))
+    report.add(Metric("node_cut_stopped_s", max(stopped), CUTS, "the longest"))
+    report.add(Metric("node_cut_named_s", max(named), CUTS, "the longest"))
+
+
+# ------------------------------------------------------------------------------------------------ engines side by side
+def certificates(folder: Path) -> None:
+    """Write the files of a local authority for the servers."""
+    data = folder / "data"
+    data.mkdir()
+    authority = Authority(data, lambda: ["localhost", "127.0.0.1"])
+    authority.renew()
+    for source, name in zip((*authority.files, authority.file), ("chain.pem", "key.pem", "authority.pem"), strict=True):
+        shutil.copyfile(source, folder / name)
+
+
+@contextlib.asynccontextmanager
+async def echo(folder: Path, kind: str, port: int = 0) -> AsyncIterator[str]:
+    """Run an echo process in this context; return what it prints when it is ready."""
+    command = (sys.executable, "-m", "benchmarks.node_echo", str(folder), kind, str(port))
+    process = await asyncio.create_subprocess_exec(*command, stdout=subprocess.PIPE)
+    try:
+        assert process.stdout is not None
+        yield (await process.stdout.readline()).decode().strip()
+    finally:
+        process.kill()
+        await process.wait()
+
+
+class _Asking(Frames):
+    answer: "asyncio.Future[bytes]"
+
+    def received(self, body: bytes) -> None:
+        self.answer.set_result(body)
+
+    async def ask(self, body: bytes) -> bytes:
+        self.answer = asyncio.get_running_loop().create_future()
+        self.send(body)
+        return await self.answer
+
+
+async def _engines(report: Report, folder: Path) -> None:
+    certificates(folder)
+    config = folder / "nats.conf"
+    config.write_text(f'tls {{cert_file: "{folder}/chain.pem", key_file: "{folder}/key.pem"}}\n')
+    broker = Broker(folder, options=("--config", str(config)))
+    payload = os.urandom(256)
+    try:
+        port = int(broker.url.rpartition(":")[2])
+        tls = context(folder, server=False)
+        async with echo(folder, "nats", port), echo(folder, "socket") as number:
+            client: Client = await nats.connect(f"tls://localhost:{port}", tls=tls)
+            _, asking = await asyncio.get_running_loop().create_connection(
+                _Asking, "127.0.0.1", int(number), ssl=tls, server_hostname="localhost"
+            )
+            ways: dict[str, Callable[[], Awaitable[object]]] = {
+                "broker": lambda: client.request(SUBJECT, payload, WITHIN),
+                "socket": lambda: asking.ask(payload),
+            }
+            samples: dict[str, list[float]] = {name: [] for name in ways}
+            for repetition in range(CALLS + 50):
+                for name, ask in ways.items():
+                    duration = await timed(ask)
+                    if repetition >= 50:
+                        samples[name].append(duration)
+            await client.close()
+    finally:
+        broker.end()
+    for name, found in samples.items():
+        note = f"median {percentile(found, 50):.2f} ms; 256 bytes, TLS"
+        report.add(Metric(f"node_{name}_p99_ms", percentile(found, 99), CALLS, note))
+
+
+async def run(report: Report, directory: Path) -> None:
+    """Measure all of it."""
+    folder = directory / "nodes"
+    folder.mkdir()
+    places = [folder / name for name in ("broker", "cache", "engines")]
+    for place in places:
+        place.mkdir()
+    broker = Broker(places[0])
+    try:
+        node = Node(broker.url, places[1])
+        try:
+            local, remote = await started(broker.url, ""), await started(broker.url, NODE)
+            try:
+                await _calls(report, local, remote)
+                await _stops(report, local, remote)
+            finally:
+                await asyncio.gather(local.close(), remote.close())
+        finally:
+            node.end()
+    finally:
+        broker.end()
+    await _cuts(report, folder)
+    await _engines(report, places[2])
