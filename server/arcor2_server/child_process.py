@@ -2,12 +2,16 @@
 
 import asyncio
 import contextlib
+import fcntl
+import functools
 import os
+import shutil
 import signal
 import socket
 import sys
 import tempfile
 from collections.abc import AsyncIterator, Mapping, Sequence
+from pathlib import Path
 from typing import Final
 
 from arcor2_hw.messages import Message
@@ -15,6 +19,45 @@ from arcor2_hw.messages import Message
 LONGEST_LINE: Final = 64 * 1024
 """Maximum length of a line of output, bytes; the rest of a longer line is dropped."""
 _CHUNK: Final = 65536
+_PREFIX: Final = "arcor2-hw-child-"
+
+
+class _Folder:
+    """A directory for the temporary files of a process, locked by the server and by the process until both have ended.
+
+    If the server is killed, the next server removes the directory as soon as nobody has locked it.
+    """
+
+    def __init__(self) -> None:
+        while True:
+            self.path = Path(tempfile.mkdtemp(prefix=_PREFIX))
+            try:
+                self.lock = os.open(self.path, os.O_RDONLY)
+            except FileNotFoundError:
+                continue  # another server has removed it already
+            fcntl.flock(self.lock, fcntl.LOCK_EX)
+            if self.path.exists():
+                return
+            os.close(self.lock)
+
+    def remove(self) -> None:
+        shutil.rmtree(self.path, ignore_errors=True)
+        if self.lock >= 0:
+            os.close(self.lock)
+            self.lock = -1
+
+
+@functools.cache
+def _remove_leftovers() -> None:
+    """Remove the directories of processes that have ended and whose server was killed; once per process."""
+    for path in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
+        with contextlib.suppress(OSError):  # in use, or of another user
+            lock = os.open(path, os.O_RDONLY)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                shutil.rmtree(path, ignore_errors=True)
+            finally:
+                os.close(lock)
 
 
 class ChildProcess:
@@ -25,7 +68,7 @@ class ChildProcess:
         folder: the directory for its temporary files. It is removed after the end of the process, even a killed one.
     """
 
-    def __init__(self, process: asyncio.subprocess.Process, folder: "tempfile.TemporaryDirectory[str]") -> None:
+    def __init__(self, process: asyncio.subprocess.Process, folder: _Folder) -> None:
         self._process, self._folder = process, folder
 
     @classmethod
@@ -48,21 +91,23 @@ class ChildProcess:
         Raises:
             OSError: the process cannot be started.
         """
-        folder = tempfile.TemporaryDirectory(prefix="arcor2-hw-process-", ignore_cleanup_errors=True)
         try:
-            process = await asyncio.create_subprocess_exec(
-                sys.executable, *command, "--fd", str(connection.fileno()),
-                pass_fds=[connection.fileno(), *inherited],
-                stdin=asyncio.subprocess.DEVNULL,
-                stdout=asyncio.subprocess.PIPE,
-                stderr=asyncio.subprocess.STDOUT,
-                # The processes use their own threads; a thread pool of OpenBLAS would only cost memory.
-                env={"OPENBLAS_NUM_THREADS": "1", **environment, "TMPDIR": folder.name},
-                start_new_session=True,  # Ctrl-C reaches only the server, which stops its processes in order
-            )  # fmt: skip
-        except BaseException:
-            folder.cleanup()
-            raise
+            await asyncio.to_thread(_remove_leftovers)
+            folder = _Folder()
+            try:
+                process = await asyncio.create_subprocess_exec(
+                    sys.executable, *command, "--fd", str(connection.fileno()),
+                    pass_fds=[connection.fileno(), folder.lock, *inherited],
+                    stdin=asyncio.subprocess.DEVNULL,
+                    stdout=asyncio.subprocess.PIPE,
+                    stderr=asyncio.subprocess.STDOUT,
+                    # The processes use their own threads; a thread pool of OpenBLAS would only cost memory.
+                    env={"OPENBLAS_NUM_THREADS": "1", **environment, "TMPDIR": str(folder.path)},
+                    start_new_session=True,  # Ctrl-C reaches only the server, which stops its processes in order
+                )  # fmt: skip
+            except BaseException:
+                folder.remove()
+                raise
         finally:
             connection.close()
         return cls(process, folder)
@@ -86,7 +131,7 @@ class ChildProcess:
     async def wait(self) -> int:
         """Wait for the end of the process and return its exit status."""
         status = await self._process.wait()
-        self._folder.cleanup()
+        self._folder.remove()
         return status
 
     async def wait_or_kill(self, within: float) -> int:
