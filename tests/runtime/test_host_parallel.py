@@ -41,6 +41,12 @@ class Worker(Generic):
         return self.name
 
     @action
+    def meet_and_wait_for_gate(self, *, an: str | None = None) -> None:
+        _meeting.wait(60)
+        while not os.path.exists(self.settings.file + ".gate"):
+            self.stopped.wait(0.005)
+
+    @action
     def work(self, *, an: str | None = None) -> None:
         self.note("works")
         self.stopped.wait(600)
@@ -117,6 +123,10 @@ class Run:
 
     def announced(self) -> list[m.ProgramEvent]:
         return [e for e in self.host.seen if isinstance(e, m.ProgramEvent) and e.event == "ActionStateBefore"]
+
+    def open_gate(self) -> None:
+        """End `meet_and_wait_for_gate`."""
+        self.notes_path.with_name(f"{self.notes_path.name}.gate").touch()
 
     def order(self) -> list[str]:
         """Return starts and ends of actions in their order: `+name`, `-name`, and `!name` for failed ones."""
@@ -232,8 +242,12 @@ def test_stop_ends_a_branch_that_computes(run: Run) -> None:
 
 
 def test_a_breakpoint_holds_all_branches_and_a_step_continues_one(run: Run) -> None:
-    run.start("meet", "meet", breakpoints=("act_a2",))
+    run.start("meet", "meet_and_wait_for_gate", breakpoints=("act_a2",))
+    run.expect_announced("a2")
+    run.open_gate()
     run.host.expect_state("paused")
+    assert "-b1" in run.order()
+    assert "-b2" not in run.order(), "the branch act_b pauses too"
     run.host.send(m.Step(ProgramStep.OVER, "act_b"))
     run.host.expect_state("paused")
     assert "-b2" in run.order(), "the branch act_b has made its step, and has ended"
