@@ -23,7 +23,7 @@ from arcor2_server.websocket.client import Client, Wire
 from arcor2_server.websocket.dispatch import Dispatcher
 from arcor2_server.websocket.hub import Hub
 from arcor2_server.websocket.routes import Route
-from tests.server.core.serving import running, talking
+from tests.server.core.serving import WITHIN, running, talking
 
 SECRET = "swordfish-4711"
 
@@ -54,7 +54,9 @@ async def test_commands_and_refusals_are_noted_once(tmp_path: Path) -> None:
             assert forbidden.status_code == 403
             checked = (await http.get("/api/audit/check", headers=headers)).json()
             assert checked["problem"] == ""
-            found = (await http.get("/api/audit", params={"text": "arms"}, headers=headers)).json()
+            async with asyncio.timeout(WITHIN):  # entries are written a little later
+                while len(found := (await http.get("/api/audit", params={"text": "arms"}, headers=headers)).json()) < 2:
+                    await asyncio.sleep(0.01)
             exported = (await http.get("/api/audit/export", headers=headers)).text
             assert (await http.get("/api/audit", headers={"Authorization": f"Bearer {ivo}"})).status_code == 403
     printed = (tmp_path / "data.log").read_text()
