@@ -17,20 +17,11 @@ unexport PYTHONDONTWRITEBYTECODE
 run: .make/run .make/editor
 	$(BIN)/arcor2-hw demo $(ARGS)
 
-# Only these files are collected for the second run: collecting all of them takes 10 s.
-ALONE = $(shell grep -rl --include='test_*.py' mark.alone tests)
-
-# The tests are compiled once, next to the tests of the editor's units: otherwise each worker compiles all of them.
-# Tests mostly wait for simulated devices, so five workers suit two cores. Tests marked `alone` start a dozen processes
-# each and run afterwards, in two workers. Failed tests run once more without others, since a few still depend on tenths
-# of a second; both results are shown. Exit code 5 means that ARGS selected no test of that kind.
-AGAIN := --last-failed --last-failed-no-failures none
+# All tests, those of the editor's units first. Tests mostly wait for simulated devices, so seven workers suit two cores.
+# Everything, also the combinations that are checked only before a change is merged: make test ARGS=--matrix
+WORKERS ?= 7
 test: .make/dev .make/editor .make/browser .make/postgresql .make/broker
-	$(BIN)/python -m pytest --collect-only -qq >/dev/null & $(BIN)/python editor/build.py test; status=$$?; wait; exit $$status
-	$(BIN)/python -m pytest --numprocesses 5 --dist loadgroup --no-loadscope-reorder -m "not alone" $(ARGS) || \
-	test $$? = 5 || $(BIN)/python -m pytest $(AGAIN) -m "not alone" $(ARGS)
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup -m alone $(or $(ARGS),$(ALONE)) || \
-	test $$? = 5 || $(BIN)/python -m pytest $(AGAIN) -m alone $(or $(ARGS),$(ALONE))
+	$(BIN)/python -m tests.parallel $(WORKERS) --dist loadgroup --no-loadscope-reorder $(ARGS)
 
 bench: .make/dev
 	$(BIN)/python -m benchmarks $(ARGS)

@@ -26,6 +26,13 @@ LONG = (
 """Directories with long tests. The short ones come last, so that no worker is left with a long one."""
 BROWSER = "tests/editor/"
 """The directory of browser tests. They need most of the processor time."""
+CROWDED = (
+    "tests/demo/test_books.py",
+    "tests/e2e/test_alarms.py",
+    "tests/e2e/test_faults.py",
+    "tests/e2e/test_held_motion.py",
+)
+"""Files whose tests start a dozen processes each. One worker runs all of them, so that no two run at the same time."""
 APART = (
     "tests/docs/test_tutorials.py",
     "tests/server/cli/test_device_new.py",
@@ -36,17 +43,24 @@ APART = (
 """Files of long tests that share no fixture."""
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--matrix", action="store_true", help="show screens in all languages, not only the longest")
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Sort the tests of a parallel run for a queue that is read from both ends, so that short tests run last.
 
-    At the beginning of the queue are tests that wait for devices, at its end browser tests and before them long ones.
+    At the beginning of the queue are the crowded tests and those that wait for devices, at its end browser tests and
+    before them long ones.
     """
     if hasattr(config, "workerinput"):
         items.sort(key=_order)
 
 
 def _order(item: pytest.Item) -> int:
+    if item.nodeid.startswith(CROWDED):
+        return -1
     for order, places in ((0, WAITING), (2, LONG), (3, BROWSER)):
         if item.nodeid.startswith(places):
             return order
@@ -77,6 +91,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
             file, _, rest = nodeid.partition("::")
             if file in APART:
                 return nodeid
+            if file in CROWDED:
+                return "crowded"
             bench = rest.rpartition("[")[2] if rest.startswith("TestConformance::") else ""
             return f"{file}:{bench}"
 

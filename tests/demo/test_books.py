@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.books import trial
 
-pytestmark = [pytest.mark.asyncio, pytest.mark.alone, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.asyncio, pytest.mark.timeout(300)]
 SEED = 4
 BOARDS, FAULTS = 4, 10
 

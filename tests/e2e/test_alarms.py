@@ -10,8 +10,6 @@ from arcor2_hw.data import rpc
 from arcor2_hw.data.alarms import AlarmFilter, AlarmRecord
 from tests.e2e.harness import Cell, running_cell, until
 
-pytestmark = pytest.mark.alone
-
 
 @pytest.fixture
 async def cell(tmp_path: Path) -> AsyncIterator[Cell]:

@@ -21,8 +21,6 @@ from arcor2_hw.data.project import Project
 from arcor2_hw.exceptions import ConnectionLost
 from tests.e2e.harness import Cell, alive, kill, running_cell, scene_state, until
 
-pytestmark = pytest.mark.alone
-
 REST_JOINT_SPEED = 1e-3
 """Speed below which a joint counts as stopped, rad/s."""
 

@@ -26,8 +26,6 @@ from tests.drivers.universal_robots.conftest import FakeUr
 from tests.e2e.harness import until
 from tests.server.core.serving import ServerProcess, running
 
-pytestmark = pytest.mark.alone
-
 RESTS_WITHIN = 5.0
 """Time limit for standstill, s. Without a stop the arm would move for about 20 s. Benchmarks measure the time."""
 ATTEMPTS = 5

@@ -17,7 +17,7 @@ from tests.e2e.harness import Cell, scene_state
 from tests.editor import texts
 from tests.editor.screen import SERVER_GONE, Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.alone]
+pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 RESTS_WITHIN = 5.0
 """Time limit for standstill, s. Without a release the robot would move on. Benchmarks measure the time."""

@@ -14,7 +14,7 @@ from tests.e2e.harness import until
 from tests.editor import texts
 from tests.editor.screen import Screen, screen_of
 
-pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(400), pytest.mark.alone]
+pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(400)]
 
 SLOWLY = "5"
 """Speed, % of the maximum."""

@@ -124,7 +124,6 @@ def watched(arm: FakeUr) -> Iterator[list[float]]:
 
 
 # ------------------------------------------------------------------------------------------------ a robot
-@pytest.mark.alone
 def test_the_whole_day_with_an_arm_becomes_evidence(tmp_path: Path, arm: FakeUr) -> None:
     pendant = Pendant(arm)
     first_motion: list[str] = []
