@@ -1,6 +1,7 @@
 """Carrier: the robot or I/O block whose points the gripper uses, found in the scene by its name."""
 
 import contextlib
+import time
 from collections.abc import Callable, Iterator
 from typing import Final, cast
 
@@ -15,7 +16,7 @@ from arcor2_hw.exceptions import (
     Refused,
     Stale,
 )
-from arcor2_hw.keep_alive import once_within
+from arcor2_hw.keep_alive import RunningTime
 from arcor2_hw.messages import Message
 from arcor2_hw.objects import Generic
 from arcor2_hw.objects.small import HasPoints, IOPoint, OnLoss, PointDirection, PointKind
@@ -65,6 +66,7 @@ class Carrier:
             DeviceTimeout: It does not answer.
         """
         reason = ""
+        clock, reading = RunningTime(), 0.0
 
         def online() -> bool:
             nonlocal reason
@@ -77,23 +79,27 @@ class Carrier:
             return self._found.connection in ONLINE and readable()
 
         def readable() -> bool:
-            nonlocal reason
+            nonlocal reason, reading
+            began = time.monotonic()
             try:
                 self.read(point)
             except (ConnectionLost, NotConnected) as e:  # it is about to reconnect
                 reason = str(e)
+                reading += time.monotonic() - began  # the clock counts only the first moment of a long call
                 return False
             except OutOfRange:  # the carrier has no such point
                 pass
             return True
 
-        if not once_within(lambda: abandoned() or online(), timeout, POLL) or abandoned():
-            raise NotConnected(
-                "{gripper}: {carrier} is not connected. Connect it first.",
-                reason,
-                gripper=self.gripper,
-                carrier=self.name,
-            )
+        while abandoned() or not online():
+            if abandoned() or clock() + reading >= timeout:
+                raise NotConnected(
+                    "{gripper}: {carrier} is not connected. Connect it first.",
+                    reason,
+                    gripper=self.gripper,
+                    carrier=self.name,
+                )
+            time.sleep(POLL)
 
     def _look_up(self) -> Generic:
         if self._find is None:
