@@ -16,7 +16,7 @@ from tests.editor.screen import Screen, screen_of
 
 pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(400)]
 
-SLOWLY = "5"
+SLOWLY = "2"
 """Speed, % of the maximum."""
 GOOD = 3
 """A seed with a good board: the robot ends at a place with free space around it."""
