@@ -96,5 +96,7 @@ export default defineConfig({
     setupFiles: ["src/i18n/testing.ts"],
     // One process imports the sources once for all files, instead of each file again.
     isolate: false,
+    // For a test that hangs. On a busy machine any test may take long.
+    testTimeout: 60_000,
   },
 });
