@@ -1,5 +1,7 @@
 /** Set-up of the unit tests: use the English texts of the source code. */
 
+// Imported before a test replaces `document`, which it examines: test files share one process and have no fixed order.
+import "react-aria-components";
 import { i18n } from "@lingui/core";
 import { serverCatalogue } from "./serverMessages";
 
