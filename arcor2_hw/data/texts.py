@@ -1,4 +1,4 @@
-"""Length limits of the texts in requests, and the check that enforces them. No text contains the character NUL."""
+"""Length limits of the texts in requests, and the check that enforces them. Only bytes may contain NUL."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -24,6 +24,8 @@ LIMITS: Final[Mapping[str, int | None]] = (
     | dict.fromkeys(("data", "image", "source", "script", "client", "values"), None)
 )
 """Limit by field name; None for content whose size is limited elsewhere."""
+BINARY: Final = frozenset({"image"})
+"""Fields with bytes as text, one character each, which may be NUL. They are not stored."""
 SHORTEST: Final = NAME
 """A message of at most this size, in bytes, cannot contain a text that is too long."""
 NUL: Final = b"\\u0000"
@@ -55,7 +57,7 @@ def check_texts(value: Any, field: str = "") -> None:
                 count=len(value),
                 limit=limit,
             )
-        if "\0" in value:
+        if "\0" in value and field not in BINARY:
             raise InvalidData("{field} contains the character NUL. Remove it.", field=field or "A text")
     elif isinstance(value, msgspec.Struct):
         for name in value.__struct_fields__:

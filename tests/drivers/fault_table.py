@@ -325,7 +325,9 @@ NO_ALARM: dict[str, dict[str, str]] = {
         "plan": WORLD,
         "pull": "A person tightens a screw, as in normal operation.",
         "renew": RENEW,
+        "service": WORLD,
         "tighten": WORLD,
+        "tool_data_revision": "It simulates an older controller, whose counters the driver does not read.",
     },
     "two_axis_robot": {"motion": READ, "place": WORLD, "sync_writes": READ, "wrong_crc": RETRIED},
     "ur": {

@@ -156,6 +156,7 @@ async def test_tablet_follows_itself_and_markers_correct_it(server: ServerProces
         assert await screen.faults() == []
         await screen.picture("xr phone")
         await page.set_viewport_size(VIEWPORTS["ipad"])  # type: ignore[arg-type]
+        await screen.settle()
         # The seat view keeps the selection and the viewpoint.
         await screen.tap(box)
         await page.get_by_role("complementary").get_by_role("heading", name="box").wait_for()
@@ -209,10 +210,19 @@ async def check_programming(screen: Screen, adam: Client) -> None:
     await button(texts.POINTS, rail)
     await panel.get_by_role("heading", name=texts.POINTS, exact=True).wait_for()
     await screen.settle()
+    # A correction by markers moves the view for some frames.
     aimed = await page.evaluate(
-        """() => {
+        """async () => {
             const { width, height } = document.querySelector(".view").getBoundingClientRect();
-            return __engine.pick(width / 2, height / 2, 0)[0]?.point ?? __engine.floor(width / 2, height / 2);
+            const at = () => __engine.pick(width / 2, height / 2, 0)[0]?.point ?? __engine.floor(width / 2, height / 2);
+            let [aimed, same] = [at(), 0];
+            while (same < 20) {
+                await new Promise((done) => __xr.state.session.requestAnimationFrame(done));
+                const next = at();
+                same = next.distanceTo(aimed) < 1e-7 ? same + 1 : 0;
+                aimed = next;
+            }
+            return aimed;
         }"""
     )
     await button(texts.AT_CROSSHAIR, panel)
