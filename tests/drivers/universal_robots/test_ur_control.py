@@ -284,7 +284,7 @@ def test_manual_mode_limits_the_tcp_speed(ready: UR5e, fake: FakeUr) -> None:
     ):
         started = ready._observer.sample().timestamp
         move()
-        samples = [sample for sample in ready._observer.ring if sample.timestamp >= started]
+        samples = [sample for sample in tuple(ready._observer.ring) if sample.timestamp >= started]
         for first, last in zip(samples, samples[25:], strict=False):  # by the controller's clock
             way = math.dist(first.tcp[:3], last.tcp[:3])
             speeds.append(way / (last.timestamp - first.timestamp))
