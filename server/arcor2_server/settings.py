@@ -46,6 +46,18 @@ class PlcListener(msgspec.Struct, frozen=True):
     port: int
 
 
+class OpcUaListener(msgspec.Struct, frozen=True):
+    """The address of the OPC UA server.
+
+    anonymous: whether clients without a user may read. unencrypted: whether clients may connect without encryption.
+    """
+
+    host: str
+    port: int
+    anonymous: bool = False
+    unencrypted: bool = False
+
+
 class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     """The settings of the server. Times are in s, sizes in bytes."""
 
@@ -64,6 +76,8 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     """Port for clients without tokens and TLS."""
     plc: PlcListener | None = None
     """Address of the Modbus block for a PLC; None: no block."""
+    opcua: OpcUaListener | None = None
+    """Address of the OPC UA server; None: none."""
     plc_life_timeout: float = 2.0
     """Time after which a life counter of the PLC that does not change holds its program, s."""
     device_files: tuple[str, ...] = ()

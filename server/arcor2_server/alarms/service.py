@@ -53,6 +53,8 @@ class Alarms:
         """Changed and deleted records that the database could not store, for the next write."""
         self._writing: asyncio.Task[None] | None = None
         self._shelved: dict[int, asyncio.TimerHandle] = {}
+        self.on_changed: list[Callable[[AlarmRecord], None]] = []
+        """Called with each changed record after it was stored."""
         self.on_raised: list[Callable[[AlarmRecord, float], None]] = []
         """Called with the record of each occurrence, and when it was, on the monotonic clock, s."""
 
@@ -298,6 +300,8 @@ class Alarms:
                 self._refused = changed, removed
             for record in records.values():
                 self._hub.broadcast(make_event("AlarmChanged", record))
+                for notify in self.on_changed:
+                    notify(record)
             if any(self._refused) and not (self._unwritten or self._book.deleted):
                 break
         self._writing = None

@@ -59,6 +59,9 @@ from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.online.scene_calibration import SceneCalibration
 from arcor2_server.online.scene_opening import SceneOpening
 from arcor2_server.online.undo import Undo
+from arcor2_server.opcua.feed import CellFeed
+from arcor2_server.opcua.requests import PlantRequests
+from arcor2_server.opcua.service import OpcUa
 from arcor2_server.packml.cell import PackmlCell
 from arcor2_server.packml.plc import Plc
 from arcor2_server.packml.record import CellFile
@@ -272,7 +275,9 @@ class Server:
         cell_file = CellFile(settings.cell_state_file)
         cell_file.load(damage)
         cell = self.cell = PackmlCell(hub, execution, runs, online, stop_all, cell_file)
-        self.plc = closed(Plc(cell, cell_file, package_runs, alarms, audit, settings.plc_life_timeout))
+        plc = self.plc = closed(Plc(cell, cell_file, package_runs, alarms, audit, settings.plc_life_timeout))
+        feed = CellFeed((scene_host, program_host), cell, execution, runs, recipes, units, types, devices, alarms)
+        self.opcua = closed(OpcUa(settings, feed, PlantRequests(access, persons, plc, alarms, audit), cell))
         temporary_runs = self.temporary_runs = TemporaryRuns(
             hub, locks, storage, types, session, online, execution, build, tasks
         )

@@ -6,6 +6,7 @@ import errno
 import fcntl
 import gc
 import importlib
+import importlib.util
 import os
 import signal
 import socket
@@ -37,7 +38,14 @@ from arcor2_server.audit.command_line import note_command
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.deployment.service_manager import ServiceManager
 from arcor2_server.log import setup as server_logging
-from arcor2_server.settings import DATABASE_URL, DEVICE_FILES_NAME, LegacyListener, PlcListener, ServerSettings
+from arcor2_server.settings import (
+    DATABASE_URL,
+    DEVICE_FILES_NAME,
+    LegacyListener,
+    OpcUaListener,
+    PlcListener,
+    ServerSettings,
+)
 from arcor2_server.websocket.classic_ports import ports_from_environment
 
 if TYPE_CHECKING:
@@ -82,6 +90,9 @@ def serve(
     legacy_listen: str | None = None,
     legacy_role: LegacyRole = "operator",
     plc_modbus: str | None = None,
+    opcua: str | None = None,
+    opcua_anonymous: Annotated[bool, Parameter(negative="")] = False,
+    opcua_unencrypted: Annotated[bool, Parameter(negative="")] = False,
     classic_ports: Annotated[bool, Parameter(negative="")] = False,
     openapi: Annotated[bool, Parameter(negative="")] = False,
     log_level: str = "info",
@@ -115,6 +126,13 @@ def serve(
     plc_modbus
         HOST:PORT of a Modbus TCP block through which a PLC starts and stops programs. The PLC needs the authority,
         which a technician gives it.
+    opcua
+        HOST:PORT of an OPC UA server through which plant systems read the cell, and command it if they have the
+        authority.
+    opcua_anonymous
+        Let OPC UA clients read without a user, also from other machines.
+    opcua_unencrypted
+        Let OPC UA clients connect without encryption, also from other machines.
     classic_ports
         Also listen on the ports of the services of the original ARCOR2, as set by its ARCOR2_* variables.
     openapi
@@ -149,6 +167,7 @@ def serve(
             insecure=insecure or None,
             legacy=legacy,
             plc=None if plc_modbus is None else PlcListener(*_address("--plc-modbus", plc_modbus)),
+            opcua=None if opcua is None else _opcua(opcua, anonymous=opcua_anonymous, unencrypted=opcua_unencrypted),
             classic_ports=ports_from_environment() if classic_ports else None,
         )
         server_logging.set_up(log_level)
@@ -168,9 +187,12 @@ def serve(
             plc = None
             if settings.plc is not None:
                 plc = sockets.enter_context(contextlib.closing(listen(settings.plc.host, settings.plc.port)))
+            plant = None
+            if settings.opcua is not None:
+                plant = sockets.enter_context(contextlib.closing(listen(settings.opcua.host, settings.opcua.port)))
             welcome(settings, listener.getsockname()[1])
             with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-                runner.run(run(settings, [listener, *classic_listeners], legacy_listener, certificate, plc))
+                runner.run(run(settings, [listener, *classic_listeners], legacy_listener, certificate, plc, plant))
     except CannotServe as error:
         return fail("serve", error, error.status)
     except DatabaseInUse as error:
@@ -226,6 +248,19 @@ def _address(option: str, address: str) -> tuple[str, int]:
     if not host or not port.isdigit() or int(port) > 0xFFFF:
         raise InvalidData("{option} {address!r} is not HOST:PORT", option=option, address=address)
     return host.strip("[]"), int(port)
+
+
+def _opcua(address: str, *, anonymous: bool, unencrypted: bool) -> OpcUaListener:
+    """Return the settings of the OPC UA server. Clients of this machine need neither a user nor encryption.
+
+    Raises:
+        InvalidData: the address is invalid, or the library is not installed.
+    """
+    if importlib.util.find_spec("asyncua") is None:
+        raise InvalidData("--opcua needs the library asyncua: pip install 'arcor2-hw[opcua]'")
+    host, port = _address("--opcua", address)
+    local = is_loopback(host)
+    return OpcUaListener(host, port, anonymous or local, unencrypted or local)
 
 
 def _print_openapi() -> int:
@@ -314,8 +349,9 @@ async def run(
     legacy: socket.socket | None = None,
     certificate: tuple[Path, Path] | None = None,
     plc: socket.socket | None = None,
+    plant: socket.socket | None = None,
 ) -> None:
-    """Run the server on bound sockets. With a certificate it uses TLS on all sockets except `legacy` and `plc`.
+    """Run the server on bound sockets. With a certificate it uses TLS on all except `legacy`, `plc` and `plant`.
 
     Raises:
         CannotServe: another program has taken the port.
@@ -345,6 +381,8 @@ async def run(
 
         if plc is not None:
             await running.plc.serve(plc)
+        if plant is not None:
+            running.opcua.serve(plant)
         loop = asyncio.get_running_loop()
         config = configuration(create_app(running), settings, certificate)
         renewal = trust_page = None

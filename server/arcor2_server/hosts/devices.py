@@ -213,6 +213,11 @@ class DeviceBoard:
         """Return the gripped parts by name, each with the id of its robot."""
         return {part.name: (report.object_id, part) for report in self._reports.values() for part in report.held}
 
+    @property
+    def reports(self) -> Mapping[str, DeviceChanged]:
+        """The last reports by object."""
+        return self._reports
+
     def _report(self, object_id: str) -> DeviceChanged:
         return self._reports.get(object_id) or DeviceChanged(object_id, Connection.OFFLINE, Health.NORMAL)
 

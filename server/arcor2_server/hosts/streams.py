@@ -37,6 +37,7 @@ class RobotStreams:
         self._to_all_clients = to_all_clients
         self._subscribers: dict[tuple[str, str], set[Connection]] = {}
         self._rates: dict[tuple[str, str], dict[Connection, float]] = {}
+        self._observers: dict[tuple[str, str], tuple[float, Callable[[bytes], None]]] = {}
 
     def subscribe(self, client: Connection, robot_id: str, what: RobotEventKind, send: bool) -> None:
         """Start or stop a stream at the streaming period. Raise RequestRefused if it was not subscribed to."""
@@ -58,6 +59,11 @@ class RobotStreams:
             raise RequestRefused("This stream is not subscribed to.")
         self._update_host_rates(robot_id)
 
+    def observe(self, object_id: str, what: str, rate: float, receive: Callable[[bytes], None]) -> None:
+        """Pass the encoded events of a stream at `rate`, 1/s, to another part of the server until `clear`."""
+        self._observers[object_id, what] = rate, receive
+        self._update_host_rates(object_id)
+
     def publish(self, message: m.StreamEvent) -> None:
         """Publish a message of the host. It is encoded once for all clients."""
         kind = _KINDS.get(message.event)
@@ -65,6 +71,9 @@ class RobotStreams:
             return
         key, rates = (message.object_id, kind), self._rates.get((message.object_id, kind), {})
         if message.rate:
+            observed_rate, receive = self._observers.get(key, (0.0, None))
+            if receive is not None and observed_rate == message.rate:
+                receive(message.encoded)
             clients = {client for client, rate in rates.items() if rate == message.rate}
             stream = f"{message.object_id}/{message.rate:g}"
         else:
@@ -87,11 +96,16 @@ class RobotStreams:
         """Remove all subscriptions, after the scene went offline or the program ended."""
         self._subscribers.clear()
         self._rates.clear()
+        self._observers.clear()
 
     def _update_host(self, robot_id: str) -> None:
         wanted = {what: bool(self._subscribers.get((robot_id, what))) for what in RobotEventKind}
         self._send(m.Subscribe(robot_id, wanted[RobotEventKind.JOINTS], wanted[RobotEventKind.EEF_POSE]))
 
     def _update_host_rates(self, robot_id: str) -> None:
-        rates = [sorted(set(self._rates.get((robot_id, what), {}).values())) for what in _KINDS.values()]
+        rates = []
+        for what in _KINDS.values():
+            observed = self._observers.get((robot_id, what))
+            wanted = set(self._rates.get((robot_id, what), {}).values()) | ({observed[0]} if observed else set())
+            rates.append(sorted(wanted))
         self._send(m.Stream(robot_id, *rates))

@@ -80,6 +80,8 @@ class PackmlCell:
         """The running job of the PLC; 0 if there is none."""
         self.link: Callable[[], PlcLink | None] = lambda: None
         """Returns the connection of the PLC; None without a Modbus block."""
+        self.has_opcua = False
+        """Whether plant systems can command the cell over OPC UA."""
         self.on_change: list[Callable[[], None]] = []
         """Called after each change of state, mode and authority."""
         self.on_job_end: list[Callable[[JobEnd], None]] = []
@@ -181,8 +183,8 @@ class PackmlCell:
             StorageError: the authority cannot be stored.
         """
         if authority is CellAuthority.PLC and self.authority is not CellAuthority.PLC:
-            if self.link() is None:
-                raise RequestRefused("The server has no connection for a PLC. Start it with --plc-modbus.")
+            if self.link() is None and not self.has_opcua:
+                raise RequestRefused("The server has no connection for a PLC. Start it with --plc-modbus or --opcua.")
             self._execution.require_no_program()
             if self._online.state.value != "stopped":
                 raise RequestRefused("The scene is online and uses the devices. Stop the scene first.")

@@ -25,7 +25,7 @@ from arcor2_server.execution.package_runs import PackageRuns
 from arcor2_server.execution.runs import How
 from arcor2_server.packml.cell import PackmlCell
 from arcor2_server.packml.modbus import ExceptionCode, ModbusRefusal, ModbusServer
-from arcor2_server.packml.record import CellFile, JobEnd, RequestResult
+from arcor2_server.packml.record import CellFile, JobEnd, PlantRequest, RequestResult
 from arcor2_server.packml.states import COMMANDS
 
 log = structlog.get_logger(__name__)
@@ -39,6 +39,8 @@ CHECKS: Final = 8
 """Number of checks of the PLC's life counter within its time limit."""
 MOST_WAITING: Final = 16
 """Maximum number of requests that wait until the one before is executed."""
+MOST_PLANT_REQUESTS: Final = 64
+"""Number of stored requests of plant systems."""
 SILENT: Final = "plc_silent"
 """Code of the alarm for a life counter that does not change."""
 _STOPPING: Final = frozenset({MachineCommand.STOP, MachineCommand.ABORT})
@@ -129,6 +131,7 @@ class Plc:
         self._job = record.job, record.job_end
         """The last job and how it ended. The file follows."""
         self._waiting: asyncio.Queue[tuple[int, int, int]] = asyncio.Queue(MOST_WAITING)
+        self._executing = asyncio.Lock()
         self._background = BackgroundTasks()
         cell.link = self.link
         cell.on_change.append(self._cell_changed)
@@ -295,7 +298,8 @@ class Plc:
             request, command, job = await self._waiting.get()
             try:
                 await self._store_request(request, command)
-                result, text = await self._execute(command, job)
+                async with self._executing:
+                    result, text = await self._execute(command, job)
             except Arcor2Error as error:
                 result, text = R.REFUSED, error.message
             except Exception as error:
@@ -317,9 +321,44 @@ class Plc:
                 raise
             log.error("stop of the PLC not stored", reason=str(error))
 
-    async def _execute(self, number: int, job: int) -> tuple[RequestResult, Message | None]:
-        """Execute a command; return its result and the reason for a refusal."""
+    async def execute_once(self, command: int, job: int, by: str, request: str) -> tuple[RequestResult, Message | None]:
+        """Execute a command of a plant system, whose life is not supervised; return result and reason.
+
+        Args:
+            command: number of the command.
+            job: number of the job for Start.
+            by: name of the client and its user.
+            request: identifies the request. The same one is executed once, also after a restart. Empty: no identifier.
+        """
+        async with self._executing:
+            known = [each for each in self._file.record.plant_requests if each.id == request]
+            if request and known:
+                return known[0].result, Message.of(known[0].text) if known[0].text else None
+            await self._store_plant_request(request, command, R.INTERRUPTED, "The server ended meanwhile.")
+            try:
+                result, text = await self._execute(command, job, by)
+            except Arcor2Error as error:
+                result, text = R.REFUSED, error.message
+            await self._store_plant_request(request, command, result, "" if text is None else text.text)
+            return result, text
+
+    async def _store_plant_request(self, request: str, command: int, result: RequestResult, text: str) -> None:
+        if not request:
+            return
+        others = [each for each in self._file.record.plant_requests if each.id != request]
+        try:
+            await self._file.put(
+                plant_requests=[*others[1 - MOST_PLANT_REQUESTS :], PlantRequest(request, result, text)]
+            )
+        except StorageError as error:
+            if command not in _STOPPING:
+                raise
+            log.error("stop of a plant system not stored", reason=str(error))
+
+    async def _execute(self, number: int, job: int, by: str = "") -> tuple[RequestResult, Message | None]:
+        """Execute a command; return its result and the reason for a refusal. `by`: empty for the supervised PLC."""
         cell = self._cell
+        alive = bool(by) or self._alive
         if number not in COMMANDS:
             return R.UNKNOWN_COMMAND, Message.of("The command {number} does not exist.", number=number)
         command = MachineCommand(number)
@@ -331,22 +370,22 @@ class Plc:
             return R.WRONG_STATE, error.message
         match command:
             case MachineCommand.START:
-                return await self._start(job)
+                return await self._start(job, by or self.name, alive=alive)
             case MachineCommand.HOLD:
                 cell.hold(by_plc=True)
             case MachineCommand.UNHOLD:
-                if not self._alive:
+                if not alive:
                     return R.LIFE_COUNTER_FROZEN, Message.of("The life counter of the PLC does not change.")
                 if cell.person_needed:
                     return R.PERSON_NEEDED, Message.of("The program is held at a failed action. A person decides.")
                 cell.unhold()
             case _:
-                await cell.end(command, self.name)
+                await cell.end(command, by or self.name)
         return R.ACCEPTED, None
 
-    async def _start(self, number: int) -> tuple[RequestResult, Message | None]:
+    async def _start(self, number: int, by: str, *, alive: bool) -> tuple[RequestResult, Message | None]:
         cell = self._cell
-        if not self._alive:
+        if not alive:
             return R.LIFE_COUNTER_FROZEN, Message.of("The life counter of the PLC does not change.")
         try:
             cell.require_mode()
@@ -359,7 +398,7 @@ class Plc:
         await self._set_job(number, JobEnd.RUNNING)
         try:
             with cell.starting(number):
-                await self._runs.run_package(job.package_id, How(by=self.name, on_error=OnError.HOLD, by_plc=True))
+                await self._runs.run_package(job.package_id, How(by=by, on_error=OnError.HOLD, by_plc=True))
         except Arcor2Error as error:
             await self._set_job(*before)
             if isinstance(error, NotFound):

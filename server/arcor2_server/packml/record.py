@@ -47,10 +47,19 @@ class JobEnd(enum.IntEnum):
     """The server or the process of the program ended."""
 
 
+class PlantRequest(msgspec.Struct, frozen=True):
+    """A request of a plant system over OPC UA, identified by the client, and its result."""
+
+    id: str
+    result: RequestResult
+    text: str = ""
+
+
 class CellRecord(msgspec.Struct, frozen=True):
     """The stored values.
 
     request, result: the last request of the PLC that was accepted for execution. job, job_end: its last job.
+    plant_requests: the last requests of plant systems, oldest first.
     """
 
     mode: CellMode = CellMode.PRODUCE
@@ -60,6 +69,7 @@ class CellRecord(msgspec.Struct, frozen=True):
     result: RequestResult = RequestResult.ACCEPTED
     job: int = 0
     job_end: JobEnd = JobEnd.NONE
+    plant_requests: list[PlantRequest] = []
 
 
 class SettingChange(NamedTuple):

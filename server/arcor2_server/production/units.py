@@ -8,7 +8,7 @@ from typing import Any, Final
 import structlog
 from msgspec.structs import replace
 
-from arcor2_hw.data.base import UNSET, Unset, now
+from arcor2_hw.data.base import UNSET, Timestamp, Unset, now
 from arcor2_hw.data.editor import TraceEntry
 from arcor2_hw.data.parts import Part, PartBooks, PlaceKind
 from arcor2_hw.data.rpc import ListUnitsArgs
@@ -242,6 +242,14 @@ class Units:
         """Return the record of a unit. Raise NotFound if there is none."""
         await self.flush()
         return await self._store.get(number)
+
+    async def left_between(self, since: Timestamp, until: Timestamp) -> dict[UnitState, int]:
+        """Return how many units left the cell in a period, by state."""
+        await self.flush()
+        counts = dict.fromkeys(UnitState, 0)
+        for state, _, count in await self._store.left_between(since, until):
+            counts[state] += count
+        return counts
 
     # -------------------------------------------------------------------------------- storage
     def _put(self, record: UnitRecord, *, publish: bool = False) -> None:

@@ -1,0 +1,189 @@
+"""Sessions: trusted clients, users who are checked by the server, and the user of a call."""
+
+import asyncio
+import socket
+from collections.abc import Awaitable, Callable
+from contextvars import ContextVar
+from typing import Any, Final
+
+from asyncua import Server, ua
+from asyncua.common.connection import TransportLimits
+from asyncua.common.utils import Buffer, ServiceError
+from asyncua.crypto.permission_rules import User as LibraryUser, UserRole
+from asyncua.server.binary_server_asyncio import BinaryServer, OPCUAProtocol
+from asyncua.server.internal_server import InternalServer
+from asyncua.server.internal_session import InternalSession
+from asyncua.server.uaprocessor import UaProcessor
+from asyncua.ua.ua_binary import struct_from_binary
+
+from arcor2_hw.opcua.certificates import TrustedClients
+from arcor2_hw.opcua.messages import User
+
+MIB: Final = 1024 * 1024
+CHUNK: Final = 65535
+MOST_CONNECTIONS: Final = 32
+MOST_SUBSCRIPTIONS: Final = 128
+MOST_QUEUED: Final = 1000
+"""Maximum queue of a monitored item."""
+LONGEST_MESSAGE: Final = 4 * MIB
+LIMITS: Final = TransportLimits(CHUNK, CHUNK, LONGEST_MESSAGE // CHUNK + 1, LONGEST_MESSAGE)
+_ACTIVATE: Final = ua.NodeId(ua.ObjectIds.ActivateSessionRequest_Encoding_DefaultBinary)
+_CREATE: Final = ua.NodeId(ua.ObjectIds.CreateSessionRequest_Encoding_DefaultBinary)
+_ACKNOWLEDGE: Final = ua.NodeId(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge)
+_READING: Final = frozenset(
+    ua.NodeId(getattr(ua.ObjectIds, f"{name}Request_Encoding_DefaultBinary"))
+    for name in (
+        "Read", "Browse", "BrowseNext", "TranslateBrowsePathsToNodeIds", "RegisterNodes", "UnregisterNodes",
+        "CreateSubscription", "ModifySubscription", "DeleteSubscriptions", "TransferSubscriptions", "SetPublishingMode",
+        "CreateMonitoredItems", "ModifyMonitoredItems", "DeleteMonitoredItems", "SetMonitoringMode", "Publish",
+        "Republish", "Call", "CloseSecureChannel",
+    )
+)  # fmt: skip
+"""Services for users. Values are never written, and nodes never added."""
+
+CheckUser = Callable[[str, str, str], Awaitable[User | None]]
+"""Checks a user: name, PIN or token, address of the client."""
+AcknowledgeCondition = Callable[[ua.NodeId, list[ua.Variant]], Awaitable[ua.StatusCode]]
+caller: ContextVar["Caller | None"] = ContextVar("caller", default=None)
+"""The client whose call is executed."""
+_checked: ContextVar["Caller | None"] = ContextVar("checked", default=None)
+
+
+class Caller(LibraryUser):
+    """A client with its user; None for an anonymous client."""
+
+    def __init__(self, user: User | None, address: str) -> None:
+        super().__init__(UserRole.User, user.name if user else "anonymous")
+        self.user, self.address = user, address
+
+
+class Services:
+    """Permits the services for reading and calls."""
+
+    def check_validity(self, _user: LibraryUser, service: ua.NodeId, _body: Any) -> bool:
+        """Return whether a service may be used."""
+        return service in _READING
+
+
+class Users:
+    """Returns the user whom the processor of the connection has checked."""
+
+    def get_user(self, _server: Any, username: Any = None, password: Any = None, certificate: Any = None) -> Any:  # noqa: ARG002
+        """Return the checked user, None if the log-on is refused."""
+        return _checked.get()
+
+
+class Session(InternalSession):
+    """A session that knows its user during calls."""
+
+    async def call(self, params: list[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
+        """Call methods."""
+        server: Any = self.iserver
+        caller.set(self.user if isinstance(self.user, Caller) else None)
+        results = []
+        for request in params:
+            if request.MethodId == _ACKNOWLEDGE:
+                result = ua.CallMethodResult()
+                result.StatusCode = await server.acknowledge(request.ObjectId, request.InputArguments or [])
+                results.append(result)
+            else:
+                results += await super().call([request])
+        return results
+
+
+class Internal(InternalServer):
+    """The internal server with limits, our sessions and our check of users.
+
+    Args:
+        trusted: the certificates of clients.
+        check: checks a user.
+        anonymous: whether clients without a user may read.
+    """
+
+    def __init__(self, trusted: TrustedClients, check: CheckUser, *, anonymous: bool) -> None:
+        super().__init__(user_manager=Users())  # type: ignore[arg-type]
+        self.trusted, self.check = trusted, check
+        self.acknowledge: AcknowledgeCondition
+        self.max_connections = MOST_CONNECTIONS
+        self.max_subscriptions = MOST_SUBSCRIPTIONS
+        self.max_monitored_item_queue_size = MOST_QUEUED
+        self.bind_condition_methods = 1
+        tokens = (ua.UserNameIdentityToken, ua.AnonymousIdentityToken)
+        self.supported_tokens = tokens if anonymous else tokens[:1]  # type: ignore[assignment]
+
+    def create_session(self, name: str, user: LibraryUser = LibraryUser(), external: bool = False) -> Session:  # noqa: B008
+        """Return a new session."""
+        return Session(self, self.aspace, self.subscription_service, name, user=user, external=external)
+
+
+class Processor(UaProcessor):
+    """Checks the certificate of the client and its user before the library handles the request."""
+
+    async def _process_message(self, typeid: ua.NodeId, requesthdr: Any, seqhdr: Any, body: Buffer) -> Any:
+        if typeid == _CREATE:
+            self._check_certificate()
+        elif typeid == _ACTIVATE:
+            params = struct_from_binary(ua.ActivateSessionParameters, body.copy())
+            _checked.set(await self._user(params.UserIdentityToken, requesthdr))
+        return await super()._process_message(typeid, requesthdr, seqhdr, body)
+
+    def _check_certificate(self) -> None:
+        """Raise ServiceError unless the certificate of the encrypted channel is trusted."""
+        server: Any = self.iserver
+        policy = self._connection.security_policy
+        if policy.Mode is ua.MessageSecurityMode.None_:
+            return
+        if not policy.peer_certificate or not server.trusted.admits(policy.peer_certificate):
+            raise ServiceError(ua.StatusCodes.BadSecurityChecksFailed)
+
+    async def _user(self, token: Any, requesthdr: Any) -> Caller | None:
+        server: Any = self.iserver
+        address = self.name[0] if self.name else ""
+        if not isinstance(token, ua.UserNameIdentityToken):
+            return Caller(None, address)  # the library refuses kinds of tokens that are not supported
+        session = self.session or server.lookup_external_session(requesthdr.AuthenticationToken)
+        try:
+            name, secret = server.decrypt_user_token(session, token)
+        except Exception:  # noqa: BLE001 - the content comes from the client
+            raise ServiceError(ua.StatusCodes.BadIdentityTokenInvalid) from None
+        user = await server.check(name or "", secret or "", address)
+        return None if user is None else Caller(user, address)
+
+
+class Protocol(OPCUAProtocol):
+    """A connection with our processor."""
+
+    def connection_made(self, transport: Any) -> None:
+        """Handle a new connection."""
+        super().connection_made(transport)
+        if self.processor is not None:
+            self.processor = Processor(self.iserver, transport, self.limits)
+            self.processor.set_policies(self.policies)
+
+
+class Listener(BinaryServer):
+    """Listens on a socket that is bound already."""
+
+    def __init__(self, internal: InternalServer, bound: socket.socket) -> None:
+        super().__init__(internal, *bound.getsockname()[:2], LIMITS)
+        self._bound = bound
+
+    def _make_protocol(self) -> Protocol:
+        return Protocol(self.iserver, self._policies, self.clients, self.closing_tasks, self.limits)
+
+    async def start(self) -> None:
+        """Start to listen."""
+        self._server = await asyncio.get_running_loop().create_server(self._make_protocol, sock=self._bound)
+        self.cleanup_task = asyncio.create_task(self._close_task_loop())
+
+
+class OpcUaServer(Server):
+    """The server of the library on a socket that is bound already."""
+
+    async def listen(self, bound: socket.socket) -> None:
+        """Start to serve clients."""
+        await self._setup_server_nodes()
+        await self.iserver.start()
+        self.bserver = Listener(self.iserver, bound)
+        self.bserver.set_policies(self._policies)
+        await self.bserver.start()

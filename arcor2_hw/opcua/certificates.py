@@ -1,0 +1,140 @@
+"""The certificate of the OPC UA server, and the certificates of clients that it trusts, as files."""
+
+import ipaddress
+import os
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Final
+
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import rsa
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+CERTIFICATE: Final = "opcua-certificate.pem"
+KEY: Final = "opcua-key.pem"
+TRUSTED: Final = "opcua-trusted"
+REJECTED: Final = "opcua-rejected"
+VALID_DAYS: Final = 3650
+RENEW_DAYS: Final = 30
+"""Remaining validity below which the certificate is renewed at the start, days."""
+MOST_REJECTED: Final = 50
+"""Maximum number of stored certificates that were rejected."""
+_ENDINGS: Final = (".der", ".pem", ".crt", ".cer")
+
+
+def application_uri(machine: str) -> str:
+    """Return the application URI of the server on a machine."""
+    return f"urn:{machine}:arcor2-hw:opcua"
+
+
+def own_certificate(folder: Path, machine: str, hosts: list[str]) -> tuple[Path, Path]:
+    """Return the files of the certificate and its key. They are created if they are missing or expire soon.
+
+    The certificate is signed by its own RSA key: Basic256Sha256 does not permit the ECDSA of our authority.
+    """
+    certificate, key = folder / CERTIFICATE, folder / KEY
+    if not _usable(certificate, machine) or not key.exists():
+        _create(certificate, key, machine, hosts)
+    return certificate, key
+
+
+def _usable(file: Path, machine: str) -> bool:
+    try:
+        found = x509.load_pem_x509_certificate(file.read_bytes())
+        names = found.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    except (OSError, ValueError, x509.ExtensionNotFound):
+        return False
+    lasts = found.not_valid_after_utc - datetime.now(UTC) > timedelta(days=RENEW_DAYS)
+    return lasts and application_uri(machine) in names.get_values_for_type(x509.UniformResourceIdentifier)
+
+
+def _create(certificate: Path, key_file: Path, machine: str, hosts: list[str]) -> None:
+    key = rsa.generate_private_key(65537, 2048)
+    subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, f"ARCOR2-HW OPC UA on {machine}"[:64])])
+    names: list[x509.GeneralName] = [x509.UniformResourceIdentifier(application_uri(machine))]
+    for host in dict.fromkeys(hosts):
+        try:
+            names.append(x509.IPAddress(ipaddress.ip_address(host)))
+        except ValueError:
+            names.append(x509.DNSName(host))
+    start = datetime.now(UTC) - timedelta(days=1)
+    identifier = x509.SubjectKeyIdentifier.from_public_key(key.public_key())
+    built = (
+        x509.CertificateBuilder()
+        .subject_name(subject)
+        .issuer_name(subject)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(start)
+        .not_valid_after(start + timedelta(days=VALID_DAYS))
+        .add_extension(x509.SubjectAlternativeName(names), critical=False)
+        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        .add_extension(
+            x509.KeyUsage(
+                digital_signature=True, content_commitment=True, key_encipherment=True, data_encipherment=True,
+                key_agreement=False, key_cert_sign=True, crl_sign=False, encipher_only=False, decipher_only=False,
+            ),
+            critical=True,
+        )
+        .add_extension(x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH]), critical=False)
+        .add_extension(identifier, critical=False)
+        .sign(key, hashes.SHA256())
+    )  # fmt: skip
+    pem = serialization.Encoding.PEM
+    formats = serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
+    _write(key_file, key.private_bytes(pem, *formats), 0o600)
+    _write(certificate, built.public_bytes(pem), 0o644)
+
+
+def _write(file: Path, content: bytes, mode: int) -> None:
+    temporary = file.with_suffix(".new")
+    with os.fdopen(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode), "wb") as opened:
+        opened.write(content)
+        opened.flush()
+        os.fsync(opened.fileno())
+    temporary.replace(file)
+
+
+class TrustedClients:
+    """The certificates of clients in a folder. Changes of its files take effect at the next connection.
+
+    Args:
+        folder: the folder that contains the folders of trusted and rejected certificates.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._trusted, self._rejected = folder / TRUSTED, folder / REJECTED
+        for each in (self._trusted, self._rejected):
+            each.mkdir(mode=0o700, exist_ok=True)
+
+    def admits(self, certificate: bytes) -> bool:
+        """Return whether a DER certificate is valid now and trusted. Another one is stored in the rejected folder."""
+        try:
+            client = x509.load_der_x509_certificate(certificate)
+        except ValueError:
+            return False
+        if not client.not_valid_before_utc <= datetime.now(UTC) <= client.not_valid_after_utc:
+            return False
+        if any(_der(file) == certificate for file in self._trusted.iterdir() if file.suffix in _ENDINGS):
+            return True
+        self._store(certificate, client)
+        return False
+
+    def _store(self, certificate: bytes, client: x509.Certificate) -> None:
+        file = self._rejected / f"{client.fingerprint(hashes.SHA256()).hex()}.der"
+        if not file.exists() and sum(1 for _ in self._rejected.iterdir()) < MOST_REJECTED:
+            file.write_bytes(certificate)
+
+
+def _der(file: Path) -> bytes | None:
+    try:
+        content = file.read_bytes()
+        loaded = (
+            x509.load_pem_x509_certificate(content)
+            if content.startswith(b"-----")
+            else x509.load_der_x509_certificate(content)
+        )
+    except (OSError, ValueError):
+        return None
+    return loaded.public_bytes(serialization.Encoding.DER)

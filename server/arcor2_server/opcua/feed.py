@@ -1,0 +1,203 @@
+"""Collects what the OPC UA server shows: only what has changed, and of each stream only the newest event."""
+
+from collections.abc import Sequence
+from typing import Final
+
+import structlog
+
+from arcor2_hw.data.alarms import AlarmFilter, AlarmRecord
+from arcor2_hw.data.base import Unset, now
+from arcor2_hw.data.device import Connection, Identity
+from arcor2_hw.data.rpc import ListAlarmsArgs, RobotEventKind
+from arcor2_hw.data.units import UnitState
+from arcor2_hw.exceptions import Arcor2Error, NotFound
+from arcor2_hw.opcua.messages import DeviceInfo, DeviceState, UnitData, Update
+from arcor2_hw.runtime.messages import DeviceChanged
+from arcor2_server.alarms.service import Alarms
+from arcor2_server.execution.runs import Runs
+from arcor2_server.execution.service import Execution
+from arcor2_server.hosts.session import HostSession
+from arcor2_server.hosts.streams import POINTS
+from arcor2_server.maintenance.devices import Devices
+from arcor2_server.object_types.registry import ObjectTypes
+from arcor2_server.packml.cell import PackmlCell
+from arcor2_server.production.recipes import Recipes
+from arcor2_server.production.units import Units
+
+log = structlog.get_logger(__name__)
+
+JOINTS_RATE: Final = 10.0
+"""Rate at which joints are read, Hz."""
+POINTS_RATE: Final = 5.0
+"""Rate at which points are read, Hz: as fast as the editor may read them."""
+_CONNECTED: Final = (Connection.ONLINE, Connection.BACK)
+_START: Final = "1970-01-01T00:00:00+00:00"
+
+
+class CellFeed:
+    """Follows the cell from `start` on.
+
+    Args:
+        hosts: the hosts of the scene and of the program. The devices of the last one that has any are shown.
+        cell: the cell as a unit of PackML.
+        execution: the program.
+        runs: names of programs.
+        recipes: the present recipe.
+        units: counts of units.
+        types: finds the robots.
+        cards: identities of devices.
+        alarms: the alarms.
+    """
+
+    def __init__(
+        self,
+        hosts: Sequence[HostSession],
+        cell: PackmlCell,
+        execution: Execution,
+        runs: Runs,
+        recipes: Recipes,
+        units: Units,
+        types: ObjectTypes,
+        cards: Devices,
+        alarms: Alarms,
+    ) -> None:
+        self._hosts, self._cell, self._execution, self._runs = hosts, cell, execution, runs
+        self._recipes, self._units, self._types, self._cards, self._alarms = recipes, units, types, cards, alarms
+        self._devices: list[DeviceInfo] = []
+        self._states: dict[str, DeviceState] = {}
+        self._unit: UnitData | None = None
+        self._counts = dict.fromkeys(UnitState, 0)
+        self._devices_changed = self._counts_changed = True
+        self._streams: dict[tuple[str, str], bytes] = {}
+        self._changed_alarms: dict[int, AlarmRecord] = {}
+
+    def start(self) -> None:
+        """Start to follow the cell."""
+        for host in self._hosts:
+            host.board.on_report.append(lambda report, host=host: self._reported(host, report))  # type: ignore[misc]
+            host.board.on_clear.append(lambda _: self._mark_devices())
+            host.board.on_connection.append(self._mark_devices)
+            host.board.on_identified.append(lambda _: self._mark_devices())
+        self._alarms.on_changed.append(self._alarm_changed)
+        self._execution.parts.on_change.append(lambda _: self._mark_counts())
+        self._execution.on_state.append(self._mark_devices)
+        self._mark_devices()
+
+    def _mark_devices(self) -> None:
+        self._devices_changed = True
+
+    def _mark_counts(self) -> None:
+        self._counts_changed = True
+
+    def _alarm_changed(self, record: AlarmRecord) -> None:
+        self._changed_alarms[record.number] = record
+
+    def _reported(self, host: HostSession, report: DeviceChanged) -> None:
+        self._devices_changed = True
+        if report.connection in _CONNECTED:
+            key = report.object_id
+            host.streams.observe(key, POINTS, POINTS_RATE, lambda encoded: self._put(key, POINTS, encoded))
+            if self._robot_type(host, key):
+                joints = RobotEventKind.JOINTS.value
+                host.streams.observe(key, joints, JOINTS_RATE, lambda encoded: self._put(key, joints, encoded))
+
+    def _put(self, object_id: str, kind: str, encoded: bytes) -> None:
+        self._streams[object_id, kind] = encoded
+
+    # -------------------------------------------------------------------------------- what is sent
+    async def everything(self) -> Update:
+        """Return the present state for a process that has started."""
+        await self._refresh()
+        self._unit = self._unit_data()
+        self._streams, self._changed_alarms = {}, {}
+        # Records that were not stored yet are reported once more when they are.
+        alarms = await self._alarms.find(ListAlarmsArgs(show=AlarmFilter.RETAINED, limit=1000))
+        return Update(self._devices, dict(self._states), [], self._unit, list(reversed(alarms)))
+
+    async def changes(self) -> Update:
+        """Return what has changed since the last call."""
+        devices, states = self._devices, self._states
+        await self._refresh()
+        unit = self._unit_data()
+        streams, self._streams = list(self._streams.values()), {}
+        alarms, self._changed_alarms = list(self._changed_alarms.values()), {}
+        update = Update(
+            self._devices if self._devices != devices else None,
+            {key: state for key, state in self._states.items() if states.get(key) != state},
+            streams,
+            unit if unit != self._unit else None,
+            alarms,
+        )
+        self._unit = unit
+        return update
+
+    async def _refresh(self) -> None:
+        if self._devices_changed:
+            self._devices_changed = False
+            self._collect_devices()
+        if self._counts_changed:
+            self._counts_changed = False
+            try:
+                self._counts = await self._units.left_between(_START, now())
+            except Arcor2Error as error:
+                log.warning("counts of units not read", reason=str(error))
+
+    def _collect_devices(self) -> None:
+        """Collect devices and states. Without an open scene, the devices that were known last are offline."""
+        identities = {card.object_id: card.identity for card in self._cards.all()}
+        host = next((host for host in reversed(self._hosts) if host.board.reports), None)
+        if host is None:
+            if not self._devices:
+                self._devices = [
+                    DeviceInfo(card.object_id, card.name, card.object_type, self._type_of(card.object_type),
+                               card.identity)
+                    for card in self._cards.all()
+                ]  # fmt: skip
+            self._states = {info.id: DeviceState() for info in self._devices}
+            return
+        executing = self._execution.running
+        devices, states = [], {}
+        for key, report in host.board.reports.items():
+            try:
+                found = host.board.object(key)
+            except NotFound:
+                continue  # the names are not known yet; the board repeats its reports then
+            robot = self._robot_type(host, key)
+            if key not in identities and not robot and not self._is_device(found.type):
+                continue
+            devices.append(DeviceInfo(key, found.name, found.type, robot, identities.get(key, Identity())))
+            codes = tuple(alarm.code for alarm in report.alarms)
+            states[key] = DeviceState(report.connection, report.health, codes, host.board.answering, executing)
+        self._devices, self._states = devices, states
+
+    def _is_device(self, object_type: str) -> bool:
+        try:
+            return not self._types.derives_from(object_type, "VirtualCollisionObject")
+        except Arcor2Error:
+            return True
+
+    def _robot_type(self, host: HostSession, object_id: str) -> str:
+        try:
+            return self._type_of(host.board.object(object_id).type)
+        except NotFound:
+            return ""
+
+    def _type_of(self, object_type: str) -> str:
+        try:
+            robot = self._types.derives_from(object_type, "Robot")
+            return self._types.robot_meta(object_type).robot_type.value if robot else ""
+        except Arcor2Error:  # the type exists only in the package
+            return ""
+
+    def _unit_data(self) -> UnitData:
+        cell, counts = self._cell, self._counts
+        run = self._runs.get(self._execution.program.number)
+        program = recipe = ""
+        if run is not None:
+            program = run.package_name
+            if not isinstance(run.recipe, Unset):
+                recipe = f"{run.recipe.product} {run.recipe.revision}"
+        return UnitData(
+            cell.state, cell.mode, cell.authority.value, cell.job, program, self._execution.active, recipe,
+            counts[UnitState.GOOD], counts[UnitState.BAD], counts[UnitState.REJECTED],
+        )  # fmt: skip
