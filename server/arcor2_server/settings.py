@@ -49,7 +49,8 @@ class PlcListener(msgspec.Struct, frozen=True):
 class OpcUaListener(msgspec.Struct, frozen=True):
     """The address of the OPC UA server.
 
-    anonymous: whether clients without a user may read. unencrypted: whether clients may connect without encryption.
+    anonymous: whether clients without a user may read. unencrypted: whether clients may connect without encryption. On
+    loopback both are also permitted while the server requires no token.
     """
 
     host: str

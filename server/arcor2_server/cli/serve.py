@@ -251,16 +251,14 @@ def _address(option: str, address: str) -> tuple[str, int]:
 
 
 def _opcua(address: str, *, anonymous: bool, unencrypted: bool) -> OpcUaListener:
-    """Return the settings of the OPC UA server. Clients of this machine need neither a user nor encryption.
+    """Return the settings of the OPC UA server.
 
     Raises:
         InvalidData: the address is invalid, or the library is not installed.
     """
     if importlib.util.find_spec("asyncua") is None:
         raise InvalidData("--opcua needs the library asyncua: pip install 'arcor2-hw[opcua]'")
-    host, port = _address("--opcua", address)
-    local = is_loopback(host)
-    return OpcUaListener(host, port, anonymous or local, unencrypted or local)
+    return OpcUaListener(*_address("--opcua", address), anonymous, unencrypted)
 
 
 def _print_openapi() -> int:

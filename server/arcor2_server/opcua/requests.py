@@ -32,6 +32,11 @@ class PlantRequests:
     def __init__(self, access: Access, persons: Persons, plc: Plc, alarms: Alarms, audit: AuditTrail) -> None:
         self._access, self._persons, self._plc, self._alarms, self._audit = access, persons, plc, alarms, audit
 
+    @property
+    def open_to_all(self) -> bool:
+        """Whether clients of this machine need no user."""
+        return self._access.open_to_all
+
     async def log_on(self, request: m.LogOn) -> m.LogOnAnswer:
         """Check a person with a PIN, or a token as the password of any other name."""
         outcome, reason, role = AuditOutcome.DONE, "", None

@@ -10,6 +10,7 @@ import structlog
 
 from arcor2_hw.framing import PREFIX_SIZE, body_length
 from arcor2_hw.opcua import messages as m
+from arcor2_server.access.admission import is_loopback
 from arcor2_server.background import BackgroundTasks
 from arcor2_server.child_process import ChildProcess, describe_exit
 from arcor2_server.opcua.feed import CellFeed
@@ -48,6 +49,7 @@ class OpcUa:
 
     def serve(self, listener: socket.socket) -> None:
         """Start to serve clients on a bound socket. The process is started in the background."""
+        listener.listen()  # clients wait while the process is not running
         self._cell.has_opcua = True
         self._feed.start()
         self._background.spawn(self._keep_running(listener), "OPC UA server")
@@ -87,12 +89,14 @@ class OpcUa:
             writer.transport.abort()
             if process is not None:
                 status = await process.wait_or_kill(EXIT_TIMEOUT)
-                log.warning("OPC UA server ended", pid=process.pid, status=str(describe_exit(status)))
+                write = log.warning if status else log.info
+                write("OPC UA server ended", pid=process.pid, status=str(describe_exit(status)))
             await tasks.cancel()
 
     def _setup(self, listener: socket.socket) -> m.Setup:
         settings, machine = self._settings, socket.gethostname()
         assert settings.opcua is not None
+        local = is_loopback(settings.opcua.host)
         return m.Setup(
             listener=listener.fileno(),
             host=settings.opcua.host,
@@ -101,8 +105,8 @@ class OpcUa:
             folder=str(settings.data_dir.absolute()),
             cell=machine,
             version=version("arcor2-hw"),
-            anonymous=settings.opcua.anonymous,
-            unencrypted=settings.opcua.unencrypted,
+            anonymous=settings.opcua.anonymous or (local and self._requests.open_to_all),
+            unencrypted=settings.opcua.unencrypted or local,
         )
 
     # -------------------------------------------------------------------------------- messages
