@@ -18,6 +18,7 @@ from asyncua.ua.ua_binary import struct_from_binary
 
 from arcor2_hw.opcua.certificates import TrustedClients
 from arcor2_hw.opcua.messages import User
+from arcor2_hw.opcua.space import node_id
 
 MIB: Final = 1024 * 1024
 CHUNK: Final = 65535
@@ -27,11 +28,11 @@ MOST_QUEUED: Final = 1000
 """Maximum queue of a monitored item."""
 LONGEST_MESSAGE: Final = 4 * MIB
 LIMITS: Final = TransportLimits(CHUNK, CHUNK, LONGEST_MESSAGE // CHUNK + 1, LONGEST_MESSAGE)
-_ACTIVATE: Final = ua.NodeId(ua.ObjectIds.ActivateSessionRequest_Encoding_DefaultBinary)
-_CREATE: Final = ua.NodeId(ua.ObjectIds.CreateSessionRequest_Encoding_DefaultBinary)
-_ACKNOWLEDGE: Final = ua.NodeId(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge)
+_ACTIVATE: Final = node_id(ua.ObjectIds.ActivateSessionRequest_Encoding_DefaultBinary)
+_CREATE: Final = node_id(ua.ObjectIds.CreateSessionRequest_Encoding_DefaultBinary)
+_ACKNOWLEDGE: Final = node_id(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge)
 _READING: Final = frozenset(
-    ua.NodeId(getattr(ua.ObjectIds, f"{name}Request_Encoding_DefaultBinary"))
+    node_id(getattr(ua.ObjectIds, f"{name}Request_Encoding_DefaultBinary"))
     for name in (
         "Read", "Browse", "BrowseNext", "TranslateBrowsePathsToNodeIds", "RegisterNodes", "UnregisterNodes",
         "CreateSubscription", "ModifySubscription", "DeleteSubscriptions", "TransferSubscriptions", "SetPublishingMode",
@@ -98,11 +99,12 @@ class Internal(InternalServer):
         trusted: the certificates of clients.
         check: checks a user.
         anonymous: whether clients without a user may read.
+        unencrypted: whether sessions without encryption are permitted.
     """
 
-    def __init__(self, trusted: TrustedClients, check: CheckUser, *, anonymous: bool) -> None:
+    def __init__(self, trusted: TrustedClients, check: CheckUser, *, anonymous: bool, unencrypted: bool) -> None:
         super().__init__(user_manager=Users())  # type: ignore[arg-type]
-        self.trusted, self.check = trusted, check
+        self.trusted, self.check, self.unencrypted = trusted, check, unencrypted
         self.acknowledge: AcknowledgeCondition
         self.max_connections = MOST_CONNECTIONS
         self.max_subscriptions = MOST_SUBSCRIPTIONS
@@ -120,18 +122,24 @@ class Processor(UaProcessor):
     """Checks the certificate of the client and its user before the library handles the request."""
 
     async def _process_message(self, typeid: ua.NodeId, requesthdr: Any, seqhdr: Any, body: Buffer) -> Any:
-        if typeid == _CREATE:
-            self._check_certificate()
-        elif typeid == _ACTIVATE:
+        if typeid in (_CREATE, _ACTIVATE):
+            self.check_channel()
+        if typeid == _ACTIVATE:
             params = struct_from_binary(ua.ActivateSessionParameters, body.copy())
             _checked.set(await self._user(params.UserIdentityToken, requesthdr))
-        return await super()._process_message(typeid, requesthdr, seqhdr, body)
+        return await super()._process_message(typeid, requesthdr, seqhdr, body)  # type: ignore[no-untyped-call]
 
-    def _check_certificate(self) -> None:
-        """Raise ServiceError unless the certificate of the encrypted channel is trusted."""
+    def check_channel(self) -> None:
+        """Raise ServiceError unless sessions may use the channel.
+
+        The library lets every client open a channel without encryption, which is meant for finding endpoints, and
+        create a session on it.
+        """
         server: Any = self.iserver
         policy = self._connection.security_policy
         if policy.Mode is ua.MessageSecurityMode.None_:
+            if not server.unencrypted:
+                raise ServiceError(ua.StatusCodes.BadSecurityPolicyRejected)
             return
         if not policy.peer_certificate or not server.trusted.admits(policy.peer_certificate):
             raise ServiceError(ua.StatusCodes.BadSecurityChecksFailed)
@@ -158,14 +166,15 @@ class Protocol(OPCUAProtocol):
         super().connection_made(transport)
         if self.processor is not None:
             self.processor = Processor(self.iserver, transport, self.limits)
-            self.processor.set_policies(self.policies)
+            self.processor.set_policies(self.policies)  # type: ignore[no-untyped-call]
 
 
 class Listener(BinaryServer):
     """Listens on a socket that is bound already."""
 
     def __init__(self, internal: InternalServer, bound: socket.socket) -> None:
-        super().__init__(internal, *bound.getsockname()[:2], LIMITS)
+        host, port = bound.getsockname()[:2]
+        super().__init__(internal, host, port, LIMITS)
         self._bound = bound
 
     def _make_protocol(self) -> Protocol:

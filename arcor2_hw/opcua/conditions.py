@@ -10,11 +10,11 @@ from asyncua.common.event_objects import AlarmCondition
 
 from arcor2_hw.data.alarms import AlarmRecord, Priority
 from arcor2_hw.opcua.messages import CallAnswer
-from arcor2_hw.opcua.space import Space
+from arcor2_hw.opcua.space import Space, node_id, status_code
 
 SEVERITIES: Final = {Priority.LOW: 200, Priority.MEDIUM: 400, Priority.HIGH: 600, Priority.URGENT: 800}
 """Severity by priority (OPC 10000-9: 1 to 1000)."""
-_SERVER: Final = ua.NodeId(ua.ObjectIds.Server)
+_SERVER: Final = node_id(ua.ObjectIds.Server)
 _TEXTS: Final = {
     "EnabledState": ("Enabled", "Disabled"),
     "ActiveState": ("Active", "Inactive"),
@@ -59,7 +59,7 @@ class Conditions:
         await self._space.server.iserver.subscription_service.trigger_event(event)
 
     def _event(self, alarm: AlarmRecord) -> Any:
-        event: Any = AlarmCondition()
+        event: Any = AlarmCondition()  # type: ignore[no-untyped-call]
         node, name = self._source(alarm)
         changed = alarm.acknowledged_at or alarm.cleared or alarm.raised
         values = {
@@ -70,12 +70,12 @@ class Conditions:
             "ReceiveTime": datetime.fromisoformat(changed),
             "Message": ua.LocalizedText(" ".join(filter(None, (alarm.text, alarm.remedy)))),
             "Severity": SEVERITIES[alarm.priority],
-            "ConditionClassId": ua.NodeId(ua.ObjectIds.ProcessConditionClassType),
+            "ConditionClassId": node_id(ua.ObjectIds.ProcessConditionClassType),
             "ConditionClassName": ua.LocalizedText("ProcessConditionClass"),
             "ConditionName": alarm.kind,
             "BranchId": ua.NodeId(),
             "Retain": alarm.retain,
-            "Quality": ua.StatusCode(0),
+            "Quality": status_code(0),
             "LastSeverity": SEVERITIES[alarm.priority],
             "Comment": ua.LocalizedText(alarm.note or ""),
             "ClientUserId": alarm.acknowledged_by or "",
@@ -97,17 +97,17 @@ class Conditions:
         """Acknowledge a condition; return the status of the call."""
         kind, _, number = str(condition.Identifier).partition("/")
         if condition.NamespaceIndex != self._space.own("").NamespaceIndex or kind != "alarms" or not number.isdigit():
-            return ua.StatusCode(ua.StatusCodes.BadNodeIdUnknown)
+            return status_code(ua.StatusCodes.BadNodeIdUnknown)
         alarm = self.retained.get(int(number))
         if alarm is None:
-            return ua.StatusCode(ua.StatusCodes.BadNodeIdUnknown)
+            return status_code(ua.StatusCodes.BadNodeIdUnknown)
         if len(arguments) != 2:
-            return ua.StatusCode(ua.StatusCodes.BadArgumentsMissing)
+            return status_code(ua.StatusCodes.BadArgumentsMissing)
         event_id, comment = (argument.Value for argument in arguments)
         if event_id != self._events.get(alarm.number):
-            return ua.StatusCode(ua.StatusCodes.BadEventIdUnknown)
+            return status_code(ua.StatusCodes.BadEventIdUnknown)
         if alarm.acknowledged:
-            return ua.StatusCode(ua.StatusCodes.BadConditionBranchAlreadyAcked)
+            return status_code(ua.StatusCodes.BadConditionBranchAlreadyAcked)
         text = comment.Text if isinstance(comment, ua.LocalizedText) and comment.Text else ""
         answer = await self._acknowledge(alarm.number, text)
-        return ua.StatusCode(ua.StatusCodes.BadUserAccessDenied if answer.result else 0)
+        return status_code(ua.StatusCodes.BadUserAccessDenied if answer.result else 0)

@@ -120,7 +120,12 @@ class Process:
         folder = Path(setup.folder)
         hosts = [setup.machine, setup.host, "localhost", "127.0.0.1"]
         files = own_certificate(folder, setup.machine, [each for each in hosts if each not in ("0.0.0.0", "::")])  # noqa: S104
-        internal = Internal(TrustedClients(folder), self._check_user, anonymous=setup.anonymous)
+        internal = Internal(
+            TrustedClients(folder),
+            self._check_user,
+            anonymous=setup.anonymous,
+            unencrypted=setup.unencrypted,
+        )
         server = self._server = OpcUaServer(iserver=internal)
         await server.init()
         server.product_uri, server.manufacturer_name = "urn:arcor2-hw", VENDOR

@@ -53,6 +53,16 @@ UNITS: Final = {
 Method = Callable[..., Awaitable[Any]]
 
 
+def node_id(identifier: Any, namespace: Any = 0) -> ua.NodeId:
+    """Return a node identifier."""
+    return ua.NodeId(identifier, namespace)
+
+
+def status_code(code: Any) -> ua.StatusCode:
+    """Return a status code."""
+    return ua.StatusCode(code)
+
+
 class Tag:
     """A variable whose value is written repeatedly. An unchanged value is written once per REFRESH.
 
@@ -77,7 +87,8 @@ class Tag:
             return
         self._last, self._at = last, stamp
         kind = None if value is None else self._kind
-        data = ua.DataValue(ua.Variant(value, kind), StatusCode=ua.StatusCode(status), SourceTimestamp=at)
+        stamped: Any = at
+        data = ua.DataValue(_variant(value, kind), StatusCode=status_code(status), SourceTimestamp=stamped)
         await self._server.write_attribute_value(self.node, data)
 
     async def invalidate(self, status: int) -> None:
@@ -109,11 +120,11 @@ class Space:
     # -------------------------------------------------------------------------------- identifiers
     def standard(self, namespace: str, number: int) -> ua.NodeId:
         """Return a node of a specification by its number."""
-        return ua.NodeId(number, self._index[namespace])
+        return node_id(number, self._index[namespace])
 
     def own(self, *path: str) -> ua.NodeId:
         """Return the identifier of one of our nodes. It stays the same after a restart."""
-        return ua.NodeId("/".join(path), self._index["own"])
+        return node_id("/".join(path), self._index["own"])
 
     def name(self, namespace: str, name: str) -> ua.QualifiedName:
         """Return a browse name."""
@@ -170,9 +181,10 @@ class Space:
             variant: encoding of its values; None: by the data type, if it is a number of a built-in type.
             rank: -1: one value, 1: an array.
         """
-        data_type = data_type if isinstance(data_type, ua.NodeId) else ua.NodeId(data_type)
-        if variant is None and data_type.NamespaceIndex == 0 and data_type.Identifier <= ua.ObjectIds.LocalizedText:
-            variant = ua.VariantType(data_type.Identifier)
+        data_type = data_type if isinstance(data_type, ua.NodeId) else node_id(data_type)
+        number: Any = data_type.Identifier
+        if variant is None and data_type.NamespaceIndex == 0 and number <= ua.ObjectIds.LocalizedText:
+            variant = ua.VariantType(number)
         elif variant is None and type(value) is int:
             variant = ua.VariantType.Int32  # an enumeration
         attributes = ua.VariableAttributes()
@@ -182,7 +194,7 @@ class Space:
         attributes.AccessLevel = attributes.UserAccessLevel = ua.AccessLevel.CurrentRead.mask
         attributes.MinimumSamplingInterval = 100.0
         attributes.Historizing = False
-        attributes.Value = ua.Variant(value, variant if value is not None else None)
+        attributes.Value = _variant(value, None if value is None else variant)
         is_property = kind == ua.ObjectIds.PropertyType
         reference = ua.ObjectIds.HasProperty if is_property else ua.ObjectIds.HasComponent
         node = await self._add(parent, name, kind, reference, ua.NodeClass.Variable, attributes, None)
@@ -215,10 +227,10 @@ class Space:
         """Add a method. Without a function clients see it, and that it cannot be executed."""
 
         async def refuse(_parent: ua.NodeId, *_arguments: ua.Variant) -> ua.StatusCode:
-            return ua.StatusCode(ua.StatusCodes.BadNotExecutable)
+            return status_code(ua.StatusCodes.BadNotExecutable)
 
         node = await self.server.get_node(parent).add_method(
-            ua.NodeId(f"{parent.Identifier}/{name.Name}", self._index["own"]),
+            self.own(str(parent.Identifier), str(name.Name)),
             name,
             method or refuse,
             list(inputs),
@@ -246,17 +258,22 @@ class Space:
         attributes: Any,
         node: ua.NodeId | None,
     ) -> ua.NodeId:
-        prefix = parent.Identifier if parent.NamespaceIndex == self._index["own"] else ""
+        prefix = str(parent.Identifier) if parent.NamespaceIndex == self._index["own"] else ""
         item = ua.AddNodesItem()
         item.ParentNodeId = parent
-        item.ReferenceTypeId = reference if isinstance(reference, ua.NodeId) else ua.NodeId(reference)
-        item.RequestedNewNodeId = node or self.own(*filter(None, (prefix, name.Name)))
+        item.ReferenceTypeId = reference if isinstance(reference, ua.NodeId) else node_id(reference)
+        item.RequestedNewNodeId = node or self.own(*filter(None, (prefix, str(name.Name))))
         item.BrowseName = name
         item.NodeClass = node_class
-        item.TypeDefinition = kind if isinstance(kind, ua.NodeId) else ua.NodeId(kind)
+        item.TypeDefinition = kind if isinstance(kind, ua.NodeId) else node_id(kind)
         attributes.DisplayName = ua.LocalizedText(name.Name)
         attributes.WriteMask = attributes.UserWriteMask = 0
         item.NodeAttributes = attributes
         (result,) = await self.server.iserver.isession.add_nodes([item])
         result.StatusCode.check()
-        return result.AddedNodeId
+        added: ua.NodeId = result.AddedNodeId
+        return added
+
+
+def _variant(value: Any, kind: Any) -> ua.Variant:
+    return ua.Variant(value, kind)

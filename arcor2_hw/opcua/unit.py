@@ -11,7 +11,7 @@ from arcor2_hw.data.device import Identity
 from arcor2_hw.data.packml import MachineCommand, MachineState, UnitMode
 from arcor2_hw.opcua.devices import add_identification, add_item_state, add_operation_mode
 from arcor2_hw.opcua.messages import CallAnswer, DeviceInfo, Setup, UnitData
-from arcor2_hw.opcua.space import UNKNOWN, Space, Tag
+from arcor2_hw.opcua.space import UNKNOWN, Space, Tag, node_id, status_code
 from arcor2_hw.opcua.states import StateMachine
 
 VENDOR: Final = "ARCOR2-HW"
@@ -99,10 +99,10 @@ class Unit:
         async def request(_parent: ua.NodeId, *arguments: ua.Variant) -> Any:
             values = [argument.Value for argument in arguments]
             if len(values) != len(inputs) or not all(map(isinstance, values, (str, int, int))):
-                return ua.StatusCode(ua.StatusCodes.BadInvalidArgument)
+                return status_code(ua.StatusCodes.BadInvalidArgument)
             identifier, command, job = values
             if not identifier:
-                return ua.StatusCode(ua.StatusCodes.BadInvalidArgument)
+                return status_code(ua.StatusCodes.BadInvalidArgument)
             answer = await self._execute(command, job, identifier)
             return [ua.Variant(answer.result, ua.VariantType.UInt16), ua.Variant(answer.text)]
 
@@ -238,7 +238,7 @@ class Unit:
         ordered = sorted(alarms, key=lambda each: (-PRIORITIES.index(each.priority), each.number))
         reasons = []
         for each in ordered[:10]:
-            reason = ua.PackMLAlarmDataType()
+            reason = ua.PackMLAlarmDataType()  # type: ignore[attr-defined]
             reason.ID, reason.Value = each.number, PRIORITIES.index(each.priority) + 1
             reason.Message, reason.Category = (
                 f"{each.kind}: {each.text}",
@@ -259,11 +259,11 @@ def _time_or_none(alarm: AlarmRecord) -> datetime:
 
 
 def _status(answer: CallAnswer) -> ua.StatusCode:
-    return ua.StatusCode(REFUSED.get(answer.result, ua.StatusCodes.BadInvalidState) if answer.result else 0)
+    return status_code(REFUSED.get(answer.result, ua.StatusCodes.BadInvalidState) if answer.result else 0)
 
 
 def _count(name: str, number: int) -> Any:
-    count = ua.PackMLCountDataType()
+    count = ua.PackMLCountDataType()  # type: ignore[attr-defined]
     count.Name, count.Count, count.AccCount = name, number, number
     return count
 
@@ -271,7 +271,7 @@ def _count(name: str, number: int) -> Any:
 def _argument(name: str, data_type: ua.NodeId | int, text: str, rank: int = -1) -> ua.Argument:
     return ua.Argument(
         Name=name,
-        DataType=data_type if isinstance(data_type, ua.NodeId) else ua.NodeId(data_type),
+        DataType=data_type if isinstance(data_type, ua.NodeId) else node_id(data_type),
         ValueRank=rank,
         ArrayDimensions=[0] if rank > 0 else [],
         Description=ua.LocalizedText(text),

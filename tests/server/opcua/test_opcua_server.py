@@ -93,7 +93,7 @@ async def cell(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Plant]
     server = ServerProcess(data, "--opcua", f"127.0.0.1:{port}", ARCOR2_HW_DEVICE_FILES=str(folder))
     await server.start()
     try:
-        async with talking(f"{server.url}/?token={secret}", "technician") as hub:
+        async with talking(f"{server.url}/?token={secret}", "technician", max_queue=None) as hub:
             await hub.granted("AddPerson", {"name": "Line 7", "role": "operator", "pin": PIN})
             await hub.granted("SetCellJobs", {"jobs": [{"number": 7, "package_id": "pkg_1"}]})
             files = plant.client_certificate(folder)
@@ -170,7 +170,7 @@ async def test_only_trusted_clients_with_the_right_user_read(cell: Plant) -> Non
     rejected.rename(cell.data / "opcua-trusted" / rejected.name)  # as an administrator does
     for user, secret in (("Line 7", "99999"), ("nobody", "wrong"), ("", "")):
         client = await plant.encrypted(cell.url, cell.files, user, secret)
-        with pytest.raises(ua.UaStatusCodeError, match="BadUserAccessDenied|BadIdentityTokenRejected"):
+        with pytest.raises(ua.UaStatusCodeError, match=r"BadUserAccessDenied|BadIdentityTokenRejected"):
             await plant.connected(client)
     async with cell.connected() as client:
         uris = {each.Server.ApplicationUri for each in await client.get_endpoints()}

@@ -1,0 +1,170 @@
+"""Certificates, channels, repeated requests, streams and a slow process of the OPC UA server."""
+
+import asyncio
+import socket
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import msgspec
+import pytest
+from asyncua import ua
+from asyncua.common.utils import ServiceError
+from cryptography import x509
+
+from arcor2_hw.data.cell_state import CellAuthority, CellJob
+from arcor2_hw.data.packml import MachineCommand
+from arcor2_hw.opcua import access, messages as m
+from arcor2_hw.opcua.certificates import TrustedClients, application_uri, own_certificate
+from arcor2_hw.runtime.messages import Stream, StreamEvent
+from arcor2_server.hosts.streams import POINTS, RobotStreams
+from arcor2_server.opcua import service
+from arcor2_server.opcua.service import OpcUa
+from arcor2_server.packml.plc import Plc
+from arcor2_server.packml.record import CellFile, RequestResult as R
+from tests.server.opcua.plant_client import client_certificate
+from tests.server.packml.test_rules import new_cell
+
+
+def test_the_certificate_names_the_machine_and_is_renewed_only_for_another_name(tmp_path: Path) -> None:
+    first = own_certificate(tmp_path, "cell-7", ["cell-7", "192.0.2.7"])
+    before = first[0].read_bytes()
+    names = x509.load_pem_x509_certificate(before).extensions.get_extension_for_class(x509.SubjectAlternativeName)
+    assert names.value.get_values_for_type(x509.UniformResourceIdentifier) == [application_uri("cell-7")]
+    assert first[1].stat().st_mode & 0o77 == 0
+    assert own_certificate(tmp_path, "cell-7", [])[0].read_bytes() == before
+    assert own_certificate(tmp_path, "cell-8", [])[0].read_bytes() != before
+
+
+def test_only_certificates_in_the_folder_are_trusted(tmp_path: Path) -> None:
+    trusted = TrustedClients(tmp_path)
+    certificate = client_certificate(tmp_path)[0].read_bytes()
+    assert not trusted.admits(b"no certificate")
+    assert not trusted.admits(certificate)
+    (rejected,) = (tmp_path / "opcua-rejected").iterdir()
+    (tmp_path / "opcua-trusted" / "damaged.pem").write_text("-----BEGIN CERTIFICATE-----")
+    rejected.rename(tmp_path / "opcua-trusted" / "scada.der")
+    assert trusted.admits(certificate)
+
+
+@pytest.mark.parametrize(("unencrypted", "refused"), [(True, False), (False, True)])
+def test_a_channel_without_encryption_finds_endpoints_but_has_no_session(unencrypted: bool, refused: bool) -> None:
+    server: Any = SimpleNamespace(unencrypted=unencrypted)
+    transport: Any = SimpleNamespace(get_extra_info=lambda _: ("192.0.2.9", 50000))
+    processor = access.Processor(server, transport, access.LIMITS)
+    if refused:
+        with pytest.raises(ServiceError) as raised:
+            processor.check_channel()
+        assert raised.value.code == ua.StatusCodes.BadSecurityPolicyRejected
+    else:
+        processor.check_channel()
+
+
+class Runs:
+    """Counts the started packages."""
+
+    started = 0
+
+    async def run_package(self, package_id: str, how: Any) -> None:
+        self.started += 1
+
+
+READING: Any = SimpleNamespace(read_json=lambda path, kind, loss: msgspec.json.decode(path.read_bytes(), type=kind))
+"""Reads the file of the cell, which is not damaged."""
+
+
+async def new_plc(tmp_path: Path) -> tuple[Plc, Runs]:
+    """Return a PLC with the authority and one job, and the runs that it starts. The cell is idle."""
+    cell, parts = new_cell(tmp_path)
+    parts.active = parts.running = False
+    file = cell._file
+    runs: Any = Runs()
+    nothing: Any = SimpleNamespace(system=lambda *_: None, note=lambda *_, **__: None)
+    await file.put(authority=CellAuthority.PLC, jobs=[CellJob(1, "pkg_1")])
+    plc = Plc(cell, file, runs, nothing, nothing, 2.0)
+    await plc.execute_once(MachineCommand.RESET, 0, "mes", "")
+    return plc, runs
+
+
+async def test_a_request_is_executed_once_and_not_repeated_after_a_lost_answer(tmp_path: Path) -> None:
+    plc, runs = await new_plc(tmp_path)
+    start = MachineCommand.START, 1, "mes"
+    answers = await asyncio.gather(*(plc.execute_once(*start, "order 1") for _ in range(3)))
+    assert [result for result, _ in answers] == [R.ACCEPTED] * 3
+    assert runs.started == 1
+    await plc.execute_once(*start, "order 2")
+    assert runs.started == 2
+
+
+async def test_a_request_during_which_the_server_ended_is_not_repeated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plc, runs = await new_plc(tmp_path)
+
+    async def end(*_: Any) -> None:
+        raise asyncio.CancelledError
+
+    monkeypatch.setattr(runs, "run_package", end)
+    with pytest.raises(asyncio.CancelledError):
+        await plc.execute_once(MachineCommand.START, 1, "mes", "order 1")
+    monkeypatch.undo()
+    result, text = await plc.execute_once(MachineCommand.START, 1, "mes", "order 1")
+    assert (result, runs.started) == (R.INTERRUPTED, 0)
+    assert text is not None
+    restarted = CellFile(tmp_path / "cell-state.json")
+    restarted.load(READING)
+    assert [each.id for each in restarted.record.plant_requests] == ["order 1"]
+
+
+def test_a_stream_is_observed_next_to_clients_until_the_host_ends() -> None:
+    sent: list[Any] = []
+    hub: Any = SimpleNamespace(clients=set())
+    streams, seen = RobotStreams(hub, sent.append), []
+    client: Any = object()
+    streams.at_rate(client, "obj", POINTS, 2.0, True)
+    streams.observe("obj", POINTS, 5.0, seen.append)
+    assert sent[-1] == Stream("obj", [], [], [], [2.0, 5.0])
+    streams.publish(StreamEvent("ObjectPoints", "obj", b"5", 5.0))
+    streams.publish(StreamEvent("ObjectPoints", "obj", b"2", 2.0))
+    streams.publish(StreamEvent("ObjectPoints", "other", b"x", 5.0))
+    streams.forget(client)
+    assert sent[-1] == Stream("obj", [], [], [], [5.0])
+    streams.clear()
+    streams.publish(StreamEvent("ObjectPoints", "obj", b"5", 5.0))
+    assert seen == [b"5"]
+
+
+class Feed:
+    """Always has changes."""
+
+    calls = 0
+
+    async def everything(self) -> m.Update:
+        return m.Update()
+
+    async def changes(self) -> m.Update:
+        self.calls += 1
+        return m.Update(streams=[bytes(100_000)])
+
+
+async def test_a_process_that_does_not_read_gets_no_queue_of_updates(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(service, "PERIOD", 0.0)
+    feed: Any = Feed()
+    nothing: Any = None
+    opcua = OpcUa(nothing, feed, nothing, nothing)
+    ours, theirs = socket.socketpair()
+    _, writer = await asyncio.open_unix_connection(sock=ours)
+    sending = asyncio.create_task(opcua._send(writer))
+    try:
+        while writer.transport.get_write_buffer_size() <= service.MOST_UNSENT:
+            await asyncio.sleep(0)
+        calls = feed.calls
+        for _ in range(100):
+            await asyncio.sleep(0)
+        assert feed.calls <= calls + 1
+        assert writer.transport.get_write_buffer_size() < service.MOST_UNSENT + 200_000
+    finally:
+        sending.cancel()
+        writer.transport.abort()
+        theirs.close()
+        await asyncio.gather(sending, return_exceptions=True)
