@@ -118,7 +118,7 @@ async def test_a_request_during_which_the_server_ended_is_not_repeated(
 
 def test_a_stream_is_observed_next_to_clients_until_the_host_ends() -> None:
     sent: list[Any] = []
-    hub: Any = SimpleNamespace(clients=set())
+    hub: Any = SimpleNamespace(clients=set(), stream=lambda *_: None)
     streams, seen = RobotStreams(hub, sent.append), []
     client: Any = object()
     streams.at_rate(client, "obj", POINTS, 2.0, True)

@@ -282,3 +282,10 @@ async def test_a_killed_process_is_restarted_and_clients_return(cell: Plant) -> 
         machine = await plant.child(await unit_of(client), *names)
         await command(machine, "Stop")
         await until_state(client, machine, "Stopped")
+
+
+async def test_the_client_of_the_how_to_reads_the_state(cell: Plant) -> None:
+    page = (Path(__file__).parents[3] / "docs" / "how-to" / "opcua.md").read_text()
+    code: dict[str, Any] = {}
+    exec(page.partition("```python\n")[2].partition("```")[0], code)
+    assert await code["read_state"](cell.url, *map(str, cell.files), "Line 7", PIN) == "BadStateNotActive"

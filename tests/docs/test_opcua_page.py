@@ -1,0 +1,36 @@
+"""The page about OPC UA matches the options, limits, severities and methods of the OPC UA server."""
+
+import re
+from pathlib import Path
+
+from arcor2_hw.opcua import access, conditions, process, space
+from arcor2_server.cli.main import app
+from arcor2_server.opcua import requests, service
+from arcor2_server.packml import plc
+
+PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "opcua.md").read_text()
+
+
+def test_the_page_states_the_limits_of_the_server() -> None:
+    numbers = {
+        r"at most (\d+) connections": access.MOST_CONNECTIONS,
+        r"and (\d+) subscriptions": access.MOST_SUBSCRIPTIONS,
+        r"text of at most (\d+) characters": requests.LONGEST_REQUEST_ID,
+        r"The last (\d+) are stored": plc.MOST_PLANT_REQUESTS,
+        r"does not answer for (\d+) s": process.STALE_AFTER,
+        r"later after up to (\d+) s": service.LONGEST_PAUSE,
+    }
+    for pattern, number in numbers.items():
+        (found,) = re.findall(pattern, PAGE)
+        assert float(found) == number, pattern
+    for priority, severity in conditions.SEVERITIES.items():
+        assert f"{severity} {priority.value}" in PAGE
+    assert space.URIS["own"] in PAGE
+    assert process.PATH in PAGE
+
+
+def test_the_options_exist() -> None:
+    named = set(re.findall(r"--opcua[\w-]*", PAGE))
+    help_text = " ".join(str(each.name) for each in app["serve"].assemble_argument_collection())
+    assert named
+    assert [option for option in named if option not in help_text] == []
