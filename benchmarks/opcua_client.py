@@ -35,7 +35,8 @@ async def main(url: str, count: int) -> None:
     ended = asyncio.Event()
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
     async with Client(url, timeout=60.0) as client:
-        counter, points = Counter(), {}
+        counter = Counter()
+        points: dict[str, Node] = {}
         while len(points) < count:
             points = {each.nodeid.to_string(): each for each in await points_below(client.nodes.objects)}
         subscription = await client.create_subscription(100, counter)

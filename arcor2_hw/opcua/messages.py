@@ -89,10 +89,10 @@ class Update(Struct, frozen=True, tag=True):
 
 
 class User(Struct, frozen=True):
-    """A user who has logged on. role: number of the role."""
+    """A user who has logged on. key: id of the person or token."""
 
     name: str
-    role: int
+    key: str
 
 
 class LogOnAnswer(Struct, frozen=True, tag=True):

@@ -61,8 +61,10 @@ class RobotStreams:
 
     def observe(self, object_id: str, what: str, rate: float, receive: Callable[[bytes], None]) -> None:
         """Pass the encoded events of a stream at `rate`, 1/s, to another part of the server until `clear`."""
+        before = self._observers.get((object_id, what))
         self._observers[object_id, what] = rate, receive
-        self._update_host_rates(object_id)
+        if before is None or before[0] != rate:
+            self._update_host_rates(object_id)
 
     def publish(self, message: m.StreamEvent) -> None:
         """Publish a message of the host. It is encoded once for all clients."""

@@ -6,12 +6,15 @@ from arcor2_hw.data.audit import AuditOutcome
 from arcor2_hw.data.packml import MachineCommand
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.messages import Message
 from arcor2_hw.opcua import messages as m
-from arcor2_server.access.admission import Access, right
+from arcor2_server.access.admission import Access, AccessRefused, right
+from arcor2_server.access.tokens import Token
 from arcor2_server.alarms.service import Alarms
 from arcor2_server.audit.trail import AuditTrail
 from arcor2_server.collaboration.persons import Persons
 from arcor2_server.packml.plc import Plc
+from arcor2_server.packml.record import RequestResult
 from arcor2_server.packml.states import COMMANDS
 
 LONGEST_REQUEST_ID: Final = 100
@@ -31,6 +34,8 @@ class PlantRequests:
 
     def __init__(self, access: Access, persons: Persons, plc: Plc, alarms: Alarms, audit: AuditTrail) -> None:
         self._access, self._persons, self._plc, self._alarms, self._audit = access, persons, plc, alarms, audit
+        self._tokens: dict[str, Token] = {}
+        """The tokens with which clients have logged on, by id."""
 
     @property
     def open_to_all(self) -> bool:
@@ -39,32 +44,46 @@ class PlantRequests:
 
     async def log_on(self, request: m.LogOn) -> m.LogOnAnswer:
         """Check a person with a PIN, or a token as the password of any other name."""
-        outcome, reason, role = AuditOutcome.DONE, "", None
+        outcome, reason, role, user = AuditOutcome.DONE, "", None, None
         try:
-            role = await self._role(request)
+            user = m.User(request.name, await self._key(request))
+            role = await self._role(user)
         except Arcor2Error as error:
             outcome, reason = AuditOutcome.REFUSED, str(error)
-        name = request.name
-        self._audit.note(outcome, "OpcUaLogOn", user=name, role=role, address=request.address, reason=reason)
-        return m.LogOnAnswer(request.number, None if role is None else m.User(name, role))
+        self._audit.note(outcome, "OpcUaLogOn", user=request.name, role=role, address=request.address, reason=reason)
+        return m.LogOnAnswer(request.number, None if role is None else user)
 
-    async def _role(self, request: m.LogOn) -> Role:
+    async def _key(self, request: m.LogOn) -> str:
+        """Return the id of the person or token. Raise Arcor2Error if the secret is wrong."""
         for person in await self._persons.all():
             if person.name.casefold() == request.name.casefold():
                 await self._persons.check_pin(person.id, request.secret, f"OPC UA {request.address}")
-                return person.role
-        admission = self._access.by_token(request.secret, request.address)
-        assert admission.role is not None
-        shared = admission.token is not None and admission.token.shared
-        return right(admission.role, shared=shared, person=None)
+                return person.id
+        token = self._access.by_token(request.secret, request.address).token
+        assert token is not None
+        self._tokens[token.id] = token
+        return token.id
+
+    async def _role(self, user: m.User) -> Role:
+        """Return the present role of a user. Raise AccessRefused if the token was revoked or the person removed."""
+        if (token := self._tokens.get(user.key)) is not None:
+            if not self._access.valid(token):
+                raise AccessRefused("The token is not valid: it is unknown, revoked or expired.")
+            return right(token.role, shared=token.shared, person=None)
+        return (await self._persons.get(user.key)).role
 
     async def command(self, request: m.Command) -> m.CallAnswer:
         """Execute a command. A request with an identifier is executed once."""
-        user, address = request.user, request.address
-        by = f"{user.name} (OPC UA)"
-        result, text = await self._plc.execute_once(
-            request.command, request.job, by, request.request[:LONGEST_REQUEST_ID]
-        )
+        user, address, role = request.user, request.address, None
+        text: Message | None
+        try:
+            role = await self._role(user)
+        except Arcor2Error as error:
+            result, text = RequestResult.NO_AUTHORITY, error.message
+        else:
+            result, text = await self._plc.execute_once(
+                request.command, request.job, f"{user.name} (OPC UA)", request.request[:LONGEST_REQUEST_ID]
+            )
         known = request.command in COMMANDS
         name = MachineCommand(request.command).name.capitalize() if known else str(request.command)
         self._audit.note(
@@ -72,7 +91,7 @@ class PlantRequests:
             f"OPC UA {name}",
             target=f"job {request.job}" if request.command == MachineCommand.START else "",
             user=user.name,
-            role=Role(user.role),
+            role=role,
             address=address,
             reason="" if text is None else text.text,
         )
@@ -80,9 +99,10 @@ class PlantRequests:
 
     async def acknowledge(self, request: m.Acknowledge) -> m.CallAnswer:
         """Acknowledge an alarm with the role of the user."""
-        user, text = request.user, ""
+        user, role, text = request.user, None, ""
         try:
-            await self._alarms.acknowledge(request.alarm, user.name, Role(user.role), request.note[:LONGEST_NOTE])
+            role = await self._role(user)
+            await self._alarms.acknowledge(request.alarm, user.name, role, request.note[:LONGEST_NOTE])
         except Arcor2Error as error:
             text = str(error)
         self._audit.note(
@@ -90,7 +110,7 @@ class PlantRequests:
             "AcknowledgeAlarm",
             target=str(request.alarm),
             user=user.name,
-            role=Role(user.role),
+            role=role,
             address=request.address,
             reason=text,
         )

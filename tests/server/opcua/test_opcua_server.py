@@ -250,6 +250,15 @@ async def test_a_pulled_cable_is_a_bad_status_and_an_alarm(cell: Plant) -> None:
         alarm = await watch.event(lambda event: event.SourceName == "arm" and event.ActiveState.Text == "Active")
         assert alarm.Severity > 0
         assert not getattr(alarm, "AckedState/Id")
+        late = plant.Watch()
+        second = await client.create_subscription(100, late)
+        await second.subscribe_alarms_and_conditions(ua.ObjectIds.Server, ua.ObjectIds.AlarmConditionType)
+        await client.get_node(ua.ObjectIds.ConditionType).call_method(
+            ua.NodeId(ua.ObjectIds.ConditionType_ConditionRefresh),
+            ua.Variant(second.subscription_id, ua.VariantType.UInt32),
+        )
+        assert (await late.event(lambda event: event.SourceName == "arm")).NodeId == alarm.NodeId
+
         condition = client.get_node(alarm.NodeId)
         acknowledge = ua.NodeId(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge)
         arguments = ua.Variant(alarm.EventId), ua.Variant(ua.LocalizedText("seen by the line"))
@@ -289,3 +298,15 @@ async def test_the_client_of_the_how_to_reads_the_state(cell: Plant) -> None:
     code: dict[str, Any] = {}
     exec(page.partition("```python\n")[2].partition("```")[0], code)
     assert await code["read_state"](cell.url, *map(str, cell.files), "Line 7", PIN) == "BadStateNotActive"
+
+
+async def test_a_removed_person_commands_nothing_more(cell: Plant) -> None:
+    async with cell.connected() as client:
+        method = await request_method(client)
+        assert (await call_request(client, method, "reset 1", 1, 0))[0] == 0
+        person = (await cell.hub.granted("AddPerson", {"name": "Eva", "role": "programmer", "pin": "77123"}))["id"]
+        (line,) = [each for each in (await cell.hub.granted("ListPersons"))["persons"] if each["id"] != person]
+        await cell.hub.granted("RemovePerson", {"id": line["id"]})
+        result, text = await call_request(client, method, "stop 1", 3, 0)
+        assert result == 1
+        assert text
