@@ -1,6 +1,7 @@
 """The alarms of the cell as conditions (OPC 10000-9): an event for each change, refresh, acknowledgement."""
 
 import uuid
+from collections import deque
 from collections.abc import Awaitable, Callable
 from datetime import datetime
 from typing import Any, Final
@@ -14,6 +15,8 @@ from arcor2_hw.opcua.space import Space, node_id, status_code
 
 SEVERITIES: Final = {Priority.LOW: 200, Priority.MEDIUM: 400, Priority.HIGH: 600, Priority.URGENT: 800}
 """Severity by priority (OPC 10000-9: 1 to 1000)."""
+KNOWN_EVENTS: Final = 16
+"""Number of stored event identifiers of an alarm."""
 _SERVER: Final = node_id(ua.ObjectIds.Server)
 _TEXTS: Final = {
     "EnabledState": ("Enabled", "Disabled"),
@@ -39,7 +42,8 @@ class Conditions:
         self._space, self._source, self._acknowledge = space, source, acknowledge
         self.retained: dict[int, AlarmRecord] = {}
         """The alarms that need attention, by number."""
-        self._events: dict[int, bytes] = {}
+        self._events: dict[int, deque[bytes]] = {}
+        """The identifiers of the last events of each retained alarm, any of which a client may acknowledge."""
 
     @staticmethod
     async def prepare(server: Server) -> None:
@@ -53,9 +57,10 @@ class Conditions:
         elif self.retained.pop(alarm.number, None) is None:
             return  # a change of an alarm that clients do not know, such as a note
         event = self._event(alarm)
-        self._events[alarm.number] = event.EventId
-        if not alarm.retain:
-            del self._events[alarm.number]
+        if alarm.retain:
+            self._events.setdefault(alarm.number, deque(maxlen=KNOWN_EVENTS)).append(event.EventId)
+        else:
+            self._events.pop(alarm.number, None)
         await self._space.server.iserver.subscription_service.trigger_event(event)
 
     def _event(self, alarm: AlarmRecord) -> Any:
@@ -104,7 +109,7 @@ class Conditions:
         if len(arguments) != 2:
             return status_code(ua.StatusCodes.BadArgumentsMissing)
         event_id, comment = (argument.Value for argument in arguments)
-        if event_id != self._events.get(alarm.number):
+        if event_id not in self._events.get(alarm.number, ()):
             return status_code(ua.StatusCodes.BadEventIdUnknown)
         if alarm.acknowledged:
             return status_code(ua.StatusCodes.BadConditionBranchAlreadyAcked)

@@ -19,15 +19,16 @@ class Setup(Struct, frozen=True, tag=True):
     """The first message.
 
     listener: file descriptor of the bound socket. host, port: address that clients connect to. machine: name of this
-    machine, which is part of the application URI. folder: for certificate, key and trusted certificates. cell: name of
-    the cell. version: of the product. anonymous: whether clients without a user may read. unencrypted: whether the
-    endpoint without encryption exists.
+    machine, which is part of the application URI. hosts: names and addresses for the certificate. folder: for
+    certificate, key and trusted certificates. cell: name of the cell. version: of the product. anonymous: whether
+    clients without a user may read. unencrypted: whether the endpoint without encryption exists.
     """
 
     listener: int
     host: str
     port: int
     machine: str
+    hosts: list[str]
     folder: str
     cell: str
     version: str

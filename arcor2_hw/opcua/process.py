@@ -84,6 +84,7 @@ class Process:
         self._numbers = itertools.count(1)
         self._answers: dict[int, asyncio.Future[Any]] = {}
         self._devices: dict[str, Device] = {}
+        self._unit_data = m.UnitData()
         self._heard = time.monotonic()
 
     async def run(self) -> None:
@@ -118,8 +119,7 @@ class Process:
 
     async def _start(self, setup: m.Setup) -> None:
         folder = Path(setup.folder)
-        hosts = [setup.machine, setup.host, "localhost", "127.0.0.1"]
-        files = own_certificate(folder, setup.machine, [each for each in hosts if each not in ("0.0.0.0", "::")])  # noqa: S104
+        files = own_certificate(folder, setup.machine, setup.hosts)
         internal = Internal(
             TrustedClients(folder),
             self._check_user,
@@ -167,10 +167,12 @@ class Process:
         for encoded in update.streams:
             await self._stream(encoded)
         if update.unit is not None:
+            self._unit_data = update.unit
             await self._unit.set(update.unit)
+        if update.unit is not None or update.devices is not None:
             for device in self._devices.values():
                 if device.robot is not None:
-                    await device.robot.set_program(update.unit)
+                    await device.robot.set_program(self._unit_data)
         for alarm in update.alarms:
             await self._conditions.change(alarm)
         if update.alarms:

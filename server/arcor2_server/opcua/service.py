@@ -10,6 +10,7 @@ import structlog
 
 from arcor2_hw.framing import PREFIX_SIZE, body_length
 from arcor2_hw.opcua import messages as m
+from arcor2_server.access.addresses import certified_hosts
 from arcor2_server.access.admission import is_loopback
 from arcor2_server.background import BackgroundTasks
 from arcor2_server.child_process import ChildProcess, describe_exit
@@ -102,6 +103,7 @@ class OpcUa:
             host=settings.opcua.host,
             port=listener.getsockname()[1],
             machine=machine,
+            hosts=certified_hosts(settings.opcua.host),
             folder=str(settings.data_dir.absolute()),
             cell=machine,
             version=version("arcor2-hw"),

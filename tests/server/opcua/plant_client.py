@@ -1,7 +1,7 @@
 """A client of plant systems that knows only the specifications: browse names, types, and services."""
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -84,6 +84,14 @@ async def typed(node: Node, namespace: str, type_name: str) -> list[Node]:
             kind = Node(node.session, await each.read_type_definition())
             if await kind.read_browse_name() == ua.QualifiedName(type_name, index):
                 found.append(each)
+    return found
+
+
+async def eventually(read: Callable[[], Awaitable[Any]], condition: Callable[[Any], bool]) -> Any:
+    """Read until the result meets a condition, and return it."""
+    async with asyncio.timeout(WITHIN):
+        while not condition(found := await read()):
+            await asyncio.sleep(0.1)
     return found
 
 

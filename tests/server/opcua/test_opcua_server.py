@@ -128,17 +128,21 @@ async def unit_of(client: Client) -> Node:
 async def robot_of(client: Client) -> Node:
     """Return the only motion device system in the device set."""
     device_set = await plant.child(client.nodes.objects, (plant.DI, "DeviceSet"))
-    (system,) = await plant.typed(device_set, plant.ROBOTICS, "MotionDeviceSystemType")
+    (system,) = await plant.eventually(
+        lambda: plant.typed(device_set, plant.ROBOTICS, "MotionDeviceSystemType"), lambda found: len(found) == 1
+    )
+    assert isinstance(system, Node)
     return system
 
 
 async def positions(system: Node) -> list[Node]:
-    """Return the variables ActualPosition of all axes."""
+    """Return the variables ActualPosition of the two axes."""
     devices = await plant.child(system, (plant.ROBOTICS, "MotionDevices"))
     (device,) = await plant.typed(devices, plant.ROBOTICS, "MotionDeviceType")
     axes = await plant.child(device, (plant.ROBOTICS, "Axes"))
     names = (plant.DI, "ParameterSet"), (plant.ROBOTICS, "ActualPosition")
-    return [await plant.child(axis, *names) for axis in await plant.typed(axes, plant.ROBOTICS, "AxisType")]
+    found = await plant.eventually(lambda: plant.typed(axes, plant.ROBOTICS, "AxisType"), lambda found: len(found) == 2)
+    return [await plant.child(axis, *names) for axis in found]
 
 
 async def execute_state(client: Client) -> Node:
@@ -229,7 +233,13 @@ async def test_all_objects_have_the_mandatory_members_of_their_types(cell: Plant
     async with cell.connected() as client:
         mandatory = plant.Mandatory(client)
         system = await robot_of(client)
-        assert len(await positions(system)) == 2
+        await positions(system)
+        controllers = await plant.child(system, (plant.ROBOTICS, "Controllers"))
+        (controller,) = await plant.typed(controllers, plant.ROBOTICS, "ControllerType")
+        tasks = await plant.child(controller, (plant.ROBOTICS, "TaskControls"))
+        (task,) = await plant.typed(tasks, plant.ROBOTICS, "TaskControlType")
+        names = (plant.DI, "ParameterSet"), (plant.ROBOTICS, "TaskProgramName")
+        await plant.eventually((await plant.child(task, *names)).read_value, lambda name: name == "demo")
         roots = await machine_of(client), await unit_of(client), system
         assert [each for root in roots for each in await mandatory.missing(root)] == []
 
