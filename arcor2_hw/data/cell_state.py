@@ -67,7 +67,8 @@ class CellStatus(Data, frozen=True):
     """The cell.
 
     jobs: by number. job: number of the job that the PLC has started and that has not ended. held_by_plc: whether the
-    PLC has commanded the hold. plc: left out if the server has no Modbus block.
+    PLC has commanded the hold. plc: left out if the server has no Modbus block. opcua: whether plant systems can
+    command the cell over OPC UA; left out if not.
     """
 
     state: CellStateName
@@ -77,3 +78,4 @@ class CellStatus(Data, frozen=True):
     held_by_plc: bool = False
     job: int | Unset = UNSET
     plc: PlcLink | Unset = UNSET
+    opcua: bool | Unset = UNSET

@@ -588,7 +588,8 @@ export type CellStateName = "stopped" | "starting" | "idle" | "execute" | "stopp
  * The cell.
  *
  * jobs: by number. job: number of the job that the PLC has started and that has not ended. held_by_plc: whether the
- * PLC has commanded the hold. plc: left out if the server has no Modbus block.
+ * PLC has commanded the hold. plc: left out if the server has no Modbus block. opcua: whether plant systems can
+ * command the cell over OPC UA; left out if not.
  */
 export interface CellStatus {
   state: CellStateName;
@@ -598,6 +599,7 @@ export interface CellStatus {
   held_by_plc: boolean;
   job?: number;
   plc?: PlcLink;
+  opcua?: boolean;
 }
 
 /** Arguments of ChangeOwnPin: the present PIN of the person who is logged on, and the new one. */

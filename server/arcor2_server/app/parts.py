@@ -276,7 +276,7 @@ class Server:
         cell_file.load(damage)
         cell = self.cell = PackmlCell(hub, execution, runs, online, stop_all, cell_file)
         plc = self.plc = closed(Plc(cell, cell_file, package_runs, alarms, audit, settings.plc_life_timeout))
-        feed = CellFeed((scene_host, program_host), cell, execution, runs, recipes, units, types, devices, alarms)
+        feed = CellFeed((scene_host, program_host), cell, execution, runs, units, types, devices, alarms)
         self.opcua = closed(OpcUa(settings, feed, PlantRequests(access, persons, plc, alarms, audit), cell))
         temporary_runs = self.temporary_runs = TemporaryRuns(
             hub, locks, storage, types, session, online, execution, build, tasks

@@ -84,6 +84,8 @@ def _run(command: str, server: Server, work: Callable[[Client], Awaitable[CellSt
 def _show(cell: CellStatus) -> None:
     print_ = console().print
     print_(f"state {cell.state}, mode {cell.mode}, authority {cell.authority}")
+    if cell.opcua:
+        print_("Plant systems connect by OPC UA.")
     if isinstance(cell.plc, Unset):
         print_("The server has no Modbus block for a PLC. Start it with --plc-modbus.")
     else:

@@ -21,7 +21,6 @@ from arcor2_server.hosts.streams import POINTS
 from arcor2_server.maintenance.devices import Devices
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.packml.cell import PackmlCell
-from arcor2_server.production.recipes import Recipes
 from arcor2_server.production.units import Units
 
 log = structlog.get_logger(__name__)
@@ -41,8 +40,7 @@ class CellFeed:
         hosts: the hosts of the scene and of the program. The devices of the last one that has any are shown.
         cell: the cell as a unit of PackML.
         execution: the program.
-        runs: names of programs.
-        recipes: the present recipe.
+        runs: names of programs and recipes.
         units: counts of units.
         types: finds the robots.
         cards: identities of devices.
@@ -55,14 +53,13 @@ class CellFeed:
         cell: PackmlCell,
         execution: Execution,
         runs: Runs,
-        recipes: Recipes,
         units: Units,
         types: ObjectTypes,
         cards: Devices,
         alarms: Alarms,
     ) -> None:
         self._hosts, self._cell, self._execution, self._runs = hosts, cell, execution, runs
-        self._recipes, self._units, self._types, self._cards, self._alarms = recipes, units, types, cards, alarms
+        self._units, self._types, self._cards, self._alarms = units, types, cards, alarms
         self._devices: list[DeviceInfo] = []
         self._states: dict[str, DeviceState] = {}
         self._unit: UnitData | None = None
@@ -144,7 +141,7 @@ class CellFeed:
 
     def _collect_devices(self) -> None:
         """Collect devices and states. Without an open scene, the devices that were known last are offline."""
-        identities = {card.object_id: card.identity for card in self._cards.all()}
+        identities = self._cards.identities()
         host = next((host for host in reversed(self._hosts) if host.board.reports), None)
         if host is None:
             if not self._devices:

@@ -133,6 +133,7 @@ class PackmlCell:
             self._held_by_plc,
             self.job or UNSET,
             UNSET if link is None else link,
+            self.has_opcua or UNSET,
         )
 
     def changed(self) -> None:

@@ -13,12 +13,17 @@ from asyncua.common.utils import ServiceError
 from cryptography import x509
 
 from arcor2_hw.data.cell_state import CellAuthority, CellJob
-from arcor2_hw.data.packml import MachineCommand
-from arcor2_hw.opcua import access, messages as m
+from arcor2_hw.data.device import Connection, Health, Identity
+from arcor2_hw.data.maintenance import DeviceCard
+from arcor2_hw.data.packml import MachineCommand, MachineState, UnitMode
+from arcor2_hw.data.robot import RobotMeta, RobotType
+from arcor2_hw.data.units import UnitState
+from arcor2_hw.opcua import access, messages as m, unit
 from arcor2_hw.opcua.certificates import TrustedClients, application_uri, own_certificate
-from arcor2_hw.runtime.messages import Stream, StreamEvent
+from arcor2_hw.runtime.messages import DeviceChanged, Stream, StreamEvent
 from arcor2_server.hosts.streams import POINTS, RobotStreams
 from arcor2_server.opcua import service
+from arcor2_server.opcua.feed import CellFeed
 from arcor2_server.opcua.service import OpcUa
 from arcor2_server.packml.plc import Plc
 from arcor2_server.packml.record import CellFile, RequestResult as R
@@ -168,3 +173,86 @@ async def test_a_process_that_does_not_read_gets_no_queue_of_updates(monkeypatch
         writer.transport.abort()
         theirs.close()
         await asyncio.gather(sending, return_exceptions=True)
+
+
+@pytest.mark.parametrize("state", MachineState)
+def test_each_state_of_packml_is_in_one_state_machine(state: MachineState) -> None:
+    machines = unit._BASE, unit._MACHINE, unit._EXECUTE
+    assert sum(state.name.capitalize() in machine for machine in machines) == 1
+
+
+class Cell:
+    """The parts that the feed reads: a cell with one known device, and a board with what a scene reports."""
+
+    def __init__(self) -> None:
+        self.board = SimpleNamespace(
+            on_report=[],
+            on_clear=[],
+            on_connection=[],
+            on_identified=[],
+            reports={},
+            answering=True,
+            object=self.object,
+        )
+        self.streams = SimpleNamespace(observe=lambda *_: None)
+        self.parts, self.program = SimpleNamespace(on_change=[]), SimpleNamespace(number=1)
+        self.on_changed: list[Any] = []
+        self.on_state: list[Any] = []
+        self.running = self.active = False
+        self.state, self.mode, self.authority, self.job = MachineState.IDLE, UnitMode.PRODUCE, CellAuthority.HUB, 0
+        self.left = {UnitState.GOOD: 0, UnitState.BAD: 0, UnitState.REJECTED: 0}
+
+    def object(self, object_id: str) -> Any:
+        return SimpleNamespace(name=object_id, type={"obj_table": "Table", "obj_arm": "UR5e"}.get(object_id, "Block"))
+
+    def identities(self) -> dict[str, Identity]:
+        return {"obj_io": Identity("WAGO", "750", "17")}
+
+    def all(self) -> list[DeviceCard]:
+        return [DeviceCard("obj_io", "io", "Block", self.identities()["obj_io"], "", "", "")]
+
+    def derives_from(self, name: str, base: str) -> bool:
+        return (name, base) in {("UR5e", "Robot"), ("Table", "VirtualCollisionObject")}
+
+    def robot_meta(self, name: str) -> Any:
+        return RobotMeta(name, RobotType.ARTICULATED)
+
+    def get(self, number: int) -> None:
+        return None
+
+    async def find(self, args: Any) -> list[Any]:
+        return []
+
+    async def left_between(self, since: str, until: str) -> dict[UnitState, int]:
+        return dict(self.left)
+
+
+async def test_the_feed_shows_devices_and_sends_only_changes() -> None:
+    cell: Any = Cell()
+    feed = CellFeed([cell], cell, cell, cell, cell, cell, cell, cell)
+    feed.start()
+    first = await feed.everything()
+    assert first.devices == [m.DeviceInfo("obj_io", "io", "Block", "", Identity("WAGO", "750", "17"))]
+    assert first.states == {"obj_io": m.DeviceState(Connection.OFFLINE)}
+    assert await feed.changes() == m.Update()
+
+    for key in ("obj_io", "obj_arm", "obj_table"):
+        cell.board.reports[key] = report = DeviceChanged(key, Connection.ONLINE, Health.NORMAL)
+        for notify in cell.board.on_report:
+            notify(report)
+    cell.left[UnitState.GOOD], cell.state = 3, MachineState.EXECUTE
+    for notify in cell.parts.on_change:
+        notify(None)
+    changed = await feed.changes()
+    assert changed.devices is not None
+    assert {each.id: each.robot_type for each in changed.devices} == {"obj_io": "", "obj_arm": "articulated"}
+    assert changed.states["obj_arm"].connection is Connection.ONLINE
+    assert changed.unit is not None
+    assert (changed.unit.good, changed.unit.state) == (3, MachineState.EXECUTE)
+
+    cell.board.reports.clear()
+    for forget in cell.board.on_clear:
+        forget([])
+    ended = await feed.changes()
+    assert ended.devices is None
+    assert {state.connection for state in ended.states.values()} == {Connection.OFFLINE}

@@ -17,6 +17,13 @@ test("the operator's screen shows only what differs from the default", () => {
   expect(noteText({ ...commanded, plc: { ...LINK, alive: false } })).toContain("does not change");
 });
 
+test("plant systems need no life counter", () => {
+  const plant: CellStatus = { ...DEFAULT, opcua: true };
+  expect(plcText(plant)).toMatchObject({ tone: "good", text: "Plant systems connect by OPC UA." });
+  expect(noteText({ ...plant, authority: "plc" })).toBe("A plant system commands this cell.");
+  expect(noteText({ ...plant, authority: "plc", plc: { ...LINK, alive: false } })).toContain("does not change");
+});
+
 test("a silent PLC is an error only while it commands the cell", () => {
   expect(plcText(DEFAULT)).toMatchObject({ word: "", text: "The server has no connection for a PLC." });
   const { peer: _, ...listening } = LINK;

@@ -50,7 +50,12 @@ export function programText({ state, held_by_plc, job }: CellStatus): string {
 }
 
 /** Return whether the life counter of the PLC changes. The word is empty as long as no PLC has connected. */
-export function plcText({ plc, authority }: CellStatus): { word: string; tone: "good" | "bad" | "warn"; text: string } {
+export function plcText({ plc, authority, opcua }: CellStatus): {
+  word: string;
+  tone: "good" | "bad" | "warn";
+  text: string;
+} {
+  if (!plc && opcua) return { word: "", tone: "good", text: t`Plant systems connect by OPC UA.` };
   if (!plc) return { word: "", tone: "warn", text: t`The server has no connection for a PLC.` };
   const { listening, alive, peer } = plc;
   if (peer === undefined) return { word: "", tone: "warn", text: t`No PLC has written to ${listening} yet.` };
@@ -66,7 +71,8 @@ export function plcText({ plc, authority }: CellStatus): { word: string; tone: "
 export function noteText(cell: CellStatus): string {
   const sentences: string[] = [];
   if (cell.authority === "nobody") sentences.push(t`Nobody commands this cell.`);
-  if (cell.authority === "plc")
+  if (cell.authority === "plc" && !cell.plc && cell.opcua) sentences.push(t`A plant system commands this cell.`);
+  else if (cell.authority === "plc")
     sentences.push(
       cell.plc?.alive
         ? t`The PLC commands this cell.`
