@@ -2,6 +2,7 @@
 
 import asyncio
 import socket
+import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,10 +17,13 @@ from arcor2_hw.data.cell_state import CellAuthority, CellJob
 from arcor2_hw.data.device import Connection, Health, Identity
 from arcor2_hw.data.maintenance import DeviceCard
 from arcor2_hw.data.packml import MachineCommand, MachineState, UnitMode
+from arcor2_hw.data.points import LivePoint, PointUse
 from arcor2_hw.data.robot import RobotMeta, RobotType
 from arcor2_hw.data.units import UnitState
 from arcor2_hw.opcua import access, messages as m, unit
 from arcor2_hw.opcua.certificates import TrustedClients, application_uri, own_certificate
+from arcor2_hw.opcua.devices import Device
+from arcor2_hw.opcua.space import Tag
 from arcor2_hw.runtime.messages import DeviceChanged, Stream, StreamEvent
 from arcor2_server.hosts.streams import POINTS, RobotStreams
 from arcor2_server.opcua import service
@@ -256,3 +260,35 @@ async def test_the_feed_shows_devices_and_sends_only_changes() -> None:
     ended = await feed.changes()
     assert ended.devices is None
     assert {state.connection for state in ended.states.values()} == {Connection.OFFLINE}
+
+
+class Written:
+    """Stores what is written to variables."""
+
+    def __init__(self) -> None:
+        self.values: list[ua.DataValue] = []
+
+    async def write_attribute_value(self, node: ua.NodeId, value: ua.DataValue) -> None:
+        self.values.append(value)
+
+
+async def test_values_that_are_not_renewed_become_stale_and_keep_value_and_time() -> None:
+    written: Any = Written()
+    space: Any = SimpleNamespace(own=lambda *path: ua.NodeId("/".join(path), 1))
+    device = Device(space, m.DeviceInfo("obj_io", "io", "Block"))
+    device._connection = Connection.ONLINE
+    device._points["DI1"] = Tag(written, ua.NodeId("DI1", 1), ua.VariantType.Boolean)
+    point, at = LivePoint("DI1", PointUse.INPUT, True), time.monotonic() * 1e3
+    for _ in range(3):  # unchanged values are not written again at once
+        await device.set_points([point], at)
+    (good,) = written.values
+    await device.expire(3.0)
+    assert len(written.values) == 1
+    for _ in range(2):
+        await device.expire(-1.0)
+    _, stale = written.values
+    assert stale.StatusCode.name == "UncertainLastUsableValue"
+    assert stale.Value.Value is True
+    assert abs((stale.SourceTimestamp - good.SourceTimestamp).total_seconds()) < 0.001
+    await device.set_points([point], at)
+    assert written.values[-1].StatusCode.is_good()
