@@ -42,6 +42,7 @@ class Conditions:
         self._space, self._source, self._acknowledge = space, source, acknowledge
         self.retained: dict[int, AlarmRecord] = {}
         """The alarms that need attention, by number."""
+        self._newest = 0
         self._events: dict[int, deque[bytes]] = {}
         """The identifiers of the last events of each retained alarm, any of which a client may acknowledge."""
 
@@ -52,10 +53,12 @@ class Conditions:
 
     async def change(self, alarm: AlarmRecord) -> None:
         """Publish the event of a changed alarm."""
+        is_new = alarm.number > self._newest
+        self._newest = max(self._newest, alarm.number)
         if alarm.retain:
             self.retained[alarm.number] = alarm
-        elif self.retained.pop(alarm.number, None) is None:
-            return  # a change of an alarm that clients do not know, such as a note
+        elif self.retained.pop(alarm.number, None) is None and not is_new:
+            return  # a later change of an alarm that needs no attention, such as a note
         event = self._event(alarm)
         if alarm.retain:
             self._events.setdefault(alarm.number, deque(maxlen=KNOWN_EVENTS)).append(event.EventId)

@@ -59,7 +59,6 @@ class Unit:
         self.node = space.own("cell")
         """The machine."""
         self.components = space.own("cell", "Components")
-        self._data: UnitData | None = None
 
     async def add(self) -> None:
         """Add the machine and the unit."""
@@ -137,7 +136,6 @@ class Unit:
         modes = await self._add_modes()
         await space.add_property(status, pack("UnitSupportedModes"), modes, ua.ObjectIds.NodeId)
         self._unit_mode = await space.add_variable(status, pack("UnitModeCurrent"), 1, modes)
-        self._requested = await space.add_variable(status, pack("StateRequested"), 0, ua.ObjectIds.Int32)
         for variable in ("MachSpeed", "CurMachSpeed"):
             tag = await space.add_variable(
                 status, pack(variable), None, ua.ObjectIds.Float, ua.ObjectIds.AnalogItemType, status=UNKNOWN
@@ -213,7 +211,6 @@ class Unit:
     # -------------------------------------------------------------------------------- values
     async def set(self, data: UnitData) -> None:
         """Show the state of the cell."""
-        self._data = data
         state, mode = MachineState(data.state), UnitMode(data.mode)
         await self._unit_mode.write(data.mode)
         await self._item.enter(_ITEM_STATES.get(state, "NotExecuting"))

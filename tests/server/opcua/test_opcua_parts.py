@@ -12,7 +12,9 @@ import pytest
 from asyncua import ua
 from asyncua.common.utils import ServiceError
 from cryptography import x509
+from msgspec.structs import replace
 
+from arcor2_hw.data.alarms import AlarmCategory, AlarmRecord, Priority
 from arcor2_hw.data.cell_state import CellAuthority, CellJob
 from arcor2_hw.data.device import Connection, Health, Identity
 from arcor2_hw.data.maintenance import DeviceCard
@@ -22,6 +24,7 @@ from arcor2_hw.data.robot import RobotMeta, RobotType
 from arcor2_hw.data.units import UnitState
 from arcor2_hw.opcua import access, messages as m, unit
 from arcor2_hw.opcua.certificates import TrustedClients, application_uri, own_certificate
+from arcor2_hw.opcua.conditions import Conditions
 from arcor2_hw.opcua.devices import Device
 from arcor2_hw.opcua.space import Tag
 from arcor2_hw.runtime.messages import DeviceChanged, Stream, StreamEvent
@@ -292,3 +295,22 @@ async def test_values_that_are_not_renewed_become_stale_and_keep_value_and_time(
     assert abs((stale.SourceTimestamp - good.SourceTimestamp).total_seconds()) < 0.001
     await device.set_points([point], at)
     assert written.values[-1].StatusCode.is_good()
+
+
+async def test_a_momentary_alarm_is_one_event_and_a_retained_one_ends_with_an_event() -> None:
+    events: list[Any] = []
+
+    async def trigger_event(event: Any) -> None:
+        events.append((event.ConditionName, event.Retain, getattr(event, "ActiveState/Id")))
+
+    server = SimpleNamespace(iserver=SimpleNamespace(subscription_service=SimpleNamespace(trigger_event=trigger_event)))
+    space: Any = SimpleNamespace(server=server, own=lambda *path: ua.NodeId("/".join(path), 1))
+    nothing: Any = None
+    conditions = Conditions(space, lambda alarm: (ua.NodeId("cell", 1), "Cell"), nothing)
+    at = "2026-01-02T03:04:05+00:00"
+    lost = AlarmRecord(1, "io-1", "connection_lost", Priority.HIGH, AlarmCategory.CONNECTION, "Lost.", at, 1)
+    refused = replace(lost, number=2, kind="plc-4", active=False, retain=False)
+    for alarm in (lost, refused, replace(refused, note="seen"), replace(lost, active=False, retain=False, cleared=at)):
+        await conditions.change(alarm)
+    assert events == [("io-1", True, True), ("plc-4", False, False), ("io-1", False, False)]
+    assert conditions.retained == {}
