@@ -60,14 +60,17 @@ class UnitData(Struct, frozen=True):
     """The cell as a unit.
 
     state, mode: numbers of PackML. authority: who may start programs. job: number of the plant's running job, 0 for
-    none. program: name of the running or last program. loaded: whether it is running. recipe: name and revision. good,
-    bad, rejected: units that left the cell since it exists.
+    none. last_job, job_end: the last one and how it ended, "running" until then. program: name of the running or last
+    program. loaded: whether it is running. recipe: product and revision. good, bad, rejected: units that left the cell
+    since it exists.
     """
 
     state: int = 2
     mode: int = 1
     authority: str = "hub"
     job: int = 0
+    last_job: int = 0
+    job_end: str = "none"
     program: str = ""
     loaded: bool = False
     recipe: str = ""

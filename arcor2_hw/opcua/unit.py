@@ -89,11 +89,11 @@ class Unit:
         space = self._space
         self._production: dict[str, Tag] = {}
         folder = await space.add_folder(self.node, space.name("own", "Production"))
-        texts = dict.fromkeys(("authority", "program", "recipe"), ua.ObjectIds.String)
-        numbers = dict.fromkeys(("job", "good", "bad", "rejected"), ua.ObjectIds.UInt32)
-        for name, kind in (texts | numbers).items():
-            value = "" if kind == ua.ObjectIds.String else 0
-            self._production[name] = await space.add_variable(folder, space.name("own", name.capitalize()), value, kind)
+        for field in ("authority", "program", "recipe", "job", "last_job", "job_end", "good", "bad", "rejected"):
+            first = getattr(UnitData(), field)
+            kind = ua.ObjectIds.String if isinstance(first, str) else ua.ObjectIds.UInt32
+            name = space.name("own", field.title().replace("_", ""))
+            self._production[field] = await space.add_variable(folder, name, first, kind)
 
         async def request(_parent: ua.NodeId, *arguments: ua.Variant) -> Any:
             values = [argument.Value for argument in arguments]

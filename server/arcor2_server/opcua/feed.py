@@ -194,7 +194,9 @@ class CellFeed:
             program = run.package_name
             if not isinstance(run.recipe, Unset):
                 recipe = f"{run.recipe.product} {run.recipe.revision}"
+        last_job, end = cell.last_job
         return UnitData(
-            cell.state, cell.mode, cell.authority.value, cell.job, program, self._execution.active, recipe,
+            cell.state, cell.mode, cell.authority.value, cell.job, last_job, end.name.lower(), program,
+            self._execution.active, recipe,
             counts[UnitState.GOOD], counts[UnitState.BAD], counts[UnitState.REJECTED],
         )  # fmt: skip

@@ -113,6 +113,11 @@ class PackmlCell:
         return self._file.record.jobs
 
     @property
+    def last_job(self) -> tuple[int, JobEnd]:
+        """The last job of the PLC, 0 for none, and how it ended."""
+        return self._file.record.job, self._file.record.job_end
+
+    @property
     def program_state(self) -> PackageStateEnum:
         """The state of the program."""
         return self._execution.state

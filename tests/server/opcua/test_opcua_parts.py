@@ -33,7 +33,7 @@ from arcor2_server.opcua import service
 from arcor2_server.opcua.feed import CellFeed
 from arcor2_server.opcua.service import OpcUa
 from arcor2_server.packml.plc import Plc
-from arcor2_server.packml.record import CellFile, RequestResult as R
+from arcor2_server.packml.record import CellFile, JobEnd, RequestResult as R
 from tests.server.opcua.plant_client import client_certificate
 from tests.server.packml.test_rules import new_cell
 
@@ -206,6 +206,7 @@ class Cell:
         self.on_changed: list[Any] = []
         self.on_state: list[Any] = []
         self.running = self.active = False
+        self.last_job = 7, JobEnd.COMPLETED
         self.state, self.mode, self.authority, self.job = MachineState.IDLE, UnitMode.PRODUCE, CellAuthority.HUB, 0
         self.left = {UnitState.GOOD: 0, UnitState.BAD: 0, UnitState.REJECTED: 0}
 
@@ -256,6 +257,7 @@ async def test_the_feed_shows_devices_and_sends_only_changes() -> None:
     assert changed.states["obj_arm"].connection is Connection.ONLINE
     assert changed.unit is not None
     assert (changed.unit.good, changed.unit.state) == (3, MachineState.EXECUTE)
+    assert (changed.unit.last_job, changed.unit.job_end) == (7, "completed")
 
     cell.board.reports.clear()
     for forget in cell.board.on_clear:

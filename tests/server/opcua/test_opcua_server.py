@@ -301,6 +301,10 @@ async def test_a_killed_process_is_restarted_and_clients_return(cell: Plant) -> 
         machine = await plant.child(await unit_of(client), *names)
         await command(machine, "Stop")
         await until_state(client, machine, "Stopped")
+        production = [each for each in await (await machine_of(client)).get_children() if "Production" in str(each)]
+        values = {(await each.read_browse_name()).Name: each for each in await production[0].get_variables()}
+        await plant.eventually(values["JobEnd"].read_value, lambda end: end == "stopped")
+        assert await values["LastJob"].read_value() == 7
 
 
 async def test_the_client_of_the_how_to_reads_the_state(cell: Plant) -> None:
