@@ -16,6 +16,8 @@ from arcor2_hw.exceptions import InvalidData, NotFound
 
 MAX_SIZE: Final = 1 << 20
 """Maximum size, bytes; a cell of hundreds of devices has some ten thousand."""
+BROKER_URL: Final = "ARCOR2_HW_NATS_URL"
+"""The variable with the address of the broker between a server and its nodes. It may contain a password."""
 
 
 class CellDevice(Data, frozen=True, forbid_unknown_fields=True):

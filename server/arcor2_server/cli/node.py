@@ -14,6 +14,7 @@ from urllib.parse import urlsplit
 import uvloop
 from cyclopts import App, Parameter
 
+from arcor2_hw.data.cell import BROKER_URL
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.access.admission import is_loopback
 from arcor2_server.cli.exit_status import ExitStatus, fail
@@ -32,7 +33,7 @@ app = App(name="node")
 def run(
     name: str,
     *,
-    broker: Annotated[str, Parameter(env_var="ARCOR2_HW_NATS_URL")] = "nats://127.0.0.1:4222",
+    broker: Annotated[str, Parameter(env_var=BROKER_URL)] = "nats://127.0.0.1:4222",
     ca: Annotated[Path | None, Parameter(env_var="ARCOR2_HW_NATS_CA")] = None,
     insecure: bool = False,
     log_level: str = "info",

@@ -10,7 +10,7 @@ from typing import Final
 
 import structlog
 
-from arcor2_hw.data.cell import Cell, node_of
+from arcor2_hw.data.cell import BROKER_URL, Cell, node_of
 from arcor2_hw.data.device import DEVICE_FILES
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error
@@ -103,7 +103,10 @@ class CellHosts:
         return set()
 
     async def _start(self, node: str = "") -> CellHost:
-        host = await CellHost.start(self._environment, node)
+        environment = dict(self._environment)
+        if not node:
+            environment.pop(BROKER_URL, None)  # its password is not for devices and programs
+        host = await CellHost.start(environment, node)
         try:
             async with asyncio.timeout(READY_TIMEOUT):
                 await asyncio.shield(host.ready)

@@ -17,6 +17,7 @@ import msgspec
 import uvloop
 from nats.errors import Error as NatsError, NoRespondersError, TimeoutError as NatsTimeoutError
 
+from arcor2_hw.data.cell import BROKER_URL
 from arcor2_hw.exceptions import Arcor2Error, message_of
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
@@ -166,7 +167,7 @@ def main() -> None:
     with contextlib.suppress(OSError):  # not permitted without LimitNICE in the service file
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
     # In the environment, because arguments are visible to all users and the address may contain a password.
-    url = os.environ.get("ARCOR2_HW_NATS_URL", "nats://127.0.0.1:4222")
+    url = os.environ.get(BROKER_URL, "nats://127.0.0.1:4222")
     authority = os.environ.get("ARCOR2_HW_NATS_CA", "")
     uvloop.run(_main(options.node, socket.socket(fileno=options.fd), url, authority, options.silence))
     sys.stdout.flush()

@@ -14,6 +14,7 @@ import structlog
 from nats.aio.msg import Msg
 from nats.errors import Error as NatsError
 
+from arcor2_hw.data.cell import BROKER_URL
 from arcor2_hw.exceptions import Arcor2Error, ArrivedLate, Cancelled, ConnectionLost, InvalidData, NotFound
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
@@ -212,7 +213,8 @@ class NodeService:
         authority: str = "",
     ) -> None:
         self._authority = authority
-        self._name, self._url, self._environment, self._ready = name, url, environment, ready
+        self._name, self._url, self._ready = name, url, ready
+        self._environment = {key: value for key, value in environment.items() if key != BROKER_URL}
         self._store = ContentStore(default_store())
         self._connections: Connections = {}
         self._sessions: set[HostedSession] = set()

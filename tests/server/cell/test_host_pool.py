@@ -4,12 +4,13 @@ import asyncio
 import os
 import signal
 from collections.abc import Mapping
+from pathlib import Path
 from typing import cast
 
 import pytest
 from msgspec import UNSET, UnsetType
 
-from arcor2_hw.data.cell import Cell, CellDevice
+from arcor2_hw.data.cell import BROKER_URL, Cell, CellDevice
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.hosts import pool
@@ -75,5 +76,15 @@ async def test_a_scene_with_a_device_on_a_node_needs_the_node(monkeypatch: pytes
         with pytest.raises(Arcor2Error, match=r"must be on one node: arm \(press\), lamp \(oven\)"):
             await hosts.take(USER, [arm, lamp])
         assert (await hosts.take(USER, [belt])).node == ""
+    finally:
+        await hosts.close()
+
+
+async def test_devices_do_not_see_the_password_of_the_broker(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(BROKER_URL, "nats://cell:secret@127.0.0.1:4222")
+    hosts = pool.CellHosts([])
+    try:
+        host = await hosts.take(USER)
+        assert b"secret" not in Path(f"/proc/{host.pid}/environ").read_bytes()
     finally:
         await hosts.close()
