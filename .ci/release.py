@@ -134,7 +134,11 @@ def build_debian(bundle: Path, version: str, target: Path) -> None:
         (tree / "DEBIAN" / "control").write_text("".join(f"{key}: {value}\n" for key, value in control.items()))
         for script in sorted((Path(__file__).parent / "debian").iterdir()):
             shutil.copy(script, tree / "DEBIAN" / script.name)
-            (tree / "DEBIAN" / script.name).chmod(0o755)
+        for path in tree.rglob("*"):
+            executable = (
+                path.is_dir() or (path.parent.name == "DEBIAN" and path.name != "control") or path.suffix == ".sh"
+            )
+            path.chmod(0o755 if executable else 0o644)
         run("dpkg-deb", "--root-owner-group", "-Znone", "--build", tree, target, env=environment())
 
 

@@ -6,12 +6,12 @@
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
 import { isLanguage, loadCatalogue, preferredLanguage } from "./i18n/catalogue";
+import { persistently } from "./persistently";
 import { createClient } from "./session/connection";
 import { remembered, takeTokenFromAddress } from "./session/localStorage";
 import { recordErrors } from "./session/log";
 import { createSession } from "./session/session";
 import { App } from "./ui/App";
-import { persistently } from "./ui/kit/lazy";
 import "./ui/tokens.css";
 import "./ui/base.css";
 

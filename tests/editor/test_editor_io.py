@@ -40,7 +40,7 @@ async def changes_the_mode(screen: Screen, client: Client) -> None:
         assert (await client.call("GetCell")).mode is mode
     await dialog.get_by_role("button", name=re.compile("^The PLC")).click()
     await screen.press("Let the PLC command")
-    await expect(dialog.get_by_role("alert")).to_contain_text("Start it with --plc-modbus.")
+    await expect(dialog.get_by_role("alert")).to_contain_text("Start it with --plc-modbus or --opcua.")
     await screen.settle()
     assert await screen.faults() == []
     assert await screen.barriers() == []

@@ -11,6 +11,7 @@ import {
   PlaneGeometry,
   ShadowMaterial,
 } from "three";
+import { persistently } from "../persistently";
 import type { Scale } from "./floorScale";
 import type { Palette } from "./palette";
 import { boundsOf, type Thing } from "./thing";
@@ -87,7 +88,7 @@ export class Floor {
 
   /** Add the numbers, which are not needed for the first picture; `draw` draws them. */
   async number(draw: () => void): Promise<void> {
-    const { Scale } = await import("./floorScale");
+    const { Scale } = await persistently(() => import("./floorScale"));
     this.scale = new Scale(AXIS, STEP);
     this.root.add(this.scale.mesh);
     if (this.palette) this.scale.paint(this.palette);

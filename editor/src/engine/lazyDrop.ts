@@ -2,6 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { type Scene, Vector3 } from "three";
+import { persistently } from "../persistently";
 import type { DropLine } from "./dropLine";
 import type { Palette } from "./palette";
 import type { Thing } from "./thing";
@@ -40,7 +41,7 @@ export class LazyDrop {
 
   private async load(): Promise<void> {
     this.loading = true;
-    const { DropLine } = await import("./dropLine");
+    const { DropLine } = await persistently(() => import("./dropLine"));
     this.line = new DropLine(this.scene);
     this.draw();
   }

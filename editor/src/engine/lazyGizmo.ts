@@ -1,5 +1,6 @@
 /** The gizmo of the transform tool: moves, turns and resizes an item. It is loaded when it is first shown. */
 
+import { persistently } from "../persistently";
 import type { Drag, Gizmo, GizmoSetup, Surroundings } from "./gizmo/gizmo";
 
 export class LazyGizmo {
@@ -45,7 +46,7 @@ export class LazyGizmo {
   }
 
   private async load(): Promise<void> {
-    const { Gizmo } = await import("./gizmo/gizmo");
+    const { Gizmo } = await persistently(() => import("./gizmo/gizmo"));
     if (this.ended || this.gizmo || !this.wanted) return;
     this.gizmo = new Gizmo(this.around);
     this.gizmo.onDrag = (drag) => this.onDrag(drag);

@@ -1,6 +1,7 @@
 /** The straight path of the tool; what draws it is loaded for the first one. */
 
 import type { Scene } from "three";
+import { persistently } from "../persistently";
 import type { Palette } from "./palette";
 import type { PathLine, StraightPath } from "./pathLine";
 
@@ -16,7 +17,7 @@ export class LazyPath {
   async show(path: StraightPath | null, palette: Palette): Promise<void> {
     this.wanted = path;
     if (!path && !this.line) return;
-    const { PathLine } = await import("./pathLine");
+    const { PathLine } = await persistently(() => import("./pathLine"));
     this.line ??= new PathLine(this.scene);
     if (this.line.show(this.wanted, palette)) this.draw();
   }

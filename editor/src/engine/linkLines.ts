@@ -1,6 +1,7 @@
 /** The lines of all connections, drawn in one call by what is loaded with the first line. */
 
 import type { Color, Scene } from "three";
+import { persistently } from "../persistently";
 import type { Arrow, Line, LinkMesh } from "./linkMesh";
 
 export class LinkLines {
@@ -48,7 +49,7 @@ export class LinkLines {
   }
 
   private async load(): Promise<void> {
-    const { LinkMesh } = await import("./linkMesh");
+    const { LinkMesh } = await persistently(() => import("./linkMesh"));
     this.mesh = new LinkMesh(this.scene);
     this.mesh.height = this.pixels;
     this.refresh();

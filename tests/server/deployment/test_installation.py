@@ -16,6 +16,7 @@ BROKEN = "import pathlib\npathlib.Path('documents.sqlite').unlink()\nraise Syste
 """A version that destroys its data and does not start."""
 PREPARE = """
 set -eu
+umask 022
 trap 'test $? = 0 || tail -60 /opt/test/bin/log >&2' EXIT
 ip link set lo up
 mount -t tmpfs tmpfs /opt

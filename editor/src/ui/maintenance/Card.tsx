@@ -43,7 +43,7 @@ export function Card({ card, reload, onReplace }: Props) {
     [t`Actions executed`, decimal(card.cycles)],
     [t`Counted since`, dateAndTime(card.counted_since)],
     ...counters.map(([name, value]): [string, string] => [words(translate({ text: name })), decimal(value)]),
-    ...(counters.length > 0 ? [[t`Counters of the device read`, dateAndTime(card.seen)] as [string, string]] : []),
+    ...(counters.length > 0 ? [[t`Device counters read`, dateAndTime(card.seen)] as [string, string]] : []),
     ...(card.confirmed_at
       ? [[t`Confirmed`, `${dateAndTime(card.confirmed_at)}, ${card.confirmed_by ?? ""}`] as [string, string]]
       : []),

@@ -3,10 +3,11 @@
 import { t } from "@lingui/core/macro";
 import { Suspense } from "react";
 import type { Engine } from "../../engine/engine";
+import { persistently } from "../../persistently";
 import { tapTaken } from "../../session/taps";
 import { store } from "../../store/store";
 import { Waiting } from "../kit/kit";
-import { lazyComponent, persistently } from "../kit/lazy";
+import { lazyComponent } from "../kit/lazy";
 import { pick } from "./pick";
 import { useEngine } from "./useEngine";
 

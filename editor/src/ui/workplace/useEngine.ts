@@ -4,12 +4,12 @@ import { i18n } from "@lingui/core";
 import { type RefObject, useEffect, useRef, useState } from "react";
 import type { Engine, Quality } from "../../engine/engine";
 import type { Item } from "../../engine/items";
+import { persistently } from "../../persistently";
 import { readShown } from "../../session/assets";
 import { setEngine } from "../../session/engine";
 import { notify, now, store, useEditor } from "../../store/store";
 import { telemetry } from "../../store/telemetry";
 import { ItemMaker } from "../../viewmodel/items";
-import { persistently } from "../kit/lazy";
 import { useTheme } from "../settings/Settings";
 
 /** Which items a view shows, and what it does with its engine until the returned function is called. */
