@@ -77,6 +77,7 @@ class DigitalGripper(HoldsParts, DigitalIO):
         self._motion.to_pose(above, False, speed, 0.5, guard)
         self._check_part_held("on the way")
         self._motion.to_pose(pose, True, slow_speed, 0.5, guard)
+        self._check_part_held("on the way down")
         self._switch(output, False)
         released = self._await_part(False, guard)
         self._motion.to_pose(above, True, slow_speed, 0.5, guard)

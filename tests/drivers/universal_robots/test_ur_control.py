@@ -584,6 +584,20 @@ def test_pick_and_place_use_the_part_sensor(fake: FakeUr) -> None:
         fake.do("set_input", bit=1, on=False)
         placing.result()
         assert robot.parts == {}
+
+        # A part that slips out on the last way is not at the place, although the gripper would open there.
+        picking = BackgroundCall(robot.pick, target, approach=0.05, slow_speed=0.5)
+        fake.control.wait_until(lambda t: t["digital_outputs"] & 1)
+        fake.do("set_input", bit=1, on=True)
+        picking.result()
+        placing = BackgroundCall(robot.place, target, approach=0.05, slow_speed=0.05)
+        wait_for(lambda: robot.get_end_effector_pose("tcp").position.distance_to(up) > 0.01)
+        fake.do("set_input", bit=1, on=False)
+        with pytest.raises(DeviceFault, match="lost the part on the way down") as fault:
+            placing.result()
+        assert fault.value.fault_code == "part_lost"
+        assert robot.parts == {}
+        robot.set_digital_output(0, False)
         with pytest.raises(AssertionError):
             robot.pick(target, approach=0.9)
     finally:
