@@ -15,7 +15,7 @@ import socket
 import sys
 import threading
 import types
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Final
@@ -23,25 +23,22 @@ from typing import Final
 import msgspec
 from msgspec.structs import replace
 
-from arcor2_hw.data.device import Connection, Identity
 from arcor2_hw.data.held import HeldData
 from arcor2_hw.data.interlocks import InterlockState
 from arcor2_hw.data.position import MAIN_BRANCH, Frame
-from arcor2_hw.exceptions import Arcor2Error, Conflict, ProgramFinished, ProgramStopped, Refused
+from arcor2_hw.exceptions import Arcor2Error, Conflict, ProgramFinished, ProgramStopped
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.calls import Calls, error_data
-from arcor2_hw.runtime.cell import Cell, SceneFault, scene_recipes
+from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.clock import Clock
-from arcor2_hw.runtime.creation import write_sources
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.forcing import CHECK_PERIOD, Forces
 from arcor2_hw.runtime.holding import Holds
-from arcor2_hw.runtime.identification import Reported
+from arcor2_hw.runtime.hosted_scene import HostedScene, recognise
 from arcor2_hw.runtime.interlocks import Interlocks
 from arcor2_hw.runtime.link import Link
-from arcor2_hw.runtime.methods import overrides
-from arcor2_hw.runtime.program import Program, set_current, traceback_text
+from arcor2_hw.runtime.program import Program, set_current
 from arcor2_hw.runtime.record import RunRecord
 from arcor2_hw.runtime.recorder import Recorder
 from arcor2_hw.runtime.ring import Ring
@@ -112,9 +109,8 @@ class Host:
         self._shutting_down = threading.Event()
         self._saved = threading.Event()
         self._stop_requested = threading.Event()
-        self._scene: m.OpenScene | None = None
+        self._scene = HostedScene(self._cell, self._watch, self.link)
         self._package: m.RunPackage | None = None
-        self._connecting = threading.Lock()
         self._wake, wake_up = socket.socketpair()
         wake_up.setblocking(False)
         signal.set_wakeup_fd(wake_up.detach(), warn_on_full_buffer=False)
@@ -157,117 +153,15 @@ class Host:
 
     def _open_scene(self, message: m.OpenScene) -> bool:
         """Open the scene. Return False if the host has to exit."""
-        fault: SceneFault | None = None
-        self._scene = message
-        self._cell.assets = message.assets
-        self._recognise(message.identities)
-        failed = self._skip_object if message.keep_going else None
         try:
-            write_sources(message.types)
-            self._cell.open(scene_recipes(message, failed), failed)
-        except SceneFault as caught:
-            fault = caught
-        except Arcor2Error as error:
-            fault = SceneFault("", error)
-        except ProgramStopped:  # the scene was closed, or the server ended, while the objects were connecting
+            if not self._scene.open(message):
+                return False
+        except ProgramStopped:
             return True
-        except Exception as error:  # noqa: BLE001 - loading an object type may raise anything
-            fault = SceneFault(
-                "", Arcor2Error("{type}: {reason}", traceback_text(error), type=type(error).__name__, reason=error)
-            )
-        if fault is not None:
-            self._cell.close()
-            self.link.post(m.SceneFailed(error_data(fault.error, fault.object_id)))
-            return False
-        for device in self._cell:  # clients receive the state of each device before the scene is online
-            self._watch.check_connection(device)
         self._interlocks.configure(message.scene.interlocks)
         self.link.post(m.SceneOpened())
         self.clock.every(message.streaming_period if message.streaming_period > 0 else 0.1, self._stream_subscribed)
         return True
-
-    def _recognise(self, identities: Mapping[str, Identity]) -> None:
-        """Let the devices that will be connected be compared with the confirmed identities."""
-        self._cell.identities, self._cell.identified = identities, self._identified
-
-    def _identified(self, device: Device, reported: Reported) -> None:
-        cls = device.recipe.cls
-        restores = overrides(cls, "parameters_restore")
-        self.link.post(
-            m.DeviceIdentified(
-                device.id, device.name, cls.__name__, *reported, overrides(cls, "parameters_dump"), restores
-            )
-        )
-
-    def _confirm_identity(self, message: m.ConfirmIdentity) -> None:
-        self._cell.identities = {**self._cell.identities, message.object_id: message.identity}
-        with contextlib.suppress(Arcor2Error):  # the object was removed
-            if (identification := self._cell[message.object_id].identification) is not None:
-                identification.confirm(message.identity)
-
-    def _skip_object(self, fault: SceneFault) -> None:
-        """Continue without an object that could not be created or connected."""
-        self._cell.mark_absent(fault)
-        self._watch.report(fault.object_id, Connection.FAILED, fault.error.message)
-
-    # Objects are connected on threads of their own, because loading a type may take long.
-    def _retry(self, message: m.RetryObject) -> None:
-        """Create and connect a failed object again."""
-        with self._answering(message.id, message.object_id):
-            self._cell.require_failure(message.object_id)
-            if not self._connecting.acquire(blocking=False):
-                raise Refused("another object is being connected again. Wait until that has ended.")
-            try:
-                self._connect(message.object_id)
-            finally:
-                self._connecting.release()
-
-    def _add(self, message: m.AddObject) -> None:
-        """Create and connect a new object."""
-        (added,) = message.opening.scene.objects
-        with self._answering(message.id, added.id), self._connecting:
-            self._extend_scene(message.opening)
-            self._connect(added.id)
-
-    @contextlib.contextmanager
-    def _answering(self, number: int, object_id: str) -> Iterator[None]:
-        """Answer the request with this number when the object is connected, or with an error."""
-        try:
-            yield
-        except Exception as error:  # noqa: BLE001 - loading an object type may raise anything
-            self.link.post(m.CallFailed(number, error_data(error, object_id)))
-            return
-        self._watch.check_connection(self._cell[object_id])
-        self.link.post(m.CallDone(number))
-
-    def _connect(self, object_id: str) -> None:
-        assert self._scene is not None
-        self._watch.report(object_id, Connection.CONNECTING)
-        try:
-            (recipe,) = scene_recipes(self._scene, only=object_id)
-            self._cell.retry(recipe)
-        except SceneFault as fault:
-            self._skip_object(fault)
-            raise fault.error from fault
-
-    def _extend_scene(self, opening: m.OpenScene) -> None:
-        """Add the object of another scene with its type, model, settings and secrets to the open scene."""
-        assert self._scene is not None
-        scene, objects = self._scene, opening.scene.objects
-        known = {code.name for code in scene.types}
-        types = [*scene.types, *(code for code in opening.types if code.name not in known)]
-        if any(code.source for code in types[len(scene.types) :]):
-            write_sources(types)
-        added = {one.id for one in objects}
-        self._scene = replace(
-            scene,
-            scene=replace(scene.scene, objects=[*scene.scene.objects, *objects]),
-            types=types,
-            models=scene.models | opening.models,
-            overrides=[*scene.overrides, *(each for each in opening.overrides if each.id in added)],
-            secrets=scene.secrets | opening.secrets,
-        )
-        self._recognise({**self._cell.identities, **opening.identities})
 
     def _close_scene(self) -> None:
         active = (
@@ -297,7 +191,7 @@ class Host:
         )
         self._package, self._cell = message, program.cell
         self._cell.assets, self._cell.updates = message.assets, self._updates
-        self._recognise(message.identities)
+        recognise(self._cell, message.identities, self.link)
         self._watch = Watch(program.cell, self._device_changed, self._device_lost)
         self._cell.state_taken = self._recorder.state_taken
         program.inside = True
@@ -428,9 +322,9 @@ class Host:
             case m.Lease():
                 self._holds.lease(message)
             case m.RetryObject():
-                threading.Thread(target=self._retry, args=(message,), name="retry", daemon=True).start()
+                self._scene.retry(message)
             case m.AddObject():
-                threading.Thread(target=self._add, args=(message,), name="add", daemon=True).start()
+                self._scene.add(message)
             case m.Stream():
                 self._rated.set_rates(message)
             case m.Subscribe():
@@ -466,6 +360,12 @@ class Host:
     def _held(self, held: HeldData, device: Device, error: BaseException) -> None:
         """Report that the program is held."""
         self.link.post(m.ProgramHeld(held, _described(error, device)))
+
+    def _confirm_identity(self, message: m.ConfirmIdentity) -> None:
+        self._cell.identities = {**self._cell.identities, message.object_id: message.identity}
+        with contextlib.suppress(Arcor2Error):  # the object was removed
+            if (identification := self._cell[message.object_id].identification) is not None:
+                identification.confirm(message.identity)
 
     def _decide(self, message: m.DecideHeld) -> None:
         """Continue the held program."""

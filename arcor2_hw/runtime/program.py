@@ -4,7 +4,6 @@ import contextvars
 import itertools
 import threading
 import time
-import traceback
 from collections.abc import Callable, Mapping, Sequence, Set
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
@@ -481,11 +480,6 @@ class Program:
             message.text, type(error).__name__, isinstance(error, Arcor2Error), action_id, **message.translation()
         )
         self.channel.event("ProjectException", _encode(Event("ProjectException", data=data)))
-
-
-def traceback_text(error: BaseException) -> str:
-    """Return the traceback of an exception as text."""
-    return "".join(traceback.format_exception(error))
 
 
 _current: Program | None = None

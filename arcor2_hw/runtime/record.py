@@ -2,36 +2,26 @@
 
 import enum
 import hashlib
-import inspect
 import logging
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from msgspec.structs import replace
 
-from arcor2_hw.actions import metadata_of
-from arcor2_hw.actions.decorator import PartFlow, ends_with_program, part_flow_of
-from arcor2_hw.data.base import UNSET, Unset, now
+from arcor2_hw.actions.decorator import ends_with_program
+from arcor2_hw.data.base import Unset, now
 from arcor2_hw.data.geometry import Orientation, Pose, Position
-from arcor2_hw.data.parts import ConfirmedPart, DoneAction, PartBooks, Place, PlaceKind, RunCheckpoint, RunningAction
+from arcor2_hw.data.parts import ConfirmedPart, DoneAction, PartBooks, RunCheckpoint, RunningAction
 from arcor2_hw.data.project import START, Project
-from arcor2_hw.exceptions import (
-    Arcor2Error,
-    Conflict,
-    InvalidData,
-    PartUnconfirmed,
-    PlaceEmpty,
-    PlaceOccupied,
-    StorageError,
-)
+from arcor2_hw.exceptions import Arcor2Error, Conflict, PartUnconfirmed, StorageError
 from arcor2_hw.runtime.branches import Action, Branch
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.checkpoints import CheckpointFile
 from arcor2_hw.runtime.continuing import Continuation, kind_of
 from arcor2_hw.runtime.device import Device
-from arcor2_hw.runtime.ledger import Ledger
+from arcor2_hw.runtime.part_tracking import PartTracking, Step
 from arcor2_hw.runtime.values import results
 
 LONGEST_RESULT: Final = 10_000
@@ -44,29 +34,8 @@ _STORED: Final = (bool, int, float, str, enum.Enum, Pose, Position, Orientation)
 log = logging.getLogger(__name__)
 
 
-class Step(NamedTuple):
-    """A started action.
-
-    part, target: number of the part that it moves, and where to. place: where it identifies or judges one.
-    concerns: number of the part that it concerns otherwise. serial, order: of the part, as arguments state them.
-    """
-
-    number: int
-    done: DoneAction
-    part: int | None = None
-    target: str = ""
-    place: str = ""
-    identifies: bool = False
-    judges: bool = False
-    concerns: int = 0
-    serial: str = ""
-    order: str = ""
-
-
 class RunRecord:
     """Keeps the books of parts and stores checkpoints. The threads of the script and the reader thread call it.
-
-    The books are kept in scenes with a feeder or a box. In other scenes there are only checkpoints.
 
     Args:
         directory: the directory of the checkpoints.
@@ -96,17 +65,7 @@ class RunRecord:
         self._run = RunCheckpoint(run, package_id, "", now())
         self._lock = threading.Lock()
         self._file: CheckpointFile | None = None
-        self._ledger = Ledger(PartBooks(""))
-        self._cell: Cell | None = None
-        self._keeps_books = False
-        self._points: dict[str, str] = {}
-        """The place of each action point by its id."""
-        self._free: dict[str, Place] = {}
-        """Places that are action points at no object, by their ids; they count when a part is first moved there."""
-        self._own: dict[str, str] = {}
-        """The place of each action at an action point, by the id of the action."""
-        self._only_feeder = ""
-        """The place of actions of functions, which are at no action point: the feeder, if there is only one."""
+        self._parts: PartTracking | None = None
         self._first = ""
         self._named: set[str] = set()
         """The actions whose results have names, so that other actions can use them."""
@@ -136,15 +95,11 @@ class RunRecord:
             PartUnconfirmed: a person has to confirm the place of a part first.
             Conflict: the program cannot continue, because it was not interrupted, or was changed since.
         """
-        self._cell = cell
-        self._file = CheckpointFile(self._directory, project.scene_id)
-        former = self._file.read() or PartBooks(project.scene_id)
+        file = CheckpointFile(self._directory, project.scene_id)
+        former = file.read() or PartBooks(project.scene_id)
         if former.unconfirmed:
             raise PartUnconfirmed("Confirm where the parts are before the program starts: {parts}.",
                                   parts=", ".join(part.shown for part in former.unconfirmed))  # fmt: skip
-        self._ledger = Ledger(former)
-        kinds = {device.require().place_kind for device in cell}
-        self._keeps_books = not kinds <= {None, PlaceKind.HOLDER}
         self._first = next((item.end for item in project.logic if item.start == START), "")
         self._named = {action.id for action in project.all_actions() if action.outputs()}
         self._variables = {one.name: one.value for one in project.parameters if one.variable}
@@ -153,10 +108,9 @@ class RunRecord:
         self._run = replace(self._run, package_hash=package_hash(package), variables=dict(self._variables))
         if self.continues:
             self._continue(former.run)
-        if self._keeps_books:
-            self._ledger.set_places(self._find_places(project, cell))
+        self._parts, self._file = PartTracking(former, project, cell, self._changed, self._concerned), file
         self._store(always=True)
-        self._publish()
+        self._parts.publish()
 
     def _continue(self, former: RunCheckpoint | Unset) -> None:
         """Use what an interrupted run has done in its last cycle. Raises Conflict."""
@@ -173,39 +127,6 @@ class RunRecord:
         self._run = replace(
             self._run, cycle=former.cycle, last=former.last, complete=True, variables=dict(self._variables)
         )
-
-    def _find_places(self, project: Project, cell: Cell) -> list[Place]:
-        """Return the places of the scene and of the project, and assign action points and actions to them."""
-        places: dict[str, Place] = {}
-        for device in cell:
-            instance = device.require()
-            if instance.place_kind is not None:
-                kind, capacity = PlaceKind(instance.place_kind), instance.place_capacity
-                places[device.id] = Place(device.id, device.name, kind, capacity)
-        feeders = [key for key, place in places.items() if place.kind is PlaceKind.FEEDER]
-        self._only_feeder = feeders[0] if len(feeders) == 1 else ""
-        points = {point.id: point for point in project.action_points}
-        for point in project.action_points:
-            parent, seen = point.parent, {point.id}
-            while not isinstance(parent, Unset) and parent in points and parent not in seen:
-                seen.add(parent)
-                parent = points[parent].parent
-            if not isinstance(parent, Unset) and parent in places:
-                self._points[point.id] = parent
-            else:
-                self._points[point.id] = point.id
-                self._free[point.id] = Place(point.id, point.name, PlaceKind.FEEDER, 0)
-            self._own |= {action.id: self._points[point.id] for action in point.actions}
-        for action in project.all_actions():
-            owner, _, method = action.type.partition("/")
-            if owner not in (device.id for device in cell):
-                continue
-            bound = getattr(cell[owner].require(), method, None)
-            flow, found = part_flow_of(bound), metadata_of(bound)
-            self._ledger.tests = self._ledger.tests or (found is not None and found.verdict is True)
-            if (flow.takes_from or flow.puts_to) and owner not in places:  # a robot or gripper
-                places[owner] = Place(owner, cell[owner].name, PlaceKind.HOLDER)
-        return list(places.values())
 
     # -------------------------------------------------------------------------------- actions
     def begin(
@@ -231,8 +152,7 @@ class RunRecord:
         action_id = action.id or ""
         with self._lock:
             step = Step(action.number, _done(action, name, branch, device, bound))
-            if self._keeps_books:
-                step = self._begin_part(step, device, bound, arguments, keywords)
+            step = self._tracking.begin(step, device, bound, arguments, keywords)
             if self._starts_cycle(action, branch):
                 variables = dict(self._variables)
                 self._run = replace(self._run, cycle=self._run.cycle + 1, complete=True, variables=variables)
@@ -265,75 +185,6 @@ class RunRecord:
             self._cycle_call = branch.calls[0].number  # the call around it belongs to the interrupted cycle
         return done
 
-    def _begin_part(
-        self, step: Step, device: Device, bound: Any, arguments: Sequence[Any], keywords: Mapping[str, Any]
-    ) -> Step:
-        flow, found = part_flow_of(bound), metadata_of(bound)
-        judges = found is not None and found.verdict is True
-        own = self._own.get(step.done.action_id, "")
-        if flow.serial or flow.order:
-            given = inspect.signature(bound).bind(*arguments, **keywords).arguments
-            serial, order = (str(given.get(name, "")) if name else "" for name in (flow.serial, flow.order))
-            step = step._replace(serial=serial, order=order)
-        if not step.serial:  # the part in this device, or at the place of the action
-            step = step._replace(concerns=self._ledger.part_at(device.id) or self._ledger.part_at(own))
-        if flow._replace(serial="", order="") == PartFlow() and not judges:
-            return step
-        if flow.takes_from or flow.puts_to:
-            there = self._place_of(bound, flow.takes_from or flow.puts_to, arguments, keywords) or own
-            if not there:
-                raise InvalidData(
-                    "{device}: the place of the part is unknown, because its pose is at no action point.",
-                    device=device.name,
-                )
-            if there in self._free:
-                self._ledger.add_place(self._free[there])
-            source, target = (there, device.id) if flow.takes_from else (device.id, there)
-            self._compare(source, target)
-            part = self._ledger.move(source, target)
-            self._publish()
-            return step._replace(
-                part=part, target=target, done=replace(step.done, moved=True, source=source, target=target)
-            )
-        if judges and self._ledger.has_part(device.id):
-            own = device.id
-        elif flow.identifies:
-            own = own or self._only_feeder
-        if own in self._free:
-            own = ""
-        return step._replace(place=own, identifies=flow.identifies, judges=judges)
-
-    def _place_of(self, bound: Any, parameter: str, arguments: Sequence[Any], keywords: Mapping[str, Any]) -> str:
-        """Return the place that an argument names; empty if it is a pose at no action point."""
-        given = inspect.signature(bound).bind(*arguments, **keywords).arguments.get(parameter)
-        point = vars(given).get("action_point_id", "") if isinstance(given, Pose) else ""
-        return self._points.get(point, "")
-
-    def _compare(self, source: str, target: str) -> None:
-        """Compare what the books expect with what sensors detect. Raises PlaceEmpty, PlaceOccupied."""
-        if self._sensed(source) is False:
-            raise PlaceEmpty(
-                "The sensor detects no part at {place}. Check the place, then confirm where the parts are.",
-                place=self._ledger.name_of(source),
-            )
-        if not self._ledger.has_part(target) and self._sensed(target) is True:
-            raise PlaceOccupied(
-                "{place} is occupied: its sensor detects a part that is not in the books. Remove it.",
-                place=self._ledger.name_of(target),
-            )
-
-    def _sensed(self, place_id: str) -> bool | None:
-        """Return whether the sensor of a place detects a part; None without a sensor that can be read."""
-        if self._cell is None:
-            return None
-        for device in self._cell:
-            if device.id == place_id and device.instance is not None:
-                try:
-                    return device.instance.part_present()
-                except Arcor2Error:
-                    return None
-        return None
-
     def end(self, step: Step, value: Any) -> None:
         """Record that an action has succeeded, or counts as done. It is on disk when this returns.
 
@@ -341,42 +192,30 @@ class RunRecord:
             WrongPart: another part was identified than expected.
         """
         with self._lock:
-            if step.part is not None:
-                self._ledger.complete(step.part)
-            if step.place and step.identifies and isinstance(value, str):
-                self._ledger.identify(step.place, value)
-            if step.place and step.judges and isinstance(value, bool):
-                self._ledger.judge(step.place, value)
+            self._tracking.end(step, value)
             self._running.pop(step.number, None)
             self._add_done(step.done, value)
             self._store_later()
             if step.part is not None or step.place:
-                self._publish()
-            self._report(step, value if step.judges and isinstance(value, bool) else None)
-
-    def _report(self, step: Step, verdict: bool | None = None) -> None:
-        """Report that an action has concerned a part."""
-        part = step.part or self._ledger.part_at(step.place) or step.concerns
-        if self._keeps_books and (part or step.serial):
-            self._concerned(step.number, 0 if step.serial else part, step.serial, step.order, verdict)
+                self._tracking.publish()
+            self._tracking.report(step, value if step.judges and isinstance(value, bool) else None)
 
     def fail(self, step: Step) -> None:
         """Record that an action has failed or was stopped: the part may be at its source or its target."""
         with self._lock:
             if not self._interrupted and (running := self._running.pop(step.number, None)) is not None:
                 self._held[running.branch, running.action_id] = running
-            if step.part is not None:
-                self._ledger.fail(step.part)
+            self._tracking.fail(step)
             self._store_later()
             if step.part is not None:
-                self._publish(sense=True)
-            self._report(step)
+                self._tracking.publish(sense=True)
+            self._tracking.report(step)
 
     def require_arrived(self, step: Step | None) -> None:
         """Check that a movement may count as done by hand. Raises WrongPart if a person has confirmed otherwise."""
-        if step is not None and step.part is not None:
+        if step is not None:
             with self._lock:
-                self._ledger.require_arrived(step.part, step.target)
+                self._tracking.require_arrived(step)
 
     def decided(self, action: Action, name: str, branch: Branch, device: Device, bound: Any, value: Any) -> None:
         """Record that an action that has not started counts as done, by the decision of a person."""
@@ -450,32 +289,27 @@ class RunRecord:
             NotFound: there is no such part or place.
         """
         with self._lock:
+            if self._parts is None:  # the program is still starting
+                raise Conflict("The program keeps no books of parts.")
             if self._running:
                 names = ", ".join(action.action_name for action in self._running.values())
                 raise Conflict("Parts cannot be confirmed while an action runs: {names}.", names=names)
-            self._ledger.confirm(found)
+            self._tracking.confirm(found)
             self._store(always=True)
-            self._publish(sense=True)
+            self._tracking.publish(sense=True)
 
     # -------------------------------------------------------------------------------- helpers
-    def _publish(self, *, sense: bool = False) -> None:
-        """Publish the books. sense: whether sensors are read, which may take some milliseconds."""
-        if not self._keeps_books:
-            return
-        books = self._ledger.books
-        if sense:
-            sensed = ((place, self._sensed(place.id)) for place in books.places)
-            books = replace(
-                books, places=[replace(place, sensed=UNSET if found is None else found) for place, found in sensed]
-            )
-        self._changed(books)
+    @property
+    def _tracking(self) -> PartTracking:
+        assert self._parts is not None, "open has succeeded"
+        return self._parts
 
     def _store(self, *, always: bool = False) -> None:
         if self._file is not None and (always or self._each_action):
             unfinished = [] if self.continuation is None else self.continuation.unfinished
             actions = [*self._running.values(), *self._held.values(), *unfinished]
             run = replace(self._run, actions=actions, results=self._results, done=self._done)
-            self._file.write(replace(self._ledger.books, run=run))
+            self._file.write(replace(self._tracking.books, run=run))
 
     def _store_later(self, *, always: bool = False) -> None:
         """Store a checkpoint. If the disk fails, the next action does not start, but this one does not fail."""

@@ -4,6 +4,7 @@ import ast
 import contextlib
 import os
 import sys
+import traceback
 import types
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,7 +13,7 @@ from arcor2_hw.data.project import Project
 from arcor2_hw.runtime.continuing import set_variables
 from arcor2_hw.runtime.documents import read_document
 from arcor2_hw.runtime.package import put_on_path
-from arcor2_hw.runtime.program import Program, traceback_text
+from arcor2_hw.runtime.program import Program
 from arcor2_hw.runtime.program_values import set_values
 
 
@@ -50,3 +51,8 @@ def save_traceback(directory: Path, error: BaseException) -> None:
     path = directory / f"traceback-{datetime.now(UTC):%Y-%m-%dT%H-%M-%S}.txt"
     with contextlib.suppress(OSError):
         path.write_text(traceback_text(error), encoding="utf-8")
+
+
+def traceback_text(error: BaseException) -> str:
+    """Return the traceback of an exception as text."""
+    return "".join(traceback.format_exception(error))

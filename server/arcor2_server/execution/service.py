@@ -1,7 +1,6 @@
 """The Execution service: runs packages (protocol, section 12)."""
 
 import asyncio
-import contextlib
 import time
 from collections.abc import Mapping
 from typing import Any, Final
@@ -19,7 +18,7 @@ from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.position import ProgramStep
 from arcor2_hw.data.rpc import ConfirmPartsArgs, DecideHeldArgs
 from arcor2_hw.data.scene import SceneObject
-from arcor2_hw.exceptions import Arcor2Error, NotFound, ProgramInterrupted
+from arcor2_hw.exceptions import Arcor2Error, ProgramInterrupted
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.background import BackgroundTasks
@@ -30,6 +29,7 @@ from arcor2_server.execution.holds import ProgramHold
 from arcor2_server.execution.packages import PackageLibrary
 from arcor2_server.execution.part_books import AllPartBooks
 from arcor2_server.execution.program_run import ProgramRun
+from arcor2_server.execution.program_streams import ProgramStreams
 from arcor2_server.execution.run_message import RunMessages
 from arcor2_server.execution.run_observers import RunObservers
 from arcor2_server.execution.run_statistics import verdicts_of
@@ -37,7 +37,6 @@ from arcor2_server.execution.runs import How, Runs
 from arcor2_server.hosts.devices import DeviceBoard, overlay_for
 from arcor2_server.hosts.process import CellHost, json_of
 from arcor2_server.hosts.session import HostSession, decoded_info
-from arcor2_server.hosts.streams import RobotStreams
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.settings import ServerSettings
@@ -88,6 +87,8 @@ class Execution(PackageLibrary, RunObservers):
         """The hold of the present run."""
         self.parts = parts
         """The books of parts."""
+        self.streams = ProgramStreams(host, types)
+        """The subscriptions to the devices of the program."""
         self._host = host
         self._online = online
         self._settings = settings
@@ -123,11 +124,6 @@ class Execution(PackageLibrary, RunObservers):
         """The states of the program's devices."""
         return self._host.board
 
-    @property
-    def streams(self) -> RobotStreams:
-        """The subscriptions to joints and end effector poses."""
-        return self._host.streams
-
     def require_permitted(self, how: How) -> None:
         """Raise RequestRefused if no program may be started in this way now."""
         for check in self.before_start:
@@ -137,28 +133,6 @@ class Execution(PackageLibrary, RunObservers):
         """Raise RequestRefused while a program runs."""
         if self.busy:
             raise RequestRefused("A program is running. Stop it first.")
-
-    def streams_of_object(self, object_id: str) -> RobotStreams:
-        """Return the subscriptions to a device of the running program. Raise RequestRefused while it starts."""
-        self._require_devices()
-        self.board.object(object_id)
-        return self.streams
-
-    def streams_of(self, robot_id: str) -> RobotStreams:
-        """Return the subscriptions to a robot of the running program. Raise RequestRefused while it starts."""
-        self._require_devices()
-        found = self.board.object(robot_id)
-        with contextlib.suppress(NotFound):  # the type may be only in the package
-            if not self._types.derives_from(found.type, "Robot"):
-                raise RequestRefused("{name} is not a robot.", name=found.name)
-        return self.streams
-
-    def _require_devices(self) -> None:
-        """Raise RequestRefused while the devices of the program are not connected yet."""
-        if self._host.package_info is None:
-            raise RequestRefused(
-                "The devices of the program are not connected yet. Try again after the event PackageInfo."
-            )
 
     def state_and_info(self) -> tuple[Event, bytes | None]:
         """Return the present PackageState, and the encoded PackageInfo while a program runs."""
@@ -507,7 +481,7 @@ class Execution(PackageLibrary, RunObservers):
             for notify in self.on_failed:
                 notify(self.program.number, self.program.error, host)
         self._publish_position()
-        self.streams.clear()
+        self._host.streams.clear()
         error = self.program.error
         self.board.clear(None if error is None else error.message)
         self._host.package_info = None

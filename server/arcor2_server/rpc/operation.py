@@ -161,7 +161,7 @@ class OperationRequests:
         """
         execution = self._execution
         if execution.busy:
-            streams = execution.streams_of(args.robot_id)
+            streams = execution.streams.of_robot(args.robot_id)
         else:
             streams = self._motion.require_robot_online(args.robot_id).streams
         if args.send and not 1.0 <= args.rate <= FASTEST_STREAM:
@@ -192,7 +192,7 @@ class OperationRequests:
         self, context: Context, args: StreamObservationsArgs | StreamPointsArgs, what: str, fastest: float
     ) -> None:
         if self._execution.busy:
-            streams = self._execution.streams_of_object(args.object_id)
+            streams = self._execution.streams.of_object(args.object_id)
         else:
             self._session.require_scene_open()
             self._online.require_online()

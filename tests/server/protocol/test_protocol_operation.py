@@ -132,7 +132,7 @@ async def test_a_robot_is_streamed_while_a_program_runs(tmp_path: Path) -> None:
         await viewer.ask("StreamRobot", **what, rate=30)
         await alice.ask("StopPackage")
         await happens(viewer, "OpenProject")
-        assert stage.services.execution.streams._rates == {}
+        assert stage.services.execution._host.streams._rates == {}
         viewer.take()
         await alice.ask("TemporaryPackage")
         await happens(viewer, "ActionStateBefore")
