@@ -18,6 +18,12 @@ MAX_SIZE: Final = 1 << 20
 """Maximum size, bytes; a cell of hundreds of devices has some ten thousand."""
 BROKER_URL: Final = "ARCOR2_HW_NATS_URL"
 """The variable with the address of the broker between a server and its nodes. It may contain a password."""
+LOCAL_BROKER: Final = "nats://127.0.0.1:4222"
+"""The address of the broker if the variable is not set."""
+BROKER_AUTHORITY: Final = "ARCOR2_HW_NATS_CA"
+"""The variable with the file of the certificate to trust for tls://."""
+BROKER_CREDENTIALS: Final = "ARCOR2_HW_NATS_CREDENTIALS"
+"""The variable with the file of the credentials for the broker, which is used if there is no address."""
 
 
 class CellDevice(Data, frozen=True, forbid_unknown_fields=True):

@@ -166,6 +166,16 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return self.data_dir / "cell-state.json"
 
     @property
+    def broker_dir(self) -> Path:
+        """The directory of the keys and nodes of the broker."""
+        return self.data_dir / "broker"
+
+    @property
+    def broker_credentials(self) -> Path:
+        """The file with the credentials of the server for the broker."""
+        return self.broker_dir / "server.json"
+
+    @property
     def history_dir(self) -> Path:
         """The directory of the histories of closed documents."""
         return self.data_dir / "history"
@@ -279,6 +289,16 @@ _VARIABLES: Final = {
 }
 _LISTS: Final = {"allowed_hosts": ",", "trusted_proxies": ",", "device_files": os.pathsep}
 """Separators of the settings that are lists."""
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether only this machine can reach an address."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return False
 
 
 def default_data_dir(environment: Mapping[str, str] = os.environ) -> Path:

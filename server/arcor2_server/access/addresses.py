@@ -5,8 +5,7 @@ import socket
 from pathlib import Path
 
 from arcor2_hw.data.base import Data
-from arcor2_server.access.admission import is_loopback
-from arcor2_server.settings import ServerSettings
+from arcor2_server.settings import ServerSettings, is_loopback
 
 _DOCUMENTATION = "192.0.2.1"
 """A documentation address (RFC 5737) for finding the outgoing interface. Nothing is sent to it."""

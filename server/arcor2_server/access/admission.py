@@ -1,6 +1,5 @@
 """Admission of clients: which role a client has, by its token, its listener or the settings of the server."""
 
-import ipaddress
 import time
 from collections import OrderedDict, deque
 from typing import Any, Final
@@ -18,7 +17,7 @@ from arcor2_hw.messages import Message, translatable
 from arcor2_server.access.connection_limits import CONNECTION
 from arcor2_server.access.route_options import AS_ROLE, OPEN, PERSON, ROLE, STOPS
 from arcor2_server.access.tokens import FILE, Token, TokenFile
-from arcor2_server.settings import ServerSettings
+from arcor2_server.settings import ServerSettings, is_loopback
 
 log = structlog.get_logger(__name__)
 
@@ -63,16 +62,6 @@ def right(ceiling: Role, *, shared: bool, person: Role | None) -> Role:
     if person is not None:
         return min(ceiling, person)
     return min(ceiling, Role.OPERATOR) if shared else ceiling
-
-
-def is_loopback(host: str) -> bool:
-    """Return whether only this machine can reach an address."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host.strip("[]")).is_loopback
-    except ValueError:
-        return False
 
 
 def is_local(settings: ServerSettings) -> bool:

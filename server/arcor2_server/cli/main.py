@@ -53,7 +53,11 @@ app.command(
     "arcor2_server.cli.database:app", name="database", help="Move the documents of a data directory to PostgreSQL."
 )
 app.command("arcor2_server.cli.device:app", name="device", help="List, find and check devices; create a driver.")
-app.command("arcor2_server.cli.node:app", name="node", help="Run devices on this computer for a server on another one.")
+app.command(
+    "arcor2_server.cli.node:app",
+    name="node",
+    help="Run devices on another computer (node), and manage the nodes of a server.",
+)
 app.command(
     "arcor2_server.cli.calibrate:app", name="calibrate", help="Calibrate the poses of cameras, robots and tools."
 )

@@ -28,16 +28,17 @@ from arcor2_hw.calibration.configuration import (
     yaml_of,
 )
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.cell import Cell, read_cell
+from arcor2_hw.data.cell import BROKER_URL, Cell, read_cell
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error, DatabaseInUse, InvalidData, NotFound, StorageError
 from arcor2_server.access.addresses import certified_hosts, server_addresses
-from arcor2_server.access.admission import PARAMETER, is_local, is_loopback
+from arcor2_server.access.admission import PARAMETER, is_local
 from arcor2_server.access.tokens import TokenFile
 from arcor2_server.audit.command_line import note_command
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.deployment.service_manager import ServiceManager
 from arcor2_server.log import setup as server_logging
+from arcor2_server.nodes.credentials import require_tls
 from arcor2_server.settings import (
     DATABASE_URL,
     DEVICE_FILES_NAME,
@@ -45,6 +46,7 @@ from arcor2_server.settings import (
     OpcUaListener,
     PlcListener,
     ServerSettings,
+    is_loopback,
 )
 from arcor2_server.websocket.classic_ports import ports_from_environment
 
@@ -170,6 +172,8 @@ def serve(
             opcua=None if opcua is None else _opcua(opcua, anonymous=opcua_anonymous, unencrypted=opcua_unencrypted),
             classic_ports=ports_from_environment() if classic_ports else None,
         )
+        if broker := os.environ.get(BROKER_URL):
+            require_tls(broker)
         server_logging.set_up(log_level)
         os.environ.pop(DATABASE_URL, None)  # may contain a password, which devices and programs must not see
     except (InvalidData, KeyError) as error:

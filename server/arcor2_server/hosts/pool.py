@@ -10,7 +10,7 @@ from typing import Final
 
 import structlog
 
-from arcor2_hw.data.cell import BROKER_URL, Cell, node_of
+from arcor2_hw.data.cell import BROKER_CREDENTIALS, BROKER_URL, Cell, node_of
 from arcor2_hw.data.device import DEVICE_FILES
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error
@@ -30,11 +30,14 @@ class CellHosts:
     Args:
         device_files: directories of the files that settings of devices may name.
         cell: names the nodes of devices that are not on this computer.
+        broker: file with the credentials of the server for the broker of nodes; it may be missing.
     """
 
-    def __init__(self, device_files: Sequence[Path], cell: Cell | None = None) -> None:
+    def __init__(self, device_files: Sequence[Path], cell: Cell | None = None, broker: Path | None = None) -> None:
         self._cell = cell
         self._environment = os.environ | {DEVICE_FILES: os.pathsep.join(map(str, device_files))}
+        if broker is not None:
+            self._environment.setdefault(BROKER_CREDENTIALS, str(broker))
         self._spare: asyncio.Task[CellHost] | None = None
         self._taken: set[CellHost] = set()
         self._closed = False
@@ -105,7 +108,8 @@ class CellHosts:
     async def _start(self, node: str = "") -> CellHost:
         environment = dict(self._environment)
         if not node:
-            environment.pop(BROKER_URL, None)  # its password is not for devices and programs
+            for variable in (BROKER_URL, BROKER_CREDENTIALS):  # not for devices and programs
+                environment.pop(variable, None)
         host = await CellHost.start(environment, node)
         try:
             async with asyncio.timeout(READY_TIMEOUT):

@@ -1,16 +1,15 @@
 """Connections to the broker (NATS), one for each lane."""
 
 import asyncio
-import ssl
+import contextlib
 from collections.abc import Callable
 from typing import Final
-from urllib.parse import urlsplit
 
-import nats
 from nats.aio.client import Client
 from nats.errors import Error as NatsError
 
 from arcor2_hw.exceptions import ConnectionLost
+from arcor2_server.nodes.credentials import Credentials, address_of
 from arcor2_server.nodes.lanes import Lane
 from arcor2_server.nodes.session import Connections
 
@@ -18,6 +17,8 @@ PREFIX: Final = "arcor2"
 """First token of all subjects."""
 CONNECT_WITHIN: Final = 2.0
 """Time limit for a connection, s."""
+REFUSAL: Final = "authorization violation"
+"""The answer of a broker to wrong credentials, in lower case."""
 CLOSE_WITHIN: Final = 0.5
 """Time limit for closing a connection, s."""
 
@@ -32,20 +33,34 @@ def session_subject(node: str, session: str) -> str:
     return f"{PREFIX}.{node}.{session}"
 
 
-async def connect(url: str, lost: Callable[[], None] = lambda: None, authority: str = "") -> Connections:
+async def connect(credentials: Credentials, lost: Callable[[], None] = lambda: None) -> Connections:
+    """Connect to the broker once for each lane. Arguments and errors as of `connect_client`."""
+    connections: dict[Lane, Client] = {}
+    try:
+        for lane in Lane:
+            connections[lane] = await connect_client(credentials, f"arcor2-hw {lane}", lost)
+    except BaseException:
+        await close(connections)
+        raise
+    return connections
+
+
+async def connect_client(credentials: Credentials, name: str, lost: Callable[[], None] = lambda: None) -> Client:
     """Connect to the broker.
 
     A connection that is lost is not established again, because messages may have been lost with it.
 
     Args:
-        url: address of the broker, such as nats://10.0.0.1:4222, with user and password if the broker requires them.
-        lost: called when a connection has ended by itself.
-        authority: file of the certificate to trust for tls://; empty for those that the system trusts.
+        credentials: address and credentials of the broker.
+        name: of the connection, in the log of the broker.
+        lost: called when the connection has ended by itself.
 
     Raises:
+        InvalidData: the broker is on another computer and the address is without TLS, or a value is damaged.
         ConnectionLost: the broker cannot be reached, or refuses the connection.
     """
-    connections: dict[Lane, Client] = {}
+    options = credentials.options()
+    client = Client()
 
     async def disconnected() -> None:
         lost()
@@ -54,38 +69,38 @@ async def connect(url: str, lost: Callable[[], None] = lambda: None, authority: 
         """Errors end the connection, or the call that caused them raises them."""
 
     try:
-        # Without it, the client would also accept a broker without TLS.
-        tls = ssl.create_default_context(cafile=authority or None) if url.startswith("tls://") else None
-        for lane in Lane:
-            connections[lane] = await asyncio.wait_for(
-                nats.connect(
-                    url,
-                    name=f"arcor2-hw {lane}",
-                    allow_reconnect=False,
-                    connect_timeout=int(CONNECT_WITHIN),
-                    tls=tls,
-                    disconnected_cb=disconnected,
-                    error_cb=ignore,
-                ),
-                CONNECT_WITHIN,
+        async with asyncio.timeout(CONNECT_WITHIN):
+            await client.connect(
+                credentials.url,
+                name=name,
+                allow_reconnect=False,
+                connect_timeout=int(CONNECT_WITHIN),
+                disconnected_cb=disconnected,
+                error_cb=ignore,
+                **options,
             )
     except (NatsError, OSError, TimeoutError) as error:
-        await close(connections)
+        await _close(client)  # also a refused one has a socket
+        detail, address = f"{type(error).__name__}: {error}", address_of(credentials.url)
+        if REFUSAL in str(error).lower():
+            raise ConnectionLost(
+                "The broker at {address} refuses the credentials. A node that was revoked must be paired again.",
+                detail,
+                address=address,
+            ) from error
         raise ConnectionLost(
             "The broker at {address} cannot be reached. Check that nats-server is running there.",
-            f"{type(error).__name__}: {error}",
-            address=_address(url),
+            detail,
+            address=address,
         ) from error
-    return connections
+    return client
 
 
 async def close(connections: Connections) -> None:
     """Close connections. Those that do not close in time, because their peer cannot be reached, are abandoned."""
-    closing = [asyncio.wait_for(client.close(), CLOSE_WITHIN) for client in connections.values()]
-    await asyncio.gather(*closing, return_exceptions=True)
+    await asyncio.gather(*(_close(client) for client in connections.values()))
 
 
-def _address(url: str) -> str:
-    """Return an address without user and password."""
-    parts = urlsplit(url)
-    return f"{parts.hostname or url}:{parts.port or 4222}"
+async def _close(client: Client) -> None:
+    with contextlib.suppress(NatsError, OSError, TimeoutError):
+        await asyncio.wait_for(client.close(), CLOSE_WITHIN)

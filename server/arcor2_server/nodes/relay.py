@@ -17,13 +17,13 @@ import msgspec
 import uvloop
 from nats.errors import Error as NatsError, NoRespondersError, TimeoutError as NatsTimeoutError
 
-from arcor2_hw.data.cell import BROKER_URL
 from arcor2_hw.exceptions import Arcor2Error, message_of
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.nodes import connections as broker
 from arcor2_server.nodes.content import WITH_FILES, Content
 from arcor2_server.nodes.conversion import STOPS, for_server, outline
+from arcor2_server.nodes.credentials import of_environment
 from arcor2_server.nodes.lanes import Header, Lane
 from arcor2_server.nodes.opening import Opened, Opening, own_version
 from arcor2_server.nodes.session import SILENCE, Connections, SessionEnd
@@ -57,12 +57,12 @@ class Relay:
         """Messages that wait until the files of the first one are sent: number, type, message."""
         self._transfer: asyncio.Task[None] | None = None
 
-    async def run(self, url: str, authority: str, silence: float) -> None:
+    async def run(self, silence: float) -> None:
         """Serve until the session ends. Report the reason to the server."""
         await asyncio.get_running_loop().create_unix_connection(lambda: self._stream, sock=self._socket)
         connections: Connections = {}
         try:
-            connections = await broker.connect(url, self._broker_lost, authority)
+            connections = await broker.connect(of_environment(os.environ), self._broker_lost)
             await self._open(connections, silence)
             reason = await self._over
         except Arcor2Error as error:
@@ -153,8 +153,8 @@ class Relay:
         self.ended(reason, False)
 
 
-async def _main(node: str, sock: socket.socket, url: str, authority: str, silence: float) -> None:
-    await Relay(node, sock).run(url, authority, silence)
+async def _main(node: str, sock: socket.socket, silence: float) -> None:
+    await Relay(node, sock).run(silence)
 
 
 def main() -> None:
@@ -166,10 +166,7 @@ def main() -> None:
     options = parser.parse_args()
     with contextlib.suppress(OSError):  # not permitted without LimitNICE in the service file
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
-    # In the environment, because arguments are visible to all users and the address may contain a password.
-    url = os.environ.get(BROKER_URL, "nats://127.0.0.1:4222")
-    authority = os.environ.get("ARCOR2_HW_NATS_CA", "")
-    uvloop.run(_main(options.node, socket.socket(fileno=options.fd), url, authority, options.silence))
+    uvloop.run(_main(options.node, socket.socket(fileno=options.fd), options.silence))
     sys.stdout.flush()
 
 

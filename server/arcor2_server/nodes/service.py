@@ -14,7 +14,6 @@ import structlog
 from nats.aio.msg import Msg
 from nats.errors import Error as NatsError
 
-from arcor2_hw.data.cell import BROKER_URL
 from arcor2_hw.exceptions import Arcor2Error, ArrivedLate, Cancelled, ConnectionLost, InvalidData, NotFound
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
@@ -22,6 +21,7 @@ from arcor2_server.child_process import ChildProcess, describe_exit
 from arcor2_server.nodes import connections as broker
 from arcor2_server.nodes.content import WITH_FILES, ContentStore, default_store
 from arcor2_server.nodes.conversion import FRAMES, LARGE, Outline, for_host, outline
+from arcor2_server.nodes.credentials import Credentials, environment_without
 from arcor2_server.nodes.lanes import Header, Lane
 from arcor2_server.nodes.opening import Opened, Opening, refusal_of
 from arcor2_server.nodes.session import Connections, SessionEnd
@@ -198,23 +198,20 @@ class NodeService:
 
     Args:
         name: name of the node.
-        url: address of the broker.
+        credentials: returns those for the broker; called before each attempt to connect.
         environment: the environment of cell hosts.
         ready: called each time when the node can be used.
-        authority: file of the certificate to trust for tls://; empty for those that the system trusts.
     """
 
     def __init__(
         self,
         name: str,
-        url: str,
+        credentials: Callable[[], Credentials],
         environment: Mapping[str, str] = os.environ,
         ready: Callable[[], None] = lambda: None,
-        authority: str = "",
     ) -> None:
-        self._authority = authority
-        self._name, self._url, self._ready = name, url, ready
-        self._environment = {key: value for key, value in environment.items() if key != BROKER_URL}
+        self._name, self._credentials, self._ready = name, credentials, ready
+        self._environment = environment_without(environment)
         self._store = ContentStore(default_store())
         self._connections: Connections = {}
         self._sessions: set[HostedSession] = set()
@@ -238,7 +235,7 @@ class NodeService:
         """Serve until the connection is lost. Raise ConnectionLost if there is none."""
         self._lost.clear()
         try:
-            self._connections = await broker.connect(self._url, self._lose, self._authority)
+            self._connections = await broker.connect(self._credentials(), self._lose)
             try:
                 calls = self._connections[Lane.CALLS]
                 await calls.subscribe(broker.open_subject(self._name), cb=self._open)

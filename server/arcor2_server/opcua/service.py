@@ -11,13 +11,12 @@ import structlog
 from arcor2_hw.framing import PREFIX_SIZE, body_length
 from arcor2_hw.opcua import messages as m
 from arcor2_server.access.addresses import certified_hosts
-from arcor2_server.access.admission import is_loopback
 from arcor2_server.background import BackgroundTasks
 from arcor2_server.child_process import ChildProcess, describe_exit
 from arcor2_server.opcua.feed import CellFeed
 from arcor2_server.opcua.requests import PlantRequests
 from arcor2_server.packml.cell import PackmlCell
-from arcor2_server.settings import ServerSettings
+from arcor2_server.settings import ServerSettings, is_loopback
 
 log = structlog.get_logger(__name__)
 

@@ -7,15 +7,19 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from arcor2_hw.data.cell import BROKER_CREDENTIALS
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
+from arcor2_server.access.authority import Authority
 from arcor2_server.hosts.process import CellHost
+from arcor2_server.nodes.accounts import Accounts
+from arcor2_server.settings import ServerSettings
 from tests.waiting import wait_for
 
 NODE = "press"
@@ -34,6 +38,8 @@ class Broker:
     """
 
     def __init__(self, folder: Path, address: str = "127.0.0.1", options: tuple[str, ...] = ()) -> None:
+        for old in folder.glob("*.ports"):
+            old.unlink()
         command = (NATS_SERVER, "--addr", address, "--port", "-1", "--ports_file_dir", str(folder), *options)
         self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
@@ -51,16 +57,52 @@ class Broker:
         self.process.wait()
 
 
+def tls_configuration(folder: Path, host: str) -> tuple[Path, Path]:
+    """Write the configuration of a broker with TLS; return it and the certificate to trust."""
+    authority = Authority(folder, lambda: [host])
+    authority.renew()
+    chain, key = authority.files
+    config = folder / "nats.conf"
+    config.write_text(f'tls {{ cert_file: "{chain}", key_file: "{key}" }}\n')
+    return config, authority.file
+
+
+class Server:
+    """A data directory of a server, and a broker that accepts only the server and its nodes."""
+
+    def __init__(self, folder: Path) -> None:
+        self.settings = ServerSettings(data_dir=folder / "data")
+        self.accounts = Accounts(self.settings)
+        self._folder = folder
+        self._config = folder / "nats.conf"
+        accounts = str(folder / "accounts")
+        self._config.write_text(self.accounts.set_up("nats://127.0.0.1:4222", "", folder=accounts))
+        self.broker = Broker(folder, options=("--config", str(self._config)))
+        self.accounts.set_up(self.broker.url, "", folder=accounts)
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """Return the environment of relays."""
+        return os.environ | {BROKER_CREDENTIALS: str(self.settings.broker_credentials)}
+
+    def restart_broker(self) -> None:
+        """Start the broker again on the same port."""
+        port = self.broker.url.rpartition(":")[2]
+        self.broker.end()
+        self.broker = Broker(self._folder, options=("--config", str(self._config), "--port", port))
+
+
 class Node:
     """A node service."""
 
     def __init__(self, url: str, cache: Path, *options: str, name: str = NODE, wrapper: tuple[str, ...] = ()) -> None:
+        broker = ("--broker", url) if url else ()
         self.process = subprocess.Popen(
-            [*wrapper, *CLI, "node", "run", name, "--broker", url, *options],
+            [*wrapper, *CLI, "node", "run", name, *broker, *options],
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
-            env=os.environ | {"XDG_CACHE_HOME": str(cache)},
+            env=os.environ | {"XDG_CACHE_HOME": str(cache), "XDG_DATA_HOME": str(cache)},
         )
         assert self.process.stdout is not None
         assert self.process.stdout.readline() == f"ready {name}\n"
@@ -110,8 +152,10 @@ async def start_host(broker: Broker) -> AsyncIterator[Callable[..., Any]]:
     """Start a host on a node, with its listener."""
     hosts: list[CellHost] = []
 
-    async def start(url: str = broker.url, name: str = NODE) -> tuple[CellHost, Listener]:
-        host = await CellHost.start(os.environ | {"ARCOR2_HW_NATS_URL": url}, name)
+    async def start(
+        url: str = broker.url, name: str = NODE, environment: Mapping[str, str] | None = None
+    ) -> tuple[CellHost, Listener]:
+        host = await CellHost.start(environment or os.environ | {"ARCOR2_HW_NATS_URL": url}, name)
         hosts.append(host)
         listener = Listener()
         host.user = listener

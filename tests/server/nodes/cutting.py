@@ -18,7 +18,7 @@ from arcor2_hw.runtime import messages as m
 from arcor2_server.hosts.process import CellHost
 from tests.runtime.conftest import open_scene, scene_object, type_code
 from tests.server.nodes.cable import HUB, run
-from tests.server.nodes.conftest import NODE, PATIENCE, Broker, Listener, Node
+from tests.server.nodes.conftest import NODE, PATIENCE, Broker, Listener, Node, tls_configuration
 from tests.waiting import wait_for
 
 MOVER = type_code(
@@ -62,10 +62,13 @@ async def wait(read: Callable[[], object]) -> None:
 
 
 async def main(folder: Path, cut: list[str], heal: list[str], at_node: list[str]) -> dict[str, object]:
-    broker = Broker(folder, HUB)
-    node = Node(broker.url, folder, "--insecure", wrapper=tuple(at_node))
+    config, authority = tls_configuration(folder, HUB)
+    os.environ["ARCOR2_HW_NATS_CA"] = str(authority)
+    broker = Broker(folder, HUB, ("--config", str(config)))
+    url = f"tls://{HUB}:{broker.url.rpartition(':')[2]}"
+    node = Node(url, folder, wrapper=tuple(at_node))
     try:
-        host, listener = await start(broker.url)
+        host, listener = await start(url)
         moving = move(host, folder / "first")
         await wait((folder / "first").exists)
         await asyncio.to_thread(run, *cut)
@@ -78,7 +81,7 @@ async def main(folder: Path, cut: list[str], heal: list[str], at_node: list[str]
         again = None
         while again is None:  # the node connects again by itself
             try:
-                again, _ = await start(broker.url)
+                again, _ = await start(url)
             except Arcor2Error:
                 await asyncio.sleep(0.1)
         second = move(again, folder / "second")

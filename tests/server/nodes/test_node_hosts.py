@@ -15,12 +15,11 @@ import pytest
 from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.exceptions import Arcor2Error, OutcomeUnknown
 from arcor2_hw.runtime import messages as m
-from arcor2_server.access.authority import Authority
 from arcor2_server.hosts.process import CellError, CellHost
 from tests.runtime.conftest import Package, open_scene, scene_object, type_code
 from tests.runtime.test_host_holding import ARM
 from tests.runtime.test_host_program import Run
-from tests.server.nodes.conftest import NODE, PATIENCE, Broker, Node
+from tests.server.nodes.conftest import NODE, PATIENCE, Broker, Node, tls_configuration
 from tests.waiting import wait_for
 
 pytestmark = pytest.mark.xdist_group("nodes")  # its tests share a broker and a node
@@ -207,22 +206,18 @@ async def test_a_broker_that_does_not_run_is_named(start_host: Callable[..., Any
 
 
 async def test_tls_with_a_password(start_host: Callable[..., Any], tmp_path: Path, monkeypatch: Any) -> None:
-    authority = Authority(tmp_path, lambda: ["localhost"])
-    authority.renew()
-    chain, key = authority.files
-    config = tmp_path / "nats.conf"
-    config.write_text(
-        f'tls {{cert_file: "{chain}", key_file: "{key}"}}\nauthorization {{user: cell, password: secret}}'
-    )
+    config, authority = tls_configuration(tmp_path, "localhost")
+    with config.open("a") as file:
+        file.write("authorization {user: cell, password: secret}\n")
     broker = Broker(tmp_path, options=("--config", str(config)))
-    monkeypatch.setenv("ARCOR2_HW_NATS_CA", str(authority.file))
+    monkeypatch.setenv("ARCOR2_HW_NATS_CA", str(authority))
     url = f"tls://{{}}@localhost:{broker.url.rpartition(':')[2]}"
     try:
         node = Node(url.format("cell:secret"), tmp_path)
         try:
             host, _ = await start_host(url.format("cell:secret"))
             await online(host)
-            with pytest.raises(Arcor2Error, match="cannot be reached"):
+            with pytest.raises(Arcor2Error, match="refuses the credentials"):
                 await start_host(url.format("cell:wrong"))
             monkeypatch.delenv("ARCOR2_HW_NATS_CA")
             with pytest.raises(Arcor2Error, match="cannot be reached"):

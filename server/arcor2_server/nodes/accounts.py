@@ -1,0 +1,261 @@
+"""The keys of the server, and the nodes that it has accepted.
+
+The broker trusts one operator key. The operator signs two accounts: one in which the server, its nodes and other
+services exchange messages, and one of the broker itself, over which the server revokes users.
+"""
+
+import contextlib
+import fcntl
+import os
+import time
+from collections.abc import Iterator
+from typing import Final
+
+import msgspec
+from nats.errors import Error as NatsError
+
+from arcor2_hw.data.base import now
+from arcor2_hw.exceptions import Conflict, ConnectionLost, NotFound, StorageError
+from arcor2_server.files import DIRECTORY_MODE, FILE_MODE, write_private
+from arcor2_server.nodes import claims
+from arcor2_server.nodes.connections import PREFIX, connect_client
+from arcor2_server.nodes.credentials import Credentials, address_of, check_name, load, require_tls
+from arcor2_server.nodes.nkeys import Kind, SigningKey
+from arcor2_server.settings import ServerSettings
+
+FILE: Final = "accounts.json"
+ACCOUNT_NAME: Final = "ARCOR2-HW"
+UPDATE_SUBJECT: Final = "$SYS.REQ.CLAIMS.UPDATE"
+UPDATE_WITHIN: Final = 2.0
+"""Time limit for the broker to accept a changed account, s."""
+
+
+class AcceptedNode(msgspec.Struct, frozen=True):
+    """A node that may connect. key: its public key. accepted: when (UTC). address: of the node at that time."""
+
+    key: str
+    accepted: str
+    address: str = ""
+
+
+class _State(msgspec.Struct):
+    """The content of the file. operator, account, system: private keys. issued: time of the last claim, s."""
+
+    url: str
+    operator: str
+    account: str
+    system: str
+    authority: str = ""
+    nodes: dict[str, AcceptedNode] = {}
+    revoked: list[str] = []
+    issued: int = 0
+
+
+class _Answer(msgspec.Struct, frozen=True):
+    """The answer of the broker to a changed account."""
+
+    error: dict[str, object] | None = None
+
+
+class Accounts:
+    """The accounts of a broker. Other processes may change the file at any time.
+
+    Args:
+        settings: name the files, which are created when they are needed.
+    """
+
+    def __init__(self, settings: ServerSettings) -> None:
+        self._directory, self._server_file = settings.broker_dir, settings.broker_credentials
+        self._file = self._directory / FILE
+
+    # -------------------------------------------------------------------------------- broker
+    def set_up(self, url: str, authority: str, *, certificate: str = "", key: str = "", folder: str) -> str:
+        """Create keys unless they exist, and the credentials of the server; return the configuration for the broker.
+
+        Args:
+            url: address of the broker, for the server and for nodes.
+            authority: certificates to trust (PEM); empty for those that the system trusts.
+            certificate: file of the certificate of the broker, on the broker's computer.
+            key: file of its key.
+            folder: in which the broker stores the accounts.
+
+        Raises:
+            InvalidData: the address is invalid, or without TLS on another computer.
+            StorageError: the files cannot be used.
+        """
+        require_tls(url)
+        with self._locked():
+            if self._file.exists():
+                state = self._load()
+                state.url, state.authority = url, authority
+            else:
+                operator, account, system = (
+                    SigningKey.create(kind) for kind in (Kind.OPERATOR, Kind.ACCOUNT, Kind.ACCOUNT)
+                )
+                state = _State(url, operator.seed, account.seed, system.seed, authority)
+            claim = self._account_claim(state)
+            self._save(state)
+            self._save_server(state)
+        system_key = SigningKey.from_seed(state.system).public
+        operator = SigningKey.from_seed(state.operator)
+        lines = [f"listen: {_listen(url)}"]
+        if url.startswith("tls://"):
+            lines.append(f'tls {{ cert_file: "{certificate}", key_file: "{key}" }}')
+        lines += [
+            f"operator: {claims.operator(operator, system_key)}",
+            f"system_account: {system_key}",
+            f'resolver {{ type: full, dir: "{folder}", allow_delete: false }}',
+            "resolver_preload {",
+            f"  {SigningKey.from_seed(state.account).public}: {claim}",
+            f"  {system_key}: {claims.account(operator, system_key, 'SYS', storage=False)}",
+            "}",
+        ]
+        return "\n".join(lines) + "\n"
+
+    def _save_server(self, state: _State) -> None:
+        try:  # with the same key, because the claim of an earlier one would stay valid
+            known = load(self._server_file)
+            found = msgspec.structs.replace(known, url=state.url, authority=state.authority)
+        except NotFound:
+            key = SigningKey.create(Kind.USER)
+            claim = claims.user(SigningKey.from_seed(state.account), key.public, "server")
+            found = Credentials(state.url, state.authority, claim, key.seed)
+        found.save(self._server_file)
+
+    # -------------------------------------------------------------------------------- nodes
+    def url(self) -> str:
+        """Return the address of the broker. Raise NotFound if there is none."""
+        return self._load().url
+
+    def nodes(self) -> dict[str, AcceptedNode]:
+        """Return the accepted nodes by name. Raise StorageError if the file cannot be used."""
+        return self._load().nodes if self._file.exists() else {}
+
+    def check_new(self, name: str) -> None:
+        """Check that a node can be accepted.
+
+        Raises:
+            InvalidData: the text is not a name of a node.
+            NotFound: the broker has not been set up.
+            Conflict: the name is used.
+        """
+        _check(name, self._load())
+
+    def accept(self, name: str, key: str, address: str) -> Credentials:
+        """Accept a node; return its credentials without its private key.
+
+        Args:
+            name: its name.
+            key: its public key.
+            address: where it is, for the list.
+
+        Raises:
+            InvalidData, NotFound, Conflict: as of `check_new`.
+            StorageError: the file cannot be written.
+        """
+        with self._locked():
+            state = self._load()
+            _check(name, state)
+            state.nodes[name] = AcceptedNode(key, now(), address)
+            self._save(state)
+        claim = claims.user(SigningKey.from_seed(state.account), key, name, node_subjects(name))
+        return Credentials(state.url, state.authority, claim)
+
+    async def revoke(self, name: str) -> None:
+        """Revoke a node. The broker ends its connections at once.
+
+        Raises:
+            NotFound: there is no such node.
+            ConnectionLost: the broker cannot be reached. The node is still in the list, so that this can be repeated.
+            StorageError: the file cannot be used.
+        """
+        with self._locked():
+            state = self._load()
+            node = state.nodes.get(name)
+            if node is None:
+                raise NotFound("There is no node {node}.", node=name)
+            if node.key not in state.revoked:
+                state.revoked.append(node.key)
+            claim = self._account_claim(state)
+            self._save(state)
+            try:
+                await self._send(state, claim)
+            except ConnectionLost as error:
+                raise ConnectionLost(
+                    "The node {node} may still have access, revoke it again: {reason}",
+                    error.detail,
+                    node=name,
+                    reason=error,
+                ) from error
+            del state.nodes[name]
+            self._save(state)
+
+    async def _send(self, state: _State, claim: str) -> None:
+        """Send the changed account to the broker, as a user of its system account."""
+        key = SigningKey.create(Kind.USER)
+        own = claims.user(SigningKey.from_seed(state.system), key.public, "revocation")
+        client = await connect_client(Credentials(state.url, state.authority, own, key.seed), "arcor2-hw revocation")
+        try:
+            answer = await client.request(UPDATE_SUBJECT, claim.encode(), UPDATE_WITHIN)
+            found = msgspec.json.decode(answer.data, type=_Answer)
+        except (NatsError, OSError, msgspec.MsgspecError) as error:
+            raise ConnectionLost("The broker did not confirm the change.", str(error)) from error
+        finally:
+            await client.close()
+        if found.error is not None:
+            raise ConnectionLost("The broker does not accept the change.", str(found.error))
+
+    # -------------------------------------------------------------------------------- file
+    def _account_claim(self, state: _State) -> str:
+        """Return the claim of the account, newer than all earlier ones whatever the clock shows."""
+        state.issued = max(int(time.time()), state.issued + 1)
+        key = SigningKey.from_seed(state.account).public
+        operator = SigningKey.from_seed(state.operator)
+        return claims.account(operator, key, ACCOUNT_NAME, state.revoked, issued=state.issued)
+
+    def _load(self) -> _State:
+        try:
+            return msgspec.json.decode(self._file.read_bytes(), type=_State)
+        except FileNotFoundError as error:
+            raise NotFound("The broker is not set up. Run `arcor2-hw node broker` first.") from error
+        except (OSError, msgspec.MsgspecError) as error:
+            raise StorageError("{file} cannot be used: {reason}.", file=self._file, reason=error) from error
+
+    def _save(self, state: _State) -> None:
+        try:
+            write_private(self._file, msgspec.json.encode(state))
+        except OSError as error:
+            raise StorageError("{file} cannot be written: {reason}.", file=self._file, reason=error.strerror) from error
+
+    @contextlib.contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Exclude other processes that change the file."""
+        try:
+            self._directory.mkdir(mode=DIRECTORY_MODE, parents=True, exist_ok=True)
+            lock = os.open(self._directory / ".lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, FILE_MODE)
+        except OSError as error:
+            raise StorageError(
+                "{file} cannot be written: {reason}.", file=self._directory, reason=error.strerror
+            ) from error
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield
+        finally:
+            os.close(lock)
+
+
+def node_subjects(name: str) -> list[str]:
+    """Return the subjects that a node may publish and subscribe."""
+    return [f"{PREFIX}.{name}.>"]
+
+
+def _check(name: str, state: _State) -> None:
+    check_name(name)
+    if name in state.nodes:
+        raise Conflict("There is a node {node} already. Revoke it first: arcor2-hw node revoke {node}", node=name)
+
+
+def _listen(url: str) -> str:
+    """Return the address on which a broker listens."""
+    host, _, port = address_of(url).rpartition(":")
+    return f"0.0.0.0:{port}" if url.startswith("tls://") else f"{host}:{port}"
