@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import logging
 import os
 import signal
 import sys
@@ -279,6 +280,7 @@ def _run(work: Callable[[], Any]) -> int:
     """Do the work of a command and print errors; return its exit status."""
     if find_spec("nats") is None:
         return fail("node", "install the extra `nodes` of arcor2-hw", ExitStatus.FAILED)
+    logging.getLogger("asyncio").setLevel(logging.ERROR)  # it warns of each end of a TLS connection
     try:
         work()
     except StorageError as error:

@@ -23,6 +23,10 @@ CLOSE_WITHIN: Final = 0.5
 """Time limit for closing a connection, s."""
 
 
+class CredentialsRefused(ConnectionLost):
+    """The broker refuses the credentials."""
+
+
 def open_subject(node: str) -> str:
     """Return the subject of requests to open a session at a node."""
     return f"{PREFIX}.{node}.open"
@@ -57,7 +61,8 @@ async def connect_client(credentials: Credentials, name: str, lost: Callable[[],
 
     Raises:
         InvalidData: the broker is on another computer and the address is without TLS, or a value is damaged.
-        ConnectionLost: the broker cannot be reached, or refuses the connection.
+        ConnectionLost: the broker cannot be reached.
+        CredentialsRefused: the broker refuses the credentials.
     """
     options = credentials.options()
     client = Client()
@@ -83,7 +88,7 @@ async def connect_client(credentials: Credentials, name: str, lost: Callable[[],
         await _close(client)  # also a refused one has a socket
         detail, address = f"{type(error).__name__}: {error}", address_of(credentials.url)
         if REFUSAL in str(error).lower():
-            raise ConnectionLost(
+            raise CredentialsRefused(
                 "The broker at {address} refuses the credentials. A node that was revoked must be paired again.",
                 detail,
                 address=address,

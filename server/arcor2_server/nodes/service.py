@@ -36,6 +36,8 @@ LAST_MESSAGES_WITHIN: Final = 1.0
 """Time limit for the last messages and lines of a host after its exit, s."""
 RETRY_PERIOD: Final = 0.5
 """Period of the attempts to connect to the broker, s."""
+REFUSED_PERIOD: Final = 2.0
+"""Period of the attempts to connect while the broker refuses the credentials, s."""
 _encode = msgspec.msgpack.encode
 
 
@@ -222,14 +224,15 @@ class NodeService:
         """Serve until cancelled. Connect again when the connection to the broker is lost."""
         reported = ""
         while True:
+            refused = False
             try:
                 await self._serve()
                 reported = ""
-            except ConnectionLost as error:
+            except Arcor2Error as error:
                 if reported != str(error):
                     log.warning("broker not reached", reason=str(error), detail=error.detail)
-                reported = str(error)
-            await asyncio.sleep(RETRY_PERIOD)
+                reported, refused = str(error), isinstance(error, broker.CredentialsRefused)
+            await asyncio.sleep(REFUSED_PERIOD if refused else RETRY_PERIOD)
 
     async def _serve(self) -> None:
         """Serve until the connection is lost. Raise ConnectionLost if there is none."""

@@ -15,6 +15,7 @@ from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.hosts import pool
 from arcor2_server.hosts.process import CellHost, HostUser
+from arcor2_server.nodes.credentials import Credentials
 
 USER = cast("HostUser", None)
 """The hosts of these tests load no object types, so that they notify nobody."""
@@ -82,9 +83,20 @@ async def test_a_scene_with_a_device_on_a_node_needs_the_node(monkeypatch: pytes
 
 async def test_devices_do_not_see_the_password_of_the_broker(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(BROKER_URL, "nats://cell:secret@127.0.0.1:4222")
-    hosts = pool.CellHosts([])
+    hosts = pool.CellHosts([], broker=Path("/secret/server.json"))
     try:
         host = await hosts.take(USER)
         assert b"secret" not in Path(f"/proc/{host.pid}/environ").read_bytes()
+    finally:
+        await hosts.close()
+
+
+async def test_the_server_uses_its_credentials_for_the_broker(tmp_path: Path) -> None:
+    file = tmp_path / "server.json"
+    Credentials("nats://127.0.0.1:1").save(file)
+    hosts = pool.CellHosts([], Cell([on_node("arm", "press")]), file)
+    try:
+        with pytest.raises(Arcor2Error, match=r"The broker at 127\.0\.0\.1:1 cannot be reached"):
+            await hosts.take(USER, [SceneObject("arm", "Arm", id="obj_arm")])
     finally:
         await hosts.close()

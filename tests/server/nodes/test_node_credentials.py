@@ -18,6 +18,7 @@ from nats.aio.msg import Msg
 from arcor2_hw.data.cell import BROKER_URL
 from arcor2_hw.exceptions import Arcor2Error, Conflict, ConnectionLost, InvalidData, NotFound, OutcomeUnknown, Refused
 from arcor2_server.audit.chain import AuditFile
+from arcor2_server.cli import node as cli
 from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.hosts.process import CellHost
 from arcor2_server.nodes import opening, pairing
@@ -79,31 +80,33 @@ async def test_a_node_is_paired_works_is_revoked_and_paired_again(
         call = moving(host, tmp_path / "moving")
         await asyncio.to_thread(wait_for, (tmp_path / "moving").exists)
 
-        here = ("--data-dir", str(server.settings.data_dir))
         begin = time.monotonic()
-        await server.accounts.revoke(NODE)
+        assert await asyncio.to_thread(cli.revoke, NODE, data_dir=server.settings.data_dir) == ExitStatus.OK
         await asyncio.to_thread(wait_for, (tmp_path / "moving.stopped").exists)
         assert time.monotonic() - begin < CUT_WITHIN
         with pytest.raises(OutcomeUnknown, match=f"the connection to the node {NODE} was lost"):
             await call
         with pytest.raises(Arcor2Error, match=f"The node {NODE} is not connected"):
             await start_host(environment=server.environment)
-        assert command("revoke", NODE, *here).returncode == ExitStatus.NOT_FOUND
-
-        await asyncio.to_thread(pair_by_command, server, data)
-        assert NODE in command("list", *here).stdout
+        accepted(server, NODE).save(node_file(data, NODE))
         assert await asyncio.to_thread(node.process.stdout.readline) == f"ready {NODE}\n"  # type: ignore[union-attr]
-        host, _ = await start_host(environment=server.environment)
-        await online(host)
-        assert command("revoke", NODE, *here).returncode == 0
-        async with asyncio.timeout(PATIENCE):
-            await asyncio.shield(host.ended)
+        await start_host(environment=server.environment)
     finally:
         node.end()
     with contextlib.closing(AuditFile(server.settings.audit_file)) as file:
         noted = [(entry.request, entry.target.split(",")[0]) for entry in file.all()]
-    accept, revoke = ("arcor2-hw node accept", NODE), ("arcor2-hw node revoke", NODE)
-    assert noted == [accept, accept, revoke]
+    assert noted == [("arcor2-hw node accept", NODE), ("arcor2-hw node revoke", NODE)]
+
+
+def test_nodes_are_listed(server: Server, capsys: pytest.CaptureFixture[str]) -> None:
+    data = server.settings.data_dir
+    assert cli.list_nodes(data_dir=data) == ExitStatus.OK
+    assert "There are no nodes" in capsys.readouterr().out
+    accepted(server, NODE)
+    cli.list_nodes(data_dir=data)
+    name, key, *_ = capsys.readouterr().out.splitlines()[1].split()
+    assert (name, key) == (NODE, pairing.short_key(server.accounts.nodes()[NODE].key))
+    assert cli.revoke("oven", data_dir=data) == ExitStatus.NOT_FOUND
 
 
 # ---------------------------------------------------------------------------------------------------- rights
