@@ -245,7 +245,11 @@ class Accounts:
 
 
 def node_subjects(name: str) -> list[str]:
-    """Return the subjects that a node may publish and subscribe."""
+    """Return the subjects that a node may publish and subscribe.
+
+    The server must not answer messages of nodes: the broker does not check the subject for an answer, which could be
+    one of another node.
+    """
     return [f"{PREFIX}.{name}.>"]
 
 

@@ -24,8 +24,6 @@ _STORAGE: Final = {"mem_storage": _UNLIMITED, "disk_storage": _UNLIMITED, "strea
 """Limits of JetStream, which an account may use if the broker has it."""
 _FOREVER: Final = 253_402_300_799
 """End of the year 9999, s since 1970. A revoked key is never used again, so no clock matters."""
-_ANSWERS: Final = {"max": 1, "ttl": 10 * 10**9}
-"""A user may answer each request once, within this time, ns."""
 
 
 def operator(key: SigningKey, system_account: str) -> str:
@@ -65,14 +63,14 @@ def user(signer: SigningKey, user_key: str, name: str, subjects: Sequence[str] |
         signer: key of the account.
         user_key: public key of the user.
         name: its name.
-        subjects: what it may publish and subscribe; None for everything in the account. It may answer requests that
-            it has received.
+        subjects: what it may publish and subscribe; None for everything in the account. It may not answer requests in
+            general: it could send a request with any subject for the answer to itself.
     """
     allowed = {} if subjects is None else {"allow": list(subjects)}
     claim: dict[str, Any] = {"type": "user", "pub": allowed, "sub": allowed}
     claim |= {"subs": _UNLIMITED, "data": _UNLIMITED, "payload": _UNLIMITED}
     if subjects is not None:
-        claim["resp"] = _ANSWERS
+        claim["allowed_connection_types"] = ["STANDARD"]  # no leaf node, websocket or MQTT
     return _signed(signer, user_key, name, claim)
 
 

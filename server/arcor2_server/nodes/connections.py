@@ -5,7 +5,7 @@ import contextlib
 from collections.abc import Callable
 from typing import Final
 
-from nats.aio.client import Client
+from nats.aio.client import DEFAULT_INBOX_PREFIX, Client
 from nats.errors import Error as NatsError
 
 from arcor2_hw.exceptions import ConnectionLost
@@ -37,19 +37,32 @@ def session_subject(node: str, session: str) -> str:
     return f"{PREFIX}.{node}.{session}"
 
 
-async def connect(credentials: Credentials, lost: Callable[[], None] = lambda: None) -> Connections:
-    """Connect to the broker once for each lane. Arguments and errors as of `connect_client`."""
+def answer_subject(node: str) -> str:
+    """Return the start of the subjects of answers of a node, which may publish only subjects of its own."""
+    return f"{PREFIX}.{node}.answer"
+
+
+async def connect(credentials: Credentials, node: str, lost: Callable[[], None] = lambda: None) -> Connections:
+    """Connect to the broker once for each lane, for a session with a node or at the node.
+
+    Other arguments and errors as of `connect_client`.
+    """
     connections: dict[Lane, Client] = {}
     try:
         for lane in Lane:
-            connections[lane] = await connect_client(credentials, f"arcor2-hw {lane}", lost)
+            connections[lane] = await connect_client(credentials, f"arcor2-hw {lane}", lost, answer_subject(node))
     except BaseException:
         await close(connections)
         raise
     return connections
 
 
-async def connect_client(credentials: Credentials, name: str, lost: Callable[[], None] = lambda: None) -> Client:
+async def connect_client(
+    credentials: Credentials,
+    name: str,
+    lost: Callable[[], None] = lambda: None,
+    answers: str = DEFAULT_INBOX_PREFIX.decode(),
+) -> Client:
     """Connect to the broker.
 
     A connection that is lost is not established again, because messages may have been lost with it.
@@ -58,6 +71,7 @@ async def connect_client(credentials: Credentials, name: str, lost: Callable[[],
         credentials: address and credentials of the broker.
         name: of the connection, in the log of the broker.
         lost: called when the connection has ended by itself.
+        answers: start of the subjects on which answers to requests are received.
 
     Raises:
         InvalidData: the broker is on another computer and the address is without TLS, or a value is damaged.
@@ -82,6 +96,7 @@ async def connect_client(credentials: Credentials, name: str, lost: Callable[[],
                 connect_timeout=int(CONNECT_WITHIN),
                 disconnected_cb=disconnected,
                 error_cb=ignore,
+                inbox_prefix=answers,
                 **options,
             )
     except (NatsError, OSError, TimeoutError) as error:

@@ -62,7 +62,7 @@ class Relay:
         await asyncio.get_running_loop().create_unix_connection(lambda: self._stream, sock=self._socket)
         connections: Connections = {}
         try:
-            connections = await broker.connect(of_environment(os.environ), self._broker_lost)
+            connections = await broker.connect(of_environment(os.environ), self._node, self._broker_lost)
             await self._open(connections, silence)
             reason = await self._over
         except Arcor2Error as error:

@@ -238,7 +238,7 @@ class NodeService:
         """Serve until the connection is lost. Raise ConnectionLost if there is none."""
         self._lost.clear()
         try:
-            self._connections = await broker.connect(self._credentials(), self._lose)
+            self._connections = await broker.connect(self._credentials(), self._name, self._lose)
             try:
                 calls = self._connections[Lane.CALLS]
                 await calls.subscribe(broker.open_subject(self._name), cb=self._open)
