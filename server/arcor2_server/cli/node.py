@@ -182,7 +182,9 @@ def broker(
             authority = trusted.read_text() if ca or trusted.exists() else ""
         except (OSError, ValueError) as error:
             raise InvalidData("{file} cannot be used: {reason}", file=trusted, reason=error) from error
-        configuration = _accounts(settings).set_up(address, authority, certificate=certificate, key=key, folder=folder)
+        configuration = _accounts(settings).set_up(
+            address, authority, certificate=certificate, key_file=key, folder=folder
+        )
         sys.stdout.write(configuration)
         _note(settings, "broker", address)
 

@@ -69,58 +69,51 @@ class Accounts:
         self._file = self._directory / FILE
 
     # -------------------------------------------------------------------------------- broker
-    def set_up(self, url: str, authority: str, *, certificate: str = "", key: str = "", folder: str) -> str:
+    def set_up(self, url: str, authority: str, *, certificate: str = "", key_file: str = "", folder: str) -> str:
         """Create keys unless they exist, and the credentials of the server; return the configuration for the broker.
 
         Args:
             url: address of the broker, for the server and for nodes.
             authority: certificates to trust (PEM); empty for those that the system trusts.
             certificate: file of the certificate of the broker, on the broker's computer.
-            key: file of its key.
+            key_file: file of its key.
             folder: in which the broker stores the accounts.
 
         Raises:
             InvalidData: the address is invalid, or without TLS on another computer.
             StorageError: the files cannot be used.
+            NotFound: the file of the server's credentials is missing, but not that of the keys.
         """
         require_tls(url)
         with self._locked():
             if self._file.exists():
                 state = self._load()
                 state.url, state.authority = url, authority
+                # Its key stays the same, because the claim of an earlier key would stay valid.
+                server = msgspec.structs.replace(load(self._server_file), url=url, authority=authority)
             else:
-                operator, account, system = (
-                    SigningKey.create(kind) for kind in (Kind.OPERATOR, Kind.ACCOUNT, Kind.ACCOUNT)
-                )
-                state = _State(url, operator.seed, account.seed, system.seed, authority)
+                state = _new_state(url, authority)
+                key = SigningKey.create(Kind.USER)
+                claim = claims.user(SigningKey.from_seed(state.account), key.public, "server")
+                server = Credentials(url, authority, claim, key.seed)
             claim = self._account_claim(state)
+            server.save(self._server_file)
             self._save(state)
-            self._save_server(state)
-        system_key = SigningKey.from_seed(state.system).public
         operator = SigningKey.from_seed(state.operator)
+        system = SigningKey.from_seed(state.system).public
         lines = [f"listen: {_listen(url)}"]
         if url.startswith("tls://"):
-            lines.append(f'tls {{ cert_file: "{certificate}", key_file: "{key}" }}')
+            lines.append(f'tls {{ cert_file: "{certificate}", key_file: "{key_file}" }}')
         lines += [
-            f"operator: {claims.operator(operator, system_key)}",
-            f"system_account: {system_key}",
+            f"operator: {claims.operator(operator, system)}",
+            f"system_account: {system}",
             f'resolver {{ type: full, dir: "{folder}", allow_delete: false }}',
             "resolver_preload {",
             f"  {SigningKey.from_seed(state.account).public}: {claim}",
-            f"  {system_key}: {claims.account(operator, system_key, 'SYS', storage=False)}",
+            f"  {system}: {claims.account(operator, system, 'SYS', storage=False)}",
             "}",
         ]
         return "\n".join(lines) + "\n"
-
-    def _save_server(self, state: _State) -> None:
-        try:  # with the same key, because the claim of an earlier one would stay valid
-            known = load(self._server_file)
-            found = msgspec.structs.replace(known, url=state.url, authority=state.authority)
-        except NotFound:
-            key = SigningKey.create(Kind.USER)
-            claim = claims.user(SigningKey.from_seed(state.account), key.public, "server")
-            found = Credentials(state.url, state.authority, claim, key.seed)
-        found.save(self._server_file)
 
     # -------------------------------------------------------------------------------- nodes
     def url(self) -> str:
@@ -242,6 +235,11 @@ class Accounts:
             yield
         finally:
             os.close(lock)
+
+
+def _new_state(url: str, authority: str) -> _State:
+    operator, account, system = (SigningKey.create(kind) for kind in (Kind.OPERATOR, Kind.ACCOUNT, Kind.ACCOUNT))
+    return _State(url, operator.seed, account.seed, system.seed, authority)
 
 
 def node_subjects(name: str) -> list[str]:

@@ -224,7 +224,7 @@ def test_credentials_are_private(tmp_path: Path) -> None:
         accounts.check_new(NODE)
     accounts.set_up("nats://127.0.0.1:4222", "", folder="/unused")
     server = settings.broker_credentials.read_bytes()
-    configuration = accounts.set_up("tls://hub.local:4222", "PEM", certificate="/c", key="/k", folder="/unused")
+    configuration = accounts.set_up("tls://hub.local:4222", "PEM", certificate="/c", key_file="/k", folder="/unused")
     assert {each.stat().st_mode & 0o777 for each in settings.broker_dir.iterdir()} == {0o600}
     assert settings.broker_dir.stat().st_mode & 0o777 == 0o700
     seeds = [
