@@ -38,7 +38,6 @@ from arcor2_server.audit.command_line import note_command
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.deployment.service_manager import ServiceManager
 from arcor2_server.log import setup as server_logging
-from arcor2_server.nodes.credentials import require_tls
 from arcor2_server.settings import (
     DATABASE_URL,
     DEVICE_FILES_NAME,
@@ -173,6 +172,8 @@ def serve(
             classic_ports=ports_from_environment() if classic_ports else None,
         )
         if broker := os.environ.get(BROKER_URL):
+            from arcor2_server.nodes.credentials import require_tls  # takes time, and few servers need it
+
             require_tls(broker)
         server_logging.set_up(log_level)
         os.environ.pop(DATABASE_URL, None)  # may contain a password, which devices and programs must not see
