@@ -6,7 +6,7 @@ import socket
 import sys
 import time
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Self
 
 import msgspec
 import psutil
@@ -14,7 +14,7 @@ import psutil
 from arcor2_hw.data.device import Connection
 from arcor2_hw.data.events import Event
 from arcor2_hw.data.points import LivePoint, ObjectPointsData, PointUse
-from arcor2_hw.opcua import messages as m
+from arcor2_hw.plant import messages as m
 from arcor2_hw.runtime.messages import StreamEvent
 from arcor2_server.hosts.streams import POINTS, RobotStreams
 from arcor2_server.opcua.service import OpcUa
@@ -36,8 +36,8 @@ class Feed:
         self.streams.observe(DEVICE, POINTS, RATE, self._put)
         self._newest: list[bytes] = []
 
-    def start(self) -> None:
-        pass
+    def reader(self) -> Self:
+        return self
 
     def _put(self, encoded: bytes) -> None:
         self._newest = [encoded]
@@ -74,8 +74,8 @@ async def measure(directory: Path) -> list[Metric]:
     port = listener.getsockname()[1]
     settings = ServerSettings(data_dir=directory, opcua=OpcUaListener("127.0.0.1", port, anonymous=True))
     feed: Any = Feed()
-    others: Any = type("Others", (), {"has_opcua": False, "open_to_all": True})()
-    opcua = OpcUa(settings, feed, others, others)
+    others: Any = type("Others", (), {"has_opcua": False, "open_to_all": True, "system": lambda *_: None})()
+    opcua = OpcUa(settings, feed, others, others, others)
     opcua.serve(listener)
     client = await asyncio.create_subprocess_exec(
         sys.executable, "-m", "benchmarks.opcua_client", f"opc.tcp://127.0.0.1:{port}/arcor2hw/", str(COUNT),

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from typing import Any, Final
 
 from asyncua import ua
@@ -11,9 +10,10 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.device import Connection, Health, Identity
 from arcor2_hw.data.points import LivePoint, PointQuality
 from arcor2_hw.data.robot import Joint, RobotType
-from arcor2_hw.opcua.messages import DeviceInfo, DeviceState, UnitData
 from arcor2_hw.opcua.space import GOOD, NOT_CONNECTED, UNKNOWN, Space, Tag
 from arcor2_hw.opcua.states import StateMachine
+from arcor2_hw.plant.messages import DeviceInfo, DeviceState, UnitData
+from arcor2_hw.plant.streams import time_of
 
 STALE: Final = ua.StatusCodes.UncertainLastUsableValue
 _STATUS: Final = {
@@ -31,11 +31,6 @@ _PROFILES: Final = {RobotType.ARTICULATED: (1, "rad"), RobotType.CARTESIAN: (3, 
 _PROTECTIVE: Final = frozenset({"protective_stop", "safeguard_stop"})
 _ITEM_STATES: Final = {"OutOfService": 5004, "NotAvailable": 5005, "Executing": 5006, "NotExecuting": 5007}
 _MODES: Final = {"None": 5024, "Maintenance": 5025, "Processing": 5026, "Setup": 5027}
-
-
-def time_of(monotonic: float) -> datetime:
-    """Return the time of a stamp of the monotonic clock, s."""
-    return datetime.fromtimestamp(time.time() - time.monotonic() + monotonic, UTC)
 
 
 async def add_identification(space: Space, item: ua.NodeId, blocks: ua.NodeId, kind: int, info: DeviceInfo) -> None:

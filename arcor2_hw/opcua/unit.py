@@ -10,9 +10,10 @@ from arcor2_hw.data.alarms import PRIORITIES, AlarmCategory, AlarmRecord
 from arcor2_hw.data.device import Identity
 from arcor2_hw.data.packml import MachineCommand, MachineState, UnitMode
 from arcor2_hw.opcua.devices import add_identification, add_item_state, add_operation_mode
-from arcor2_hw.opcua.messages import CallAnswer, DeviceInfo, Setup, UnitData
+from arcor2_hw.opcua.messages import CallAnswer, Setup
 from arcor2_hw.opcua.space import UNKNOWN, Space, Tag, node_id, status_code
 from arcor2_hw.opcua.states import StateMachine
+from arcor2_hw.plant.messages import DeviceInfo, UnitData
 
 VENDOR: Final = "ARCOR2-HW"
 REFUSED: Final = {

@@ -4,9 +4,11 @@ import re
 from pathlib import Path
 
 from arcor2_hw.opcua import access, conditions, process, space
+from arcor2_hw.plant import messages
 from arcor2_server.cli.main import app
-from arcor2_server.opcua import requests, service
+from arcor2_server.opcua import requests
 from arcor2_server.packml import plc
+from arcor2_server.plant import process as plant
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "opcua.md").read_text()
 
@@ -17,8 +19,8 @@ def test_the_page_states_the_limits_of_the_server() -> None:
         r"and (\d+) subscriptions": access.MOST_SUBSCRIPTIONS,
         r"text of at most (\d+) characters": requests.LONGEST_REQUEST_ID,
         r"The last (\d+) are stored": plc.MOST_PLANT_REQUESTS,
-        r"does not answer for (\d+) s": process.STALE_AFTER,
-        r"later after up to (\d+) s": service.LONGEST_PAUSE,
+        r"does not answer for (\d+) s": messages.STALE_AFTER,
+        r"later after up to (\d+) s": plant.LONGEST_PAUSE,
     }
     for pattern, number in numbers.items():
         (found,) = re.findall(pattern, PAGE)
@@ -27,6 +29,7 @@ def test_the_page_states_the_limits_of_the_server() -> None:
         assert f"{severity} {priority.value}" in PAGE
     assert space.URIS["own"] in PAGE
     assert process.PATH in PAGE
+    assert f"after {plant.ALARM_AFTER} ends in a row" in PAGE
 
 
 def test_the_options_exist() -> None:

@@ -59,12 +59,12 @@ from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.online.scene_calibration import SceneCalibration
 from arcor2_server.online.scene_opening import SceneOpening
 from arcor2_server.online.undo import Undo
-from arcor2_server.opcua.feed import CellFeed
 from arcor2_server.opcua.requests import PlantRequests
 from arcor2_server.opcua.service import OpcUa
 from arcor2_server.packml.cell import PackmlCell
 from arcor2_server.packml.plc import Plc
 from arcor2_server.packml.record import CellFile
+from arcor2_server.plant.feed import CellFeed
 from arcor2_server.production.cell_time import CellTime, activity_of
 from arcor2_server.production.recipes import Recipes
 from arcor2_server.production.units import Units
@@ -277,7 +277,7 @@ class Server:
         cell = self.cell = PackmlCell(hub, execution, runs, online, stop_all, cell_file)
         plc = self.plc = closed(Plc(cell, cell_file, package_runs, alarms, audit, settings.plc_life_timeout))
         feed = CellFeed((scene_host, program_host), cell, execution, runs, units, types, devices, alarms)
-        self.opcua = closed(OpcUa(settings, feed, PlantRequests(access, persons, plc, alarms, audit), cell))
+        self.opcua = closed(OpcUa(settings, feed, PlantRequests(access, persons, plc, alarms, audit), cell, alarms))
         temporary_runs = self.temporary_runs = TemporaryRuns(
             hub, locks, storage, types, session, online, execution, build, tasks
         )

@@ -57,6 +57,8 @@ class Units:
         """The last units that have left the cell, by number."""
         self.left: Counter[UnitState] = Counter()
         """Number of units that have left the cell since the start of the server, by where they went."""
+        self.on_left: list[Callable[[Unit], None]] = []
+        """Called with each unit that has left the cell, without its steps."""
         self._next = 1
         self._books: dict[str, PartBooks] = {}
         """The last known books of each scene."""
@@ -224,7 +226,10 @@ class Units:
         self._recent[record.number] = record
         if len(self._recent) > RECENT:
             self._recent.popitem(last=False)
-        self._put(replace(record, state=state, left=now()), publish=True)
+        record = replace(record, state=state, left=now())
+        self._put(record, publish=True)
+        for notify in self.on_left:
+            notify(_without_steps(record))
 
     def _delete(self, record: UnitRecord) -> None:
         del self._in_cell[record.scene_id, record.part]
@@ -260,8 +265,7 @@ class Units:
         self._unwritten[record.number] = record
         self._write_later()
         if publish and self._hub.subscribers("UnitChanged"):
-            fields = {name: getattr(record, name) for name in Unit.__struct_fields__}
-            self._hub.broadcast(make_event("UnitChanged", Unit(**fields)))
+            self._hub.broadcast(make_event("UnitChanged", _without_steps(record)))
 
     def _write_later(self) -> None:
         if self._writing is None:
@@ -283,6 +287,10 @@ class Units:
             log.warning("records of units not stored", reason=str(error))
         finally:
             self._writing = None
+
+
+def _without_steps(record: UnitRecord) -> Unit:
+    return Unit(**{name: getattr(record, name) for name in Unit.__struct_fields__})
 
 
 def _parts_in(books: PartBooks | None, place_id: str) -> list[str]:

@@ -21,19 +21,20 @@ from arcor2_hw.data.maintenance import DeviceCard
 from arcor2_hw.data.packml import MachineCommand, MachineState, UnitMode
 from arcor2_hw.data.points import LivePoint, PointUse
 from arcor2_hw.data.robot import RobotMeta, RobotType
-from arcor2_hw.data.units import UnitState
-from arcor2_hw.opcua import access, messages as m, unit
+from arcor2_hw.data.units import Unit, UnitState
+from arcor2_hw.opcua import access, unit
 from arcor2_hw.opcua.certificates import TrustedClients, application_uri, own_certificate
 from arcor2_hw.opcua.conditions import Conditions
 from arcor2_hw.opcua.devices import Device
 from arcor2_hw.opcua.space import Tag
+from arcor2_hw.plant import messages as m
 from arcor2_hw.runtime.messages import DeviceChanged, Stream, StreamEvent
 from arcor2_server.hosts.streams import POINTS, RobotStreams
-from arcor2_server.opcua import service
-from arcor2_server.opcua.feed import CellFeed
-from arcor2_server.opcua.service import OpcUa
 from arcor2_server.packml.plc import Plc
 from arcor2_server.packml.record import CellFile, JobEnd, RequestResult as R
+from arcor2_server.plant import process
+from arcor2_server.plant.feed import CellFeed
+from arcor2_server.plant.process import PlantProcess
 from tests.server.opcua.plant_client import client_certificate
 from tests.server.packml.test_rules import new_cell
 
@@ -160,21 +161,21 @@ class Feed:
 
 
 async def test_a_process_that_does_not_read_gets_no_queue_of_updates(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(service, "PERIOD", 0.0)
+    monkeypatch.setattr(process, "PERIOD", 0.0)
     feed: Any = Feed()
     nothing: Any = None
-    opcua = OpcUa(nothing, feed, nothing, nothing)
+    running = PlantProcess("OPC UA server", "", feed, nothing, "", nothing, nothing)
     ours, theirs = socket.socketpair()
     _, writer = await asyncio.open_unix_connection(sock=ours)
-    sending = asyncio.create_task(opcua._send(writer))
+    sending = asyncio.create_task(running._send(writer))
     try:
-        while writer.transport.get_write_buffer_size() <= service.MOST_UNSENT:
+        while writer.transport.get_write_buffer_size() <= process.MOST_UNSENT:
             await asyncio.sleep(0)
         calls = feed.calls
         for _ in range(100):
             await asyncio.sleep(0)
         assert feed.calls <= calls + 1
-        assert writer.transport.get_write_buffer_size() < service.MOST_UNSENT + 200_000
+        assert writer.transport.get_write_buffer_size() < process.MOST_UNSENT + 200_000
     finally:
         sending.cancel()
         writer.transport.abort()
@@ -186,6 +187,9 @@ async def test_a_process_that_does_not_read_gets_no_queue_of_updates(monkeypatch
 def test_each_state_of_packml_is_in_one_state_machine(state: MachineState) -> None:
     machines = unit._BASE, unit._MACHINE, unit._EXECUTE
     assert sum(state.name.capitalize() in machine for machine in machines) == 1
+
+
+LEFT = Unit(1, "S1", "scn", 1, UnitState.GOOD, "2026-01-02T03:04:05+00:00")
 
 
 class Cell:
@@ -204,6 +208,7 @@ class Cell:
         self.streams = SimpleNamespace(observe=lambda *_: None)
         self.parts, self.program = SimpleNamespace(on_change=[]), SimpleNamespace(number=1)
         self.on_changed: list[Any] = []
+        self.on_left: list[Any] = []
         self.on_state: list[Any] = []
         self.running = self.active = False
         self.last_job = 7, JobEnd.COMPLETED
@@ -238,11 +243,11 @@ class Cell:
 async def test_the_feed_shows_devices_and_sends_only_changes() -> None:
     cell: Any = Cell()
     feed = CellFeed([cell], cell, cell, cell, cell, cell, cell, cell)
-    feed.start()
-    first = await feed.everything()
+    reader, other = feed.reader(), feed.reader()
+    first = await reader.everything()
     assert first.devices == [m.DeviceInfo("obj_io", "io", "Block", "", Identity("WAGO", "750", "17"))]
     assert first.states == {"obj_io": m.DeviceState(Connection.OFFLINE)}
-    assert await feed.changes() == m.Update()
+    assert await reader.changes() == m.Update()
 
     for key in ("obj_io", "obj_arm", "obj_table"):
         cell.board.reports[key] = report = DeviceChanged(key, Connection.ONLINE, Health.NORMAL)
@@ -251,7 +256,12 @@ async def test_the_feed_shows_devices_and_sends_only_changes() -> None:
     cell.left[UnitState.GOOD], cell.state = 3, MachineState.EXECUTE
     for notify in cell.parts.on_change:
         notify(None)
-    changed = await feed.changes()
+    for notify in cell.on_left:
+        notify(LEFT)
+    changed = await reader.changes()
+    assert changed.left == [LEFT]
+    assert (await other.changes()).unit == changed.unit
+    assert (await other.changes()) == m.Update()
     assert changed.devices is not None
     assert {each.id: each.robot_type for each in changed.devices} == {"obj_io": "", "obj_arm": "articulated"}
     assert changed.states["obj_arm"].connection is Connection.ONLINE
@@ -262,7 +272,7 @@ async def test_the_feed_shows_devices_and_sends_only_changes() -> None:
     cell.board.reports.clear()
     for forget in cell.board.on_clear:
         forget([])
-    ended = await feed.changes()
+    ended = await reader.changes()
     assert ended.devices is None
     assert {state.connection for state in ended.states.values()} == {Connection.OFFLINE}
 

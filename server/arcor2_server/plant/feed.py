@@ -1,17 +1,19 @@
-"""Collects what the OPC UA server shows: only what has changed, and of each stream only the newest event."""
+"""Collects what plant systems are shown: only what has changed, and of each stream only the newest event."""
 
+from collections import deque
 from collections.abc import Sequence
 from typing import Final
 
 import structlog
+from msgspec.structs import replace
 
 from arcor2_hw.data.alarms import AlarmFilter, AlarmRecord
 from arcor2_hw.data.base import Unset, now
 from arcor2_hw.data.device import Connection, Identity
 from arcor2_hw.data.rpc import ListAlarmsArgs, RobotEventKind
-from arcor2_hw.data.units import UnitState
+from arcor2_hw.data.units import Unit, UnitState
 from arcor2_hw.exceptions import Arcor2Error, NotFound
-from arcor2_hw.opcua.messages import DeviceInfo, DeviceState, UnitData, Update
+from arcor2_hw.plant.messages import DeviceInfo, DeviceState, UnitData, Update
 from arcor2_hw.runtime.messages import DeviceChanged
 from arcor2_server.alarms.service import Alarms
 from arcor2_server.execution.runs import Runs
@@ -29,12 +31,55 @@ JOINTS_RATE: Final = 10.0
 """Rate at which joints are read, Hz."""
 POINTS_RATE: Final = 5.0
 """Rate at which points are read, Hz: as fast as the editor may read them."""
+MOST_LEFT: Final = 1000
+"""Maximum number of units that wait for a process, such as while it restarts. The oldest are dropped."""
 _CONNECTED: Final = (Connection.ONLINE, Connection.BACK)
 _START: Final = "1970-01-01T00:00:00+00:00"
 
 
+class FeedReader:
+    """What one process for plant systems has not received yet. Created by `CellFeed.reader`."""
+
+    def __init__(self, feed: "CellFeed") -> None:
+        self._feed = feed
+        self._devices: list[DeviceInfo] = []
+        self._states: dict[str, DeviceState] = {}
+        self._unit: UnitData | None = None
+        self.streams: dict[tuple[str, str], bytes] = {}
+        self.alarms: dict[int, AlarmRecord] = {}
+        self.left: deque[Unit] = deque(maxlen=MOST_LEFT)
+
+    async def everything(self) -> Update:
+        """Return the present state for a process that has started, and the units that left while none was running."""
+        self.streams, self.alarms = {}, {}
+        update = await self.changes()
+        # Records that were not stored yet are reported once more when they are.
+        alarms = await self._feed.retained_alarms()
+        return replace(update, devices=self._devices, states=dict(self._states), unit=self._unit, alarms=alarms)
+
+    async def changes(self) -> Update:
+        """Return what has changed since the last call."""
+        feed = self._feed
+        await feed.refresh()
+        unit = feed.unit()
+        streams, self.streams = list(self.streams.values()), {}
+        alarms, self.alarms = list(self.alarms.values()), {}
+        left = list(self.left)
+        self.left.clear()
+        update = Update(
+            feed.devices if feed.devices != self._devices else None,
+            {key: state for key, state in feed.states.items() if self._states.get(key) != state},
+            streams,
+            unit if unit != self._unit else None,
+            alarms,
+            left,
+        )
+        self._devices, self._states, self._unit = feed.devices, feed.states, unit
+        return update
+
+
 class CellFeed:
-    """Follows the cell from `start` on.
+    """Follows the cell from the first reader on.
 
     Args:
         hosts: the hosts of the scene and of the program. The devices of the last one that has any are shown.
@@ -60,22 +105,30 @@ class CellFeed:
     ) -> None:
         self._hosts, self._cell, self._execution, self._runs = hosts, cell, execution, runs
         self._units, self._types, self._cards, self._alarms = units, types, cards, alarms
-        self._devices: list[DeviceInfo] = []
-        self._states: dict[str, DeviceState] = {}
-        self._unit: UnitData | None = None
+        self.devices: list[DeviceInfo] = []
+        """The devices. A change replaces the list."""
+        self.states: dict[str, DeviceState] = {}
+        """Their states by id. A change replaces the dictionary."""
         self._counts = dict.fromkeys(UnitState, 0)
         self._devices_changed = self._counts_changed = True
-        self._streams: dict[tuple[str, str], bytes] = {}
-        self._changed_alarms: dict[int, AlarmRecord] = {}
+        self._readers: list[FeedReader] = []
 
-    def start(self) -> None:
-        """Start to follow the cell."""
+    def reader(self) -> FeedReader:
+        """Return a new reader. It gets all changes from now on."""
+        if not self._readers:
+            self._start()
+        reader = FeedReader(self)
+        self._readers.append(reader)
+        return reader
+
+    def _start(self) -> None:
         for host in self._hosts:
             host.board.on_report.append(lambda report, host=host: self._reported(host, report))  # type: ignore[misc]
             host.board.on_clear.append(lambda _: self._mark_devices())
             host.board.on_connection.append(self._mark_devices)
             host.board.on_identified.append(lambda _: self._mark_devices())
         self._alarms.on_changed.append(self._alarm_changed)
+        self._units.on_left.append(self._left)
         self._execution.parts.on_change.append(lambda _: self._mark_counts())
         self._execution.on_state.append(self._mark_devices)
         self._mark_devices()
@@ -87,7 +140,12 @@ class CellFeed:
         self._counts_changed = True
 
     def _alarm_changed(self, record: AlarmRecord) -> None:
-        self._changed_alarms[record.number] = record
+        for reader in self._readers:
+            reader.alarms[record.number] = record
+
+    def _left(self, unit: Unit) -> None:
+        for reader in self._readers:
+            reader.left.append(unit)
 
     def _reported(self, host: HostSession, report: DeviceChanged) -> None:
         self._devices_changed = True
@@ -99,36 +157,17 @@ class CellFeed:
                 host.streams.observe(key, joints, JOINTS_RATE, lambda encoded: self._put(key, joints, encoded))
 
     def _put(self, object_id: str, kind: str, encoded: bytes) -> None:
-        self._streams[object_id, kind] = encoded
+        for reader in self._readers:
+            reader.streams[object_id, kind] = encoded
 
-    # -------------------------------------------------------------------------------- what is sent
-    async def everything(self) -> Update:
-        """Return the present state for a process that has started."""
-        await self._refresh()
-        self._unit = self._unit_data()
-        self._streams, self._changed_alarms = {}, {}
-        # Records that were not stored yet are reported once more when they are.
+    # -------------------------------------------------------------------------------- what readers send
+    async def retained_alarms(self) -> list[AlarmRecord]:
+        """Return the alarms that need attention, oldest first."""
         alarms = await self._alarms.find(ListAlarmsArgs(show=AlarmFilter.RETAINED, limit=1000))
-        return Update(self._devices, dict(self._states), [], self._unit, list(reversed(alarms)))
+        return list(reversed(alarms))
 
-    async def changes(self) -> Update:
-        """Return what has changed since the last call."""
-        devices, states = self._devices, self._states
-        await self._refresh()
-        unit = self._unit_data()
-        streams, self._streams = list(self._streams.values()), {}
-        alarms, self._changed_alarms = list(self._changed_alarms.values()), {}
-        update = Update(
-            self._devices if self._devices != devices else None,
-            {key: state for key, state in self._states.items() if states.get(key) != state},
-            streams,
-            unit if unit != self._unit else None,
-            alarms,
-        )
-        self._unit = unit
-        return update
-
-    async def _refresh(self) -> None:
+    async def refresh(self) -> None:
+        """Collect what has changed."""
         if self._devices_changed:
             self._devices_changed = False
             self._collect_devices()
@@ -144,13 +183,13 @@ class CellFeed:
         identities = self._cards.identities()
         host = next((host for host in reversed(self._hosts) if host.board.reports), None)
         if host is None:
-            if not self._devices:
-                self._devices = [
+            if not self.devices:
+                self.devices = [
                     DeviceInfo(card.object_id, card.name, card.object_type, self._type_of(card.object_type),
                                card.identity)
                     for card in self._cards.all()
                 ]  # fmt: skip
-            self._states = {info.id: DeviceState() for info in self._devices}
+            self.states = {info.id: DeviceState() for info in self.devices}
             return
         executing = self._execution.running
         devices, states = [], {}
@@ -165,7 +204,7 @@ class CellFeed:
             devices.append(DeviceInfo(key, found.name, found.type, robot, identities.get(key, Identity())))
             codes = tuple(alarm.code for alarm in report.alarms)
             states[key] = DeviceState(report.connection, report.health, codes, host.board.answering, executing)
-        self._devices, self._states = devices, states
+        self.devices, self.states = devices, states
 
     def _is_device(self, object_type: str) -> bool:
         try:
@@ -186,7 +225,8 @@ class CellFeed:
         except Arcor2Error:  # the type exists only in the package
             return ""
 
-    def _unit_data(self) -> UnitData:
+    def unit(self) -> UnitData:
+        """Return the cell as a unit."""
         cell, counts = self._cell, self._counts
         run = self._runs.get(self._execution.program.number)
         program = recipe = ""
