@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 ARGS ?=
 FAMILIES := --extra ur --extra modbus --extra serial --extra can --extra dynamixel --extra depthai --extra vision --extra kinematics --extra nodes
 # Drivers beyond the demo are tested too.
-TESTED := $(FAMILIES) --extra opcua --extra postgresql
+TESTED := $(FAMILIES) --extra opcua --extra mqtt --extra postgresql
 
 # Compiled modules are kept, whatever the environment says: a test run starts some hundred Python processes, and each of
 # them would compile all of ours again.
@@ -23,7 +23,7 @@ run: .make/run .make/editor
 # Everything, also the combinations that are checked only before a change is merged: make test ARGS=--matrix
 WORKERS ?= 6
 AGAIN := --last-failed --last-failed-no-failures none
-test: .make/dev .make/editor .make/browser .make/postgresql .make/broker
+test: .make/dev .make/editor .make/browser .make/postgresql .make/broker .make/mosquitto
 	$(BIN)/python -m pytest --collect-only -qq >/dev/null & $(BIN)/python editor/build.py test; status=$$?; wait; exit $$status
 	$(BIN)/python -m pytest --numprocesses $(WORKERS) --dist loadgroup --no-loadscope-reorder $(ARGS) || \
 	test $$? = 5 || $(BIN)/python -m pytest $(AGAIN) $(ARGS)
@@ -146,6 +146,15 @@ EDITOR := $(shell find editor -name node_modules -prune -o -name __pycache__ -pr
 	@command -v nats-server >/dev/null || test -x /usr/sbin/nats-server || { \
 	  if test "$$(id -u)" = 0; then apt-get update -qq && apt-get install -y -qq --no-install-recommends nats-server >/dev/null; \
 	  else echo "please install: nats-server" >&2; exit 1; fi; \
+	}
+	@touch $@
+
+# The MQTT broker of the tests. Each starts its own.
+.make/mosquitto:
+	@mkdir -p .make
+	@command -v mosquitto >/dev/null || test -x /usr/sbin/mosquitto || { \
+	  if test "$$(id -u)" = 0; then apt-get update -qq && apt-get install -y -qq --no-install-recommends mosquitto >/dev/null; \
+	  else echo "please install: mosquitto" >&2; exit 1; fi; \
 	}
 	@touch $@
 

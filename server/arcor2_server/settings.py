@@ -13,6 +13,7 @@ from arcor2_hw.data.cell import Cell
 from arcor2_hw.data.device import DEVICE_FILES
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.mqtt.messages import Broker, Sparkplug
 
 VERSION: Final = "1.4.0"
 """Version of the ARServer that this server is compatible with; its own version: `arcor2-hw --version`."""
@@ -23,6 +24,8 @@ LONGEST_LIFE_TIMEOUT: Final = 60.0
 """Longest time limit of the PLC's life counter, s."""
 DATABASE_URL: Final = "ARCOR2_HW_DATABASE_URL"
 """The variable with the address of the database."""
+MQTT_URL: Final = "ARCOR2_HW_MQTT_URL"
+"""The variable with the address of the MQTT broker, which may contain a password."""
 DEVICE_FILES_NAME: Final = "device-files"
 """Folder of the data directory with the files that settings of devices may name."""
 
@@ -59,6 +62,18 @@ class OpcUaListener(msgspec.Struct, frozen=True):
     unencrypted: bool = False
 
 
+class MqttSettings(msgspec.Struct, frozen=True):
+    """How the cell is published over MQTT.
+
+    broker: how to connect to the broker. sparkplug: None to publish no Sparkplug B. prefix: of the topics with plain
+    JSON; empty for none.
+    """
+
+    broker: Broker
+    sparkplug: Sparkplug | None = None
+    prefix: str = ""
+
+
 class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     """The settings of the server. Times are in s, sizes in bytes."""
 
@@ -79,6 +94,8 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     """Address of the Modbus block for a PLC; None: no block."""
     opcua: OpcUaListener | None = None
     """Address of the OPC UA server; None: none."""
+    mqtt: MqttSettings | None = None
+    """The broker to which the cell is published; None: none."""
     plc_life_timeout: float = 2.0
     """Time after which a life counter of the PLC that does not change holds its program, s."""
     device_files: tuple[str, ...] = ()

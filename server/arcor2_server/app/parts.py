@@ -47,6 +47,7 @@ from arcor2_server.hosts.session import HostSession
 from arcor2_server.log.redaction import REDACTION
 from arcor2_server.maintenance.devices import Devices
 from arcor2_server.maintenance.parameters import Parameters
+from arcor2_server.mqtt.service import Mqtt
 from arcor2_server.object_types.catalog import KnownTypes
 from arcor2_server.object_types.installations import InstallationWatch
 from arcor2_server.object_types.notifications import TypeNotifications
@@ -278,6 +279,7 @@ class Server:
         plc = self.plc = closed(Plc(cell, cell_file, package_runs, alarms, audit, settings.plc_life_timeout))
         feed = CellFeed((scene_host, program_host), cell, execution, runs, units, types, devices, alarms)
         self.opcua = closed(OpcUa(settings, feed, PlantRequests(access, persons, plc, alarms, audit), cell, alarms))
+        self.mqtt = closed(Mqtt(settings, feed, alarms))
         temporary_runs = self.temporary_runs = TemporaryRuns(
             hub, locks, storage, types, session, online, execution, build, tasks
         )

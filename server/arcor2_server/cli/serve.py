@@ -36,11 +36,13 @@ from arcor2_server.access.admission import PARAMETER, is_local
 from arcor2_server.access.tokens import TokenFile
 from arcor2_server.audit.command_line import note_command
 from arcor2_server.cli.exit_status import ExitStatus, fail
+from arcor2_server.cli.mqtt_options import mqtt_settings
 from arcor2_server.deployment.service_manager import ServiceManager
 from arcor2_server.log import setup as server_logging
 from arcor2_server.settings import (
     DATABASE_URL,
     DEVICE_FILES_NAME,
+    MQTT_URL,
     LegacyListener,
     OpcUaListener,
     PlcListener,
@@ -94,6 +96,11 @@ def serve(
     opcua: str | None = None,
     opcua_anonymous: Annotated[bool, Parameter(negative="")] = False,
     opcua_unencrypted: Annotated[bool, Parameter(negative="")] = False,
+    mqtt: str | None = None,
+    mqtt_sparkplug: str | None = None,
+    mqtt_primary_host: str | None = None,
+    mqtt_json: str | None = None,
+    mqtt_unencrypted: Annotated[bool, Parameter(negative="")] = False,
     classic_ports: Annotated[bool, Parameter(negative="")] = False,
     openapi: Annotated[bool, Parameter(negative="")] = False,
     log_level: str = "info",
@@ -134,6 +141,17 @@ def serve(
         Let OPC UA clients read without a user, also from other machines.
     opcua_unencrypted
         Let OPC UA clients connect without encryption, also from other machines.
+    mqtt
+        mqtts://HOST:PORT of an MQTT broker to which the cell is published. An address with a password belongs into the
+        variable ARCOR2_HW_MQTT_URL.
+    mqtt_sparkplug
+        GROUP/NODE under which the cell is published as an edge node of Sparkplug B.
+    mqtt_primary_host
+        Id of the Sparkplug host application. While it is offline, values are stored and published later.
+    mqtt_json
+        Prefix of the topics under which the cell is published as plain JSON, such as enterprise/site/area/line/cell.
+    mqtt_unencrypted
+        Use a broker on another machine without TLS.
     classic_ports
         Also listen on the ports of the services of the original ARCOR2, as set by its ARCOR2_* variables.
     openapi
@@ -169,6 +187,7 @@ def serve(
             legacy=legacy,
             plc=None if plc_modbus is None else PlcListener(*_address("--plc-modbus", plc_modbus)),
             opcua=None if opcua is None else _opcua(opcua, anonymous=opcua_anonymous, unencrypted=opcua_unencrypted),
+            mqtt=mqtt_settings(mqtt, mqtt_sparkplug, mqtt_primary_host, mqtt_json, unencrypted=mqtt_unencrypted),
             classic_ports=ports_from_environment() if classic_ports else None,
         )
         if broker := os.environ.get(BROKER_URL):
@@ -176,7 +195,8 @@ def serve(
 
             require_tls(broker)
         server_logging.set_up(log_level)
-        os.environ.pop(DATABASE_URL, None)  # may contain a password, which devices and programs must not see
+        for variable in (DATABASE_URL, MQTT_URL):  # may contain a password, which devices and programs must not see
+            os.environ.pop(variable, None)
     except (InvalidData, KeyError) as error:
         return fail("serve", error, ExitStatus.USAGE)
     try:
@@ -386,6 +406,7 @@ async def run(
             await running.plc.serve(plc)
         if plant is not None:
             running.opcua.serve(plant)
+        running.mqtt.start()
         loop = asyncio.get_running_loop()
         config = configuration(create_app(running), settings, certificate)
         renewal = trust_page = None

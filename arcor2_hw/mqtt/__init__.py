@@ -1,0 +1,1 @@
+"""The MQTT clients of the cell, a process of its own: Sparkplug B, and plain JSON."""

@@ -1,0 +1,79 @@
+"""MQTT brokers of the tests, each on a free port of 127.0.0.1."""
+
+import shutil
+import socket
+import subprocess
+from pathlib import Path
+
+from tests.waiting import wait_for
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def _command(name: str) -> str:
+    return shutil.which(name) or f"/usr/sbin/{name}"  # where users other than root do not look
+
+
+NATS_SERVER = _command("nats-server")
+
+
+class Broker:
+    """A broker on one port, also after a restart."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.port = folder, free_port()
+        self.file = folder / "broker.conf"
+        self.command: list[str] = []
+
+    def start(self) -> None:
+        with (self.folder / "broker.log").open("ab") as log:
+            self.process = subprocess.Popen(self.command, stdout=log, stderr=log)
+
+        def accepts() -> bool:
+            assert self.process.poll() is None, (self.folder / "broker.log").read_text()
+            with socket.socket() as probe:
+                return probe.connect_ex(("127.0.0.1", self.port)) == 0
+
+        wait_for(accepts)
+
+    def end(self) -> None:
+        self.process.kill()
+        self.process.wait()
+
+    @property
+    def url(self) -> str:
+        return f"mqtt://127.0.0.1:{self.port}"
+
+
+class Mosquitto(Broker):
+    """mosquitto. lines: further lines of its configuration; with them it decides about users itself."""
+
+    def __init__(self, folder: Path, lines: str = "allow_anonymous true") -> None:
+        super().__init__(folder)
+        user = "user root\n" if Path.home() == Path("/root") else ""
+        self.file.write_text(f"listener {self.port} 127.0.0.1\n{user}{lines}\n")
+        self.command = [_command("mosquitto"), "-c", str(self.file)]
+        self.start()
+
+
+class Nats(Broker):
+    """The MQTT port of nats-server."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder)
+        self.file.write_text(
+            f'listen: 127.0.0.1:{free_port()}\nserver_name: test\njetstream {{ store_dir: "{folder}" }}\n'
+            f"mqtt {{ listen: 127.0.0.1:{self.port} }}\n"
+        )
+        self.command = [NATS_SERVER, "-c", str(self.file)]
+        self.start()
+
+
+def nats_version() -> tuple[int, ...]:
+    """Return the version of nats-server, such as (2, 10)."""
+    text = subprocess.run([NATS_SERVER, "--version"], capture_output=True, text=True, check=True).stdout
+    return tuple(int(part) for part in text.split("v")[-1].split(".")[:2])
