@@ -18,7 +18,7 @@ from arcor2_hw.data.packml import MachineState, UnitMode
 from arcor2_hw.data.points import PointQuality
 from arcor2_hw.mqtt import payload
 from arcor2_hw.mqtt.cell import CellState, Changes, Device
-from arcor2_hw.mqtt.link import Link, client, end_if_cancelled
+from arcor2_hw.mqtt.link import Link, connection, end_if_cancelled
 from arcor2_hw.mqtt.messages import Dropped, Setup
 from arcor2_hw.mqtt.payload import Kind, Metric, Value
 
@@ -263,7 +263,7 @@ class EdgeNode:
         self._born, self._host_online, self._rebirth = {}, None, False
         death = Will(self._topic("NDEATH"), self._death(), qos=1, retain=False)
         identifier = f"{self._names.group}/{self._names.node}/sparkplug"
-        async with client(self._setup.broker, identifier, death) as connected:
+        async with connection(self._setup.broker, identifier, death) as connected:
             receiving = asyncio.create_task(self._receive(connected), name="messages of hosts")
             receiving.add_done_callback(lambda _: self._wake.set())
             try:

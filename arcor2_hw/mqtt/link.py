@@ -1,9 +1,10 @@
 """Connections to the broker, which are established again and again."""
 
 import asyncio
+import contextlib
 import ssl
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Final
 
 from aiomqtt import Client, MqttError, Will
@@ -22,8 +23,9 @@ MOST_INCOMING: Final = 100
 """Maximum number of received messages that wait. Further ones are dropped."""
 
 
-def client(broker: Broker, identifier: str, will: Will) -> Client:
-    """Return a client, which connects when it is entered.
+@contextlib.asynccontextmanager
+async def connection(broker: Broker, identifier: str, will: Will) -> AsyncIterator[Client]:
+    """Connect to the broker and yield the client.
 
     Args:
         broker: how to connect.
@@ -31,6 +33,7 @@ def client(broker: Broker, identifier: str, will: Will) -> Client:
         will: what the broker publishes when the connection is lost.
 
     Raises:
+        MqttError: the broker cannot be reached, does not answer, or refuses the client.
         OSError: a file of a certificate or key cannot be used.
     """
     context = None
@@ -38,7 +41,7 @@ def client(broker: Broker, identifier: str, will: Will) -> Client:
         context = ssl.create_default_context(cafile=broker.authority or None)
         if broker.certificate:
             context.load_cert_chain(broker.certificate, broker.key)
-    return Client(
+    client = Client(
         broker.host,
         broker.port,
         username=broker.user or None,
@@ -51,6 +54,11 @@ def client(broker: Broker, identifier: str, will: Will) -> Client:
         tls_context=context,
         max_queued_incoming_messages=MOST_INCOMING,
     )
+    try:
+        async with client:
+            yield client
+    finally:
+        client._client.disconnect()  # otherwise aiomqtt keeps the socket of a broker that did not answer
 
 
 def end_if_cancelled() -> None:

@@ -94,7 +94,7 @@ def _schema() -> descriptor_pb2.FileDescriptorProto:
 
 
 _pool = descriptor_pool.DescriptorPool()
-_pool.Add(_schema())  # type: ignore[no-untyped-call]
+_pool.Add(_schema())
 _Payload: Any = message_factory.GetMessageClass(_pool.FindMessageTypeByName("arcor2_hw.sparkplug.Payload"))
 
 

@@ -22,7 +22,7 @@ from arcor2_hw.data.packml import MachineState, UnitMode
 from arcor2_hw.data.points import PointQuality, PointValue
 from arcor2_hw.data.units import Unit
 from arcor2_hw.mqtt.cell import CellState, Changes, Device, Point
-from arcor2_hw.mqtt.link import Link, client, end_if_cancelled
+from arcor2_hw.mqtt.link import Link, connection, end_if_cancelled
 from arcor2_hw.mqtt.messages import Dropped, Setup
 
 POINTS_PERIOD: Final = 1.0
@@ -156,7 +156,7 @@ class PlainJson:
         status = f"{self._prefix}/status"
         broker = self._setup.broker
         will = Will(status, OFFLINE, qos=1, retain=True)
-        async with client(broker, f"{self._prefix}/json", will) as connected:
+        async with connection(broker, f"{self._prefix}/json", will) as connected:
             watching = asyncio.create_task(self._watch(connected), name="connection of JSON")
             watching.add_done_callback(lambda _: self._wake.set())
             try:

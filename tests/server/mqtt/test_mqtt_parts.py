@@ -3,6 +3,8 @@
 import asyncio
 import contextlib
 import json
+import ssl
+import subprocess
 import time
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
@@ -11,6 +13,7 @@ from typing import Any
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 
 from arcor2_hw.data.alarms import AlarmCategory, AlarmRecord, Priority
 from arcor2_hw.data.device import Connection, Identity
@@ -24,6 +27,7 @@ from arcor2_hw.mqtt.edge_node import EdgeNode, ValueQueue
 from arcor2_hw.mqtt.payload import Kind, Metric
 from arcor2_hw.mqtt.plain import PlainJson, schema
 from arcor2_hw.plant.messages import DeviceInfo, DeviceState, UnitData, Update
+from arcor2_server.access.authority import Authority
 from arcor2_server.cli.mqtt_options import mqtt_settings
 from arcor2_server.mqtt.service import Mqtt
 from arcor2_server.plant import process
@@ -31,6 +35,7 @@ from arcor2_server.plant.process import PlantProcess
 from tests.server.mqtt.brokers import Broker, Mosquitto, Nats, nats_version
 from tests.server.mqtt.host import Host
 from tests.server.mqtt.test_mqtt_server import until
+from tests.server.opcua.plant_client import client_certificate
 
 ROOT = Path(__file__).parents[3]
 IO = DeviceInfo("obj_io", "io block", "RemoteIO", "", Identity("WAGO", "750", "17"))
@@ -226,6 +231,51 @@ async def test_sparkplug_over_nats(nats: Broker, tmp_path: Path) -> None:
     host.end()
 
 
+# paho-mqtt leaves the socket of a failed handshake to the garbage collector.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+async def test_tls_needs_a_trusted_broker_the_right_password_and_the_client_certificate(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    authority = Authority(tmp_path, lambda: ["127.0.0.1"])
+    authority.renew()
+    der, key = client_certificate(tmp_path)
+    certificate = tmp_path / "client-certificate.pem"
+    certificate.write_text(ssl.DER_cert_to_PEM_cert(der.read_bytes()))
+    passwords = tmp_path / "passwords"
+    subprocess.run(["mosquitto_passwd", "-b", "-c", str(passwords), "cell", "right"], check=True)
+    (tmp_path / "certificate.pem").chmod(0o644)
+    lines = f"""allow_anonymous false
+password_file {passwords}
+certfile {authority.files[0]}
+keyfile {authority.files[1]}
+cafile {certificate}
+require_certificate true"""
+    broker = Mosquitto(tmp_path, lines)
+    files = {"authority": str(authority.file), "certificate": str(certificate), "key": str(key)}
+    good = m.Broker("127.0.0.1", broker.port, True, "cell", "right", **files)
+    other = Authority(tmp_path / "other", lambda: ["127.0.0.1"])
+    other.file.parent.mkdir()
+    other.renew()
+    refused = {
+        "verify failed": replace(good, authority=str(other.file)),
+        "Not authorized": replace(good, password="wrong"),
+        "timed out": replace(good, certificate="", key=""),
+        "No such file": replace(good, authority="/nowhere"),
+    }
+    monkeypatch.setattr(link, "TIMEOUT", 2.0)
+    for reason, settings in {**refused, "connected": good}.items():
+        reports: list[m.LinkChanged] = []
+        setup = m.Setup(settings, m.Sparkplug("plant", "tls"), "", str(tmp_path), "0.1")
+        node = EdgeNode(setup, CellState(), reports.append)
+        task = asyncio.create_task(node.run())
+        await until(lambda reports=reports: reports)  # type: ignore[misc]
+        assert reports[0].connected is (settings is good), reports
+        assert reason in reports[0].reason or settings is good
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+    broker.end()
+
+
 # ------------------------------------------------------------------------------------ plain JSON
 @pytest.mark.parametrize("kind", ["mosquitto", "nats"])
 async def test_json_is_published_and_topics_of_removed_devices_disappear(
@@ -251,6 +301,27 @@ async def test_json_is_published_and_topics_of_removed_devices_disappear(
         await until(lambda: host.of(f"{PREFIX}/devices/io_block/state")[-1].payload == b"")
     await until(lambda: host.of(f"{PREFIX}/status")[-1].payload == b"offline")
     host.end()
+
+
+async def test_a_broker_that_does_not_answer_leaves_no_sockets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(link, "TIMEOUT", 0.05)
+    monkeypatch.setattr(link, "LONGEST_PAUSE", 0.05)
+    attempts: set[asyncio.StreamWriter] = set()
+    ended = 0
+
+    async def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        nonlocal ended
+        attempts.add(writer)
+        while await reader.read(1000):
+            pass
+        writer.close()
+        ended += 1
+
+    async with await asyncio.start_server(accept, "127.0.0.1", 0) as server:
+        async with publishing(PlainJson, server.sockets[0].getsockname()[1], tmp_path) as cell:
+            await until(lambda: ended >= 3)
+            assert [each.reason for each in cell.reports] == ["Operation timed out"]
+        await until(lambda: ended == len(attempts))
 
 
 async def test_results_wait_for_the_broker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
