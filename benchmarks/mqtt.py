@@ -34,10 +34,17 @@ def mosquitto(directory: Path) -> Iterator[int]:
     command = shutil.which("mosquitto") or "/usr/sbin/mosquitto"  # where users other than root do not look
     broker = subprocess.Popen([command, "-c", str(file)], stderr=subprocess.DEVNULL)
     try:
+        while not _accepts(port):
+            time.sleep(0.01)
         yield port
     finally:
         broker.kill()
         broker.wait()
+
+
+def _accepts(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
 class Counter:
@@ -67,7 +74,8 @@ async def measure(directory: Path) -> list[Metric]:
         counter = Counter()
         counting = asyncio.create_task(counter.count(port))
         try:
-            await counter.connected.wait()
+            async with asyncio.timeout(30.0):
+                await counter.connected.wait()
             encoded, index = events(), 0
 
             async def stream() -> None:

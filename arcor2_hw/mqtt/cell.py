@@ -9,7 +9,7 @@ from arcor2_hw.data.alarms import AlarmRecord
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.device import Connection
 from arcor2_hw.data.events import RobotJointsData
-from arcor2_hw.data.points import LivePoint, ObjectPointsData, PointQuality, PointUse, PointValue
+from arcor2_hw.data.points import LivePoint, PointQuality, PointUse, PointValue
 from arcor2_hw.data.units import Unit
 from arcor2_hw.plant.messages import STALE_AFTER, DeviceInfo, DeviceState, UnitData, Update
 from arcor2_hw.plant.streams import decode_stream, time_of
@@ -149,17 +149,18 @@ class CellState:
         key = data.robot_id if isinstance(data, RobotJointsData) else data.object_id
         if (device := self.devices.get(key)) is None:
             return
-        if isinstance(data, ObjectPointsData):
-            if not isinstance(data.reason, Unset):
-                return
-            points, known = data.points, device.points
-        elif data.time_ms:
+        stamp = data.time_ms
+        if isinstance(stamp, Unset):
+            return
+        if isinstance(data, RobotJointsData):
             points = [LivePoint(joint.name, PointUse.SIGNAL, joint.value) for joint in data.joints]
             known = device.joints
+        elif isinstance(data.reason, Unset):
+            points, known = data.points, device.points
         else:
             return
         device.streamed = time.monotonic()
-        at = time_of(data.time_ms / 1e3).timestamp() * 1e3
+        at = time_of(stamp / 1e3).timestamp() * 1e3
         for each in points:
             quality = each.quality if device.connected else PointQuality.NOT_CONNECTED
             point = known.get(each.name)

@@ -216,9 +216,9 @@ class PlainJson:
             devices, self._points = self._points, set()
             for key in devices:
                 if (device := self._cell.devices.get(key)) is not None:
-                    content = _encode(PointsTopic(_points(device.points), _points(device.joints)))
+                    points = _encode(PointsTopic(_points(device.points), _points(device.joints)))
                     topic = f"{self._prefix}/devices/{device.level}/points"
-                    await connected.publish(topic, content, qos=0, retain=True)
+                    await connected.publish(topic, points, qos=0, retain=True)
 
     def _contents(self, topic: str) -> list[tuple[str, Any]]:
         """Return the topics below the prefix with their content; None to remove a topic."""
