@@ -13,7 +13,6 @@ from typing import Any, Final
 import aiomqtt
 import psutil
 
-from arcor2_hw.mqtt.messages import Broker, Sparkplug
 from arcor2_hw.runtime.messages import StreamEvent
 from arcor2_server.mqtt.service import Mqtt
 from arcor2_server.settings import MqttSettings, ServerSettings
@@ -68,7 +67,7 @@ async def measure(directory: Path) -> list[Metric]:
     feed: Any = Feed()
     alarms: Any = type("Alarms", (), {"system": lambda *_: None})()
     with mosquitto(directory) as port:
-        broker = MqttSettings(Broker("127.0.0.1", port), Sparkplug("brno", "cell-7"), PREFIX)
+        broker = MqttSettings(host="127.0.0.1", port=port, group="brno", node="cell-7", prefix=PREFIX)
         mqtt = Mqtt(ServerSettings(data_dir=directory, mqtt=broker), feed, alarms)
         mqtt.start()
         counter = Counter()

@@ -105,7 +105,7 @@ class CellState:
                     _invalidate(device, PointQuality.STALE, changes)
         for encoded in update.streams:
             self._stream(encoded, changes)
-        if update.unit is not None and update.unit != self.unit:
+        if update.unit is not None and (update.unit != self.unit or not self.unit_time_ms):
             self.unit, self.unit_time_ms, changes.unit = update.unit, time.time_ns() // 1_000_000, True
         for alarm in update.alarms:
             if alarm.retain:

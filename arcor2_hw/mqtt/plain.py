@@ -205,9 +205,9 @@ class PlainJson:
         for topic in sorted(self._changed):
             self._changed.discard(topic)
             for name, value in self._contents(topic):
-                content = None if value is None else _encode(value)
+                encoded = None if value is None else _encode(value)
                 try:
-                    await connected.publish(f"{self._prefix}/{name}", content, qos=1, retain=True)
+                    await connected.publish(f"{self._prefix}/{name}", encoded, qos=1, retain=True)
                 except BaseException:
                     self._changed.add(topic)
                     raise

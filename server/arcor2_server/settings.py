@@ -13,7 +13,6 @@ from arcor2_hw.data.cell import Cell
 from arcor2_hw.data.device import DEVICE_FILES
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
-from arcor2_hw.mqtt.messages import Broker, Sparkplug
 
 VERSION: Final = "1.4.0"
 """Version of the ARServer that this server is compatible with; its own version: `arcor2-hw --version`."""
@@ -62,15 +61,26 @@ class OpcUaListener(msgspec.Struct, frozen=True):
     unencrypted: bool = False
 
 
-class MqttSettings(msgspec.Struct, frozen=True):
+class MqttSettings(msgspec.Struct, frozen=True, kw_only=True):
     """How the cell is published over MQTT.
 
-    broker: how to connect to the broker. sparkplug: None to publish no Sparkplug B. prefix: of the topics with plain
-    JSON; empty for none.
+    tls: whether to use TLS. user, password: empty if the broker needs none. authority: file of the certificate to
+    trust; empty for those that the system trusts. certificate, key: files of the client certificate; empty for none.
+    group, node: names of Sparkplug B; empty to publish none. primary_host: id of the host to wait for; empty for none.
+    prefix: of the topics with plain JSON; empty for none.
     """
 
-    broker: Broker
-    sparkplug: Sparkplug | None = None
+    host: str
+    port: int
+    tls: bool = False
+    user: str = ""
+    password: str = ""
+    authority: str = ""
+    certificate: str = ""
+    key: str = ""
+    group: str = ""
+    node: str = ""
+    primary_host: str = ""
     prefix: str = ""
 
 

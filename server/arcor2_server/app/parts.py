@@ -2,7 +2,7 @@
 
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from arcor2_hw.data.audit import AuditOutcome
 from arcor2_hw.data.events import Event
@@ -47,7 +47,6 @@ from arcor2_server.hosts.session import HostSession
 from arcor2_server.log.redaction import REDACTION
 from arcor2_server.maintenance.devices import Devices
 from arcor2_server.maintenance.parameters import Parameters
-from arcor2_server.mqtt.service import Mqtt
 from arcor2_server.object_types.catalog import KnownTypes
 from arcor2_server.object_types.installations import InstallationWatch
 from arcor2_server.object_types.notifications import TypeNotifications
@@ -98,6 +97,9 @@ from arcor2_server.workspace.robot_calibrations import RobotCalibrations
 from arcor2_server.workspace.robot_models import RobotModels
 from arcor2_server.workspace.robots import SceneRobots
 from arcor2_server.workspace.scene_collisions import SceneCollisions
+
+if TYPE_CHECKING:
+    from arcor2_server.mqtt.service import Mqtt
 
 
 class Server:
@@ -279,7 +281,11 @@ class Server:
         plc = self.plc = closed(Plc(cell, cell_file, package_runs, alarms, audit, settings.plc_life_timeout))
         feed = CellFeed((scene_host, program_host), cell, execution, runs, units, types, devices, alarms)
         self.opcua = closed(OpcUa(settings, feed, PlantRequests(access, persons, plc, alarms, audit), cell, alarms))
-        self.mqtt = closed(Mqtt(settings, feed, alarms))
+        self.mqtt: Mqtt | None = None
+        if settings.mqtt is not None:
+            from arcor2_server.mqtt import service  # takes time, and few servers need it
+
+            self.mqtt = closed(service.Mqtt(settings, feed, alarms))
         temporary_runs = self.temporary_runs = TemporaryRuns(
             hub, locks, storage, types, session, online, execution, build, tasks
         )

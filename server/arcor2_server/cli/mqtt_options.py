@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import SplitResult, unquote, urlsplit
 
+from msgspec.structs import replace
+
 from arcor2_hw.exceptions import InvalidData
-from arcor2_hw.mqtt.messages import Broker, Sparkplug
 from arcor2_server.settings import MQTT_URL, MqttSettings, is_loopback
 
 AUTHORITY: Final = "ARCOR2_HW_MQTT_CA"
@@ -53,29 +54,28 @@ def mqtt_settings(
         raise InvalidData("--mqtt needs --mqtt-sparkplug GROUP/NODE, --mqtt-json PREFIX, or both.")
     if primary_host and not sparkplug:
         raise InvalidData("--mqtt-primary-host needs --mqtt-sparkplug GROUP/NODE.")
-    names = None
-    if sparkplug:
-        group, _, node = sparkplug.partition("/")
-        names = Sparkplug(group, node, primary_host or "")
-        if not (_is_level(group) and _is_level(node) and (not primary_host or _is_level(primary_host))):
-            raise InvalidData(
-                "--mqtt-sparkplug {names!r} is not GROUP/NODE, or a name contains one of / + # or a space.",
-                names=f"{sparkplug} {primary_host or ''}".strip(),
-            )
+    group, _, node = (sparkplug or "").partition("/")
+    if sparkplug and not (_is_level(group) and _is_level(node) and (not primary_host or _is_level(primary_host))):
+        raise InvalidData(
+            "--mqtt-sparkplug {names!r} is not GROUP/NODE, or a name contains one of / + # or a space.",
+            names=f"{sparkplug} {primary_host or ''}".strip(),
+        )
     if prefix and not all(map(_is_level, prefix.split("/"))):
         raise InvalidData(
             "--mqtt-json {prefix!r} is not a topic such as enterprise/site/area/line/cell, without + # and spaces.",
             prefix=prefix,
         )
     broker = _broker(url, given=address is not None, unencrypted=unencrypted, environment=environment)
-    return MqttSettings(broker, names, prefix or "")
+    names = {"group": group, "node": node, "primary_host": primary_host or "", "prefix": prefix or ""}
+    return replace(broker, **names)
 
 
 def _is_level(text: str) -> bool:
     return 0 < len(text) <= _LONGEST and not any(each in "/+#\0" or each.isspace() for each in text)
 
 
-def _broker(url: str, *, given: bool, unencrypted: bool, environment: Mapping[str, str]) -> Broker:
+def _broker(url: str, *, given: bool, unencrypted: bool, environment: Mapping[str, str]) -> MqttSettings:
+    """Return the settings of the broker, without names."""
     try:
         parts: SplitResult = urlsplit(url)
         host, port = parts.hostname, parts.port
@@ -105,13 +105,13 @@ def _broker(url: str, *, given: bool, unencrypted: bool, environment: Mapping[st
         if file and not os.access(file, os.R_OK):
             raise InvalidData("{variable}: the file {file} cannot be read.", variable=name, file=file)
     paths = {name: str(Path(file).absolute()) if file else "" for name, file in files.items()}
-    return Broker(
-        host,
-        port or _PORTS[parts.scheme],
-        tls,
-        unquote(parts.username or ""),
-        unquote(parts.password or ""),
-        paths[AUTHORITY],
-        paths[CERTIFICATE],
-        paths[KEY],
+    return MqttSettings(
+        host=host,
+        port=port or _PORTS[parts.scheme],
+        tls=tls,
+        user=unquote(parts.username or ""),
+        password=unquote(parts.password or ""),
+        authority=paths[AUTHORITY],
+        certificate=paths[CERTIFICATE],
+        key=paths[KEY],
     )

@@ -36,7 +36,6 @@ from arcor2_server.access.admission import PARAMETER, is_local
 from arcor2_server.access.tokens import TokenFile
 from arcor2_server.audit.command_line import note_command
 from arcor2_server.cli.exit_status import ExitStatus, fail
-from arcor2_server.cli.mqtt_options import mqtt_settings
 from arcor2_server.deployment.service_manager import ServiceManager
 from arcor2_server.log import setup as server_logging
 from arcor2_server.settings import (
@@ -44,6 +43,7 @@ from arcor2_server.settings import (
     DEVICE_FILES_NAME,
     MQTT_URL,
     LegacyListener,
+    MqttSettings,
     OpcUaListener,
     PlcListener,
     ServerSettings,
@@ -187,7 +187,7 @@ def serve(
             legacy=legacy,
             plc=None if plc_modbus is None else PlcListener(*_address("--plc-modbus", plc_modbus)),
             opcua=None if opcua is None else _opcua(opcua, anonymous=opcua_anonymous, unencrypted=opcua_unencrypted),
-            mqtt=mqtt_settings(mqtt, mqtt_sparkplug, mqtt_primary_host, mqtt_json, unencrypted=mqtt_unencrypted),
+            mqtt=_mqtt(mqtt, mqtt_sparkplug, mqtt_primary_host, mqtt_json, unencrypted=mqtt_unencrypted),
             classic_ports=ports_from_environment() if classic_ports else None,
         )
         if broker := os.environ.get(BROKER_URL):
@@ -284,6 +284,17 @@ def _opcua(address: str, *, anonymous: bool, unencrypted: bool) -> OpcUaListener
     if importlib.util.find_spec("asyncua") is None:
         raise InvalidData("--opcua needs the library asyncua: pip install 'arcor2-hw[opcua]'")
     return OpcUaListener(*_address("--opcua", address), anonymous, unencrypted)
+
+
+def _mqtt(
+    address: str | None, sparkplug: str | None, primary_host: str | None, prefix: str | None, *, unencrypted: bool
+) -> MqttSettings | None:
+    """Return the settings of MQTT, None without a broker. Raise InvalidData if an option is invalid."""
+    if not any((address, sparkplug, primary_host, prefix, os.environ.get(MQTT_URL))):
+        return None
+    from arcor2_server.cli.mqtt_options import mqtt_settings  # takes time, and few servers need it
+
+    return mqtt_settings(address, sparkplug, primary_host, prefix, unencrypted=unencrypted)
 
 
 def _print_openapi() -> int:
@@ -406,7 +417,8 @@ async def run(
             await running.plc.serve(plc)
         if plant is not None:
             running.opcua.serve(plant)
-        running.mqtt.start()
+        if running.mqtt is not None:
+            running.mqtt.start()
         loop = asyncio.get_running_loop()
         config = configuration(create_app(running), settings, certificate)
         renewal = trust_page = None

@@ -21,10 +21,10 @@ ALARM_AFTER: Final = 60.0
 
 
 class Mqtt:
-    """Publishes the cell over MQTT, if the settings name a broker.
+    """Publishes the cell over MQTT.
 
     Args:
-        settings: settings of the server.
+        settings: settings of the server, with a broker.
         feed: what is published.
         alarms: the alarms.
     """
@@ -37,8 +37,6 @@ class Mqtt:
 
     def start(self) -> None:
         """Start the process in the background."""
-        if self._settings.mqtt is None:
-            return
         reader = self._feed.reader()
         self._process = PlantProcess(
             NAME, "arcor2_hw.mqtt", reader, self._alarms, "mqtt_ended", self._setup, self._received
@@ -55,8 +53,12 @@ class Mqtt:
     def _setup(self) -> m.Setup:
         mqtt = self._settings.mqtt
         assert mqtt is not None
+        broker = m.Broker(
+            mqtt.host, mqtt.port, mqtt.tls, mqtt.user, mqtt.password, mqtt.authority, mqtt.certificate, mqtt.key
+        )
+        sparkplug = m.Sparkplug(mqtt.group, mqtt.node, mqtt.primary_host) if mqtt.group else None
         folder = str(self._settings.data_dir.absolute())
-        return m.Setup(mqtt.broker, mqtt.sparkplug, mqtt.prefix, folder, version("arcor2-hw"))
+        return m.Setup(broker, sparkplug, mqtt.prefix, folder, version("arcor2-hw"))
 
     async def _received(self, body: bytes) -> None:
         match m.decode_from_process(body):
@@ -68,7 +70,7 @@ class Mqtt:
     def _link_changed(self, link: str, reason: str, *, connected: bool) -> None:
         mqtt = self._settings.mqtt
         assert mqtt is not None
-        broker = f"{mqtt.broker.host}:{mqtt.broker.port}"
+        broker = f"{mqtt.host}:{mqtt.port}"
         if (timer := self._lost.pop(link, None)) is not None:
             timer.cancel()
         if connected:

@@ -32,6 +32,7 @@ from arcor2_server.cli.mqtt_options import mqtt_settings
 from arcor2_server.mqtt.service import Mqtt
 from arcor2_server.plant import process
 from arcor2_server.plant.process import PlantProcess
+from arcor2_server.settings import MqttSettings
 from tests.server.mqtt.brokers import Broker, Mosquitto, Nats, nats_version
 from tests.server.mqtt.host import Host
 from tests.server.mqtt.test_mqtt_server import until
@@ -384,9 +385,11 @@ def test_wrong_options_are_named(arguments: dict[str, Any], reason: str) -> None
 
 
 def test_the_address_of_the_broker_is_read() -> None:
-    broker = settings(ARCOR2_HW_MQTT_URL="mqtts://cell:p%40ss@broker.plant").broker
-    assert broker == m.Broker("broker.plant", 8883, True, "cell", "p@ss")
-    assert settings("mqtt://192.0.2.1:1884", unencrypted=True).broker == m.Broker("192.0.2.1", 1884)
+    names = {"group": "g", "node": "n"}
+    given = {"host": "broker.plant", "port": 8883, "tls": True, "user": "cell", "password": "p@ss"}
+    assert settings(ARCOR2_HW_MQTT_URL="mqtts://cell:p%40ss@broker.plant") == MqttSettings(**given, **names)
+    unencrypted = settings("mqtt://192.0.2.1:1884", unencrypted=True)
+    assert unencrypted == MqttSettings(host="192.0.2.1", port=1884, **names)
     assert settings(names=None) is None
 
 

@@ -106,6 +106,7 @@ async def test_the_cell_is_born_and_its_devices_follow(cell: Cell) -> None:
     host = cell.host
     (birth,) = await until(lambda: host.of("NBIRTH"))
     assert (birth.value("State"), birth.value("Counts/Good"), birth.value("Program Running")) == ("Stopped", 0, False)
+    assert all(abs(metric.time - birth.time) < 30_000 for metric in birth.metrics)
     await cell.hub.granted("RunPackage", {"id": "pkg_1", "on_error": "hold"})
     await until(lambda: host.values("State")[-1].value == "Execute")
     await until(lambda: host.values("Program")[-1].value == "demo")
