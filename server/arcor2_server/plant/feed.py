@@ -40,8 +40,9 @@ _START: Final = "1970-01-01T00:00:00+00:00"
 class FeedReader:
     """What one process for plant systems has not received yet. Created by `CellFeed.reader`."""
 
-    def __init__(self, feed: "CellFeed") -> None:
+    def __init__(self, feed: "CellFeed", *, with_streams: bool) -> None:
         self._feed = feed
+        self.with_streams = with_streams
         self._devices: list[DeviceInfo] = []
         self._states: dict[str, DeviceState] = {}
         self._unit: UnitData | None = None
@@ -113,12 +114,15 @@ class CellFeed:
         self._devices_changed = self._counts_changed = True
         self._readers: list[FeedReader] = []
 
-    def reader(self) -> FeedReader:
-        """Return a new reader. It gets all changes from now on."""
+    def reader(self, *, with_streams: bool = True) -> FeedReader:
+        """Return a new reader. It gets all changes from now on; points and joints only `with_streams`."""
         if not self._readers:
             self._start()
-        reader = FeedReader(self)
+        reader = FeedReader(self, with_streams=with_streams)
         self._readers.append(reader)
+        for host in self._hosts:
+            for report in host.board.reports.values():
+                self._observe(host, report)
         return reader
 
     def _start(self) -> None:
@@ -149,7 +153,11 @@ class CellFeed:
 
     def _reported(self, host: HostSession, report: DeviceChanged) -> None:
         self._devices_changed = True
-        if report.connection in _CONNECTED:
+        self._observe(host, report)
+
+    def _observe(self, host: HostSession, report: DeviceChanged) -> None:
+        """Read the points and joints of a connected device, if a reader wants them."""
+        if report.connection in _CONNECTED and any(reader.with_streams for reader in self._readers):
             key = report.object_id
             host.streams.observe(key, POINTS, POINTS_RATE, lambda encoded: self._put(key, POINTS, encoded))
             if self._robot_type(host, key):
@@ -158,7 +166,8 @@ class CellFeed:
 
     def _put(self, object_id: str, kind: str, encoded: bytes) -> None:
         for reader in self._readers:
-            reader.streams[object_id, kind] = encoded
+            if reader.with_streams:
+                reader.streams[object_id, kind] = encoded
 
     # -------------------------------------------------------------------------------- what readers send
     async def retained_alarms(self) -> list[AlarmRecord]:

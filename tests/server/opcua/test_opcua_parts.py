@@ -205,7 +205,8 @@ class Cell:
             answering=True,
             object=self.object,
         )
-        self.streams = SimpleNamespace(observe=lambda *_: None)
+        self.observed: dict[tuple[str, str], Any] = {}
+        self.streams = SimpleNamespace(observe=self.observe)
         self.parts, self.program = SimpleNamespace(on_change=[]), SimpleNamespace(number=1)
         self.on_changed: list[Any] = []
         self.on_left: list[Any] = []
@@ -214,6 +215,9 @@ class Cell:
         self.last_job = 7, JobEnd.COMPLETED
         self.state, self.mode, self.authority, self.job = MachineState.IDLE, UnitMode.PRODUCE, CellAuthority.HUB, 0
         self.left = {UnitState.GOOD: 0, UnitState.BAD: 0, UnitState.REJECTED: 0}
+
+    def observe(self, object_id: str, what: str, rate: float, receive: Any) -> None:
+        self.observed[object_id, what] = receive
 
     def object(self, object_id: str) -> Any:
         return SimpleNamespace(name=object_id, type={"obj_table": "Table", "obj_arm": "UR5e"}.get(object_id, "Block"))
@@ -243,7 +247,7 @@ class Cell:
 async def test_the_feed_shows_devices_and_sends_only_changes() -> None:
     cell: Any = Cell()
     feed = CellFeed([cell], cell, cell, cell, cell, cell, cell, cell)
-    reader, other = feed.reader(), feed.reader()
+    reader, other = feed.reader(with_streams=False), feed.reader(with_streams=False)
     first = await reader.everything()
     assert first.devices == [m.DeviceInfo("obj_io", "io", "Block", "", Identity("WAGO", "750", "17"))]
     assert first.states == {"obj_io": m.DeviceState(Connection.OFFLINE)}
@@ -268,6 +272,13 @@ async def test_the_feed_shows_devices_and_sends_only_changes() -> None:
     assert changed.unit is not None
     assert (changed.unit.good, changed.unit.state) == (3, MachineState.EXECUTE)
     assert (changed.unit.last_job, changed.unit.job_end) == (7, "completed")
+
+    assert cell.observed == {}
+    streamed = feed.reader()
+    assert len(cell.observed) == 4  # the points of three objects, and the joints of the robot
+    cell.observed["obj_io", POINTS](b"values")
+    assert (await streamed.changes()).streams == [b"values"]
+    assert (await reader.changes()).streams == []
 
     cell.board.reports.clear()
     for forget in cell.board.on_clear:
