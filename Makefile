@@ -6,7 +6,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
-FAMILIES := --extra ur --extra modbus --extra serial --extra can --extra dynamixel --extra depthai --extra vision --extra kinematics --extra nodes
+FAMILIES := --extra ur --extra modbus --extra serial --extra can --extra dynamixel --extra depthai --extra vision --extra kinematics --extra nodes --extra history
 # Drivers beyond the demo are tested too.
 TESTED := $(FAMILIES) --extra opcua --extra mqtt --extra postgresql
 

@@ -33,7 +33,7 @@ class Feed:
 
     def __init__(self) -> None:
         self.streams = RobotStreams(Hub(), lambda _: None)
-        self.streams.observe(DEVICE, POINTS, RATE, self._put)
+        self.streams.observe(DEVICE, POINTS, RATE, self._put, owner="feed")
         self._newest: list[bytes] = []
 
     def reader(self) -> Self:

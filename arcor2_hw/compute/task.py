@@ -21,6 +21,7 @@ class WorkerKind(enum.StrEnum):
     CALIBRATION = "calibration"
     MESHES = "meshes"
     DRY_RUN = "dry_run"
+    HISTORY = "history"
 
 
 class Task(Struct, Generic[R], frozen=True, tag=True):

@@ -82,6 +82,10 @@ def _answer(work: m.Work, state: WorkerState) -> m.Done | m.Failed:
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] == "arcor2_hw":
             raise
+        if error.name == "duckdb":
+            return failed(
+                NotInstalled("{name} is not installed. Install arcor2-hw with the extra history.", name="duckdb")
+            )
         return failed(
             NotInstalled(
                 "{name} is not installed. Install arcor2-hw with the extras vision and kinematics.",

@@ -4,7 +4,7 @@ import ipaddress
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Any, Final, NamedTuple, Self
 
 import msgspec
 
@@ -84,6 +84,22 @@ class MqttSettings(msgspec.Struct, frozen=True, kw_only=True):
     prefix: str = ""
 
 
+class DeadBand(NamedTuple):
+    """The dead band of the points whose `DEVICE.POINT` matches a pattern, in their unit."""
+
+    pattern: str
+    band: float
+
+    @classmethod
+    def parse(cls, text: str) -> "DeadBand":
+        """Parse `PATTERN=NUMBER`. Raise ValueError if the text has another form."""
+        pattern, _, number = text.rpartition("=")
+        band = float(number)
+        if not pattern or not 0 <= band < float("inf"):
+            raise ValueError(f"{text!r} is not PATTERN=NUMBER")
+        return cls(pattern, band)
+
+
 class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     """The settings of the server. Times are in s, sizes in bytes."""
 
@@ -137,6 +153,16 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     drained_size: int = 32 * MIB
     log_off_after: float = 300.0
     """Time without activity after which a person is logged off at a shared device; 0: never."""
+    point_history: bool = False
+    """Whether the history of points and runs is recorded."""
+    point_history_days: int = 90
+    """Time for which the history is stored, days."""
+    point_history_megabytes: int = 1000
+    """Maximum size of the history, MB."""
+    point_history_interval: float = 1.0
+    """Least time between two recorded values of a point."""
+    point_history_dead_bands: tuple[str, ...] = ()
+    """`DEVICE.POINT=BAND`, where DEVICE.POINT may contain wildcards: smaller changes are not recorded."""
     released_only: bool = False
     """Whether operators may run only released recipes."""
     requests_in_flight: int = 256
@@ -206,6 +232,11 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     def history_dir(self) -> Path:
         """The directory of the histories of closed documents."""
         return self.data_dir / "history"
+
+    @property
+    def point_history_dir(self) -> Path:
+        """The directory of the history of points and runs."""
+        return self.data_dir / "point-history"
 
     @property
     def problems_file(self) -> Path:
@@ -279,6 +310,15 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
             raise InvalidData(
                 "ARCOR2_HW_PLC_LIFE_TIMEOUT is not in the range above 0 to {longest} s.", longest=LONGEST_LIFE_TIMEOUT
             )
+        for name, least in _LEAST.items():
+            if values.get(name, least) < least:
+                variable = next(variable for variable, field in _VARIABLES.items() if field == name)
+                raise InvalidData("{variable} is less than {least}.", variable=variable, least=least)
+        try:
+            for band in values.get("point_history_dead_bands", ()):
+                DeadBand.parse(band)
+        except ValueError as error:
+            raise InvalidData("ARCOR2_HW_POINT_HISTORY_DEAD_BANDS: {reason}", reason=error) from None
         if values.get("streaming_period", 1) <= 0:
             values["streaming_period"] = 0.1
         if "data_dir" not in values:
@@ -303,6 +343,10 @@ _VARIABLES: Final = {
     "ARCOR2_HW_TRUSTED_PROXIES": "trusted_proxies",
     DEVICE_FILES: "device_files",
     "ARCOR2_HW_HISTORY_LIMIT": "history_limit",
+    "ARCOR2_HW_POINT_HISTORY_DAYS": "point_history_days",
+    "ARCOR2_HW_POINT_HISTORY_MEGABYTES": "point_history_megabytes",
+    "ARCOR2_HW_POINT_HISTORY_INTERVAL": "point_history_interval",
+    "ARCOR2_HW_POINT_HISTORY_DEAD_BANDS": "point_history_dead_bands",
     "ARCOR2_HW_DEFAULT_ROLE": "default_role",
     "ARCOR2_HW_LOG_OFF_AFTER": "log_off_after",
     "ARCOR2_HW_RELEASED_ONLY": "released_only",
@@ -314,7 +358,14 @@ _VARIABLES: Final = {
     "ARCOR2_HW_CONNECTIONS_PER_ADDRESS": "connections_per_address",
     "ARCOR2_HW_REQUEST_TIMEOUT": "request_timeout",
 }
-_LISTS: Final = {"allowed_hosts": ",", "trusted_proxies": ",", "device_files": os.pathsep}
+_LEAST: Final = {"point_history_interval": 0.1, "point_history_days": 1, "point_history_megabytes": 10}
+"""Least values of settings."""
+_LISTS: Final = {
+    "allowed_hosts": ",",
+    "point_history_dead_bands": ",",
+    "trusted_proxies": ",",
+    "device_files": os.pathsep,
+}
 """Separators of the settings that are lists."""
 
 

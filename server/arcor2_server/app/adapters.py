@@ -16,6 +16,7 @@ from arcor2_server.rest.display_models import DisplayModelOperations
 from arcor2_server.rest.documents import ApiDocumentOperations
 from arcor2_server.rest.execution import ExecutionOperations
 from arcor2_server.rest.general import GeneralOperations
+from arcor2_server.rest.history import HistoryOperations
 from arcor2_server.rest.kinematics import KinematicsOperations
 from arcor2_server.rest.models import ModelOperations
 from arcor2_server.rest.object_types import ObjectTypeOperations
@@ -153,6 +154,7 @@ def rest_groups(s: Server) -> list[object]:
         ApiDocumentOperations(s.settings),
         ExecutionOperations(s.hub, s.storage, s.execution, s.package_runs),
         GeneralOperations(s.settings, s.online, s.execution),
+        HistoryOperations(s.history),
         RecordingOperations(s.recordings),
         KinematicsOperations(s.online, s.robot_calibrations, s.robots),
         ModelOperations(s.storage, s.type_notifications),

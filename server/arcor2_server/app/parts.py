@@ -42,6 +42,7 @@ from arcor2_server.execution.service import Execution
 from arcor2_server.execution.stop_all import StopAll
 from arcor2_server.execution.temporary import TemporaryRuns
 from arcor2_server.files import tighten
+from arcor2_server.history.service import History
 from arcor2_server.hosts.pool import CellHosts
 from arcor2_server.hosts.session import HostSession
 from arcor2_server.log.redaction import REDACTION
@@ -215,6 +216,9 @@ class Server:
         self.script_editing = ScriptEditing(storage, types, session)
         self.package_import = PackageImport(storage, assets, types, session, type_notifications)
         runs = self.runs = Runs(hub)
+        history = self.history = closed(History(settings, compute, (scene_host, program_host)))
+        await history.open()
+        runs.on_end.append(history.run_ended)
         await runs.open(shared)
         closed(runs)
         self.dry_runs = closed(DryRuns(hub, types, session, tasks, compute, robots, scene_collisions, runs))

@@ -101,6 +101,7 @@ def serve(
     mqtt_primary_host: str | None = None,
     mqtt_json: str | None = None,
     mqtt_unencrypted: Annotated[bool, Parameter(negative="")] = False,
+    history: Annotated[bool, Parameter(negative="")] = False,
     classic_ports: Annotated[bool, Parameter(negative="")] = False,
     openapi: Annotated[bool, Parameter(negative="")] = False,
     log_level: str = "info",
@@ -152,6 +153,8 @@ def serve(
         Prefix of the topics under which the cell is published as plain JSON, such as enterprise/site/area/line/cell.
     mqtt_unencrypted
         Use a broker on another machine without TLS.
+    history
+        Record the values of all points and the runs. Settings: ARCOR2_HW_POINT_HISTORY_*.
     classic_ports
         Also listen on the ports of the services of the original ARCOR2, as set by its ARCOR2_* variables.
     openapi
@@ -188,6 +191,7 @@ def serve(
             plc=None if plc_modbus is None else PlcListener(*_address("--plc-modbus", plc_modbus)),
             opcua=None if opcua is None else _opcua(opcua, anonymous=opcua_anonymous, unencrypted=opcua_unencrypted),
             mqtt=_mqtt(mqtt, mqtt_sparkplug, mqtt_primary_host, mqtt_json, unencrypted=mqtt_unencrypted),
+            point_history=_history() if history else None,
             classic_ports=ports_from_environment() if classic_ports else None,
         )
         if broker := os.environ.get(BROKER_URL):
@@ -273,6 +277,13 @@ def _address(option: str, address: str) -> tuple[str, int]:
     if not host or not port.isdigit() or int(port) > 0xFFFF:
         raise InvalidData("{option} {address!r} is not HOST:PORT", option=option, address=address)
     return host.strip("[]"), int(port)
+
+
+def _history() -> bool:
+    """Return true. Raise InvalidData if the library for the history is not installed."""
+    if importlib.util.find_spec("duckdb") is None:
+        raise InvalidData("--history needs the library DuckDB: pip install 'arcor2-hw[history]'")
+    return True
 
 
 def _opcua(address: str, *, anonymous: bool, unencrypted: bool) -> OpcUaListener:

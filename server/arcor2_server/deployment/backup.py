@@ -146,7 +146,11 @@ def _write(data_dir: Path, file: IO[bytes], version: str, scratch: Path) -> Mani
             )
             for path in databases
         ]
-        for path in paths:
+        # A snapshot may list files, such as those of the history: those that exist now are the ones that it lists.
+        present = sorted(_files(data_dir))
+        if missing := set(paths).difference(present):
+            raise _Vanished(", ".join(sorted(missing)))
+        for path in present:
             if path not in entries and path not in databases:
                 entries[path] = _add(archive, file, path, data_dir / path)
         for path, snapshot in snapshots:

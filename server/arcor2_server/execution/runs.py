@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import OrderedDict
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from datetime import UTC, datetime
 from itertools import islice
 from types import MappingProxyType
@@ -139,6 +139,8 @@ class Runs:
 
     def __init__(self, hub: EventHub) -> None:
         self._hub = hub
+        self.on_end: list[Callable[[Run], None]] = []
+        """Called with each run that has ended, or was found as lost when the server started."""
         self._runs: OrderedDict[int, Run] = OrderedDict()
         self._data: SharedData | None = None
         self._writing: asyncio.Task[None] | None = None
@@ -342,6 +344,9 @@ class Runs:
         if len(self._runs) > MAX_RUNS:
             self._runs.popitem(last=False)
         self._hub.broadcast(make_event("RunChanged", run))
+        if run.end is not RunEnd.RUNNING:
+            for notify in self.on_end:
+                notify(run)
         if self._data is not None:
             self._unwritten[run.number] = run
             if self._writing is None:

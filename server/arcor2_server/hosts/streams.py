@@ -37,7 +37,7 @@ class RobotStreams:
         self._to_all_clients = to_all_clients
         self._subscribers: dict[tuple[str, str], set[Connection]] = {}
         self._rates: dict[tuple[str, str], dict[Connection, float]] = {}
-        self._observers: dict[tuple[str, str], tuple[float, Callable[[bytes], None]]] = {}
+        self._observers: dict[tuple[str, str], dict[str, tuple[float, Callable[[bytes], None]]]] = {}
 
     def subscribe(self, client: Connection, robot_id: str, what: RobotEventKind, send: bool) -> None:
         """Start or stop a stream at the streaming period. Raise RequestRefused if it was not subscribed to."""
@@ -59,10 +59,14 @@ class RobotStreams:
             raise RequestRefused("This stream is not subscribed to.")
         self._update_host_rates(robot_id)
 
-    def observe(self, object_id: str, what: str, rate: float, receive: Callable[[bytes], None]) -> None:
-        """Pass the encoded events of a stream at `rate`, 1/s, to another part of the server until `clear`."""
-        before = self._observers.get((object_id, what))
-        self._observers[object_id, what] = rate, receive
+    def observe(self, object_id: str, what: str, rate: float, receive: Callable[[bytes], None], *, owner: str) -> None:
+        """Pass the encoded events of a stream at `rate`, 1/s, to another part of the server until `clear`.
+
+        `owner` names that part. A part that calls this again for the same stream replaces its rate and function.
+        """
+        observers = self._observers.setdefault((object_id, what), {})
+        before = observers.get(owner)
+        observers[owner] = rate, receive
         if before is None or before[0] != rate:
             self._update_host_rates(object_id)
 
@@ -73,9 +77,9 @@ class RobotStreams:
             return
         key, rates = (message.object_id, kind), self._rates.get((message.object_id, kind), {})
         if message.rate:
-            observed_rate, receive = self._observers.get(key, (0.0, None))
-            if receive is not None and observed_rate == message.rate:
-                receive(message.encoded)
+            for observed_rate, receive in self._observers.get(key, {}).values():
+                if observed_rate == message.rate:
+                    receive(message.encoded)
             clients = {client for client, rate in rates.items() if rate == message.rate}
             stream = f"{message.object_id}/{message.rate:g}"
         else:
@@ -107,7 +111,6 @@ class RobotStreams:
     def _update_host_rates(self, robot_id: str) -> None:
         rates = []
         for what in _KINDS.values():
-            observed = self._observers.get((robot_id, what))
-            wanted = set(self._rates.get((robot_id, what), {}).values()) | ({observed[0]} if observed else set())
-            rates.append(sorted(wanted))
+            observed = {rate for rate, _ in self._observers.get((robot_id, what), {}).values()}
+            rates.append(sorted(observed.union(self._rates.get((robot_id, what), {}).values())))
         self._send(m.Stream(robot_id, *rates))

@@ -33,6 +33,8 @@ POINTS_RATE: Final = 5.0
 """Rate at which points are read, Hz: as fast as the editor may read them."""
 MOST_LEFT: Final = 1000
 """Maximum number of units that wait for a process, such as while it restarts. The oldest are dropped."""
+OWNER: Final = "plant"
+"""Names this part as an observer of streams."""
 _CONNECTED: Final = (Connection.ONLINE, Connection.BACK)
 _START: Final = "1970-01-01T00:00:00+00:00"
 
@@ -159,10 +161,12 @@ class CellFeed:
         """Read the points and joints of a connected device, if a reader wants them."""
         if report.connection in _CONNECTED and any(reader.with_streams for reader in self._readers):
             key = report.object_id
-            host.streams.observe(key, POINTS, POINTS_RATE, lambda encoded: self._put(key, POINTS, encoded))
+            host.streams.observe(key, POINTS, POINTS_RATE, lambda encoded: self._put(key, POINTS, encoded), owner=OWNER)
             if self._robot_type(host, key):
                 joints = RobotEventKind.JOINTS.value
-                host.streams.observe(key, joints, JOINTS_RATE, lambda encoded: self._put(key, joints, encoded))
+                host.streams.observe(
+                    key, joints, JOINTS_RATE, lambda encoded: self._put(key, joints, encoded), owner=OWNER
+                )
 
     def _put(self, object_id: str, kind: str, encoded: bytes) -> None:
         for reader in self._readers:

@@ -24,6 +24,7 @@ from arcor2_server.rest import (  # noqa: F401
     documents,
     execution,
     general,
+    history,
     kinematics,
     models,
     object_types,

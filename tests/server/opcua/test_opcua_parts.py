@@ -135,7 +135,8 @@ def test_a_stream_is_observed_next_to_clients_until_the_host_ends() -> None:
     streams, seen = RobotStreams(hub, sent.append), []
     client: Any = object()
     streams.at_rate(client, "obj", POINTS, 2.0, True)
-    streams.observe("obj", POINTS, 5.0, seen.append)
+    streams.observe("obj", POINTS, 5.0, seen.append, owner="one")
+    streams.observe("obj", POINTS, 5.0, lambda encoded: seen.append(encoded + b"!"), owner="two")
     assert sent[-1] == Stream("obj", [], [], [], [2.0, 5.0])
     streams.publish(StreamEvent("ObjectPoints", "obj", b"5", 5.0))
     streams.publish(StreamEvent("ObjectPoints", "obj", b"2", 2.0))
@@ -144,7 +145,7 @@ def test_a_stream_is_observed_next_to_clients_until_the_host_ends() -> None:
     assert sent[-1] == Stream("obj", [], [], [], [5.0])
     streams.clear()
     streams.publish(StreamEvent("ObjectPoints", "obj", b"5", 5.0))
-    assert seen == [b"5"]
+    assert seen == [b"5", b"5!"]
 
 
 class Feed:
@@ -216,7 +217,7 @@ class Cell:
         self.state, self.mode, self.authority, self.job = MachineState.IDLE, UnitMode.PRODUCE, CellAuthority.HUB, 0
         self.left = {UnitState.GOOD: 0, UnitState.BAD: 0, UnitState.REJECTED: 0}
 
-    def observe(self, object_id: str, what: str, rate: float, receive: Any) -> None:
+    def observe(self, object_id: str, what: str, rate: float, receive: Any, owner: str) -> None:
         self.observed[object_id, what] = receive
 
     def object(self, object_id: str) -> Any:
