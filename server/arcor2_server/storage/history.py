@@ -241,7 +241,10 @@ class HistoryFile:
         """Return all points, by the names of device and point."""
         with self._transaction() as connection:
             rows = connection.execute(f"select {_POINT} from point order by object_name, name").fetchall()
-        return [HistoryPoint(*row[:4], PointUse(row[4]), row[5], bool(row[6]), row[7]) for row in rows]
+        return [
+            HistoryPoint(number, object_id, object_name, name, PointUse(use), unit, bool(digital), last)
+            for number, object_id, object_name, name, use, unit, digital, last in rows
+        ]
 
     def require_point(self, number: int) -> HistoryPoint:
         """Return a point. Raise NotFound if it does not exist."""

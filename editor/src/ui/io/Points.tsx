@@ -2,8 +2,9 @@
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
-import { memo, useState } from "react";
+import { memo, Suspense, useEffect, useState } from "react";
 import { Input, Label, SearchField } from "react-aria-components";
+import { isRecording } from "../../commands/history";
 import type { ForcedPoint, LivePoint, PointQuality, PointUse } from "../../protocol/types";
 import { whyUnavailable } from "../../store/permissions";
 import { derivesFrom, isLive, isRunning } from "../../store/selectors";
@@ -11,6 +12,7 @@ import type { State } from "../../store/state";
 import { now, useEditor } from "../../store/store";
 import { Pick } from "../kit/fields";
 import { Button, Waiting } from "../kit/kit";
+import { lazyComponent } from "../kit/lazy";
 import { Notices } from "../notices/Notices";
 import { People } from "../people/People";
 import { closePoints } from "./address";
@@ -19,6 +21,8 @@ import { ForceForm } from "./ForceForm";
 import { type ShownDevice, type ShownPoint, shownDevices } from "./points";
 import { usePoints } from "./usePoints";
 import "./io.css";
+
+const PointHistory = lazyComponent(() => import("./PointHistory"));
 
 const USES: Record<PointUse, MessageDescriptor> = {
   input: msg`input`,
@@ -41,6 +45,15 @@ interface Forcing {
   point: LivePoint;
 }
 
+/** A point whose history is shown. */
+interface Past {
+  objectId: string;
+  device: string;
+  id: string;
+  name: string;
+  unit: string;
+}
+
 /** Return why no output can be forced now; an empty string if one can. */
 function notForcible(state: State): string {
   if (isRunning(state)) return t`A program is running. Stop it first.`;
@@ -60,6 +73,11 @@ export default function Points() {
   const [device, setDevice] = useState("");
   const [text, setText] = useState("");
   const [forcing, setForcing] = useState<Forcing | null>(null);
+  const [past, setPast] = useState<Past | null>(null);
+  const [recorded, setRecorded] = useState(false);
+  useEffect(() => {
+    if (connected) isRecording().then(setRecorded, () => setRecorded(false));
+  }, [connected]);
   const reported = usePoints(objects);
   const filter = { device, text };
   const present = { time: performance.now() / 1000, connected };
@@ -95,9 +113,23 @@ export default function Points() {
         {live && all.length === 0 && <Waiting>{t`Waiting for values…`}</Waiting>}
         {live && all.length > 0 && found.length === 0 && <p className="quiet">{t`No point matches.`}</p>}
         {live &&
-          found.map((each) => <Device key={each.id} device={each} forces={forces} why={why} onForce={setForcing} />)}
+          found.map((each) => (
+            <Device
+              key={each.id}
+              device={each}
+              forces={forces}
+              why={why}
+              onForce={setForcing}
+              onHistory={recorded ? setPast : undefined}
+            />
+          ))}
       </main>
       {forcing && <ForceForm {...forcing} onClose={() => setForcing(null)} />}
+      {past && (
+        <Suspense fallback={null}>
+          <PointHistory {...past} onClose={() => setPast(null)} />
+        </Suspense>
+      )}
       <Notices />
     </div>
   );
@@ -108,9 +140,11 @@ interface DeviceProps {
   forces: readonly ForcedPoint[];
   why: string;
   onForce: (forcing: Forcing) => void;
+  /** Undefined if the server records no history. */
+  onHistory: ((past: Past) => void) | undefined;
 }
 
-function Device({ device, forces, why, onForce }: DeviceProps) {
+function Device({ device, forces, why, onForce, onHistory }: DeviceProps) {
   const forcedBy = new Map(forces.filter((each) => each.object_id === device.id).map((each) => [each.point, each]));
   return (
     <section className="io-device" aria-label={device.name}>
@@ -125,6 +159,12 @@ function Device({ device, forces, why, onForce }: DeviceProps) {
             force={forcedBy.get(each.id)}
             why={why}
             onForce={() => onForce({ objectId: device.id, device: device.name, point: each.point })}
+            onHistory={
+              onHistory &&
+              typeof each.point.value !== "string" &&
+              (() =>
+                onHistory({ objectId: device.id, device: device.name, id: each.id, name: each.name, unit: each.unit }))
+            }
           />
         ))}
       </ul>
@@ -137,11 +177,12 @@ interface RowProps extends ShownPoint {
   force: ForcedPoint | undefined;
   why: string;
   onForce: () => void;
+  onHistory: (() => void) | false | undefined;
 }
 
 /** A point. It is drawn again only if what it shows has changed. */
 const Row = memo(
-  function Row({ device, name, use, text, on, quality, age, point, force, why, onForce }: RowProps) {
+  function Row({ device, name, use, text, on, quality, age, point, force, why, onForce, onHistory }: RowProps) {
     const output = `${device}: ${name}`;
     const lasting = t`The device would keep a forced value if the computer failed. So this output cannot be forced.`;
     return (
@@ -159,6 +200,11 @@ const Row = memo(
           )}
           {force && <span className="tag warn">{t`forced by ${force.user}`}</span>}
         </span>
+        {onHistory && (
+          <Button look="plain" aria-label={t`History of ${output}`} onPress={onHistory}>
+            {t`History`}
+          </Button>
+        )}
         {force ? (
           <EndForce force={force} />
         ) : (
@@ -178,5 +224,6 @@ const Row = memo(
     before.age === after.age &&
     before.force === after.force &&
     before.why === after.why &&
+    Boolean(before.onHistory) === Boolean(after.onHistory) &&
     before.point.force === after.point.force,
 );

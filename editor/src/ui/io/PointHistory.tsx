@@ -1,0 +1,193 @@
+/** The history of a point over an hour, a day or a week, with export; a separate chunk. */
+
+import { t } from "@lingui/core/macro";
+import { useEffect, useRef, useState } from "react";
+import UPlot from "uplot";
+import { exportPoint, findPoint, type HistoryPoint, loadSummary, type PointSummary } from "../../commands/history";
+import { refusal, sentence } from "../../commands/requests";
+import { clock, decimal } from "../../formats";
+import { shownUnit } from "../../program/values";
+import { Window } from "../kit/dialogs";
+import { OneOf } from "../kit/fields";
+import { Button, Waiting } from "../kit/kit";
+import { RefusedText, useRefusal } from "../points/Refusal";
+import { useTheme } from "../settings/Settings";
+import { BUCKETS, columnsOf, overall, SPANS, type Span } from "./history";
+import { valueText } from "./points";
+import "uplot/dist/uPlot.min.css";
+import "../trends/trends.css";
+import "./history.css";
+
+const HEIGHT = 260;
+const DAY = 86_400;
+
+interface PointHistoryProps {
+  objectId: string;
+  device: string;
+  /** Name of the point as the device reports it, and as it is shown. */
+  id: string;
+  name: string;
+  unit: string;
+  onClose: () => void;
+}
+
+export default function PointHistory({ objectId, device, id, name, unit, onClose }: PointHistoryProps) {
+  const [span, setSpan] = useState<Span>("hour");
+  const [point, setPoint] = useState<HistoryPoint | null>(null);
+  const [summary, setSummary] = useState<PointSummary | null>(null);
+  const [failed, setFailed] = useState("");
+  const { refused, busy, ask } = useRefusal();
+  useEffect(() => {
+    let open = true;
+    setSummary(null);
+    setFailed("");
+    const load = async () => {
+      const found = await findPoint(objectId, id);
+      if (!found) throw new Error(t`This point has not been recorded yet.`);
+      const loaded = await loadSummary(found.number, SPANS[span], BUCKETS);
+      if (!open) return;
+      setPoint(found);
+      setSummary(loaded);
+    };
+    load().catch((error: unknown) => open && setFailed(sentence(error)));
+    return () => {
+      open = false;
+    };
+  }, [objectId, id, span]);
+  const output = `${device}: ${name}`;
+  const save = () => exportPoint(point?.number ?? 0, SPANS[span], `${device} ${name}`);
+  return (
+    <Window title={t`History of ${output}`} onClose={onClose}>
+      <div className="point-history">
+        <OneOf
+          label={t`Period`}
+          quiet
+          value={span}
+          choices={[
+            ["hour", t`1 hour`],
+            ["day", t`1 day`],
+            ["week", t`1 week`],
+          ]}
+          onChange={setSpan}
+        />
+        {point && summary && <Content summary={summary} digital={point.digital} unit={unit} label={output} />}
+        {!summary && !failed && <Waiting>{t`Loading…`}</Waiting>}
+        <RefusedText>{failed || refused}</RefusedText>
+      </div>
+      <div className="actions">
+        <Button icon="save" isDisabled={busy || !summary} onPress={() => void ask(refusal(save))}>
+          {t`Export CSV`}
+        </Button>
+        <Button look="primary" onPress={onClose} autoFocus>
+          {t`Close`}
+        </Button>
+      </div>
+    </Window>
+  );
+}
+
+interface ContentProps {
+  summary: PointSummary;
+  digital: boolean;
+  unit: string;
+  label: string;
+}
+
+function Content({ summary, digital, unit, label }: ContentProps) {
+  const all = overall(summary);
+  if (!all) return <p className="quiet">{t`No value was known in this period.`}</p>;
+  const [lowest, mean, highest] = all;
+  const share = `${decimal(mean * 100, 1)}\u00a0%`;
+  return (
+    <>
+      <p className="point-history-facts">
+        {digital ? (
+          <span>{t`On for ${share} of the known time`}</span>
+        ) : (
+          <>
+            <Fact label={t`Lowest`} value={valueText(lowest, unit)} />
+            <Fact label={t`Mean`} value={valueText(mean, unit)} />
+            <Fact label={t`Highest`} value={valueText(highest, unit)} />
+          </>
+        )}
+      </p>
+      <Chart summary={summary} digital={digital} unit={unit} label={label} />
+      {!digital && (
+        <p className="quiet small">{t`The line is the mean, the band behind it the lowest and the highest value.`}</p>
+      )}
+    </>
+  );
+}
+
+function Fact({ label, value }: { label: string; value: string }) {
+  return (
+    <span>
+      <span className="quiet">{label}</span> <strong>{value}</strong>
+    </span>
+  );
+}
+
+function Chart({ summary, digital, unit, label }: ContentProps) {
+  const box = useRef<HTMLDivElement>(null);
+  const theme = useTheme();
+  useEffect(() => {
+    const { current } = box;
+    if (!current) return;
+    const style = getComputedStyle(current);
+    const colour = (name: string) => style.getPropertyValue(name).trim();
+    const axis: UPlot.Axis = {
+      stroke: colour("--ink-2"),
+      grid: { stroke: colour("--line"), width: 1 },
+      ticks: { stroke: colour("--line"), width: 1 },
+      font: `12px ${style.fontFamily}`,
+    };
+    const [shown, factor] = digital ? ["", 1] : shownUnit("double", { unit });
+    const { since, until } = summary;
+    const days = (until - since) / 1000 > DAY;
+    const line = { points: { show: false }, spanGaps: false };
+    const edge = { ...line, stroke: `${colour("--trend-1")}66`, width: 1 };
+    const made = new UPlot(
+      {
+        width: current.clientWidth,
+        height: HEIGHT,
+        legend: { show: false },
+        cursor: { show: false },
+        scales: {
+          x: { range: () => [since / 1000, until / 1000] },
+          y: digital ? { range: [-0.05, 1.05] } : { range: (_, least, most) => valueRange(least, most) },
+        },
+        axes: [
+          { ...axis, space: 80, values: (_, splits) => splits.map((each) => (days ? day(each) : clock(each * 1000))) },
+          {
+            ...axis,
+            size: 68,
+            space: 28,
+            values: (_, splits) => splits.map((each) => (digital ? `${decimal(each * 100, 0)} %` : decimal(each, 6))),
+            ...(shown && { label: shown, labelSize: 20, labelFont: `12px ${style.fontFamily}` }),
+          },
+        ],
+        series: [{}, { ...line, stroke: colour("--trend-1"), width: 2 }, edge, edge],
+        bands: [{ series: [3, 2], fill: `${colour("--trend-1")}33` }],
+      },
+      columnsOf(summary, factor) as UPlot.AlignedData,
+      current,
+    );
+    const watch = new ResizeObserver(() => made.setSize({ width: current.clientWidth, height: HEIGHT }));
+    watch.observe(current);
+    return () => {
+      watch.disconnect();
+      made.destroy();
+    };
+  }, [summary, digital, unit, theme]);
+  return <div ref={box} className="trend-chart" role="img" aria-label={label} />;
+}
+
+/** Return the range of the axis. A constant value is in the middle. */
+function valueRange(least: number | null, most: number | null): [number, number] {
+  if (least === null || most === null) return [0, 1];
+  const margin = (most - least) * 0.1 || Math.max(Math.abs(most) * 0.1, 1);
+  return [least - margin, most + margin];
+}
+
+const day = (seconds: number): string =>
+  new Date(seconds * 1000).toLocaleDateString(document.documentElement.lang, { day: "numeric", month: "numeric" });

@@ -1,0 +1,25 @@
+import { expect, test } from "vitest";
+import { columnsOf, overall } from "./history";
+
+const SUMMARY = {
+  since: 0,
+  until: 300_000,
+  times: [0, 1000, 5000],
+  lowest: [1, 2, 0],
+  highest: [3, 2, 4],
+  mean: [2, 2, 1],
+};
+
+test("a chart has a gap where nothing is known", () => {
+  expect(columnsOf(SUMMARY, 10)).toEqual([
+    [0, 1, 2, 5],
+    [20, 20, null, 10],
+    [10, 20, null, 0],
+    [30, 20, null, 40],
+  ]);
+});
+
+test("the whole period has a lowest, a mean and a highest value", () => {
+  expect(overall(SUMMARY)).toEqual([0, 5 / 3, 4]);
+  expect(overall({ ...SUMMARY, lowest: [], highest: [], mean: [] })).toBeNull();
+});
