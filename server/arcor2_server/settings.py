@@ -214,6 +214,11 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
         return self.data_dir / "audit.sqlite"
 
     @property
+    def alarms_file(self) -> Path:
+        """The file of the records of alarms."""
+        return self.data_dir / "alarms.sqlite"
+
+    @property
     def cell_state_file(self) -> Path:
         """The file of mode, authority and jobs of the cell."""
         return self.data_dir / "cell-state.json"

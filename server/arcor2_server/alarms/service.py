@@ -50,7 +50,7 @@ class Alarms:
         self._seen: dict[tuple[str, str], set[str]] = {}
         self._unwritten: dict[int, AlarmRecord] = {}
         self._refused: tuple[dict[int, AlarmRecord], set[int]] = ({}, set())
-        """Changed and deleted records that the database could not store, for the next write."""
+        """Changed and deleted records that could not be stored, for the next write."""
         self._writing: asyncio.Task[None] | None = None
         self._shelved: dict[int, asyncio.TimerHandle] = {}
         self.on_changed: list[Callable[[AlarmRecord], None]] = []

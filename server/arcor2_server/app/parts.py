@@ -240,9 +240,12 @@ class Server:
         cell_time = self.cell_time = closed(CellTime(unit_store, lambda: activity_of(execution)))
         cell_time.start()
         connect_production(recipes, units, cell_time, execution)
+        alarm_store = closed(AlarmStore(settings.alarms_file, storage))
+        if damaged := await alarm_store.open():
+            damage.report(damaged)
         alarms = self.alarms = Alarms(
             hub,
-            AlarmStore(storage),
+            alarm_store,
             AlarmKinds(types.installed_folder),
             lambda: execution.program.number if execution.active else 0,
         )

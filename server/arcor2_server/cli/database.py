@@ -30,8 +30,8 @@ def copy(
 ) -> int:
     """Copy the documents from SQLite in the data directory to the empty database at ARCOR2_HW_DATABASE_URL.
 
-    Stop the server first. The SQLite file is left unchanged. Assets, packages, the journal, the audit trail and secrets
-    stay in the data directory. Either everything is copied or nothing.
+    Stop the server first. The SQLite file is left unchanged. Assets, packages, the journal, alarms, the audit trail and
+    secrets stay in the data directory. Either everything is copied or nothing.
     """
     os.umask(0o077)
     try:

@@ -1,44 +1,150 @@
-"""Stores the records of alarms in the database."""
+"""Stores the records of alarms in an SQLite file next to the journal, so that they do not depend on the database."""
 
-from collections.abc import Iterable
-from typing import Final
+import asyncio
+import sqlite3
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import Final, TypeVar
 
 import msgspec
 import structlog
 from sqlalchemy import delete, select
 
 from arcor2_hw.data.alarms import AlarmRecord
+from arcor2_hw.data.base import now
+from arcor2_hw.exceptions import StorageError
+from arcor2_hw.messages import Message
+from arcor2_server.files import aside, ensure_private
 from arcor2_server.storage.models import AlarmRow
 from arcor2_server.storage.store import Storage
 
 log = structlog.get_logger(__name__)
+R = TypeVar("R")
+
+TAKEN_OVER: Final = 1
+"""Version of the file (SQLite's user_version) that contains the records of older servers."""
+_BUSY_TIMEOUT: Final = 5.0
+_SCHEMA: Final = "create table if not exists alarm (number integer primary key, document blob not null) strict"
 
 _encode: Final = msgspec.json.Encoder().encode
 _decode: Final = msgspec.json.Decoder(AlarmRecord).decode
 
 
 class AlarmStore:
-    """The stored records of alarms. All methods may raise StorageError."""
+    """The stored records of alarms. All methods may raise StorageError.
 
-    def __init__(self, storage: Storage) -> None:
-        self._storage = storage
+    Args:
+        path: the file.
+        storage: the database, in which older servers have stored the records.
+    """
+
+    def __init__(self, path: Path, storage: Storage) -> None:
+        self._path, self._storage = path, storage
+        self._connection: sqlite3.Connection | None = None
+        self._thread = ThreadPoolExecutor(1, "alarms")
+
+    async def open(self) -> Message | None:
+        """Open or create the file, and take over the records of the database once.
+
+        Returns:
+            What happened to a damaged file, which is renamed; otherwise None.
+        """
+        problem = await self._in_thread(self._open)
+        async with self._storage.reading() as session:
+            rows = list(await session.execute(select(AlarmRow.number, AlarmRow.document)))
+        await self._in_thread(self._take_over, [(row.number, row.document) for row in rows])
+        if rows:
+            async with self._storage.writing(documents=False) as session:
+                await session.execute(delete(AlarmRow))
+        return problem
+
+    async def close(self) -> None:
+        """Close the file."""
+        await self._in_thread(self._close)
+        self._thread.shutdown()
 
     async def all(self) -> list[AlarmRecord]:
         """Return all records, oldest first, without unreadable ones."""
-        async with self._storage.reading() as session:
-            rows = list(await session.scalars(select(AlarmRow.document).order_by(AlarmRow.number)))
+        return await self._in_thread(self._all)
+
+    async def put(self, records: Iterable[AlarmRecord], deleted: set[int]) -> None:
+        """Store records, and delete those with the given numbers. They are on disk when this returns."""
+        await self._in_thread(self._put, [(record.number, _encode(record)) for record in records], deleted)
+
+    # -------------------------------------------------------------------------------- in the thread
+    async def _in_thread(self, function: Callable[..., R], *arguments: object) -> R:
+        try:
+            return await asyncio.get_running_loop().run_in_executor(self._thread, partial(function, *arguments))
+        except (sqlite3.Error, OSError) as error:
+            raise StorageError(
+                "The records of alarms in {path} cannot be used: {reason}", path=self._path, reason=error
+            ) from error
+
+    def _open(self) -> Message | None:
+        try:
+            self._connect()
+            return None
+        except sqlite3.OperationalError:  # it cannot be written; that is no damage
+            raise
+        except sqlite3.DatabaseError as error:
+            self._close()
+            stored = aside(self._path, now())
+            for ending in ("", "-wal", "-shm"):
+                if (part := self._path.with_name(self._path.name + ending)).exists():
+                    part.rename(stored.with_name(stored.name + ending))
+            self._connect(user_version=TAKEN_OVER)  # what the database contains is older
+            return Message.of(
+                "The records of alarms were damaged: {reason}. They are stored as {file}.",
+                reason=error,
+                file=stored.name,
+            )
+
+    def _connect(self, user_version: int | None = None) -> None:
+        ensure_private(self._path)
+        self._connection = connection = sqlite3.connect(
+            self._path, timeout=_BUSY_TIMEOUT, isolation_level=None, check_same_thread=False
+        )
+        for pragma in ("journal_mode=wal", "synchronous=full"):
+            connection.execute(f"pragma {pragma}")
+        if (verdict := connection.execute("pragma quick_check(1)").fetchone()[0]) != "ok":
+            raise sqlite3.DatabaseError(verdict)
+        connection.execute(_SCHEMA)
+        if user_version is not None:
+            connection.execute(f"pragma user_version={user_version}")
+
+    def _close(self) -> None:
+        if self._connection is not None:
+            self._connection.close()
+            self._connection = None
+
+    def _opened(self) -> sqlite3.Connection:
+        if self._connection is None:
+            raise StorageError("The records of alarms are closed.")
+        return self._connection
+
+    def _take_over(self, rows: list[tuple[int, bytes]]) -> None:
+        connection = self._opened()
+        if connection.execute("pragma user_version").fetchone()[0] >= TAKEN_OVER:
+            return
+        with connection:
+            connection.execute("begin immediate")
+            connection.executemany("insert or ignore into alarm values (?, ?)", rows)
+            connection.execute(f"pragma user_version={TAKEN_OVER}")
+
+    def _all(self) -> list[AlarmRecord]:
         found = []
-        for document in rows:
+        for (document,) in self._opened().execute("select document from alarm order by number"):
             try:
                 found.append(_decode(document))
             except msgspec.MsgspecError as error:
                 log.warning("record of an alarm left out", reason=str(error))
         return found
 
-    async def put(self, records: Iterable[AlarmRecord], deleted: set[int]) -> None:
-        """Store records, and delete those with the given numbers."""
-        async with self._storage.writing(documents=False) as session:
-            for record in records:
-                await self._storage.upsert(session, AlarmRow(number=record.number, document=_encode(record)))
-            if deleted:
-                await session.execute(delete(AlarmRow).where(AlarmRow.number.in_(deleted)))
+    def _put(self, rows: list[tuple[int, bytes]], deleted: set[int]) -> None:
+        connection = self._opened()
+        with connection:
+            connection.execute("begin immediate")
+            connection.executemany("insert or replace into alarm values (?, ?)", rows)
+            connection.executemany("delete from alarm where number = ?", [(number,) for number in deleted])

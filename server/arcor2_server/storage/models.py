@@ -183,7 +183,7 @@ class RunTraceRow(Base):
 
 
 class AlarmRow(Base):
-    """One record of an alarm, as JSON."""
+    """A record of an alarm that an older server has stored, as JSON. The next start moves it to a file."""
 
     __tablename__ = "alarm"
 
