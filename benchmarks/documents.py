@@ -26,6 +26,8 @@ class Author:
     """Creates documents over a plain websocket."""
 
     def __init__(self, socket: ClientConnection) -> None:
+        self.opened = ""
+        """Id of the open project."""
         self.socket = socket
         self.object = ""
 

@@ -70,7 +70,7 @@ def server() -> URL:
     with (folder / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not (folder / "data").exists():
-            _start(folder, run)
+            start(folder, run)
             _create_template(url)
     return url
 
@@ -80,13 +80,19 @@ def programs() -> Path:
     return max(Path("/usr/lib/postgresql").glob("*/bin"), key=lambda each: int(each.parent.name))
 
 
-def _start(folder: Path, run: int) -> None:
-    as_user: dict[str, Any] = {}
-    if os.getuid() == 0:
-        as_user = {"user": SERVER_USER, "group": "nogroup", "extra_groups": []}
+FAST = "-c fsync=off -c full_page_writes=off"
+"""Options of a server whose data are not needed after a power cut."""
+DURABLE = ""
+"""Options of a server that flushes to the disk."""
+
+
+def start(folder: Path, run: int, options: str = FAST) -> None:
+    """Start a server in an empty folder. It is stopped when the process `run` has ended."""
+    as_user = _server_user()
+    if as_user:
         shutil.chown(folder, SERVER_USER)
     folder_of_programs = programs()
-    options = f"-k {folder} -c listen_addresses= -c fsync=off -c full_page_writes=off -c shared_buffers=32MB"
+    options = f"-k {folder} -c listen_addresses= -c shared_buffers=32MB {options}"
     for command in (
         ["initdb", "-D", folder / "data", "-U", "hub", "-A", "trust", "-E", "UTF8", "--locale=C.UTF-8", "--no-sync"],
         ["pg_ctl", "-D", folder / "data", "-w", "-l", folder / "log", "-o", options, "start"],
@@ -96,6 +102,17 @@ def _start(folder: Path, run: int) -> None:
     watch = ["setsid", "--fork", "sh", "-c", WATCH, "watch", str(run), folder_of_programs / "pg_ctl", folder]
     null = subprocess.DEVNULL
     subprocess.run(watch, check=True, stdin=null, stdout=null, stderr=null, cwd="/", **as_user)
+
+
+def stop(folder: Path) -> None:
+    """Stop the server in a folder."""
+    command = [programs() / "pg_ctl", "-D", folder / "data", "-m", "fast", "stop"]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd="/", **_server_user())
+
+
+def _server_user() -> dict[str, Any]:
+    """Return the options with which a process runs as the user of the server."""
+    return {"user": SERVER_USER, "group": "nogroup", "extra_groups": []} if os.getuid() == 0 else {}
 
 
 def execute(statement: str, url: URL | None = None) -> None:

@@ -81,7 +81,7 @@ def write_cold_file(task: WriteColdFile, _state: WorkerState) -> Written:
                 rows = f"select r.*, n.* exclude (number) from ({rows}) r left join names n on n.number = r.point"
             engine.execute(
                 f"copy ({rows} order by {_ORDER[task.kind]}) to '{_quoted(temporary)}' (format parquet, "
-                f"compression zstd, compression_level 9, parquet_version v2, row_group_size {ROW_GROUP})"
+                f"compression zstd, compression_level 19, parquet_version v2, row_group_size {ROW_GROUP})"
             )
             summary = f"select count(*), min(time), max(time) from read_parquet('{_quoted(temporary)}')"
             found = engine.execute(summary).fetchone()

@@ -145,7 +145,7 @@ function Chart({ summary, digital, unit, label }: ContentProps) {
     const { since, until } = summary;
     const days = (until - since) / 1000 > DAY;
     const line = { points: { show: false }, spanGaps: false };
-    const edge = { ...line, stroke: `${colour("--trend-1")}66`, width: 1 };
+    const edge = { ...line, show: !digital, stroke: `${colour("--trend-1")}66`, width: 1 };
     const made = new UPlot(
       {
         width: current.clientWidth,
@@ -167,7 +167,7 @@ function Chart({ summary, digital, unit, label }: ContentProps) {
           },
         ],
         series: [{}, { ...line, stroke: colour("--trend-1"), width: 2 }, edge, edge],
-        bands: [{ series: [3, 2], fill: `${colour("--trend-1")}33` }],
+        bands: digital ? [] : [{ series: [3, 2], fill: `${colour("--trend-1")}33` }],
       },
       columnsOf(summary, factor) as UPlot.AlignedData,
       current,
