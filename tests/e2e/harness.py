@@ -104,7 +104,9 @@ class Cell:
 
     async def start_server(self, port: int = 0) -> None:
         fresh = not self.data_dir.exists()
-        self.url = await self._start("server", lambda log: fork_server(self.data_dir, "--port", str(port), stderr=log))
+        self.url = await self._start(
+            "server", lambda log: fork_server(self.data_dir, "--port", str(port), "--history", stderr=log)
+        )
         if fresh:
             keep_analysis(self.data_dir)
 

@@ -48,6 +48,20 @@ async def changes_the_mode(screen: Screen, client: Client) -> None:
     await dialog.get_by_role("button", name="Close").click()
 
 
+async def shows_the_history(screen: Screen) -> None:
+    """Open the history of the lamp, which has been off, over an hour and over a day."""
+    await screen.press("History of signal: lamp")
+    dialog = screen.page.get_by_role("dialog", name="History of signal: lamp")
+    await expect(dialog).to_contain_text("On for 0\u00a0% of the known time")
+    await dialog.get_by_role("radio", name="1 day").click()
+    await expect(dialog.get_by_role("img", name="signal: lamp")).to_be_visible()
+    await screen.settle()
+    assert await screen.faults() == []
+    assert await screen.barriers() == []
+    await screen.picture("point-history")
+    await dialog.get_by_role("button", name="Close").click()
+
+
 async def test_an_output_is_forced_and_an_operator_ends_it(cell: Cell, browser: Browser) -> None:
     colleague = await cell.client("colleague")
     await with_lamp(colleague, cell)
@@ -70,6 +84,7 @@ async def test_an_output_is_forced_and_an_operator_ends_it(cell: Cell, browser: 
         await screen.sees("The device would keep a forced value")
 
         await page.get_by_placeholder("Search device or point").fill("lamp")
+        await shows_the_history(screen)
         await screen.press("Force signal: lamp")
         await screen.press("Force on")
         lamp = page.get_by_role("region", name="signal").get_by_role("listitem")

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import importlib.util
 import signal
 import time
 from pathlib import Path
@@ -164,6 +165,7 @@ class Demo:
             python_module(
                 *("arcor2_server.cli.main", "serve", "--host", self._host, "--port", str(self._port)),
                 *("--data-dir", str(self._data_dir), "--markers", str(markers_file())),
+                *(["--history"] if importlib.util.find_spec("duckdb") is not None else []),
             ),
         )
         children = [self._child(fake.name, fake.command()) for fake in wanted]

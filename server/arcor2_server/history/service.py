@@ -57,8 +57,8 @@ HOUR: Final = 3_600_000
 DAY: Final = 24 * HOUR
 LATE: Final = 60_000
 """Time after the end of an hour at which its values are moved, ms: some may still wait to be stored."""
-MOST_MERGED: Final = 50_000_000
-"""Maximum number of rows of a file that is made from others."""
+MOST_MERGED: Final = 5_000_000
+"""Maximum number of rows of a file that is made from others: queries wait while it is written."""
 FEW_RUNS: Final = 10_000
 """Number of runs below which a file is merged with newer runs."""
 MOST_RUNS_WAITING: Final = 1000
@@ -130,10 +130,11 @@ class History:
     async def _in_thread(self, function: Callable[..., R], *arguments: object) -> R:
         return await asyncio.get_running_loop().run_in_executor(self._thread, partial(function, *arguments))
 
-    def _failed(self, error: Arcor2Error) -> None:
+    def _failed(self, error: Arcor2Error | OSError) -> None:
         """Log a problem once."""
-        if self._problem != error.message:
-            self._problem = error.message
+        problem = error.message if isinstance(error, Arcor2Error) else Message.of(str(error))
+        if self._problem != problem:
+            self._problem = problem
             log.warning("history not stored", reason=str(error))
 
     def _now(self) -> int:
@@ -207,7 +208,7 @@ class History:
             await asyncio.sleep(MAINTAIN_PERIOD)
             try:
                 await self.maintain()
-            except Arcor2Error as error:
+            except (Arcor2Error, OSError) as error:
                 self._failed(error)
 
     async def maintain(self) -> None:

@@ -1,13 +1,14 @@
 """Backups: the state of one moment while the server writes, and restorations that lose nothing when interrupted."""
 
 import asyncio
+import contextlib
 import json
 import os
 import shutil
 import sqlite3
 import threading
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import IO
@@ -145,6 +146,21 @@ def test_a_file_that_is_deleted_meanwhile_is_left_out(
 
     monkeypatch.setattr(backups, "_add", add)
     assert "secrets.json" not in write_backup(data, tmp_path / "backup.zip", "0.1.0").files
+
+
+def test_a_file_that_a_database_lists_meanwhile_is_included(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    original = backups._snapshot
+
+    @contextlib.contextmanager
+    def snapshot(path: Path, scratch: Path) -> Iterator[sqlite3.Connection]:
+        (data / "listed.parquet").write_bytes(b"rows")
+        with original(path, scratch) as connection:
+            yield connection
+
+    monkeypatch.setattr(backups, "_snapshot", snapshot)
+    assert "listed.parquet" in write_backup(data, tmp_path / "backup.zip", "0.1.0").files
 
 
 def test_a_failed_backup_leaves_no_file(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
