@@ -11,7 +11,7 @@ import asyncio
 import statistics
 import time
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 import numpy as np
@@ -51,7 +51,7 @@ RECORDED: Final = 100
 DEVICE: Final = "obj_1"
 
 
-def digital(random: np.random.Generator, number: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def digital(random: np.random.Generator, number: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """Return times of a day, ms, and values of a point that is switched on and off in each cycle."""
     starts = np.cumsum(random.normal(CYCLE_MS, 900, DAY // CYCLE_MS))
     on = starts + 1100 * number
@@ -61,7 +61,7 @@ def digital(random: np.random.Generator, number: int) -> tuple[npt.NDArray[np.fl
     return np.floor(times / POLLED_MS) * POLLED_MS, np.arange(len(times)) % 2.0
 
 
-def analog(random: np.random.Generator, number: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def analog(random: np.random.Generator, number: int) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """Return times of a day, ms, and values of a point that changes by more than its dead band, at most once per s."""
     seconds = np.arange(DAY // 1000)
     drift = 300 * np.sin(seconds / len(seconds) * 2 * np.pi + number)

@@ -130,11 +130,10 @@ class History:
     async def _in_thread(self, function: Callable[..., R], *arguments: object) -> R:
         return await asyncio.get_running_loop().run_in_executor(self._thread, partial(function, *arguments))
 
-    def _failed(self, error: Arcor2Error | OSError) -> None:
+    def _failed(self, error: Arcor2Error) -> None:
         """Log a problem once."""
-        problem = error.message if isinstance(error, Arcor2Error) else Message.of(str(error))
-        if self._problem != problem:
-            self._problem = problem
+        if self._problem != error.message:
+            self._problem = error.message
             log.warning("history not stored", reason=str(error))
 
     def _now(self) -> int:
@@ -208,8 +207,10 @@ class History:
             await asyncio.sleep(MAINTAIN_PERIOD)
             try:
                 await self.maintain()
-            except (Arcor2Error, OSError) as error:
+            except Arcor2Error as error:
                 self._failed(error)
+            except OSError as error:  # the worker cannot be started
+                self._failed(StorageError("The history cannot be moved to files: {reason}", reason=error))
 
     async def maintain(self) -> None:
         """Move closed hours to files, merge the files of closed days, and delete what is too old or too much.

@@ -1,11 +1,7 @@
 """The history of points and runs over REST (docs/protocol/history.md)."""
 
 import asyncio
-import csv
-import io
-from collections.abc import Iterable
 from dataclasses import dataclass
-from datetime import UTC, datetime
 
 from arcor2_hw.data.history import (
     HistoryPoint,
@@ -18,7 +14,6 @@ from arcor2_hw.data.history import (
     PointValues,
 )
 from arcor2_hw.data.role import Role
-from arcor2_server.audit.export import as_cell
 from arcor2_server.history.service import History
 from arcor2_server.rest.general import SERVER
 from arcor2_server.rest.operations import Binary, operation
@@ -53,10 +48,10 @@ class HistoryOperations:
     @operation("GET", "/api/history/values/export", SERVER, Role.OPERATOR, media_type="text/csv")
     async def export_values(self, query: HistoryQuery) -> Binary:
         """Return the recorded values of a point in a period as CSV, oldest first."""
+        from arcor2_server.history.export import values_as_csv  # with a module that no start needs
+
         found = await self._history.values(query)
-        rows = zip(map(_time, found.times), found.values, found.qualities, strict=True)
-        content = await asyncio.to_thread(_as_csv, ("time", "value", "quality"), rows)
-        return Binary(content, "text/csv", f"point-{query.point}.csv")
+        return Binary(await asyncio.to_thread(values_as_csv, found), "text/csv", f"point-{query.point}.csv")
 
     @operation("GET", "/api/history/runs", SERVER, Role.OPERATOR, plain=True)
     async def past_runs(self, query: HistoryRunQuery) -> list[PastRun]:
@@ -66,28 +61,7 @@ class HistoryOperations:
     @operation("GET", "/api/history/runs/export", SERVER, Role.OPERATOR, media_type="text/csv")
     async def export_past_runs(self, query: HistoryRunQuery) -> Binary:
         """Return runs that ended in a period as CSV, newest first."""
+        from arcor2_server.history.export import runs_as_csv  # with a module that no start needs
+
         found = await self._history.runs(query)
-        names = PastRun.__struct_fields__
-        rows = (
-            [
-                _time(value) if name in ("started", "ended") else value
-                for name in names
-                for value in (getattr(run, name),)
-            ]
-            for run in found
-        )
-        return Binary(await asyncio.to_thread(_as_csv, names, rows), "text/csv", "runs.csv")
-
-
-def _as_csv(header: Iterable[str], rows: Iterable[Iterable[object]]) -> bytes:
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(header)
-    writer.writerows(
-        ["" if each is None else as_cell(each) if isinstance(each, str) else each for each in row] for row in rows
-    )
-    return text.getvalue().encode()
-
-
-def _time(milliseconds: int) -> str:
-    return datetime.fromtimestamp(milliseconds / 1000, UTC).isoformat(timespec="milliseconds")
+        return Binary(await asyncio.to_thread(runs_as_csv, found), "text/csv", "runs.csv")
