@@ -19,6 +19,7 @@ from msgspec import UnsetType
 from arcor2_hw.data.events import EVENTS, ChangeType
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS
+from arcor2_server.fleet.registry import FleetUpdate
 
 TARGET: Final = Path(__file__).resolve().parent / "src" / "protocol" / "types.ts"
 """Generated file."""
@@ -121,6 +122,8 @@ def typescript() -> str:
         declarations.add_sent(rpc.data)
     for event in EVENTS.values():
         declarations.add_sent(event.data)
+    declarations.add_sent(FleetUpdate)
+    declarations.expression(FleetUpdate)
     requests, roles_of_requests = [], []
     for name, rpc in sorted(RPCS.items()):
         args = "undefined" if rpc.args is None else declarations.expression(rpc.args)

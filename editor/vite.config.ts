@@ -76,6 +76,7 @@ export default defineConfig({
   resolve: { alias: [{ find: /^three$/, replacement: "three/src/Three.js" }] },
   build: {
     outDir: OUT,
+    rolldownOptions: { input: ["index.html", "fleet.html"] },
     emptyOutDir: true,
     manifest: true,
     target: "es2022",

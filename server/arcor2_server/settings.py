@@ -2,6 +2,7 @@
 
 import ipaddress
 import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
@@ -9,7 +10,7 @@ from typing import Any, Final, NamedTuple, Self
 import msgspec
 
 from arcor2_hw.calibration.configuration import CalibrationConfiguration
-from arcor2_hw.data.cell import Cell
+from arcor2_hw.data.cell import BROKER_URL, Cell
 from arcor2_hw.data.device import DEVICE_FILES
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
@@ -19,6 +20,8 @@ VERSION: Final = "1.4.0"
 API_VERSION: Final = "1.1.0"
 """Version of the protocol. Existing clients refuse another major version."""
 MIB: Final = 1024 * 1024
+CELL_NAME: Final = re.compile(r"[a-z0-9][a-z0-9_-]{0,62}")
+"""A name of a cell. It is part of subjects of the broker, in which dots, spaces and wildcards have a meaning."""
 LONGEST_LIFE_TIMEOUT: Final = 60.0
 """Longest time limit of the PLC's life counter, s."""
 DATABASE_URL: Final = "ARCOR2_HW_DATABASE_URL"
@@ -122,6 +125,16 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     """Address of the OPC UA server; None: none."""
     mqtt: MqttSettings | None = None
     """The broker to which the cell is published; None: none."""
+    cell_name: str = ""
+    """Name of the cell in the editor and in the fleet; empty: none."""
+    cell_address: str = ""
+    """Address of the editor for other computers; empty: the first one that this machine has."""
+    fleet_address: str = ""
+    """Address of the page with all cells, to which the editor links; empty: none."""
+    broker_url: str = ""
+    """Address of the broker (NATS); empty: none."""
+    broker_authority: str = ""
+    """File of the certificate to trust for the broker; empty: those that the system trusts."""
     plc_life_timeout: float = 2.0
     """Time after which a life counter of the PLC that does not change holds its program, s."""
     device_files: tuple[str, ...] = ()
@@ -182,6 +195,11 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         for proxy in self.trusted_proxies:
             ipaddress.ip_network(proxy)
+
+    @property
+    def in_fleet(self) -> bool:
+        """Whether the cell publishes its state and results."""
+        return bool(self.cell_name and self.broker_url)
 
     @property
     def documents_database(self) -> Path:
@@ -324,6 +342,18 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
                 DeadBand.parse(band)
         except ValueError as error:
             raise InvalidData("ARCOR2_HW_POINT_HISTORY_DEAD_BANDS: {reason}", reason=error) from None
+        if (name := values.get("cell_name")) and not CELL_NAME.fullmatch(name):
+            raise InvalidData(
+                "ARCOR2_HW_CELL_NAME={name!r} is not a name of a cell: use lower-case letters, digits, - and _.",
+                name=name,
+            )
+        for variable in ("cell_address", "fleet_address"):
+            if (address := values.get(variable)) and not address.startswith(("http://", "https://")):
+                raise InvalidData(
+                    "ARCOR2_HW_{variable}={address!r} is not an address: it starts with http:// or https://.",
+                    variable=variable.upper(),
+                    address=address,
+                )
         if values.get("streaming_period", 1) <= 0:
             values["streaming_period"] = 0.1
         if "data_dir" not in values:
@@ -359,6 +389,11 @@ _VARIABLES: Final = {
     "ARCOR2_HW_OUTGOING_BYTES": "outgoing_bytes",
     "ARCOR2_HW_OUTGOING_AGE": "outgoing_age",
     "ARCOR2_HW_PING_INTERVAL": "ping_interval",
+    "ARCOR2_HW_CELL_NAME": "cell_name",
+    "ARCOR2_HW_CELL_ADDRESS": "cell_address",
+    "ARCOR2_HW_FLEET_ADDRESS": "fleet_address",
+    BROKER_URL: "broker_url",
+    "ARCOR2_HW_NATS_CA": "broker_authority",
     "ARCOR2_HW_CONNECTIONS": "connections",
     "ARCOR2_HW_CONNECTIONS_PER_ADDRESS": "connections_per_address",
     "ARCOR2_HW_REQUEST_TIMEOUT": "request_timeout",

@@ -75,13 +75,21 @@ class SubscribeEventsArgs(Data, frozen=True):
     users: Annotated[set[str], Meta(max_length=100)] | Unset = UNSET
 
 
+class CellInfo(Data, frozen=True):
+    """The cell of the server. fleet: address of the page with all cells; left out if there is none."""
+
+    name: str
+    fleet: str | Unset = UNSET
+
+
 class SystemInfoData(Data, frozen=True):
-    """Answer to SystemInfo."""
+    """Answer to SystemInfo. cell: left out if the cell has no name."""
 
     version: str
     api_version: str
     supported_parameter_types: set[str] = field(default_factory=set)
     supported_rpc_requests: set[str] = field(default_factory=set)
+    cell: CellInfo | Unset = UNSET
 
 
 GENERAL_RPCS: Final = (

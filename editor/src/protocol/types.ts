@@ -572,6 +572,12 @@ export interface CarriedPart {
 /** Who may start programs: clients of the server, the PLC, or nobody. */
 export type CellAuthority = "nobody" | "hub" | "plc";
 
+/** The cell of the server. fleet: address of the page with all cells; left out if there is none. */
+export interface CellInfo {
+  name: string;
+  fleet?: string;
+}
+
 /** A job: the number by which the PLC requests it, and the package that it runs. */
 export interface CellJob {
   number: number;
@@ -1036,6 +1042,77 @@ export interface FindDevicesArgs {
   setting: string;
   parameters?: Parameter[];
   addresses?: string;
+}
+
+/** The alarm of a cell that needs a person first. device: its name; empty for the program and the system. */
+export interface FirstAlarm {
+  priority: Priority;
+  text: string;
+  raised: string;
+  device: string;
+  text_message?: Message;
+}
+
+/**
+ * A cell on the page.
+ *
+ * id: of the card. alive: whether the cell has a signal. conflict: whether another server uses the same name or the
+ * same data. seen: when the last state was received. state: the last state; its `number` and `boot` have no meaning.
+ */
+export interface FleetCard {
+  id: string;
+  name: string;
+  alive: boolean;
+  conflict: boolean;
+  seen: string;
+  state: FleetState;
+}
+
+/**
+ * The state of a cell.
+ *
+ * identity: id of the data of the server. boot: id of the process of the server. number: counts the states of this
+ * process. address: of its editor; empty if only its own computer reaches it. domain: JetStream domain in which its
+ * results are stored. program: name of the running or last program. held: whether the program waits for a person after
+ * a failed action. good, bad, rejected: units that left the cell in the last 8 hours. urgent, high, medium, low:
+ * alarms that need attention. started_by: who started the running program. users: who is connected. controlling: who
+ * of them has locked something, such as a robot. missing: names of devices that are not connected. waiting: results
+ * that the broker has not stored yet.
+ */
+export interface FleetState {
+  identity: string;
+  boot: string;
+  number: number;
+  version: string;
+  state: CellStateName;
+  mode: CellMode;
+  authority: CellAuthority;
+  program_state: PackageStateEnum;
+  address: string;
+  domain: string;
+  program: string;
+  recipe: string;
+  held: boolean;
+  good: number;
+  bad: number;
+  rejected: number;
+  urgent: number;
+  high: number;
+  medium: number;
+  low: number;
+  first_alarm?: FirstAlarm;
+  started_by: string;
+  users: string[];
+  controlling: string[];
+  missing: string[];
+  waiting: number;
+}
+
+/** An update of the page. cells: changed cards. removed: ids of cards. broker: whether the broker is connected. */
+export interface FleetUpdate {
+  cells: FleetCard[];
+  removed: string[];
+  broker: boolean;
 }
 
 /**
@@ -3449,12 +3526,13 @@ export interface SubscribeEventsArgs {
   users?: string[];
 }
 
-/** Answer to SystemInfo. */
+/** Answer to SystemInfo. cell: left out if the cell has no name. */
 export interface SystemInfoData {
   version: string;
   api_version: string;
   supported_parameter_types: string[];
   supported_rpc_requests: string[];
+  cell?: CellInfo;
 }
 
 /** Arguments of TakeOverLocks: a disconnected user. */

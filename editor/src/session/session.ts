@@ -36,6 +36,8 @@ import { RobotStreams } from "./streams";
 const TOKEN_REFUSED = 4401;
 /** Code of the error if a request needs a token. */
 const TOKEN_NEEDED = "token_needed";
+/** Time limit for releasing locks before this page leaves the cell, s; the server releases them later otherwise. */
+const GIVE_UP_WITHIN = 1;
 
 declare module "../store/runtime" {
   interface Runtime {
@@ -95,6 +97,12 @@ export class Session {
     setConnection({ status: "connecting", user, reason: "", needsToken: false, role: ROLES.programmer });
     this.client.stop(t`Joining again.`);
     this.client.start();
+  }
+
+  /** Release the locks of this user, and leave. */
+  async giveUp(): Promise<void> {
+    await Promise.race([releaseOwnLocks(), new Promise((resolve) => setTimeout(resolve, GIVE_UP_WITHIN * 1000))]);
+    this.leave();
   }
 
   leave(): void {

@@ -109,6 +109,7 @@ def request_handlers(s: Server) -> Handlers:
             s.presence,
             s.edit_notifications,
             s.reachability,
+            s.settings,
         ),
         HistoryRequests(s.session, s.undo, editing),
         InterlockRequests(s.locks, s.types, s.session, s.online, s.execution, editing),

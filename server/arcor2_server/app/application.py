@@ -4,8 +4,6 @@ from typing import Any
 
 from litestar import Litestar, Request, Response, WebSocket, websocket
 from litestar.exceptions import HTTPException, MethodNotAllowedException, NotFoundException
-from litestar.plugins import PluginProtocol
-from litestar.plugins.core import MsgspecDIPlugin
 
 from arcor2_hw.data.role import Role
 from arcor2_server.access.admission import role_needed
@@ -16,6 +14,7 @@ from arcor2_server.app.parts import Server
 from arcor2_server.rest import routes as rest_routes
 from arcor2_server.rest.metrics import Metrics, metrics_route
 from arcor2_server.rest.responses import http_refusal
+from arcor2_server.web.application import Application
 from arcor2_server.web.editor import editor_routes
 from arcor2_server.web.response_headers import add_headers
 from arcor2_server.websocket.classic_ports import SOCKET
@@ -43,14 +42,6 @@ def no_such_route(request: Request[Any, Any, Any], error: MethodNotAllowedExcept
     if allowed in (None, "websocket"):
         return http_refusal(request, NotFoundException())
     return http_refusal(request, error)
-
-
-class Application(Litestar):
-    """Litestar without its plugins for pydantic and attrs, which are not needed and take 0.1 s to load."""
-
-    @staticmethod
-    def _get_default_plugins(plugins: list[PluginProtocol]) -> list[PluginProtocol]:
-        return [*plugins, MsgspecDIPlugin()]
 
 
 def endpoints(server: Server) -> tuple[Endpoint, Endpoint]:

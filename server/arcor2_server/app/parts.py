@@ -42,6 +42,7 @@ from arcor2_server.execution.service import Execution
 from arcor2_server.execution.stop_all import StopAll
 from arcor2_server.execution.temporary import TemporaryRuns
 from arcor2_server.files import tighten
+from arcor2_server.fleet.link import FleetLink
 from arcor2_server.history.service import History
 from arcor2_server.hosts.pool import CellHosts
 from arcor2_server.hosts.session import HostSession
@@ -76,6 +77,7 @@ from arcor2_server.storage.alarms import AlarmStore
 from arcor2_server.storage.calibrations import Calibrations
 from arcor2_server.storage.damage_notices import DataDamage
 from arcor2_server.storage.maintenance import MaintenanceStore
+from arcor2_server.storage.outbox import Outbox
 from arcor2_server.storage.packages import Packages
 from arcor2_server.storage.persons import PersonStore
 from arcor2_server.storage.recipes import RecipeStore
@@ -234,7 +236,8 @@ class Server:
             hub, RecipeStore(storage), packages, persons, released_only=settings.released_only
         )
         await recipes.open()
-        unit_store = UnitStore(storage)
+        outbox = Outbox(storage) if settings.in_fleet else None
+        unit_store = UnitStore(storage, outbox)
         units = self.units = closed(Units(hub, unit_store, runs, packages, calibration_records))
         await units.open(books.all)
         cell_time = self.cell_time = closed(CellTime(unit_store, lambda: activity_of(execution)))
@@ -293,6 +296,7 @@ class Server:
             from arcor2_server.mqtt import service  # takes time, and few servers need it
 
             self.mqtt = closed(service.Mqtt(settings, feed, alarms))
+        self.fleet = closed(FleetLink(settings, outbox, feed, cell, execution, runs, units, alarms, users, locks))
         temporary_runs = self.temporary_runs = TemporaryRuns(
             hub, locks, storage, types, session, online, execution, build, tasks
         )

@@ -53,6 +53,7 @@ app.command(
     "arcor2_server.cli.database:app", name="database", help="Move the documents of a data directory to PostgreSQL."
 )
 app.command("arcor2_server.cli.device:app", name="device", help="List, find and check devices; create a driver.")
+app.command("arcor2_server.cli.fleet:app", name="fleet", help="Show many cells on one page.")
 app.command(
     "arcor2_server.cli.node:app",
     name="node",

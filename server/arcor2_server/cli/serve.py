@@ -212,7 +212,7 @@ def serve(
             listener = sockets.enter_context(contextlib.closing(listen(settings.host, settings.port)))
             settings, classic_listeners = _bind_classic(settings, sockets)
             settings, legacy_listener = _bind_legacy(settings, sockets)
-            settings, certificate = _certificate(settings, tls, self_signed)
+            settings, certificate = certificate_of(settings, tls, self_signed)
             plc = None
             if settings.plc is not None:
                 plc = sockets.enter_context(contextlib.closing(listen(settings.plc.host, settings.plc.port)))
@@ -229,6 +229,13 @@ def serve(
     except StorageError as error:
         return fail("serve", error, ExitStatus.DATABASE_UNUSABLE)
     return ExitStatus.OK
+
+
+def _editor_address(settings: ServerSettings, port: int) -> str:
+    """Return the address of the editor for other computers, else that for this computer."""
+    if addresses := server_addresses(settings, port).addresses:
+        return addresses[0]
+    return f"{'https' if settings.certificate else 'http'}://127.0.0.1:{port}"
 
 
 def _markers(given: Path | None, path: Path | None, cell: Cell | None) -> CalibrationConfiguration | None:
@@ -344,7 +351,7 @@ def _bind_legacy(
     return msgspec.structs.replace(settings, legacy=legacy), listener
 
 
-def _certificate(
+def certificate_of(
     settings: ServerSettings, given: tuple[Path, Path] | None, self_signed: bool
 ) -> tuple[ServerSettings, tuple[Path, Path] | None]:
     """Return the settings with the certificate, and the files of certificate and key; None without TLS.
@@ -375,7 +382,7 @@ def _authority(settings: ServerSettings) -> "Authority":
     return Authority(settings.data_dir, lambda: certified_hosts(settings.host))
 
 
-async def _renew_certificate(settings: ServerSettings, used: ssl.SSLContext) -> None:
+async def renew_certificate(settings: ServerSettings, used: ssl.SSLContext) -> None:
     """Renew the certificate before it expires, and when the machine has a new address. Clients stay connected."""
     authority = _authority(settings)
     while True:
@@ -430,6 +437,7 @@ async def run(
             running.opcua.serve(plant)
         if running.mqtt is not None:
             running.mqtt.start()
+        running.fleet.serve(_editor_address(settings, listeners[0].getsockname()[1]))
         loop = asyncio.get_running_loop()
         config = configuration(create_app(running), settings, certificate)
         renewal = trust_page = None
@@ -437,7 +445,7 @@ async def run(
             from arcor2_server.web.trust_page import TrustPage
 
             config.load()
-            renewal = loop.create_task(_renew_certificate(settings, cast("ssl.SSLContext", config.ssl)))
+            renewal = loop.create_task(renew_certificate(settings, cast("ssl.SSLContext", config.ssl)))
             trust_page = TrustPage(settings.authority, settings)
         server = Server(config, settings, ConnectionLimits.of(settings), legacy, when_ready, trust_page)
         for number in (signal.SIGTERM, signal.SIGINT):

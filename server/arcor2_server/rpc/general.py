@@ -12,6 +12,7 @@ from arcor2_hw.data.interlocks import InterlockStates
 from arcor2_hw.data.rpc import (
     AuthenticateArgs,
     AuthenticateData,
+    CellInfo,
     RegisterUserArgs,
     SubscribeEventsArgs,
     SystemInfoData,
@@ -30,7 +31,7 @@ from arcor2_server.events import encode, make_event
 from arcor2_server.execution.service import Execution
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.rpc.registry import DECLARED, Context, cached, rpc
-from arcor2_server.settings import API_VERSION, VERSION
+from arcor2_server.settings import API_VERSION, VERSION, ServerSettings
 from arcor2_server.websocket.client import Client, CloseCode
 from arcor2_server.websocket.hub import Hub
 from arcor2_server.workspace.object_aiming import ObjectAimings
@@ -51,9 +52,10 @@ PARAMETER_TYPES: Final = (
 
 
 @functools.lru_cache(maxsize=1)
-def _system_info(_handlers: int) -> Raw:
+def _system_info(_handlers: int, name: str, fleet: str) -> Raw:
     """Encode the answer once per number of handlers, which is constant after all modules are imported."""
-    return Raw(encode(SystemInfoData(VERSION, API_VERSION, set(PARAMETER_TYPES), set(DECLARED))))
+    cell = CellInfo(name, fleet or UNSET) if name else UNSET
+    return Raw(encode(SystemInfoData(VERSION, API_VERSION, set(PARAMETER_TYPES), set(DECLARED), cell)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,16 +76,20 @@ class GeneralRequests:
     _presence: PresenceBoard
     _edit_notifications: EditNotifications
     _reachability: ReachabilityBoard
+    _settings: ServerSettings
+
+    def _system_info(self) -> Raw:
+        return _system_info(len(DECLARED), self._settings.cell_name, self._settings.fleet_address)
 
     @rpc("SystemInfo")
     async def system_info(self, context: Context, args: None) -> Any:
         """Return versions, parameter types and supported requests. Existing clients send no other requests."""
-        return _system_info(len(DECLARED))
+        return self._system_info()
 
     @cached("SystemInfo")
     def cached_system_info(self, codes: bool) -> Raw:
         """Return the encoded answer to SystemInfo."""
-        return _system_info(len(DECLARED))
+        return self._system_info()
 
     @rpc("Authenticate")
     async def authenticate(self, context: Context, args: AuthenticateArgs) -> AuthenticateData:

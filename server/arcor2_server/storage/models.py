@@ -13,6 +13,7 @@ from sqlalchemy import (
     String,
     Text,
     TypeDecorator,
+    UniqueConstraint,
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from sqlalchemy.types import TypeEngine
@@ -297,6 +298,20 @@ class ParameterBackupRow(Base):
     object_id: Mapped[str] = mapped_column(StoredText(255), index=True)
     info: Mapped[bytes] = mapped_column(LargeBinary)
     document: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class OutboxRow(Base):
+    """A changed unit or alarm that the broker has not stored yet. A further change replaces the row by a newer one.
+
+    `kind`: "unit" or "alarm". `record`: the number of the unit or alarm.
+    """
+
+    __tablename__ = "outbox"
+    __table_args__ = (UniqueConstraint("kind", "record"), {"sqlite_autoincrement": True})
+
+    number: Mapped[int] = mapped_column(Integer, primary_key=True)
+    kind: Mapped[str] = mapped_column(StoredText(20))
+    record: Mapped[int] = mapped_column(Integer)
 
 
 for _table in Base.metadata.tables.values():

@@ -11,9 +11,9 @@ from sqlalchemy.ext.asyncio import AsyncEngine
 from arcor2_hw.exceptions import StorageError
 from arcor2_server.storage.models import Base
 
-REVISION: Final = "0010"
+REVISION: Final = "0011"
 """The newest revision in `migrations/versions`."""
-KNOWN: Final = frozenset({"0001", "0002", "0003", "0004", "0005", "0006", "0007", "0008", "0009", REVISION})
+KNOWN: Final = frozenset({"0001", "0002", "0003", "0004", "0005", "0006", "0007", "0008", "0009", "0010", REVISION})
 """All revisions from which a database can be migrated."""
 MIGRATIONS: Final = Path(__file__).parent / "migrations"
 CHECKED_SIZE: Final = 64 * 1024 * 1024

@@ -13,6 +13,7 @@ from arcor2_hw.data.rpc import ListUnitsArgs
 from arcor2_hw.data.units import CellActivity, Unit, UnitRecord, UnitState
 from arcor2_hw.exceptions import NotFound, StorageError
 from arcor2_server.storage.models import CellTimeRow, UnitRow, UnitRunRow
+from arcor2_server.storage.outbox import Outbox, OutboxKind
 from arcor2_server.storage.store import Storage
 
 MAX_UNITS: Final = 100_000
@@ -33,10 +34,16 @@ def _unpacked(document: bytes, kind: Any = UnitRecord) -> Any:
 
 
 class UnitStore:
-    """The stored records of units. All methods may raise StorageError."""
+    """The stored records of units. All methods may raise StorageError.
 
-    def __init__(self, storage: Storage) -> None:
+    Args:
+        storage: the database.
+        outbox: gets the units that have left the cell; None: they are not sent.
+    """
+
+    def __init__(self, storage: Storage, outbox: Outbox | None = None) -> None:
         self._storage = storage
+        self._outbox = outbox
 
     async def newest_number(self) -> int:
         """Return the number of the newest record, 0 if there is none."""
@@ -53,7 +60,10 @@ class UnitStore:
         """Store records, and delete those with the given numbers. The oldest ones beyond MAX_UNITS are deleted."""
         async with self._storage.writing(documents=False) as session:
             newest = 0
+            finished = []
             for record in records:
+                if record.state is not UnitState.IN_CELL:
+                    finished.append(record.number)
                 newest = max(newest, record.number)
                 recipe = record.recipe
                 rate = None if isinstance(recipe, Unset) or isinstance(recipe.planned_rate, Unset) else (
@@ -81,6 +91,8 @@ class UnitStore:
             if newest > MAX_UNITS:
                 await session.execute(delete(UnitRow).where(UnitRow.number <= newest - MAX_UNITS))
                 await session.execute(delete(UnitRunRow).where(UnitRunRow.unit <= newest - MAX_UNITS))
+            if self._outbox is not None:
+                await self._outbox.add(session, OutboxKind.UNIT, finished)
 
     async def get(self, number: int) -> UnitRecord:
         """Return a record. Raise NotFound if there is none."""

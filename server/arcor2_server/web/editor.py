@@ -19,6 +19,9 @@ from arcor2_server.web.encodings import accepted_encodings
 
 FILES: Final = Path(__file__).parents[1] / "editor_files"
 """Directory of the built editor; missing in a checkout without a build."""
+EDITOR_PAGE: Final = "index.html"
+FLEET_PAGE: Final = "fleet.html"
+"""The pages of the build."""
 NONCE: Final = b"__NONCE__"
 """Placeholder in the page for the nonce of inserted styles. Each response has its own nonce."""
 NOT_BUILT: Final = (
@@ -83,10 +86,10 @@ def page_policy(nonce: str) -> str:
     )
 
 
-def editor_routes(directory: Path = FILES) -> list[HTTPRouteHandler]:
-    """Return the routes of the page and its files. They need no token. A file is read on its first request."""
+def editor_routes(directory: Path = FILES, page_name: str = EDITOR_PAGE) -> list[HTTPRouteHandler]:
+    """Return the routes of a page and of the files of all pages. They need no token. Files are read when requested."""
     names = file_names(directory)
-    page = read_file(directory / "index.html") if "index.html" in names else None
+    page = read_file(directory / page_name) if page_name in names else None
     files: dict[str, EditorFile] = {}
     open_to_all = {ROLE: Role.OPERATOR, OPEN: True}
 
@@ -102,7 +105,7 @@ def editor_routes(directory: Path = FILES) -> list[HTTPRouteHandler]:
     async def editor_file(request: Request[Any, Any, Any]) -> Response[bytes]:
         """Return a file in an accepted encoding; 304 if the browser has it, 404 if it does not exist."""
         name = str(request.path_params["path"]).lstrip("/")
-        if name not in names or name == "index.html":
+        if name not in names or name in (EDITOR_PAGE, FLEET_PAGE):
             raise NotFoundException(translatable("The editor has no such file."))
         if (file := files.get(name)) is None:
             file = files[name] = await asyncio.to_thread(read_file, directory / name)

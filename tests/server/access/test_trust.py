@@ -100,7 +100,7 @@ async def test_a_running_server_uses_the_renewed_certificate(tmp_path: Path, mon
             loaded.set_result(certfile)
 
     context = Context(ssl.PROTOCOL_TLS_SERVER)
-    renewal = asyncio.create_task(serve_module._renew_certificate(ServerSettings(data_dir=tmp_path), context))
+    renewal = asyncio.create_task(serve_module.renew_certificate(ServerSettings(data_dir=tmp_path), context))
     hosts.append("10.1.2.3")
     try:
         async with asyncio.timeout(60):

@@ -9,6 +9,7 @@ import { chosen, type Entry, entriesOf, SORTS, type Sort } from "../../home/entr
 import { whyUnavailable } from "../../store/permissions";
 import type { State } from "../../store/state";
 import { useEditor } from "../../store/store";
+import { CellName } from "../cell/CellName";
 import { Button, Waiting } from "../kit/kit";
 import { Notices } from "../notices/Notices";
 import { People } from "../people/People";
@@ -63,6 +64,7 @@ export function Home() {
   return (
     <div className="home">
       <header className="bar">
+        <CellName />
         <h1>{t`Workplace`}</h1>
         <Button
           look="plain"

@@ -11,6 +11,7 @@ import { derivesFrom, isLive, isRunning } from "../../store/selectors";
 import type { State } from "../../store/state";
 import { now, useEditor } from "../../store/store";
 import { Pick } from "../kit/fields";
+import { useCellName } from "../cell/CellName";
 import { Button, Waiting } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
 import { Notices } from "../notices/Notices";
@@ -70,6 +71,7 @@ export default function Points() {
   const objects = Object.values(doc?.objects ?? {}).filter(
     (each) => !derivesFrom(now(), each.type, "VirtualCollisionObject"),
   );
+  const cell = useCellName();
   const [device, setDevice] = useState("");
   const [text, setText] = useState("");
   const [forcing, setForcing] = useState<Forcing | null>(null);
@@ -88,6 +90,7 @@ export default function Points() {
     <div className="io-page">
       <header className="bar">
         <Button look="plain" icon="left" aria-label={t`Back`} onPress={closePoints} />
+        {cell && <strong className="cell-name">{cell}</strong>}
         <h1>{t`Inputs and outputs`}</h1>
         <People />
       </header>

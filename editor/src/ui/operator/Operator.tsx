@@ -21,6 +21,7 @@ import { useEditor } from "../../store/store";
 import { withNames } from "../../viewmodel/names";
 import { AlarmCard } from "../alarms/AlarmCard";
 import { useAlarms } from "../alarms/useAlarms";
+import { CellName } from "../cell/CellName";
 import { useCell } from "../cell/useCell";
 import { noteText } from "../cell/words";
 import { openPoints } from "../io/address";
@@ -148,6 +149,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
         {!kiosk && (
           <Button look="plain" icon="home" aria-label={t`Open the editor`} onPress={() => (location.hash = "")} />
         )}
+        <CellName />
         <h1 data-name={runs || undefined}>{runs ? program.packageName || t`Program` : t`Operator`}</h1>
         {serves("ListAlarms") && (
           <Button

@@ -4,6 +4,7 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { chooseLanguage } from "../../commands/language";
 import { ask } from "../../commands/requests";
+import { showWorkplaces } from "../../commands/workplaces";
 import { LANGUAGES, type Language, useLanguage } from "../../i18n/catalogue";
 import { ROLES } from "../../protocol/types";
 import { remember } from "../../session/localStorage";
@@ -25,6 +26,7 @@ export default function SettingsMenu({ defaultOpen }: { defaultOpen: boolean }) 
   const { theme, leftHanded } = useEditor((state) => state.ui);
   const { user, shared } = useEditor((state) => state.connection);
   const noPersons = useEditor((state) => whyUnavailable(state, "AddPerson"));
+  const fleet = useEditor((state) => state.connection.server?.cell?.fleet);
   const language = useLanguage();
   // It needs the role that edits scenes.
   const noAudit = useEditor((state) => whyUnavailable(state, "SaveScene"));
@@ -74,6 +76,9 @@ export default function SettingsMenu({ defaultOpen }: { defaultOpen: boolean }) 
     { id: "persons", label: t`Persons`, icon: "people", not: noPersons, act: () => openOverlay("persons") },
     ...(shared ? [{ id: "pin", label: t`Change PIN`, icon: "lock" as const, act: () => openOverlay("pin") }] : []),
     { id: "about", label: t`Invite others, about, keys ( ? )`, icon: "info", act: () => openOverlay("about") },
+    ...(fleet
+      ? [{ id: "workplaces", label: t`All workplaces`, icon: "left" as const, act: () => void showWorkplaces(fleet) }]
+      : []),
     shared
       ? { id: "leave", label: t`Log off ${user}`, icon: "close", act: () => void ask("LogOff") }
       : { id: "leave", label: t`Leave (you are ${user})`, icon: "close", act: () => theSession().leave() },

@@ -9,6 +9,7 @@ import { translate } from "../../i18n/serverMessages";
 import { whyUnavailable } from "../../store/permissions";
 import { isClosed } from "../../store/selectors";
 import { notify, useEditor } from "../../store/store";
+import { useCellName } from "../cell/CellName";
 import { Button } from "../kit/kit";
 import { Confirm } from "../kit/lazyControls";
 import { People } from "../people/People";
@@ -24,6 +25,7 @@ export function TopBar() {
   const cannotSave = useEditor((state) => whyUnavailable(state, state.doc?.project ? "SaveProject" : "SaveScene"));
   const cannotUndo = useEditor((state) => whyUnavailable(state, "Undo"));
   const [asking, setAsking] = useState(false);
+  const cell = useCellName();
   useUndoKeys();
   if (!doc) return null;
   const { unsaved } = doc;
@@ -43,6 +45,7 @@ export function TopBar() {
       <div className="document">
         <h1>{doc.project?.name ?? doc.scene.name}</h1>
         <p className="quiet small">
+          {cell && <strong className="cell-name">{cell} · </strong>}
           {doc.project ? t`on ${doc.scene.name}` : t`scene`}
           {" · "}
           <span className={unsaved ? "tag warn" : ""}>{running ? t`running` : unsaved ? t`not saved` : t`saved`}</span>

@@ -1,0 +1,12 @@
+/** Moves this device from this cell to another one. */
+
+import { theSession } from "../session/session";
+import { now } from "../store/store";
+import { ask } from "./requests";
+
+/** Give up what this device controls here, and show the page with all cells. */
+export async function showWorkplaces(address: string): Promise<void> {
+  if (now().connection.shared) await ask("LogOff");
+  await theSession().giveUp();
+  location.assign(address);
+}

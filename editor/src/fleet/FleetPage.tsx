@@ -1,0 +1,117 @@
+/** The page with all cells: who needs somebody first. A tap opens the operator's screen of a cell on its own server. */
+
+import { i18n } from "@lingui/core";
+import { plural, t } from "@lingui/core/macro";
+import { useState, useSyncExternalStore } from "react";
+import { isLanguage, LANGUAGES, loadCatalogue, useLanguage } from "../i18n/catalogue";
+import { remember } from "../session/localStorage";
+import { Icon } from "../ui/kit/icons";
+import { Button, Waiting } from "../ui/kit/kit";
+import { useScreenSettings } from "../ui/settings/Settings";
+import { groups, ICONS, TITLES } from "./attention";
+import { CellCard } from "./CellCard";
+import type { FleetFeed } from "./feed";
+import "./fleet.css";
+
+export function FleetPage({ feed }: { feed: FleetFeed }) {
+  const language = useLanguage();
+  useScreenSettings();
+  const { cards, connected, broker, loaded, needsToken } = useSyncExternalStore(feed.subscribe, feed.present);
+  const [search, setSearch] = useState("");
+  const wanted = search.trim().toLowerCase();
+  const shown = [...cards.values()].filter(
+    ({ name, state }) => name.includes(wanted) || state.program.toLowerCase().includes(wanted),
+  );
+  // Without the server of the fleet, nothing that is shown is known to be true.
+  const current = connected ? shown : shown.map((card) => ({ ...card, alive: false }));
+  const found = groups(current);
+  if (needsToken) return <Token key={language} onToken={(token) => (remember("token", token), feed.connect(token))} />;
+  return (
+    <div className="fleet screen" key={language}>
+      <header className="bar">
+        <h1>{t`Workplaces`}</h1>
+        <input
+          className="fleet-search"
+          type="search"
+          aria-label={t`Search`}
+          placeholder={t`Name or program`}
+          value={search}
+          onChange={(event) => setSearch(event.target.value)}
+        />
+        <select
+          aria-label={t`Language`}
+          value={language}
+          onChange={({ target: { value } }) => {
+            if (!isLanguage(value)) return;
+            remember("language", value);
+            void loadCatalogue(value);
+          }}
+        >
+          {Object.entries(LANGUAGES).map(([id, name]) => (
+            <option key={id} value={id}>
+              {name}
+            </option>
+          ))}
+        </select>
+      </header>
+      <main>
+        {loaded && !(connected && broker) && (
+          <p className="fleet-lost" role="alert">
+            <Icon name="plug" />
+            {connected
+              ? t`The broker is not connected, so no cell has a signal. The cells work without it.`
+              : t`The server of this page is not connected, so no cell has a signal. The cells work without it.`}
+          </p>
+        )}
+        {!loaded && <Waiting>{t`Loading…`}</Waiting>}
+        {loaded && cards.size === 0 && (
+          <p className="empty quiet">{t`No cells yet. A cell appears here when it has a name and the broker.`}</p>
+        )}
+        {cards.size > 0 && found.length === 0 && <p className="empty quiet">{t`No match for “${search.trim()}”.`}</p>}
+        <ul className="fleet-summary" aria-label={t`Summary`}>
+          {found.map(([level, members]) => (
+            <li key={level} data-level={level}>
+              <Icon name={ICONS[level]} />
+              <strong>{members.length}</strong> {i18n._(TITLES[level])}
+            </li>
+          ))}
+        </ul>
+        {found.map(([level, members]) => (
+          <section key={level} className="fleet-group" data-level={level}>
+            <h2>
+              {i18n._(TITLES[level])}
+              <span className="hidden-but-read">{plural(members.length, { one: ": # cell", other: ": # cells" })}</span>
+            </h2>
+            <ul className="fleet-cards">
+              {members.map((card) => (
+                <CellCard key={card.id} card={card} level={level} />
+              ))}
+            </ul>
+          </section>
+        ))}
+      </main>
+    </div>
+  );
+}
+
+/** Ask for the token of this screen. */
+function Token({ onToken }: { onToken: (token: string) => void }) {
+  const [token, setToken] = useState("");
+  return (
+    <form
+      className="fleet-token"
+      onSubmit={(event) => {
+        event.preventDefault();
+        if (token.trim()) onToken(token.trim());
+      }}
+    >
+      <h1>{t`Workplaces`}</h1>
+      <p>{t`A token is needed. An administrator creates one on the server of this page.`}</p>
+      <label>
+        {t`Token`}
+        <input type="password" autoComplete="off" value={token} onChange={(event) => setToken(event.target.value)} />
+      </label>
+      <Button look="primary" type="submit">{t`Show the cells`}</Button>
+    </form>
+  );
+}

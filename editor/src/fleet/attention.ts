@@ -1,0 +1,79 @@
+/** Which cells need somebody, and why. */
+
+import { i18n, type MessageDescriptor } from "@lingui/core";
+import { msg, t } from "@lingui/core/macro";
+import { clock, compared } from "../formats";
+import { translate } from "../i18n/serverMessages";
+import type { FleetCard, FleetState } from "../protocol/types";
+import { STATES } from "../ui/cell/words";
+import type { IconName } from "../ui/kit/icons";
+
+/** How urgently a cell needs somebody, most urgently first. */
+export const LEVELS = ["need", "watch", "running", "ready", "gone"] as const;
+export type Level = (typeof LEVELS)[number];
+
+export const TITLES: Record<Level, MessageDescriptor> = {
+  need: msg`Needs somebody`,
+  watch: msg`Check`,
+  running: msg`Running`,
+  ready: msg`Ready`,
+  gone: msg`No signal`,
+};
+export const ICONS: Record<Level, IconName> = {
+  need: "warn",
+  watch: "info",
+  running: "play",
+  ready: "pause",
+  gone: "plug",
+};
+
+/** States in which a program runs. */
+const ACTIVE: ReadonlySet<FleetState["state"]> = new Set(["starting", "execute", "unholding"]);
+
+/** Return the level of a card. */
+export function levelOf({ alive, conflict, state }: FleetCard): Level {
+  if (conflict) return "need";
+  if (!alive) return "gone";
+  if (state.held || state.state === "aborted" || state.urgent > 0 || state.high > 0) return "need";
+  if (state.medium > 0 || state.missing.length > 0 || state.state === "held" || state.state === "holding")
+    return "watch";
+  return ACTIVE.has(state.state) ? "running" : "ready";
+}
+
+/** Return the state of a cell in words. */
+export function stateText({ alive, conflict, seen, state }: FleetCard): string {
+  if (conflict) return t`Two servers use this name`;
+  if (!alive) return t`No signal since ${clock(seen)}`;
+  if (state.held) return t`Waits for a person`;
+  if (state.program_state === "paused") return t`Paused`;
+  return i18n._(STATES[state.state]);
+}
+
+/** Return why a cell needs somebody; an empty string if it does not. */
+export function reasonOf({ alive, conflict, state }: FleetCard): string {
+  if (conflict) return t`Its state may be that of another cell. Give each cell a name of its own.`;
+  if (!alive) return "";
+  const { first_alarm: alarm, missing } = state;
+  if (alarm) {
+    const text = translate(alarm.text_message ?? { text: alarm.text });
+    return alarm.device ? t`${alarm.device}: ${text}` : text;
+  }
+  if (missing.length > 0) return t`Not connected: ${missing.join(", ")}`;
+  return "";
+}
+
+/** Return who controls the cell: the PLC, who started the program, or who has locked something. */
+export function controlOf({ authority, started_by, controlling }: FleetState): string {
+  if (authority === "plc") return t`PLC`;
+  return [...new Set([started_by, ...controlling].filter(Boolean))].join(", ");
+}
+
+/** Return the cards of each level that has some, by name. */
+export function groups(cards: Iterable<FleetCard>): [Level, FleetCard[]][] {
+  const sorted = [...cards].sort((one, other) => compared(one.name, other.name) || compared(one.id, other.id));
+  const found = LEVELS.map((level): [Level, FleetCard[]] => [
+    level,
+    sorted.filter((card) => levelOf(card) === level),
+  ]);
+  return found.filter(([, members]) => members.length > 0);
+}

@@ -1,0 +1,156 @@
+"""`arcor2-hw fleet`: the page that shows many cells."""
+
+import asyncio
+import contextlib
+import os
+import signal
+import socket
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated, Final
+from urllib.parse import urlsplit
+
+import uvloop
+from cyclopts import App, Parameter, validators
+
+from arcor2_hw.data.cell import BROKER_URL
+from arcor2_hw.data.role import Role
+from arcor2_hw.exceptions import InvalidData, StorageError
+from arcor2_server.access.addresses import server_addresses
+from arcor2_server.access.admission import PARAMETER, Access, is_local, is_loopback
+from arcor2_server.access.tokens import TokenFile
+from arcor2_server.audit.command_line import note_command
+from arcor2_server.cli.exit_status import ExitStatus, fail
+from arcor2_server.cli.serve import CannotServe, certificate_of, data_directory, listen, renew_certificate
+from arcor2_server.deployment.service_manager import ServiceManager
+from arcor2_server.log import setup as server_logging
+from arcor2_server.settings import ServerSettings, default_data_dir
+
+FIRST_SCREEN: Final = "first screen"
+"""Name of the token that the first start on a network creates."""
+
+app = App(name="fleet")
+
+
+@app.command
+def serve(
+    *,
+    broker: Annotated[str, Parameter(env_var=BROKER_URL)] = "nats://127.0.0.1:4222",
+    ca: Annotated[Path | None, Parameter(env_var="ARCOR2_HW_NATS_CA")] = None,
+    host: str = "127.0.0.1",
+    port: Annotated[int, Parameter(validator=validators.Number(gte=0, lte=65535))] = 6780,
+    data_dir: Path | None = None,
+    tls: Annotated[tuple[Path, Path] | None, Parameter(negative="")] = None,
+    self_signed: bool = False,
+    insecure: bool = False,
+    log_level: str = "info",
+) -> int:
+    """Show all cells of a broker on one page, until Ctrl-C or SIGTERM.
+
+    Prints `ready URL` on standard output when the page is served. Nobody can command a cell through it.
+
+    Parameters
+    ----------
+    broker
+        Address of the broker (nats-server), with tls:// if it is on another computer. User and password are part of it;
+        set the variable instead of the option to hide them from other users.
+    ca
+        Certificate to trust for tls://.
+    host
+        Address to listen on. The default 127.0.0.1 is only reachable from this machine.
+    port
+        Port to listen on; 0 selects a free port, which `ready` shows.
+    data_dir
+        Data directory for results, tokens and known cells ($XDG_DATA_HOME/arcor2-hw-fleet). It is created if missing.
+    tls
+        PEM files of a certificate chain and its key for TLS.
+    self_signed
+        Use TLS with a certificate of a local authority. This is the default if other machines can connect.
+    insecure
+        Require no token, use TLS only if requested, and accept a broker on another computer without TLS. Use this only
+        in an isolated network.
+    log_level
+        Level of the log on standard error: debug, info, warning or error.
+    """
+    if find_spec("nats") is None:
+        return fail("fleet", "install the extra `nodes` of arcor2-hw", ExitStatus.FAILED)
+    os.umask(0o077)  # only the user may read the files of the server
+    try:
+        address = urlsplit(broker)
+        if not (insecure or address.scheme == "tls" or is_loopback(address.hostname or "")):
+            raise InvalidData(
+                "The broker at {host} is on another computer. Use an address with tls://, or --insecure in an "
+                "isolated network.",
+                host=address.hostname,
+            )
+        settings = ServerSettings.from_environment(
+            host=host,
+            port=port,
+            data_dir=data_dir or default_data_dir().with_name("arcor2-hw-fleet"),
+            insecure=insecure,
+            default_role=Role.TECHNICIAN,
+            broker_url=broker,
+            broker_authority=str(ca or ""),
+        )
+        server_logging.set_up(log_level)
+    except (InvalidData, KeyError, ValueError) as error:
+        return fail("fleet", error, ExitStatus.USAGE)
+    try:
+        with data_directory(settings.data_dir), contextlib.closing(listen(host, port)) as listener:
+            settings, certificate = certificate_of(settings, tls, self_signed)
+            _welcome(settings, listener.getsockname()[1])
+            with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+                runner.run(_run(settings, listener, certificate))
+    except CannotServe as error:
+        return fail("fleet", error, error.status)
+    except StorageError as error:
+        return fail("fleet", error, ExitStatus.DATA_UNUSABLE)
+    return ExitStatus.OK
+
+
+def _welcome(settings: ServerSettings, port: int) -> None:
+    """At the first start on a network, create a token for viewing and print an address with it."""
+    tokens = TokenFile(settings.data_dir)
+    if is_local(settings) or settings.insecure or tokens.all() or tokens.unusable:
+        return
+    _, secret = tokens.add(FIRST_SCREEN, Role.OPERATOR)
+    note_command(settings.audit_file, "fleet serve", FIRST_SCREEN)
+    here = server_addresses(settings, port).addresses or ["http://ADDRESS-OF-THE-PROXY"]
+    sys.stderr.write(f"arcor2-hw fleet: first start. Open the page at {here[0]}/?{PARAMETER}={secret}\n")
+
+
+async def _run(settings: ServerSettings, listener: socket.socket, certificate: tuple[Path, Path] | None) -> None:
+    from arcor2_server.access.connection_limits import ConnectionLimits
+    from arcor2_server.audit.trail import AuditTrail
+    from arcor2_server.fleet.application import create_fleet_app
+    from arcor2_server.fleet.collector import Collector  # needs the extra `nodes`
+    from arcor2_server.fleet.file import FILE, FleetFile
+    from arcor2_server.log.redaction import REDACTION
+    from arcor2_server.web.http_server import Server, configuration
+
+    manager = ServiceManager.from_environment()
+    access = Access(settings)
+    if problem := access.repair():
+        sys.stderr.write(f"arcor2-hw fleet: {problem}\n")
+    audit = AuditTrail(settings.audit_file, REDACTION.in_text)
+    await audit.open()
+    collector = Collector(settings.broker_url, settings.broker_authority, FleetFile(settings.data_dir / FILE))
+    loop = asyncio.get_running_loop()
+    config = configuration(create_fleet_app(settings, collector, access, audit), settings, certificate)
+    renewal = None
+    if settings.authority is not None:
+        config.load()
+        renewal = loop.create_task(renew_certificate(settings, config.ssl))
+    server = Server(config, settings, ConnectionLimits.of(settings), None, manager.ready)
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, server.end)
+    collector.start()
+    try:
+        await server.serve(sockets=[listener])
+    finally:
+        manager.stopping()
+        if renewal is not None:
+            renewal.cancel()
+        await collector.close()
+        audit.close()

@@ -1,0 +1,136 @@
+"""Sends the results in the outbox of a cell to the stream of this cell at the broker. It needs the extra `nodes`."""
+
+import asyncio
+import contextlib
+import hashlib
+from typing import Final
+
+import msgspec
+import structlog
+from msgspec.structs import replace
+from nats.aio.client import Client
+from nats.errors import Error as NatsError
+from nats.js.api import DiscardPolicy, PubAck, RetentionPolicy, StorageType
+from nats.js.client import JetStreamContext
+from nats.js.errors import NotFoundError
+
+from arcor2_hw.data.units import UnitRecord
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server.fleet import records as r
+from arcor2_server.storage.outbox import Outbox, OutboxKind, Waiting
+
+log = structlog.get_logger(__name__)
+
+BATCH: Final = 200
+"""Maximum number of results that are sent at once."""
+STORED_WITHIN: Final = 10.0
+"""Time limit for the broker to store a batch of results, s."""
+POLL_PERIOD: Final = 5.0
+"""Period in which the outbox is checked, also without an event, and time before a failed batch is sent again, s."""
+HEADERS: Final = 4096
+"""Size that is left for the headers of a message, bytes."""
+STREAM_BYTES: Final = 1 << 30
+"""Maximum size of the stream of a cell at the broker, bytes. Further results wait in the database of the cell."""
+
+
+class Delivery:
+    """Sends results, each until the broker has stored it.
+
+    Args:
+        outbox: the results.
+        name: of the cell.
+        identity: of the cell.
+    """
+
+    def __init__(self, outbox: Outbox, name: str, identity: str) -> None:
+        self._outbox, self._name, self._identity = outbox, name, identity
+        self._added = asyncio.Event()
+        outbox.on_added.append(self._added.set)
+        self.waiting = 0
+        """Number of results that wait."""
+        self.domain = ""
+        """JetStream domain of the broker; empty if it has none, or before it is known."""
+
+    async def run(self, client: Client) -> None:
+        """Send the results, each until the broker has stored it."""
+        reported = ""
+        while True:
+            try:
+                stream = await self._stream(client)
+                if reported:
+                    log.info("results are stored by the broker again")
+                reported = ""
+                await self._deliver_to(client, stream)
+            except (NatsError, TimeoutError, Arcor2Error) as error:
+                if (reason := f"{type(error).__name__}: {error}") != reported:
+                    reported = reason
+                    log.warning("results are not stored by the broker; they wait", reason=reason, waiting=self.waiting)
+            await asyncio.sleep(POLL_PERIOD)
+
+    async def _stream(self, client: Client) -> JetStreamContext:
+        """Return the JetStream of the broker, in which the stream of this cell exists."""
+        stream = client.jetstream(timeout=STORED_WITHIN)
+        self.domain = (await stream.account_info()).domain or ""
+        try:
+            await stream.stream_info(r.stream_name(self._name))
+        except NotFoundError:
+            await stream.add_stream(
+                name=r.stream_name(self._name),
+                subjects=r.result_subjects(self._name),
+                retention=RetentionPolicy.WORK_QUEUE,  # the server of the fleet acknowledges what it has stored
+                storage=StorageType.FILE,
+                discard=DiscardPolicy.NEW,
+                max_bytes=STREAM_BYTES,
+                max_msg_size=r.LARGEST_RESULT,
+            )
+        return stream
+
+    async def _deliver_to(self, client: Client, stream: JetStreamContext) -> None:
+        limit = min(client.max_payload, r.LARGEST_RESULT) - HEADERS
+        while True:
+            self._added.clear()
+            self.waiting = await self._outbox.count()
+            if not self.waiting:
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(POLL_PERIOD):
+                        await self._added.wait()
+                continue
+            done: list[int] = []
+            sent: list[int] = []
+            pending: list[asyncio.Future[PubAck]] = []
+            for waiting in await self._outbox.first(BATCH):
+                encoded = self._encoded(waiting, limit)
+                if len(encoded) > limit:
+                    log.error("result is too large for the broker and not sent", kind=waiting.kind, size=len(encoded))
+                    done.append(waiting.number)
+                    continue
+                message_id = hashlib.sha256(b"%d " % waiting.number + encoded).hexdigest()[:32]
+                headers = {"Nats-Msg-Id": message_id}  # the broker stores a message once that is sent again
+                subject = f"{r.PREFIX}.{self._name}.{waiting.kind}"
+                pending.append(
+                    await stream.publish_async(subject, encoded, stream=r.stream_name(self._name), headers=headers)
+                )
+                sent.append(waiting.number)
+            async with asyncio.timeout(STORED_WITHIN):
+                answers = await asyncio.gather(*pending, return_exceptions=True)
+            failures = [answer for answer in answers if isinstance(answer, BaseException)]
+            done += [
+                number for number, answer in zip(sent, answers, strict=True) if not isinstance(answer, BaseException)
+            ]
+            if done:
+                await self._outbox.remove(done)
+            if failures:
+                raise failures[0]
+
+    def _encoded(self, waiting: Waiting, limit: int) -> bytes:
+        """Return the message of a result. Steps of a unit that do not fit are left out."""
+        head = {"kind": waiting.kind.value, "identity": self._identity}
+        encoded = r.encode(head | {"record": msgspec.Raw(waiting.document)})
+        if len(encoded) <= limit or waiting.kind is not OutboxKind.UNIT:
+            return encoded
+        record = msgspec.json.decode(waiting.document, type=UnitRecord)
+        while len(encoded) > limit and record.steps:
+            stored = record.steps[: len(record.steps) // 2]
+            record = replace(record, steps=stored, dropped=record.dropped + len(record.steps) - len(stored))
+            encoded = r.encode(head | {"record": record})
+        return encoded

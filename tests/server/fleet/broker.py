@@ -1,0 +1,93 @@
+"""Brokers of two sites: a hub, and a leaf whose link to the hub can be cut. Both store streams."""
+
+import asyncio
+import contextlib
+import socket
+import subprocess
+from pathlib import Path
+
+from tests.server.nodes.conftest import NATS_SERVER
+from tests.waiting import wait_for
+
+
+class Server:
+    """A nats-server with a stream store on a fixed port, so that it can be killed and started again.
+
+    Args:
+        folder: for its files.
+        name: of the server and of its JetStream domain.
+        leaf_port: port for leaf nodes; 0: none.
+        hub_port: port of the hub to which it connects as a leaf node; 0: none.
+    """
+
+    def __init__(self, folder: Path, name: str, leaf_port: int = 0, hub_port: int = 0) -> None:
+        folder.mkdir(exist_ok=True)
+        self.port = free_port()
+        self.url = f"nats://127.0.0.1:{self.port}"
+        leafs = [f'listen: "127.0.0.1:{leaf_port}"'] if leaf_port else []
+        if hub_port:
+            leafs += ["reconnect: 1", f'remotes: [{{ url: "nats-leaf://127.0.0.1:{hub_port}" }}]']
+        self._file = folder / "nats.conf"
+        self._file.write_text(
+            f'server_name: {name}\nlisten: "127.0.0.1:{self.port}"\n'
+            f'jetstream {{ store_dir: "{folder / "store"}", domain: {name} }}\n'
+            f"leafnodes {{ {chr(10).join(leafs)} }}\n"
+        )
+        self.start()
+
+    def start(self) -> None:
+        command = (NATS_SERVER, "-c", str(self._file))
+        self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        wait_for(lambda: listens(self.port))
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.wait()
+
+
+class Link:
+    """Passes connections on to a port until it is cut."""
+
+    def __init__(self, target: int) -> None:
+        self._target = target
+        self.port = free_port()
+        self._server: asyncio.Server | None = None
+        self._writers: set[asyncio.StreamWriter] = set()
+
+    async def heal(self) -> None:
+        self._server = await asyncio.start_server(self._pass_on, "127.0.0.1", self.port)
+
+    async def cut(self) -> None:
+        assert self._server is not None
+        self._server.close()
+        for writer in tuple(self._writers):
+            writer.transport.abort()
+        self._server = None
+
+    async def _pass_on(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with contextlib.suppress(OSError):
+            other_reader, other_writer = await asyncio.open_connection("127.0.0.1", self._target)
+            both = {writer, other_writer}
+            self._writers |= both
+            await asyncio.gather(_copy(reader, other_writer), _copy(other_reader, writer), return_exceptions=True)
+            self._writers -= both
+
+
+async def _copy(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    try:
+        while data := await reader.read(65536):
+            writer.write(data)
+            await writer.drain()
+    finally:
+        writer.transport.abort()
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def listens(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0

@@ -1,0 +1,194 @@
+"""Results of a cell at another site: the link is cut, the broker and the server of the fleet are killed."""
+
+import asyncio
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import AsyncIterator, Callable, Iterator
+from pathlib import Path
+
+import httpx
+import msgspec
+import pytest
+
+from arcor2_hw.data.units import UnitState
+from arcor2_server.fleet.broker import keep_connected
+from arcor2_server.fleet.delivery import Delivery
+from arcor2_server.fleet.file import FILE, FleetFile, ReceivedResult
+from arcor2_server.fleet.records import encode, state_subject
+from arcor2_server.settings import ServerSettings
+from arcor2_server.storage import Storage
+from arcor2_server.storage.outbox import Outbox, OutboxKind
+from arcor2_server.storage.units import UnitStore
+from tests.server.fleet.broker import Link, Server, free_port
+from tests.server.fleet.cells import ENTERED, state_of, unit
+from tests.waiting import WITHIN
+
+pytestmark = pytest.mark.xdist_group("fleet")
+CELL, IDENTITY = "press", "a" * 32
+
+
+class FleetProcess:
+    """`arcor2-hw fleet serve`."""
+
+    def __init__(self, url: str, data_dir: Path, *options: str) -> None:
+        self.command = [sys.executable, "-P", "-m", "arcor2_server.cli.main", "fleet", "serve", "--port", "0"]
+        self.command += ["--broker", url, "--data-dir", str(data_dir), *options]
+        self.start()
+
+    def start(self) -> None:
+        self.process = subprocess.Popen(self.command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        assert self.process.stdout is not None
+        self.url = self.process.stdout.readline().split()[1].replace("ws://", "http://")
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+
+    def numbers(self) -> list[int]:
+        """Return the numbers of the stored units in order. They may arrive in another one."""
+        found = httpx.get(f"{self.url}/api/fleet/results", params={"kind": "unit", "limit": 1000}).json()
+        return sorted(each["record"]["number"] for each in found)
+
+
+class SmallCell:
+    """The database of a cell, and the tasks that publish its state and results."""
+
+    def __init__(self, storage: Storage, url: str, domain: str) -> None:
+        self.outbox = Outbox(storage)
+        self.units = UnitStore(storage, self.outbox)
+        self._delivery = Delivery(self.outbox, CELL, IDENTITY)
+        self._domain = domain
+        self._task = asyncio.create_task(keep_connected(url, "", "cell", self._publish, lambda: None))
+
+    async def _publish(self, client: object) -> None:
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(self._delivery.run(client))  # type: ignore[arg-type]
+            tasks.create_task(self._states(client))
+
+    async def _states(self, client: object) -> None:
+        for number in range(1, 10**6):
+            state = state_of(IDENTITY, number=number, domain=self._domain)
+            await client.publish(state_subject(CELL), encode(state))  # type: ignore[attr-defined]
+            await asyncio.sleep(0.2)
+
+    async def sent(self) -> None:
+        """Wait until the broker of the site has stored all results."""
+        async with asyncio.timeout(WITHIN):
+            while await self.outbox.count():
+                await asyncio.sleep(0.02)
+
+    async def close(self) -> None:
+        self._task.cancel()
+        await asyncio.gather(self._task, return_exceptions=True)
+
+
+@contextlib.asynccontextmanager
+async def two_sites(folder: Path) -> AsyncIterator[tuple[SmallCell, Link, Server, FleetProcess]]:
+    """Run a hub with the fleet, a link, and a leaf with a cell."""
+    leaf_port = free_port()
+    hub = Server(folder / "hub", "hub", leaf_port=leaf_port)
+    link = Link(leaf_port)
+    await link.heal()
+    site = Server(folder / "site", "site", hub_port=link.port)
+    fleet = FleetProcess(hub.url, folder / "fleet")
+    storage = await Storage.open(ServerSettings(data_dir=folder))
+    cell = SmallCell(storage, site.url, "site")
+    try:
+        yield cell, link, site, fleet
+    finally:
+        await cell.close()
+        await storage.close()
+        fleet.kill()
+        site.kill()
+        hub.kill()
+        with contextlib.suppress(AssertionError):
+            await link.cut()
+
+
+async def until(read: Callable[[], object], expected: object) -> None:
+    async with asyncio.timeout(2 * WITHIN):
+        while await asyncio.to_thread(read) != expected:
+            await asyncio.sleep(0.2)
+
+
+async def test_results_queued_while_offline_arrive_once_each(tmp_path: Path) -> None:
+    async with two_sites(tmp_path) as (cell, link, site, fleet):
+        await cell.units.put([unit(1)])
+        await until(fleet.numbers, [1])
+
+        # The link is cut: the broker of the site stores the results. Then it fails, too: the cell does.
+        await link.cut()
+        await cell.units.put([unit(number) for number in range(2, 151)])
+        await cell.sent()
+        site.kill()
+        await cell.units.put([unit(number) for number in range(151, 301)])
+        assert await cell.outbox.count() == 150
+        fleet.kill()
+        site.start()
+        await cell.sent()
+        await link.heal()
+        fleet.start()
+        await until(fleet.numbers, list(range(1, 301)))
+
+        # A unit that changes later replaces its earlier version.
+        await cell.units.put([unit(300, state=UnitState.REJECTED)])
+        await cell.sent()
+
+        def state_of_300() -> str:
+            found = httpx.get(f"{fleet.url}/api/fleet/results", params={"cell": CELL, "limit": 1000}).json()
+            return next(str(each["record"]["state"]) for each in found if each["record"]["number"] == 300)
+
+        await until(state_of_300, "rejected")
+        assert fleet.numbers() == list(range(1, 301))
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Iterator[FleetFile]:
+    opened = FleetFile(tmp_path / FILE)
+    yield opened
+    opened.close()
+
+
+def received(number: int, stamp: int, state: UnitState = UnitState.GOOD, since: str = ENTERED) -> ReceivedResult:
+    return ReceivedResult(CELL, IDENTITY, "unit", number, since, stamp, msgspec.json.encode(unit(number, state=state)))
+
+
+def test_a_result_that_is_delivered_again_is_stored_once(file: FleetFile) -> None:
+    """After kill -9 between storing and acknowledging, or after the broker has forgotten its message id."""
+    file.put_results([received(1, 10), received(2, 11)])
+    file.put_results([received(1, 10), received(1, 20, UnitState.BAD)])
+    file.put_results([received(1, 10)])  # an older version, delivered late
+    file.put_results([received(2, 30, since="2026-02-02T03:04:05.000000+00:00")])  # number reused after a restoration
+    found = [(each.id, msgspec.json.decode(each.record)["state"]) for each in file.results("", "unit", 0, 10)]
+    assert found == [(max(each for each, _ in found), "good"), (2, "good"), (1, "bad")]
+    assert file.count() == 3
+
+
+async def test_a_record_that_changes_while_it_waits_is_sent_once(tmp_path: Path) -> None:
+    storage = await Storage.open(ServerSettings(data_dir=tmp_path))
+    outbox = Outbox(storage)
+    units = UnitStore(storage, outbox)
+    try:
+        await units.put([unit(1), unit(2), unit(3, state=UnitState.IN_CELL)])
+        before = [each.number for each in await outbox.first(10)]
+        await units.put([unit(1, state=UnitState.BAD)])
+        await outbox.remove(before)  # the broker has stored the versions from before
+        (waiting,) = await outbox.first(10)
+        assert (waiting.kind, msgspec.json.decode(waiting.document)["state"]) == (OutboxKind.UNIT, "bad")
+        await units.put([], {1})
+        assert await outbox.first(10) == []
+        assert await outbox.count() == 0
+    finally:
+        await storage.close()
+
+
+def test_the_server_of_the_fleet_ends_orderly(tmp_path: Path) -> None:
+    fleet = FleetProcess(f"nats://127.0.0.1:{free_port()}", tmp_path)
+    os.kill(fleet.process.pid, signal.SIGTERM)
+    assert fleet.process.wait(WITHIN) == 0
+    fleet.kill()  # closes its output
