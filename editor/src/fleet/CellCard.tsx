@@ -1,9 +1,11 @@
 /** One cell on the page: state, program, counts, alarms, and who controls it. */
 
 import { plural, t } from "@lingui/core/macro";
-import { memo } from "react";
+import { memo, useState } from "react";
 import type { FleetCard } from "../protocol/types";
+import { rest } from "../session/rest";
 import { Icon } from "../ui/kit/icons";
+import { Button } from "../ui/kit/kit";
 import { controlOf, ICONS, type Level, reasonOf, stateText } from "./attention";
 
 export const CellCard = memo(function CellCard({ card, level }: { card: FleetCard; level: Level }) {
@@ -17,10 +19,13 @@ export const CellCard = memo(function CellCard({ card, level }: { card: FleetCar
         <Icon name={ICONS[level]} />
         <span className="fleet-name">{name}</span>
       </h3>
-      <p className="fleet-state">{stateText(card)}</p>
+      {/* The heading of the group says it already. */}
+      <p className={level === "running" ? "hidden-but-read" : "fleet-state"}>{stateText(card)}</p>
       {reason && <p className="fleet-reason">{reason}</p>}
       {(state.program || state.recipe) && (
-        <p className="fleet-program quiet small">{state.recipe ? `${state.program} · ${state.recipe}` : state.program}</p>
+        <p className="fleet-program quiet small">
+          {state.recipe ? `${state.program} · ${state.recipe}` : state.program}
+        </p>
       )}
       <p className="fleet-facts small">
         <span title={t`Good and bad units of the last 8 hours`}>
@@ -48,6 +53,22 @@ export const CellCard = memo(function CellCard({ card, level }: { card: FleetCar
   return (
     <li className="fleet-card" data-level={level}>
       {state.address ? <a href={`${state.address}/#/operator`}>{content}</a> : <div>{content}</div>}
+      {!alive && <Remove id={card.id} name={name} />}
     </li>
   );
 });
+
+/** Remove a cell that does not exist any more from the page. It appears again as soon as it has a signal. */
+function Remove({ id, name }: { id: string; name: string }) {
+  const [refused, setRefused] = useState("");
+  const remove = () =>
+    rest(`/api/fleet/cells/${encodeURIComponent(id)}`, { method: "DELETE" }).catch((error: Error) =>
+      setRefused(error.message),
+    );
+  return (
+    <>
+      <Button look="plain" icon="close" aria-label={t`Remove ${name} from this page`} onPress={() => void remove()} />
+      {refused && <p role="alert">{refused}</p>}
+    </>
+  );
+}

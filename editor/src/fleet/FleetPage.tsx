@@ -27,69 +27,73 @@ export function FleetPage({ feed }: { feed: FleetFeed }) {
   const found = groups(current);
   if (needsToken) return <Token key={language} onToken={(token) => (remember("token", token), feed.connect(token))} />;
   return (
-    <div className="fleet screen" key={language}>
-      <header className="bar">
-        <h1>{t`Workplaces`}</h1>
-        <input
-          className="fleet-search"
-          type="search"
-          aria-label={t`Search`}
-          placeholder={t`Name or program`}
-          value={search}
-          onChange={(event) => setSearch(event.target.value)}
-        />
-        <select
-          aria-label={t`Language`}
-          value={language}
-          onChange={({ target: { value } }) => {
-            if (!isLanguage(value)) return;
-            remember("language", value);
-            void loadCatalogue(value);
-          }}
-        >
-          {Object.entries(LANGUAGES).map(([id, name]) => (
-            <option key={id} value={id}>
-              {name}
-            </option>
-          ))}
-        </select>
-      </header>
-      <main>
-        {loaded && !(connected && broker) && (
-          <p className="fleet-lost" role="alert">
-            <Icon name="plug" />
-            {connected
-              ? t`The broker is not connected, so no cell has a signal. The cells work without it.`
-              : t`The server of this page is not connected, so no cell has a signal. The cells work without it.`}
-          </p>
-        )}
-        {!loaded && <Waiting>{t`Loading…`}</Waiting>}
-        {loaded && cards.size === 0 && (
-          <p className="empty quiet">{t`No cells yet. A cell appears here when it has a name and the broker.`}</p>
-        )}
-        {cards.size > 0 && found.length === 0 && <p className="empty quiet">{t`No match for “${search.trim()}”.`}</p>}
-        <ul className="fleet-summary" aria-label={t`Summary`}>
+    <div className="screen" key={language}>
+      <div className="fleet">
+        <header className="bar">
+          <h1>{t`Workplaces`}</h1>
+          <input
+            className="fleet-search"
+            type="search"
+            aria-label={t`Search`}
+            placeholder={t`Name or program`}
+            value={search}
+            onChange={(event) => setSearch(event.target.value)}
+          />
+          <select
+            aria-label={t`Language`}
+            value={language}
+            onChange={({ target: { value } }) => {
+              if (!isLanguage(value)) return;
+              remember("language", value);
+              void loadCatalogue(value);
+            }}
+          >
+            {Object.entries(LANGUAGES).map(([id, name]) => (
+              <option key={id} value={id}>
+                {name}
+              </option>
+            ))}
+          </select>
+        </header>
+        <main>
+          {loaded && !(connected && broker) && (
+            <p className="fleet-lost" role="alert">
+              <Icon name="plug" />
+              {connected
+                ? t`The broker is not connected, so no cell has a signal. The cells work without it.`
+                : t`The server of this page is not connected, so no cell has a signal. The cells work without it.`}
+            </p>
+          )}
+          {!loaded && <Waiting>{t`Loading…`}</Waiting>}
+          {loaded && cards.size === 0 && (
+            <p className="empty quiet">{t`No cells yet. A cell appears here when it has a name and the broker.`}</p>
+          )}
+          {cards.size > 0 && found.length === 0 && <p className="empty quiet">{t`No match for “${search.trim()}”.`}</p>}
+          <ul className="fleet-summary" aria-label={t`Summary`}>
+            {found.map(([level, members]) => (
+              <li key={level} data-level={level}>
+                <Icon name={ICONS[level]} />
+                <strong>{members.length}</strong> {i18n._(TITLES[level])}
+              </li>
+            ))}
+          </ul>
           {found.map(([level, members]) => (
-            <li key={level} data-level={level}>
-              <Icon name={ICONS[level]} />
-              <strong>{members.length}</strong> {i18n._(TITLES[level])}
-            </li>
+            <section key={level} className="fleet-group" data-level={level}>
+              <h2>
+                {i18n._(TITLES[level])}
+                <span className="hidden-but-read">
+                  {plural(members.length, { one: ": # cell", other: ": # cells" })}
+                </span>
+              </h2>
+              <ul className="fleet-cards">
+                {members.map((card) => (
+                  <CellCard key={card.id} card={card} level={level} />
+                ))}
+              </ul>
+            </section>
           ))}
-        </ul>
-        {found.map(([level, members]) => (
-          <section key={level} className="fleet-group" data-level={level}>
-            <h2>
-              {i18n._(TITLES[level])}
-              <span className="hidden-but-read">{plural(members.length, { one: ": # cell", other: ": # cells" })}</span>
-            </h2>
-            <ul className="fleet-cards">
-              {members.map((card) => (
-                <CellCard key={card.id} card={card} level={level} />
-              ))}
-            </ul>
-          </section>
-        ))}
-      </main>
+        </main>
+      </div>
     </div>
   );
 }

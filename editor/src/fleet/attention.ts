@@ -14,7 +14,7 @@ export type Level = (typeof LEVELS)[number];
 
 export const TITLES: Record<Level, MessageDescriptor> = {
   need: msg`Needs somebody`,
-  watch: msg`Check`,
+  watch: msg`To check`,
   running: msg`Running`,
   ready: msg`Ready`,
   gone: msg`No signal`,
@@ -23,7 +23,7 @@ export const ICONS: Record<Level, IconName> = {
   need: "warn",
   watch: "info",
   running: "play",
-  ready: "pause",
+  ready: "check",
   gone: "plug",
 };
 
@@ -71,9 +71,6 @@ export function controlOf({ authority, started_by, controlling }: FleetState): s
 /** Return the cards of each level that has some, by name. */
 export function groups(cards: Iterable<FleetCard>): [Level, FleetCard[]][] {
   const sorted = [...cards].sort((one, other) => compared(one.name, other.name) || compared(one.id, other.id));
-  const found = LEVELS.map((level): [Level, FleetCard[]] => [
-    level,
-    sorted.filter((card) => levelOf(card) === level),
-  ]);
+  const found = LEVELS.map((level): [Level, FleetCard[]] => [level, sorted.filter((card) => levelOf(card) === level)]);
   return found.filter(([, members]) => members.length > 0);
 }

@@ -4,8 +4,8 @@ import { createRoot } from "react-dom/client";
 import { isLanguage, loadCatalogue, preferredLanguage } from "../i18n/catalogue";
 import { persistently } from "../persistently";
 import { remembered, takeTokenFromAddress } from "../session/localStorage";
-import { FleetFeed } from "./feed";
 import { FleetPage } from "./FleetPage";
+import { FleetFeed } from "./feed";
 import "../ui/tokens.css";
 import "../ui/base.css";
 

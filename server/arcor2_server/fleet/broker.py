@@ -39,15 +39,20 @@ async def keep_connected(
         lost: called after a connection was lost.
     """
     reported = False
+
+    def unreached(error: Exception) -> None:
+        nonlocal reported
+        if not reported:
+            reported = True
+            reason = f"{type(error).__name__}: {error}"
+            log.warning("the broker is not reached; trying again", broker=_address(url), reason=reason)
+
     while True:
         ended = asyncio.Event()
         try:
-            client = await _connect(url, authority, name, ended)
+            client = await _connect(url, authority, name, ended, unreached)
         except (NatsError, OSError, TimeoutError, ValueError) as error:
-            if not reported:
-                reported = True
-                reason = f"{type(error).__name__}: {error}"
-                log.warning("the broker is not reached; trying again", broker=_address(url), reason=reason)
+            unreached(error)
             await asyncio.sleep(RETRY_PERIOD)
             continue
         reported = False
@@ -74,21 +79,26 @@ async def keep_connected(
         await asyncio.sleep(RETRY_PERIOD)
 
 
-async def _connect(url: str, authority: str, name: str, ended: asyncio.Event) -> Client:
+async def _connect(
+    url: str, authority: str, name: str, ended: asyncio.Event, unreached: Callable[[Exception], None]
+) -> Client:
     # Without it, the client would also accept a broker without TLS.
     tls = ssl.create_default_context(cafile=authority or None) if url.startswith("tls://") else None
     reported: set[str] = set()
+    connected = False
 
     async def disconnected() -> None:
         ended.set()
 
     async def failed(error: Exception) -> None:
         """Report errors such as a missing permission once for each connection."""
-        if (text := f"{type(error).__name__}: {error}") not in reported and len(reported) < 10:
+        if not connected:
+            unreached(error)
+        elif (text := f"{type(error).__name__}: {error}") not in reported and len(reported) < 10:
             reported.add(text)
             log.warning("error of the broker", broker=_address(url), reason=text)
 
-    return await asyncio.wait_for(
+    client = await asyncio.wait_for(
         nats.connect(
             url,
             name=name,
@@ -103,6 +113,8 @@ async def _connect(url: str, authority: str, name: str, ended: asyncio.Event) ->
         ),
         CONNECT_WITHIN,
     )
+    connected = True
+    return client
 
 
 def _address(url: str) -> str:

@@ -5,7 +5,7 @@ import zlib
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
-from sqlalchemy import delete, func, select
+from sqlalchemy import delete, func, insert, select
 from sqlalchemy.ext.asyncio import AsyncSession
 
 from arcor2_server.storage.models import AlarmRow, OutboxRow, UnitRow
@@ -37,13 +37,12 @@ class Outbox:
 
     async def add(self, session: AsyncSession, kind: OutboxKind, records: Sequence[int]) -> None:
         """Add changed records within the transaction that stores them. A waiting row of the same record is replaced."""
-        for record in records:
-            await session.execute(delete(OutboxRow).where(OutboxRow.kind == kind, OutboxRow.record == record))
-            session.add(OutboxRow(kind=kind.value, record=record))
-            await session.flush()
-        if records:
-            for notify in self.on_added:
-                notify()
+        if not records:
+            return
+        await session.execute(delete(OutboxRow).where(OutboxRow.kind == kind, OutboxRow.record.in_(records)))
+        await session.execute(insert(OutboxRow), [{"kind": kind.value, "record": record} for record in records])
+        for notify in self.on_added:
+            notify()
 
     async def count(self) -> int:
         """Return the number of waiting records."""

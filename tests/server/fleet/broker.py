@@ -18,11 +18,12 @@ class Server:
         name: of the server and of its JetStream domain.
         leaf_port: port for leaf nodes; 0: none.
         hub_port: port of the hub to which it connects as a leaf node; 0: none.
+        port: port for clients; 0: a free one.
     """
 
-    def __init__(self, folder: Path, name: str, leaf_port: int = 0, hub_port: int = 0) -> None:
+    def __init__(self, folder: Path, name: str, leaf_port: int = 0, hub_port: int = 0, port: int = 0) -> None:
         folder.mkdir(exist_ok=True)
-        self.port = free_port()
+        self.port = port or free_port()
         self.url = f"nats://127.0.0.1:{self.port}"
         leafs = [f'listen: "127.0.0.1:{leaf_port}"'] if leaf_port else []
         if hub_port:
@@ -53,6 +54,7 @@ class Link:
         self.port = free_port()
         self._server: asyncio.Server | None = None
         self._writers: set[asyncio.StreamWriter] = set()
+        self._tasks: set[asyncio.Task[None]] = set()
 
     async def heal(self) -> None:
         self._server = await asyncio.start_server(self._pass_on, "127.0.0.1", self.port)
@@ -62,9 +64,14 @@ class Link:
         self._server.close()
         for writer in tuple(self._writers):
             writer.transport.abort()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
         self._server = None
 
     async def _pass_on(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.current_task()
+        assert task is not None
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
         with contextlib.suppress(OSError):
             other_reader, other_writer = await asyncio.open_connection("127.0.0.1", self._target)
             both = {writer, other_writer}

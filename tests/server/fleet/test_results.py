@@ -76,9 +76,9 @@ class SmallCell:
             await client.publish(state_subject(CELL), encode(state))  # type: ignore[attr-defined]
             await asyncio.sleep(0.2)
 
-    async def sent(self) -> None:
+    async def sent(self, within: float = WITHIN) -> None:
         """Wait until the broker of the site has stored all results."""
-        async with asyncio.timeout(WITHIN):
+        async with asyncio.timeout(within):
             while await self.outbox.count():
                 await asyncio.sleep(0.02)
 
