@@ -22,6 +22,7 @@ export const CellCard = memo(function CellCard({ card, level }: { card: FleetCar
       {/* The heading of the group says it already. */}
       <p className={level === "running" ? "hidden-but-read" : "fleet-state"}>{stateText(card)}</p>
       {reason && <p className="fleet-reason">{reason}</p>}
+      {card.conflict && <p className="fleet-reason small">{state.address || state.identity}</p>}
       {(state.program || state.recipe) && (
         <p className="fleet-program quiet small">
           {state.recipe ? `${state.program} · ${state.recipe}` : state.program}

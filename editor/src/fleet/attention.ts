@@ -50,7 +50,8 @@ export function stateText({ alive, conflict, seen, state }: FleetCard): string {
 }
 
 /** Return why a cell needs somebody; an empty string if it does not. */
-export function reasonOf({ alive, conflict, state }: FleetCard): string {
+export function reasonOf({ alive, conflict, seen, state }: FleetCard): string {
+  if (conflict && !alive) return t`No signal since ${clock(seen)}`;
   if (conflict) return t`Its state may be that of another cell. Give each cell a name of its own.`;
   if (!alive) return "";
   const { first_alarm: alarm, missing } = state;

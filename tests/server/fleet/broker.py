@@ -9,9 +9,21 @@ from pathlib import Path
 from tests.server.nodes.conftest import NATS_SERVER
 from tests.waiting import wait_for
 
+USERS = """
+authorization { users: [
+  { user: fleet, password: f,
+    permissions: { publish: ["$JS.>"], subscribe: ["arcor2hw.fleet.*.state", "_INBOX.>"] } }
+  { user: cell, password: c,
+    permissions: { publish: ["arcor2hw.fleet.press-3.>", "$JS.API.>"], subscribe: ["_INBOX.>"] } }
+] }
+"""
+"""The permissions of docs/how-to/fleet.md."""
+
 
 class Server:
     """A nats-server with a stream store on a fixed port, so that it can be killed and started again.
+
+    The server of the fleet and the cell press-3 have the permissions that they need, and no others.
 
     Args:
         folder: for its files.
@@ -24,7 +36,8 @@ class Server:
     def __init__(self, folder: Path, name: str, leaf_port: int = 0, hub_port: int = 0, port: int = 0) -> None:
         folder.mkdir(exist_ok=True)
         self.port = port or free_port()
-        self.url = f"nats://127.0.0.1:{self.port}"
+        self.url = f"nats://cell:c@127.0.0.1:{self.port}"
+        self.fleet_url = f"nats://fleet:f@127.0.0.1:{self.port}"
         leafs = [f'listen: "127.0.0.1:{leaf_port}"'] if leaf_port else []
         if hub_port:
             leafs += ["reconnect: 1", f'remotes: [{{ url: "nats-leaf://127.0.0.1:{hub_port}" }}]']
@@ -32,7 +45,7 @@ class Server:
         self._file.write_text(
             f'server_name: {name}\nlisten: "127.0.0.1:{self.port}"\n'
             f'jetstream {{ store_dir: "{folder / "store"}", domain: {name} }}\n'
-            f"leafnodes {{ {chr(10).join(leafs)} }}\n"
+            f"leafnodes {{ {chr(10).join(leafs)} }}\n{USERS}"
         )
         self.start()
 

@@ -2,8 +2,6 @@
 
 import asyncio
 import contextlib
-import os
-import signal
 import subprocess
 import sys
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -27,7 +25,7 @@ from tests.server.fleet.cells import ENTERED, state_of, unit
 from tests.waiting import WITHIN
 
 pytestmark = pytest.mark.xdist_group("fleet")
-CELL, IDENTITY = "press", "a" * 32
+CELL, IDENTITY = "press-3", "a" * 32
 
 
 class FleetProcess:
@@ -95,7 +93,7 @@ async def two_sites(folder: Path) -> AsyncIterator[tuple[SmallCell, Link, Server
     link = Link(leaf_port)
     await link.heal()
     site = Server(folder / "site", "site", hub_port=link.port)
-    fleet = FleetProcess(hub.url, folder / "fleet")
+    fleet = FleetProcess(hub.fleet_url, folder / "fleet")
     storage = await Storage.open(ServerSettings(data_dir=folder))
     cell = SmallCell(storage, site.url, "site")
     try:
@@ -185,10 +183,3 @@ async def test_a_record_that_changes_while_it_waits_is_sent_once(tmp_path: Path)
         assert await outbox.count() == 0
     finally:
         await storage.close()
-
-
-def test_the_server_of_the_fleet_ends_orderly(tmp_path: Path) -> None:
-    fleet = FleetProcess(f"nats://127.0.0.1:{free_port()}", tmp_path)
-    os.kill(fleet.process.pid, signal.SIGTERM)
-    assert fleet.process.wait(WITHIN) == 0
-    fleet.kill()  # closes its output
