@@ -5,7 +5,7 @@ const call = vi.fn();
 vi.mock("./connection", () => ({ call, serves: (request: string) => request === "GetViewState" }));
 
 const { Session } = await import("./session");
-const { now, setConnection } = await import("../store/store");
+const { now, setConnection, store } = await import("../store/store");
 
 beforeEach(() => {
   vi.stubGlobal("window", new EventTarget());
@@ -48,4 +48,19 @@ test("what a user sees and changes is never replaced by the stored view state", 
   expect(now().view.general).toEqual({ dismissed_run: 3 });
   await new Promise((resolve) => setTimeout(resolve));
   expect(answers, "requested again while the user may change it").toHaveLength(2);
+});
+
+test("a user who goes to another workplace releases own locks before the connection ends", async () => {
+  const sent: string[] = [];
+  call.mockImplementation((request: string, { object_id }: { object_id: string }) => {
+    sent.push(`${request} ${object_id}`);
+    return Promise.resolve();
+  });
+  const client = { stop: () => sent.push("stop"), start: vi.fn(), reconnect: vi.fn() };
+  const session = new Session(client as never);
+  setConnection({ user: "Olga" });
+  store.setState({ locks: { robot: "Olga", tester: "Petr" } });
+  await session.giveUp();
+  expect(sent).toEqual(["WriteUnlock robot", "stop"]);
+  expect(now().connection.status).toBe("left");
 });
