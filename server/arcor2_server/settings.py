@@ -342,10 +342,10 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
                 DeadBand.parse(band)
         except ValueError as error:
             raise InvalidData("ARCOR2_HW_POINT_HISTORY_DEAD_BANDS: {reason}", reason=error) from None
-        if (name := values.get("cell_name")) and not CELL_NAME.fullmatch(name):
+        if (cell := values.get("cell_name")) and not CELL_NAME.fullmatch(cell):
             raise InvalidData(
                 "ARCOR2_HW_CELL_NAME={name!r} is not a name of a cell: use lower-case letters, digits, - and _.",
-                name=name,
+                name=cell,
             )
         for variable in ("cell_address", "fleet_address"):
             if (address := values.get(variable)) and not address.startswith(("http://", "https://")):

@@ -5,10 +5,11 @@ import contextlib
 import os
 import signal
 import socket
+import ssl
 import sys
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Final, cast
 from urllib.parse import urlsplit
 
 import uvloop
@@ -141,7 +142,7 @@ async def _run(settings: ServerSettings, listener: socket.socket, certificate: t
     renewal = None
     if settings.authority is not None:
         config.load()
-        renewal = loop.create_task(renew_certificate(settings, config.ssl))
+        renewal = loop.create_task(renew_certificate(settings, cast("ssl.SSLContext", config.ssl)))
     server = Server(config, settings, ConnectionLimits.of(settings), None, manager.ready)
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, server.end)

@@ -2,7 +2,7 @@
 
 import asyncio
 import contextlib
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, cast
 
 from litestar import Litestar, Request, Response, WebSocket, delete, get, websocket
 from litestar.exceptions import HTTPException, WebSocketDisconnect
@@ -63,7 +63,7 @@ class _Routes:
             if admission.role is None:
                 await socket.close(CloseCode.NOT_ADMITTED, TOKEN_NEEDED)
                 return
-            protocol: WireProtocol = (socket.scope["extensions"] or {})[EXTENSION]  # type: ignore[typeddict-item]
+            protocol = cast("WireProtocol", (socket.scope["extensions"] or {})[EXTENSION])
             protocol.admit()
             sending = asyncio.create_task(self._send(socket, protocol, admission.token), name="page of the fleet")
             with contextlib.suppress(WebSocketDisconnect):

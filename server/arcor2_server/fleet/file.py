@@ -152,7 +152,7 @@ class FleetFile:
         query = f"select id, cell, identity, kind, document from result {condition}order by id desc limit ?"  # noqa: S608 (only texts from above)
         with self._guarded():
             rows = self._connection.execute(query, (*values, limit)).fetchall()
-        return [FleetResult(*row[:4], msgspec.Raw(row[4])) for row in rows]
+        return [FleetResult(row[0], row[1], row[2], row[3], msgspec.Raw(row[4])) for row in rows]
 
     def count(self) -> int:
         """Return the number of stored results."""

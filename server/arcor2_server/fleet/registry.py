@@ -184,8 +184,10 @@ class Registry:
         conflict: bool | Unset = UNSET,
         seen: Timestamp | Unset = UNSET,
     ) -> None:
-        given = {"state": state, "alive": alive, "conflict": conflict}
-        changed = {key: value for key, value in given.items() if value not in (UNSET, getattr(cell.card, key))}
+        given: dict[str, FleetState | bool | Unset] = {"state": state, "alive": alive, "conflict": conflict}
+        changed: dict[str, FleetState | bool | str | Unset] = {
+            key: value for key, value in given.items() if value not in (UNSET, getattr(cell.card, key))
+        }
         if not isinstance(alive, Unset):
             cell.alive = alive
         if not isinstance(seen, Unset):

@@ -46,6 +46,7 @@ ADDED = {
         *("checkpoints", "continue_at", "continues", "on_error", "order"),
         *("recipe_id", "recipe_values", "shared_breakpoints"),
     },
+    "SystemInfo.Response.Data": {"cell"},
     "TemporaryPackage.Request.Args": {"checkpoints", "on_error", "shared_breakpoints"},
 }
 """Optional fields that we add to the protocol (docs/protocol.md), by the name of the type."""
