@@ -65,6 +65,8 @@ describe("who needs somebody", () => {
   it("is explained by the first alarm, else by missing devices", () => {
     const first_alarm = { priority: "high", text: "No part.", raised: "", device: "Gripper" } as const;
     expect(reasonOf(card("a", { first_alarm, missing: ["camera"] }))).toBe("Gripper: No part.");
+    const addressed = { ...first_alarm, text: "tower at 127.0.0.1:41893: no answer", device: "" };
+    expect(reasonOf(card("a", { first_alarm: addressed }))).toBe("tower: no answer");
     expect(reasonOf(card("a", { missing: ["camera", "scale"] }))).toBe("Not connected: camera, scale");
     expect(reasonOf(card("a", { first_alarm }, { alive: false }))).toBe("");
     expect(stateText(card("a", { held: true }))).toBe("Waits for a person");

@@ -4,6 +4,7 @@ import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
 import { clock, compared } from "../formats";
 import { translate } from "../i18n/serverMessages";
+import { splitAddress } from "../program/messages";
 import type { FleetCard, FleetState } from "../protocol/types";
 import { STATES } from "../ui/cell/words";
 import type { IconName } from "../ui/kit/icons";
@@ -56,7 +57,8 @@ export function reasonOf({ alive, conflict, seen, state }: FleetCard): string {
   if (!alive) return "";
   const { first_alarm: alarm, missing } = state;
   if (alarm) {
-    const text = translate(alarm.text_message ?? { text: alarm.text });
+    // Its address is for technicians, who see it in the cell.
+    const { text } = splitAddress(translate(alarm.text_message ?? { text: alarm.text }));
     return alarm.device ? t`${alarm.device}: ${text}` : text;
   }
   if (missing.length > 0) return t`Not connected: ${missing.join(", ")}`;

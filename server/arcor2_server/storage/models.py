@@ -303,13 +303,13 @@ class ParameterBackupRow(Base):
 class OutboxRow(Base):
     """A changed unit or alarm that the broker has not stored yet. A further change replaces the row by a newer one.
 
-    `kind`: "unit" or "alarm". `record`: the number of the unit or alarm.
+    `number` grows and is never used again. `kind`: "unit" or "alarm". `record`: the number of the unit or alarm.
     """
 
     __tablename__ = "outbox"
-    __table_args__ = (UniqueConstraint("kind", "record"), {"sqlite_autoincrement": True})
+    __table_args__ = (UniqueConstraint("kind", "record"),)
 
-    number: Mapped[int] = mapped_column(Integer, primary_key=True)
+    number: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
     kind: Mapped[str] = mapped_column(StoredText(20))
     record: Mapped[int] = mapped_column(Integer)
 

@@ -1,6 +1,7 @@
 """Stores which changed units and alarms have to be sent to the fleet, in the transaction that changes them."""
 
 import enum
+import time
 import zlib
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
@@ -32,6 +33,7 @@ class Outbox:
 
     def __init__(self, storage: Storage) -> None:
         self._storage = storage
+        self._last = 0
         self.on_added: list[Callable[[], None]] = []
         """Called after rows were added, possibly before their transaction ends."""
 
@@ -40,7 +42,13 @@ class Outbox:
         if not records:
             return
         await session.execute(delete(OutboxRow).where(OutboxRow.kind == kind, OutboxRow.record.in_(records)))
-        await session.execute(insert(OutboxRow), [{"kind": kind.value, "record": record} for record in records])
+        # By the clock, so that a number is not used again after all rows were removed; the clock may be set back.
+        if not self._last:
+            self._last = await session.scalar(select(func.max(OutboxRow.number))) or 0
+        first = max(self._last + 1, time.time_ns() // 1000)
+        self._last = first + len(records) - 1
+        rows = [{"number": first + index, "kind": kind.value, "record": record} for index, record in enumerate(records)]
+        await session.execute(insert(OutboxRow), rows)
         for notify in self.on_added:
             notify()
 

@@ -11,11 +11,10 @@ def upgrade() -> None:
     """Migrate to this revision."""
     op.create_table(
         "outbox",
-        sa.Column("number", sa.Integer(), primary_key=True),
+        sa.Column("number", sa.BigInteger(), primary_key=True, autoincrement=False),
         sa.Column("kind", sa.String(20), nullable=False),
         sa.Column("record", sa.Integer(), nullable=False),
         sa.UniqueConstraint("kind", "record"),
-        sqlite_autoincrement=True,
     )
 
 
