@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple, Self
 import msgspec
 
 from arcor2_hw.calibration.configuration import CalibrationConfiguration
-from arcor2_hw.data.cell import BROKER_URL, Cell
+from arcor2_hw.data.cell import Cell
 from arcor2_hw.data.device import DEVICE_FILES
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
@@ -28,6 +28,10 @@ DATABASE_URL: Final = "ARCOR2_HW_DATABASE_URL"
 """The variable with the address of the database."""
 MQTT_URL: Final = "ARCOR2_HW_MQTT_URL"
 """The variable with the address of the MQTT broker, which may contain a password."""
+FLEET_BROKER: Final = "ARCOR2_HW_FLEET_NATS_URL"
+"""The variable with the address of the broker of the fleet. It may contain a password."""
+FLEET_AUTHORITY: Final = "ARCOR2_HW_FLEET_NATS_CA"
+"""The variable with the file of the certificate to trust for this broker."""
 DEVICE_FILES_NAME: Final = "device-files"
 """Folder of the data directory with the files that settings of devices may name."""
 
@@ -131,10 +135,10 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     """Address of the editor for other computers; empty: the first one that this machine has."""
     fleet_address: str = ""
     """Address of the page with all cells, to which the editor links; empty: none."""
-    broker_url: str = ""
-    """Address of the broker (NATS); empty: none."""
-    broker_authority: str = ""
-    """File of the certificate to trust for the broker; empty: those that the system trusts."""
+    fleet_broker: str = ""
+    """Address of the broker (NATS) of the fleet; empty: none."""
+    fleet_authority: str = ""
+    """File of the certificate to trust for this broker; empty: those that the system trusts."""
     plc_life_timeout: float = 2.0
     """Time after which a life counter of the PLC that does not change holds its program, s."""
     device_files: tuple[str, ...] = ()
@@ -199,7 +203,7 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def in_fleet(self) -> bool:
         """Whether the cell publishes its state and results."""
-        return bool(self.cell_name and self.broker_url)
+        return bool(self.cell_name and self.fleet_broker)
 
     @property
     def documents_database(self) -> Path:
@@ -392,8 +396,8 @@ _VARIABLES: Final = {
     "ARCOR2_HW_CELL_NAME": "cell_name",
     "ARCOR2_HW_CELL_ADDRESS": "cell_address",
     "ARCOR2_HW_FLEET_ADDRESS": "fleet_address",
-    BROKER_URL: "broker_url",
-    "ARCOR2_HW_NATS_CA": "broker_authority",
+    FLEET_BROKER: "fleet_broker",
+    FLEET_AUTHORITY: "fleet_authority",
     "ARCOR2_HW_CONNECTIONS": "connections",
     "ARCOR2_HW_CONNECTIONS_PER_ADDRESS": "connections_per_address",
     "ARCOR2_HW_REQUEST_TIMEOUT": "request_timeout",

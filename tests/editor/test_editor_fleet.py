@@ -19,7 +19,7 @@ async def test_a_tablet_moves_between_workplaces(browser: Browser, built_editor:
     port = free_port()
     fleet = FleetProcess(f"nats://fleet:f@127.0.0.1:{port}", tmp_path / "fleet")
     environment = {
-        "ARCOR2_HW_NATS_URL": f"nats://cell:c@127.0.0.1:{port}",
+        "ARCOR2_HW_FLEET_NATS_URL": f"nats://cell:c@127.0.0.1:{port}",
         "ARCOR2_HW_CELL_NAME": "press-3",
         "ARCOR2_HW_FLEET_ADDRESS": fleet.url,
     }

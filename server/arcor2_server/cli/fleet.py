@@ -9,24 +9,26 @@ import ssl
 import sys
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Final, cast
-from urllib.parse import urlsplit
+from typing import TYPE_CHECKING, Annotated, Final, cast
 
 import uvloop
 from cyclopts import App, Parameter, validators
 
-from arcor2_hw.data.cell import BROKER_URL
+from arcor2_hw.data.cell import LOCAL_BROKER
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData, StorageError
 from arcor2_server.access.addresses import server_addresses
-from arcor2_server.access.admission import PARAMETER, Access, is_local, is_loopback
+from arcor2_server.access.admission import PARAMETER, Access, is_local
 from arcor2_server.access.tokens import TokenFile
 from arcor2_server.audit.command_line import note_command
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.cli.serve import CannotServe, certificate_of, data_directory, listen, renew_certificate
 from arcor2_server.deployment.service_manager import ServiceManager
 from arcor2_server.log import setup as server_logging
-from arcor2_server.settings import ServerSettings, default_data_dir
+from arcor2_server.settings import FLEET_AUTHORITY, FLEET_BROKER, ServerSettings, default_data_dir
+
+if TYPE_CHECKING:
+    from arcor2_server.nodes.credentials import Credentials
 
 FIRST_SCREEN: Final = "first screen"
 """Name of the token that the first start on a network creates."""
@@ -37,8 +39,8 @@ app = App(name="fleet")
 @app.command
 def serve(
     *,
-    broker: Annotated[str, Parameter(env_var=BROKER_URL)] = "nats://127.0.0.1:4222",
-    ca: Annotated[Path | None, Parameter(env_var="ARCOR2_HW_NATS_CA")] = None,
+    broker: Annotated[str, Parameter(env_var=FLEET_BROKER)] = LOCAL_BROKER,
+    ca: Annotated[Path | None, Parameter(env_var=FLEET_AUTHORITY)] = None,
     host: str = "127.0.0.1",
     port: Annotated[int, Parameter(validator=validators.Number(gte=0, lte=65535))] = 6780,
     data_dir: Path | None = None,
@@ -69,8 +71,7 @@ def serve(
     self_signed
         Use TLS with a certificate of a local authority. This is the default if other machines can connect.
     insecure
-        Require no token, use TLS only if requested, and accept a broker on another computer without TLS. Use this only
-        in an isolated network.
+        Require no token, and use TLS only if requested. Use this only in an isolated network.
     log_level
         Level of the log on standard error: debug, info, warning or error.
     """
@@ -78,31 +79,26 @@ def serve(
         return fail("fleet", "install the extra `nodes` of arcor2-hw", ExitStatus.FAILED)
     os.umask(0o077)  # only the user may read the files of the server
     try:
-        address = urlsplit(broker)
-        if not (insecure or address.scheme == "tls" or is_loopback(address.hostname or "")):
-            raise InvalidData(
-                "The broker at {host} is on another computer. Use an address with tls://, or --insecure in an "
-                "isolated network.",
-                host=address.hostname,
-            )
+        from arcor2_server.nodes.credentials import of_address
+
+        credentials = of_address(broker, str(ca or ""))
+        credentials.options()  # report errors before the start
         settings = ServerSettings.from_environment(
             host=host,
             port=port,
             data_dir=data_dir or default_data_dir().with_name("arcor2-hw-fleet"),
             insecure=insecure,
             default_role=Role.TECHNICIAN,
-            broker_url=broker,
-            broker_authority=str(ca or ""),
         )
         server_logging.set_up(log_level)
-    except (InvalidData, KeyError, ValueError) as error:
+    except (InvalidData, KeyError, StorageError) as error:
         return fail("fleet", error, ExitStatus.USAGE)
     try:
         with data_directory(settings.data_dir), contextlib.closing(listen(host, port)) as listener:
             settings, certificate = certificate_of(settings, tls, self_signed)
             _welcome(settings, listener.getsockname()[1])
             with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-                runner.run(_run(settings, listener, certificate))
+                runner.run(_run(settings, listener, certificate, credentials))
     except CannotServe as error:
         return fail("fleet", error, error.status)
     except StorageError as error:
@@ -121,7 +117,12 @@ def _welcome(settings: ServerSettings, port: int) -> None:
     sys.stderr.write(f"arcor2-hw fleet: first start. Open the page at {here[0]}/?{PARAMETER}={secret}\n")
 
 
-async def _run(settings: ServerSettings, listener: socket.socket, certificate: tuple[Path, Path] | None) -> None:
+async def _run(
+    settings: ServerSettings,
+    listener: socket.socket,
+    certificate: tuple[Path, Path] | None,
+    credentials: "Credentials",
+) -> None:
     from arcor2_server.access.connection_limits import ConnectionLimits
     from arcor2_server.audit.trail import AuditTrail
     from arcor2_server.fleet.application import create_fleet_app
@@ -136,7 +137,7 @@ async def _run(settings: ServerSettings, listener: socket.socket, certificate: t
         sys.stderr.write(f"arcor2-hw fleet: {problem}\n")
     audit = AuditTrail(settings.audit_file, REDACTION.in_text)
     await audit.open()
-    collector = Collector(settings.broker_url, settings.broker_authority, FleetFile(settings.data_dir / FILE))
+    collector = Collector(credentials, FleetFile(settings.data_dir / FILE))
     loop = asyncio.get_running_loop()
     config = configuration(create_fleet_app(settings, collector, access, audit), settings, certificate)
     renewal = None

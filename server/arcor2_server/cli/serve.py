@@ -42,6 +42,7 @@ from arcor2_server.settings import (
     DATABASE_URL,
     DEVICE_FILES_NAME,
     MQTT_URL,
+    FLEET_BROKER,
     LegacyListener,
     MqttSettings,
     OpcUaListener,
@@ -198,9 +199,15 @@ def serve(
             from arcor2_server.nodes.credentials import require_tls  # takes time, and few servers need it
 
             require_tls(broker)
+        if settings.in_fleet:
+            from arcor2_server.nodes.credentials import require_tls
+
+            require_tls(settings.fleet_broker)
         server_logging.set_up(log_level)
         for variable in (DATABASE_URL, MQTT_URL):  # may contain a password, which devices and programs must not see
             os.environ.pop(variable, None)
+        for variable in (DATABASE_URL, FLEET_BROKER):
+            os.environ.pop(variable, None)  # may contain a password, which devices and programs must not see
     except (InvalidData, KeyError) as error:
         return fail("serve", error, ExitStatus.USAGE)
     try:

@@ -2,15 +2,15 @@
 
 import asyncio
 import contextlib
-import ssl
 from collections.abc import Awaitable, Callable
 from typing import Final
-from urllib.parse import urlsplit
 
-import nats
 import structlog
 from nats.aio.client import Client
 from nats.errors import Error as NatsError
+
+from arcor2_hw.exceptions import InvalidData
+from arcor2_server.nodes.credentials import Credentials, address_of
 
 log = structlog.get_logger(__name__)
 
@@ -25,67 +25,63 @@ RETRY_PERIOD: Final = 1.0
 
 
 async def keep_connected(
-    url: str, authority: str, name: str, use: Callable[[Client], Awaitable[None]], lost: Callable[[], None]
+    credentials: Credentials, name: str, use: Callable[[Client], Awaitable[None]], lost: Callable[[], None]
 ) -> None:
     """Connect to the broker and use the connection; connect again after it was lost, until this is cancelled.
 
     Losing the connection and having it again is logged once each, a missing broker once.
 
     Args:
-        url: address of the broker, with user and password if it requires them.
-        authority: file of the certificate to trust for tls://; empty for those that the system trusts.
+        credentials: address and credentials of the broker.
         name: of the connection, for the monitoring of the broker.
         use: uses a connection; it is cancelled when the connection is lost.
         lost: called after a connection was lost.
     """
-    reported = False
+    reported, address = False, address_of(credentials.url)
 
     def unreached(error: Exception) -> None:
         nonlocal reported
         if not reported:
             reported = True
             reason = f"{type(error).__name__}: {error}"
-            log.warning("the broker is not reached; trying again", broker=_address(url), reason=reason)
+            log.warning("the broker is not reached; trying again", broker=address, reason=reason)
 
     while True:
         ended = asyncio.Event()
         try:
-            client = await _connect(url, authority, name, ended, unreached)
-        except (NatsError, OSError, TimeoutError, ValueError) as error:
+            client = await _connect(credentials, name, ended, unreached)
+        except (NatsError, OSError, TimeoutError, InvalidData) as error:
             unreached(error)
             await asyncio.sleep(RETRY_PERIOD)
             continue
         reported = False
-        log.info("connected to the broker", broker=_address(url), name=name)
+        log.info("connected to the broker", broker=address, name=name)
         using = asyncio.ensure_future(use(client))
         waiting = asyncio.create_task(ended.wait(), name="connection to the broker")
         try:
             await asyncio.wait({using, waiting}, return_when=asyncio.FIRST_COMPLETED)
             if ended.is_set():
                 reported = True
-                log.warning("the connection to the broker was lost; trying again", broker=_address(url))
+                log.warning("the connection to the broker was lost; trying again", broker=address)
             else:
                 await using  # raises what has ended it
         except (NatsError, OSError, TimeoutError) as error:
             reported = True
-            log.warning("the connection to the broker failed; trying again", broker=_address(url), reason=str(error))
+            log.warning("the connection to the broker failed; trying again", broker=address, reason=str(error))
         finally:
             using.cancel()
             waiting.cancel()
             await asyncio.gather(using, waiting, return_exceptions=True)
-            with contextlib.suppress(NatsError, OSError, TimeoutError):
-                await asyncio.wait_for(client.close(), CLOSE_WITHIN)
+            await _close(client)
             lost()
         await asyncio.sleep(RETRY_PERIOD)
 
 
 async def _connect(
-    url: str, authority: str, name: str, ended: asyncio.Event, unreached: Callable[[Exception], None]
+    credentials: Credentials, name: str, ended: asyncio.Event, unreached: Callable[[Exception], None]
 ) -> Client:
-    # Without it, the client would also accept a broker without TLS.
-    tls = ssl.create_default_context(cafile=authority or None) if url.startswith("tls://") else None
     reported: set[str] = set()
-    connected = False
+    connected, address = False, address_of(credentials.url)
 
     async def disconnected() -> None:
         ended.set()
@@ -96,28 +92,30 @@ async def _connect(
             unreached(error)
         elif (text := f"{type(error).__name__}: {error}") not in reported and len(reported) < 10:
             reported.add(text)
-            log.warning("error of the broker", broker=_address(url), reason=text)
+            log.warning("error of the broker", broker=address, reason=text)
 
-    client = await asyncio.wait_for(
-        nats.connect(
-            url,
-            name=name,
-            allow_reconnect=False,
-            connect_timeout=int(CONNECT_WITHIN),
-            ping_interval=PING_PERIOD,
-            max_outstanding_pings=2,
-            tls=tls,
-            disconnected_cb=disconnected,
-            closed_cb=disconnected,
-            error_cb=failed,
-        ),
-        CONNECT_WITHIN,
-    )
+    client = Client()
+    try:
+        async with asyncio.timeout(CONNECT_WITHIN):
+            await client.connect(
+                credentials.url,
+                name=name,
+                allow_reconnect=False,
+                connect_timeout=int(CONNECT_WITHIN),
+                ping_interval=PING_PERIOD,
+                max_outstanding_pings=2,
+                disconnected_cb=disconnected,
+                closed_cb=disconnected,
+                error_cb=failed,
+                **credentials.options(),
+            )
+    except BaseException:
+        await _close(client)  # also a refused one has a socket
+        raise
     connected = True
     return client
 
 
-def _address(url: str) -> str:
-    """Return an address without user and password."""
-    parts = urlsplit(url)
-    return f"{parts.hostname or '?'}:{parts.port or 4222}"
+async def _close(client: Client) -> None:
+    with contextlib.suppress(NatsError, OSError, TimeoutError):
+        await asyncio.wait_for(client.close(), CLOSE_WITHIN)

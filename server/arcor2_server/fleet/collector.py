@@ -21,6 +21,7 @@ from arcor2_server.fleet import records as r
 from arcor2_server.fleet.broker import keep_connected
 from arcor2_server.fleet.file import FleetFile, FleetResult, ReceivedResult
 from arcor2_server.fleet.registry import MOST_PER_NAME, Registry
+from arcor2_server.nodes.credentials import Credentials
 
 log = structlog.get_logger(__name__)
 
@@ -56,13 +57,12 @@ class Collector:
     """The states and results of all cells.
 
     Args:
-        url: address of the broker.
-        authority: file of the certificate to trust for the broker; empty: those that the system trusts.
+        broker: address and credentials of the broker.
         file: stores cells and results.
     """
 
-    def __init__(self, url: str, authority: str, file: FleetFile) -> None:
-        self._url, self._authority, self._file = url, authority, file
+    def __init__(self, broker: Credentials, file: FleetFile) -> None:
+        self._broker, self._file = broker, file
         self.registry = Registry(file.cells())
         self.connected = False
         """Whether the broker is connected."""
@@ -76,7 +76,7 @@ class Collector:
 
     def start(self) -> None:
         """Start to receive."""
-        connecting = keep_connected(self._url, self._authority, "arcor2-hw fleet", self._receive, self._lost)
+        connecting = keep_connected(self._broker, "arcor2-hw fleet", self._receive, self._lost)
         self._background.spawn(connecting, "connection to the broker")
         self._background.spawn(self._watch(), "cells without a signal")
         self._background.spawn(self._save(), "stored cells")

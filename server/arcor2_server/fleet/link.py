@@ -117,6 +117,7 @@ class FleetLink:
             return
         from arcor2_server.fleet.broker import keep_connected  # needs the extra `nodes`
         from arcor2_server.fleet.delivery import Delivery
+        from arcor2_server.nodes.credentials import of_address
 
         self._address = self._settings.cell_address or address
         self._identity, self._boot, self._number = identity_of(self._settings.data_dir), uuid.uuid4().hex, 0
@@ -126,7 +127,7 @@ class FleetLink:
         self._background.spawn(self._follow(), "state for the fleet")
         settings = self._settings
         connecting = keep_connected(
-            settings.broker_url, settings.broker_authority, f"arcor2-hw cell {settings.cell_name}",
+            of_address(settings.fleet_broker, settings.fleet_authority), f"arcor2-hw cell {settings.cell_name}",
             self._publish, lambda: None,
         )  # fmt: skip
         self._background.spawn(connecting, "connection to the fleet")

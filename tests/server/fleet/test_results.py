@@ -16,6 +16,7 @@ from arcor2_server.fleet.broker import keep_connected
 from arcor2_server.fleet.delivery import Delivery
 from arcor2_server.fleet.file import FILE, FleetFile, ReceivedResult
 from arcor2_server.fleet.records import encode, state_subject
+from arcor2_server.nodes.credentials import of_address
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
 from arcor2_server.storage.outbox import Outbox, OutboxKind
@@ -61,7 +62,7 @@ class SmallCell:
         self.units = UnitStore(storage, self.outbox)
         self._delivery = Delivery(self.outbox, CELL, IDENTITY)
         self._domain = domain
-        self._task = asyncio.create_task(keep_connected(url, "", "cell", self._publish, lambda: None))
+        self._task = asyncio.create_task(keep_connected(of_address(url), "cell", self._publish, lambda: None))
 
     async def _publish(self, client: object) -> None:
         async with asyncio.TaskGroup() as tasks:
