@@ -41,8 +41,8 @@ from arcor2_server.log import setup as server_logging
 from arcor2_server.settings import (
     DATABASE_URL,
     DEVICE_FILES_NAME,
-    MQTT_URL,
     FLEET_BROKER,
+    MQTT_URL,
     LegacyListener,
     MqttSettings,
     OpcUaListener,
@@ -204,10 +204,9 @@ def serve(
 
             require_tls(settings.fleet_broker)
         server_logging.set_up(log_level)
-        for variable in (DATABASE_URL, MQTT_URL):  # may contain a password, which devices and programs must not see
+        # They may contain a password, which devices and programs must not see.
+        for variable in (DATABASE_URL, MQTT_URL, FLEET_BROKER):
             os.environ.pop(variable, None)
-        for variable in (DATABASE_URL, FLEET_BROKER):
-            os.environ.pop(variable, None)  # may contain a password, which devices and programs must not see
     except (InvalidData, KeyError) as error:
         return fail("serve", error, ExitStatus.USAGE)
     try:
