@@ -77,7 +77,7 @@ from arcor2_server.storage.alarms import AlarmStore
 from arcor2_server.storage.calibrations import Calibrations
 from arcor2_server.storage.damage_notices import DataDamage
 from arcor2_server.storage.maintenance import MaintenanceStore
-from arcor2_server.storage.outbox import Outbox
+from arcor2_server.storage.outbox import UnitOutbox
 from arcor2_server.storage.packages import Packages
 from arcor2_server.storage.persons import PersonStore
 from arcor2_server.storage.recipes import RecipeStore
@@ -236,14 +236,14 @@ class Server:
             hub, RecipeStore(storage), packages, persons, released_only=settings.released_only
         )
         await recipes.open()
-        outbox = Outbox(storage) if settings.in_fleet else None
-        unit_store = UnitStore(storage, outbox)
+        unit_outbox = UnitOutbox(storage) if settings.in_fleet else None
+        unit_store = UnitStore(storage, unit_outbox)
         units = self.units = closed(Units(hub, unit_store, runs, packages, calibration_records))
         await units.open(books.all)
         cell_time = self.cell_time = closed(CellTime(unit_store, lambda: activity_of(execution)))
         cell_time.start()
         connect_production(recipes, units, cell_time, execution)
-        alarm_store = closed(AlarmStore(settings.alarms_file, storage))
+        alarm_store = closed(AlarmStore(settings.alarms_file, storage, sends=settings.in_fleet))
         if damaged := await alarm_store.open():
             damage.report(damaged)
         alarms = self.alarms = Alarms(
@@ -296,7 +296,8 @@ class Server:
             from arcor2_server.mqtt import service  # takes time, and few servers need it
 
             self.mqtt = closed(service.Mqtt(settings, feed, alarms))
-        self.fleet = closed(FleetLink(settings, outbox, feed, cell, execution, runs, units, alarms, users, locks))
+        outboxes = [each for each in (unit_outbox, alarm_store.outbox) if each is not None]
+        self.fleet = closed(FleetLink(settings, outboxes, feed, cell, execution, runs, units, alarms, users, locks))
         temporary_runs = self.temporary_runs = TemporaryRuns(
             hub, locks, storage, types, session, online, execution, build, tasks
         )

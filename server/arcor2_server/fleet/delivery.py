@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import hashlib
+from collections.abc import Sequence
 from typing import Final
 
 import msgspec
@@ -30,22 +31,23 @@ POLL_PERIOD: Final = 5.0
 HEADERS: Final = 4096
 """Size that is left for the headers of a message, bytes."""
 STREAM_BYTES: Final = 1 << 30
-"""Maximum size of the stream of a cell at the broker, bytes. Further results wait in the database of the cell."""
+"""Maximum size of the stream of a cell at the broker, bytes. Further results wait in the cell."""
 
 
 class Delivery:
     """Sends results, each until the broker has stored it.
 
     Args:
-        outbox: the results.
+        outboxes: the results.
         name: of the cell.
         identity: of the cell.
     """
 
-    def __init__(self, outbox: Outbox, name: str, identity: str) -> None:
-        self._outbox, self._name, self._identity = outbox, name, identity
+    def __init__(self, outboxes: Sequence[Outbox], name: str, identity: str) -> None:
+        self._outboxes, self._name, self._identity = outboxes, name, identity
         self._added = asyncio.Event()
-        outbox.on_added.append(self._added.set)
+        for outbox in outboxes:
+            outbox.on_added.append(self._added.set)
         self.waiting = 0
         """Number of results that wait."""
         self.domain = ""
@@ -89,38 +91,41 @@ class Delivery:
         limit = min(client.max_payload, r.LARGEST_RESULT) - HEADERS
         while True:
             self._added.clear()
-            self.waiting = await self._outbox.count()
+            self.waiting = sum([await outbox.count() for outbox in self._outboxes])
             if not self.waiting:
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(POLL_PERIOD):
                         await self._added.wait()
                 continue
-            done: list[int] = []
-            sent: list[int] = []
-            pending: list[asyncio.Future[PubAck]] = []
-            for waiting in await self._outbox.first(BATCH):
-                encoded = self._encoded(waiting, limit)
-                if len(encoded) > limit:
-                    log.error("result is too large for the broker and not sent", kind=waiting.kind, size=len(encoded))
-                    done.append(waiting.number)
-                    continue
-                message_id = hashlib.sha256(b"%d " % waiting.number + encoded).hexdigest()[:32]
-                headers = {"Nats-Msg-Id": message_id}  # the broker stores a message once that is sent again
-                subject = f"{r.PREFIX}.{self._name}.{waiting.kind}"
-                pending.append(
-                    await stream.publish_async(subject, encoded, stream=r.stream_name(self._name), headers=headers)
-                )
-                sent.append(waiting.number)
-            async with asyncio.timeout(STORED_WITHIN):
-                answers = await asyncio.gather(*pending, return_exceptions=True)
-            failures = [answer for answer in answers if isinstance(answer, BaseException)]
-            done += [
-                number for number, answer in zip(sent, answers, strict=True) if not isinstance(answer, BaseException)
-            ]
-            if done:
-                await self._outbox.remove(done)
-            if failures:
-                raise failures[0]
+            for outbox in self._outboxes:
+                await self._deliver(outbox, stream, limit)
+
+    async def _deliver(self, outbox: Outbox, stream: JetStreamContext, limit: int) -> None:
+        """Send the results of an outbox that wait longest."""
+        done: list[int] = []
+        sent: list[int] = []
+        pending: list[asyncio.Future[PubAck]] = []
+        for waiting in await outbox.first(BATCH):
+            encoded = self._encoded(waiting, limit)
+            if len(encoded) > limit:
+                log.error("result is too large for the broker and not sent", kind=waiting.kind, size=len(encoded))
+                done.append(waiting.number)
+                continue
+            message_id = hashlib.sha256(b"%d " % waiting.number + encoded).hexdigest()[:32]
+            headers = {"Nats-Msg-Id": message_id}  # the broker stores a message once that is sent again
+            subject = f"{r.PREFIX}.{self._name}.{waiting.kind}"
+            pending.append(
+                await stream.publish_async(subject, encoded, stream=r.stream_name(self._name), headers=headers)
+            )
+            sent.append(waiting.number)
+        async with asyncio.timeout(STORED_WITHIN):
+            answers = await asyncio.gather(*pending, return_exceptions=True)
+        failures = [answer for answer in answers if isinstance(answer, BaseException)]
+        done += [number for number, answer in zip(sent, answers, strict=True) if not isinstance(answer, BaseException)]
+        if done:
+            await outbox.remove(done)
+        if failures:
+            raise failures[0]
 
     def _encoded(self, waiting: Waiting, limit: int) -> bytes:
         """Return the message of a result. Steps of a unit that do not fit are left out."""

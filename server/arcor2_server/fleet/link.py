@@ -4,6 +4,7 @@ import asyncio
 import importlib.util
 import uuid
 from collections import Counter
+from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Final
@@ -59,7 +60,7 @@ class FleetLink:
 
     Args:
         settings: settings of the server.
-        outbox: the results to send; None without a fleet.
+        outboxes: the results to send; empty without a fleet.
         feed: follows the state of the cell.
         cell: mode and authority.
         execution: the program.
@@ -73,7 +74,7 @@ class FleetLink:
     def __init__(
         self,
         settings: ServerSettings,
-        outbox: Outbox | None,
+        outboxes: Sequence[Outbox],
         feed: CellFeed,
         cell: PackmlCell,
         execution: Execution,
@@ -83,7 +84,7 @@ class FleetLink:
         users: Users,
         locks: Locks,
     ) -> None:
-        self._settings, self._outbox, self._feed, self._cell = settings, outbox, feed, cell
+        self._settings, self._outboxes, self._feed, self._cell = settings, outboxes, feed, cell
         self._execution, self._runs, self._units, self._alarms = execution, runs, units, alarms
         self._users, self._locks = users, locks
         self._background = BackgroundTasks()
@@ -110,7 +111,7 @@ class FleetLink:
         Raises:
             StorageError: the identity of the cell cannot be read or written.
         """
-        if self._outbox is None:
+        if not self._outboxes:
             return
         if importlib.util.find_spec("nats") is None:
             log.error("the cell does not join the fleet: install the extra `nodes` of arcor2-hw")
@@ -121,7 +122,7 @@ class FleetLink:
 
         self._address = self._settings.cell_address or address
         self._identity, self._boot, self._number = identity_of(self._settings.data_dir), uuid.uuid4().hex, 0
-        self._delivery = Delivery(self._outbox, self._settings.cell_name, self._identity)
+        self._delivery = Delivery(self._outboxes, self._settings.cell_name, self._identity)
         self._reader = self._feed.reader(with_streams=False)
         self._alarms.on_changed.append(lambda _: self._mark_alarms())
         self._background.spawn(self._follow(), "state for the fleet")

@@ -2,11 +2,11 @@
 
 import asyncio
 import sqlite3
-from collections.abc import Callable, Iterable
+from collections.abc import Awaitable, Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import msgspec
 import structlog
@@ -18,6 +18,7 @@ from arcor2_hw.exceptions import StorageError
 from arcor2_hw.messages import Message
 from arcor2_server.files import aside, ensure_private
 from arcor2_server.storage.models import AlarmRow
+from arcor2_server.storage.outbox import OutboxKind, Waiting, next_numbers
 from arcor2_server.storage.store import Storage
 
 log = structlog.get_logger(__name__)
@@ -26,7 +27,11 @@ R = TypeVar("R")
 TAKEN_OVER: Final = 1
 """Version of the file (SQLite's user_version) that contains the records of older servers."""
 _BUSY_TIMEOUT: Final = 5.0
-_SCHEMA: Final = "create table if not exists alarm (number integer primary key, document blob not null) strict"
+_SCHEMA: Final = (
+    "create table if not exists alarm (number integer primary key, document blob not null) strict",
+    # What has to be sent to the fleet: the alarm, and the number of this sending.
+    "create table if not exists outbox (alarm integer primary key, number integer not null unique) strict",
+)
 
 _encode: Final = msgspec.json.Encoder().encode
 _decode: Final = msgspec.json.Decoder(AlarmRecord).decode
@@ -38,10 +43,12 @@ class AlarmStore:
     Args:
         path: the file.
         storage: the database, in which older servers have stored the records.
+        sends: whether changed records have to be sent to the fleet; `outbox` contains them.
     """
 
-    def __init__(self, path: Path, storage: Storage) -> None:
+    def __init__(self, path: Path, storage: Storage, *, sends: bool = False) -> None:
         self._path, self._storage = path, storage
+        self.outbox = AlarmOutbox(self._in_thread, self._opened) if sends else None
         self._connection: sqlite3.Connection | None = None
         self._thread = ThreadPoolExecutor(1, "alarms")
 
@@ -72,6 +79,9 @@ class AlarmStore:
     async def put(self, records: Iterable[AlarmRecord], deleted: set[int]) -> None:
         """Store records, and delete those with the given numbers. They are on disk when this returns."""
         await self._in_thread(self._put, [(record.number, _encode(record)) for record in records], deleted)
+        if self.outbox is not None:
+            for notify in self.outbox.on_added:
+                notify()
 
     # -------------------------------------------------------------------------------- in the thread
     async def _in_thread(self, function: Callable[..., R], *arguments: object) -> R:
@@ -110,7 +120,8 @@ class AlarmStore:
             connection.execute(f"pragma {pragma}")
         if (verdict := connection.execute("pragma quick_check(1)").fetchone()[0]) != "ok":
             raise sqlite3.DatabaseError(verdict)
-        connection.execute(_SCHEMA)
+        for statement in _SCHEMA:
+            connection.execute(statement)
         if user_version is not None:
             connection.execute(f"pragma user_version={user_version}")
 
@@ -147,4 +158,51 @@ class AlarmStore:
         with connection:
             connection.execute("begin immediate")
             connection.executemany("insert or replace into alarm values (?, ?)", rows)
-            connection.executemany("delete from alarm where number = ?", [(number,) for number in deleted])
+            gone = [(number,) for number in deleted]
+            connection.executemany("delete from alarm where number = ?", gone)
+            connection.executemany("delete from outbox where alarm = ?", gone)
+            if self.outbox is not None:
+                self.outbox.add([number for number, _ in rows])
+
+
+class AlarmOutbox:
+    """The records that have to be sent, in the file of the alarms. A changed record replaces its earlier version.
+
+    Args:
+        in_thread: runs a function in the thread of the file.
+        connection: returns the open file; called in this thread.
+    """
+
+    def __init__(self, in_thread: Callable[..., Awaitable[Any]], connection: Callable[[], sqlite3.Connection]) -> None:
+        self._in_thread, self._connection = in_thread, connection
+        self.on_added: list[Callable[[], None]] = []
+        """Called after records were added."""
+
+    def add(self, alarms: list[int]) -> None:
+        """Add changed records within the transaction that stores them, in the thread of the file."""
+        connection = self._connection()
+        (last,) = connection.execute("select coalesce(max(number), 0) from outbox").fetchone()
+        rows = zip(alarms, next_numbers(last, len(alarms)), strict=True)
+        connection.executemany("insert or replace into outbox values (?, ?)", rows)
+
+    async def count(self) -> int:
+        """Return the number of waiting records."""
+        (found,) = await self._query("select count(*) from outbox")
+        return int(found[0])
+
+    async def first(self, limit: int) -> list[Waiting]:
+        """Return the records that wait longest."""
+        query = "select o.number, document from outbox o join alarm a on a.number = o.alarm order by o.number limit ?"
+        rows = await self._query(query, limit)
+        return [Waiting(number, OutboxKind.ALARM, document) for number, document in rows]
+
+    async def remove(self, numbers: Iterable[int]) -> None:
+        """Remove records, because the broker has stored them."""
+        removed = [(number,) for number in numbers]
+        await self._in_thread(lambda: self._connection().executemany("delete from outbox where number = ?", removed))
+
+    async def _query(self, query: str, *values: int) -> list[tuple[Any, ...]]:
+        found: list[tuple[Any, ...]] = await self._in_thread(
+            lambda: self._connection().execute(query, values).fetchall()
+        )
+        return found

@@ -13,7 +13,6 @@ from sqlalchemy import (
     String,
     Text,
     TypeDecorator,
-    UniqueConstraint,
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from sqlalchemy.types import TypeEngine
@@ -301,17 +300,15 @@ class ParameterBackupRow(Base):
 
 
 class OutboxRow(Base):
-    """A changed unit or alarm that the broker has not stored yet. A further change replaces the row by a newer one.
+    """A unit that has left the cell and that the broker of the fleet has not stored yet.
 
-    `number` grows and is never used again. `kind`: "unit" or "alarm". `record`: the number of the unit or alarm.
+    `number` grows and is never used again. `unit`: the number of the unit.
     """
 
     __tablename__ = "outbox"
-    __table_args__ = (UniqueConstraint("kind", "record"),)
 
     number: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
-    kind: Mapped[str] = mapped_column(StoredText(20))
-    record: Mapped[int] = mapped_column(Integer)
+    unit: Mapped[int] = mapped_column(Integer, unique=True)
 
 
 for _table in Base.metadata.tables.values():

@@ -13,7 +13,7 @@ from arcor2_hw.data.rpc import ListUnitsArgs
 from arcor2_hw.data.units import CellActivity, Unit, UnitRecord, UnitState
 from arcor2_hw.exceptions import NotFound, StorageError
 from arcor2_server.storage.models import CellTimeRow, UnitRow, UnitRunRow
-from arcor2_server.storage.outbox import Outbox, OutboxKind
+from arcor2_server.storage.outbox import UnitOutbox
 from arcor2_server.storage.store import Storage
 
 MAX_UNITS: Final = 100_000
@@ -41,7 +41,7 @@ class UnitStore:
         outbox: gets the units that have left the cell; None: they are not sent.
     """
 
-    def __init__(self, storage: Storage, outbox: Outbox | None = None) -> None:
+    def __init__(self, storage: Storage, outbox: UnitOutbox | None = None) -> None:
         self._storage = storage
         self._outbox = outbox
 
@@ -92,7 +92,7 @@ class UnitStore:
                 await session.execute(delete(UnitRow).where(UnitRow.number <= newest - MAX_UNITS))
                 await session.execute(delete(UnitRunRow).where(UnitRunRow.unit <= newest - MAX_UNITS))
             if self._outbox is not None:
-                await self._outbox.add(session, OutboxKind.UNIT, finished)
+                await self._outbox.add(session, finished)
 
     async def get(self, number: int) -> UnitRecord:
         """Return a record. Raise NotFound if there is none."""

@@ -5,11 +5,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from arcor2_hw.data.alarms import AlarmCategory, AlarmRecord, Priority
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
 from arcor2_server.storage.alarms import AlarmStore, _encode
 from arcor2_server.storage.models import AlarmRow
+from arcor2_server.storage.outbox import OutboxKind
 
 AT = "2026-01-01T00:00:00+00:00"
 
@@ -44,6 +47,30 @@ async def test_records_of_older_servers_are_taken_over_once(tmp_path: Path) -> N
     assert await numbers(path, storage) == [2, 3]
     path.unlink()
     assert await numbers(path, storage) == []
+    await storage.close()
+
+
+async def test_changed_records_wait_for_the_fleet(tmp_path: Path) -> None:
+    storage, path = await Storage.open(ServerSettings(data_dir=tmp_path)), tmp_path / "alarms.sqlite"
+    store = AlarmStore(path, storage, sends=True)
+    assert store.outbox is not None
+    await store.open()
+    await store.put([record(1), record(2)], set())
+    before = await store.outbox.first(10)
+    assert [each.document for each in before] == [_encode(record(1)), _encode(record(2))]
+    changed = replace(record(1), text="changed")
+    await store.put([changed], set())  # while its first version is being sent
+    await store.outbox.remove(each.number for each in before)
+    await store.close()
+    again = AlarmStore(path, storage, sends=True)
+    assert again.outbox is not None
+    await again.open()
+    (waiting,) = await again.outbox.first(10)
+    assert (waiting.kind, waiting.document) == (OutboxKind.ALARM, _encode(changed))
+    assert waiting.number > max(each.number for each in before)
+    await again.put([], {1})
+    assert (await again.outbox.first(10), await again.outbox.count()) == ([], 0)
+    await again.close()
     await storage.close()
 
 

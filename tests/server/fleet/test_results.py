@@ -19,7 +19,7 @@ from arcor2_server.fleet.records import encode, state_subject
 from arcor2_server.nodes.credentials import of_address
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
-from arcor2_server.storage.outbox import Outbox, OutboxKind
+from arcor2_server.storage.outbox import OutboxKind, UnitOutbox
 from arcor2_server.storage.units import UnitStore
 from tests.server.fleet.broker import Link, Server, free_port
 from tests.server.fleet.cells import ENTERED, state_of, unit
@@ -58,9 +58,9 @@ class SmallCell:
     """The database of a cell, and the tasks that publish its state and results."""
 
     def __init__(self, storage: Storage, url: str, domain: str) -> None:
-        self.outbox = Outbox(storage)
+        self.outbox = UnitOutbox(storage)
         self.units = UnitStore(storage, self.outbox)
-        self._delivery = Delivery(self.outbox, CELL, IDENTITY)
+        self._delivery = Delivery([self.outbox], CELL, IDENTITY)
         self._domain = domain
         self._task = asyncio.create_task(keep_connected(of_address(url), "cell", self._publish, lambda: None))
 
@@ -170,7 +170,7 @@ def test_a_result_that_is_delivered_again_is_stored_once(file: FleetFile) -> Non
 
 async def test_a_record_that_changes_while_it_waits_is_sent_once(tmp_path: Path) -> None:
     storage = await Storage.open(ServerSettings(data_dir=tmp_path))
-    outbox = Outbox(storage)
+    outbox = UnitOutbox(storage)
     units = UnitStore(storage, outbox)
     try:
         await units.put([unit(1), unit(2), unit(3, state=UnitState.IN_CELL)])

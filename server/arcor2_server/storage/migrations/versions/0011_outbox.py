@@ -1,4 +1,4 @@
-"""A table for the units and alarms that the broker has not stored yet."""
+"""A table for the units that the broker of the fleet has not stored yet."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -12,9 +12,7 @@ def upgrade() -> None:
     op.create_table(
         "outbox",
         sa.Column("number", sa.BigInteger(), primary_key=True, autoincrement=False),
-        sa.Column("kind", sa.String(20), nullable=False),
-        sa.Column("record", sa.Integer(), nullable=False),
-        sa.UniqueConstraint("kind", "record"),
+        sa.Column("unit", sa.Integer(), nullable=False, unique=True),
     )
 
 
