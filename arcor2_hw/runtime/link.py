@@ -11,7 +11,9 @@ from typing import Any, Final
 
 from arcor2_hw.runtime.messages import (
     PREFIX_SIZE,
+    Alive,
     HostBound,
+    LogLine,
     StreamEvent,
     ToServer,
     body_length,
@@ -90,13 +92,24 @@ class Link:
 
     # -------------------------------------------------------------------------------- in
     def messages(self, wake: socket.socket) -> Iterator[HostBound]:
-        """Yield the messages of the server until it closes the connection or SIGTERM arrives on `wake`."""
+        """Yield the messages of the server until it closes the connection or SIGTERM arrives on `wake`.
+
+        They also end when nothing was received for the time of the last `Alive`. A message that waits in the socket,
+        because this process was late, counts as received.
+        """
         buffer = bytearray()
+        silence: float | None = None
+        received_at = time.monotonic()
         poll = select.poll()
         poll.register(self._socket, select.POLLIN)
         poll.register(wake, select.POLLIN)
         while True:
-            for descriptor, _ in poll.poll():
+            left = None if silence is None else 1e3 * max(0.0, received_at + silence - time.monotonic())
+            found = poll.poll(left)
+            if not found:
+                self.post(LogLine("error", f"the node service hangs: nothing was received for {silence} s"))
+                return
+            for descriptor, _ in found:
                 if descriptor == wake.fileno():
                     if signal.SIGTERM in wake.recv(256):
                         return
@@ -108,7 +121,12 @@ class Link:
                 if not chunk:
                     return
                 buffer += chunk
-                yield from _take_messages(buffer)
+                received_at = time.monotonic()
+                for message in _take_messages(buffer):
+                    if isinstance(message, Alive):
+                        silence = message.silence
+                    else:
+                        yield message
 
 
 def _take_messages(buffer: bytearray) -> Iterator[Any]:

@@ -20,6 +20,7 @@ from arcor2_hw.runtime.message_parts import (
 from arcor2_hw.runtime.messages_to_host import (
     AddBody as AddBody,
     AddObject as AddObject,
+    Alive as Alive,
     Calibrate as Calibrate,
     Call as Call,
     CloseScene as CloseScene,
@@ -107,6 +108,7 @@ HostBound = (
     | SetInterlocks
     | ConfirmIdentity
     | StopProgram
+    | Alive
     | CloseScene
 )
 ServerBound = (

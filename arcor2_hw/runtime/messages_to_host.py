@@ -274,5 +274,14 @@ class StopProgram(ToHost, frozen=True):
     """Stop all devices, then end the script by an exception."""
 
 
+class Alive(ToHost, frozen=True):
+    """The sender is not hanging. Without any message for `silence` s after it, the host acts as if the socket closed.
+
+    The service of a node sends it. A server on the same computer does not: its hosts wait for the end of the socket.
+    """
+
+    silence: float
+
+
 class CloseScene(ToHost, frozen=True):
     """Disconnect all objects, answer SceneClosed and exit."""

@@ -24,7 +24,7 @@ from arcor2_server.nodes.conversion import FRAMES, LARGE, Outline, for_host, out
 from arcor2_server.nodes.credentials import Credentials, environment_without
 from arcor2_server.nodes.lanes import Header, Lane
 from arcor2_server.nodes.opening import Opened, Opening, refusal_of
-from arcor2_server.nodes.session import Connections, SessionEnd
+from arcor2_server.nodes.session import BEAT_PERIOD, Connections, SessionEnd
 from arcor2_server.nodes.stream import MessageStream
 
 log = structlog.get_logger(__name__)
@@ -89,6 +89,7 @@ class HostedSession:
             output = asyncio.create_task(self._pass_output_on(process), name=f"output of cell host {process.pid}")
             waiting = asyncio.create_task(process.wait(), name=f"end of cell host {process.pid}")
             over = asyncio.create_task(self._over.wait(), name=f"end of session {self.id}")
+            alive = asyncio.create_task(self._show_alive(), name=f"signs of life for cell host {process.pid}")
             try:
                 await asyncio.wait({waiting, over}, return_when=asyncio.FIRST_COMPLETED)
                 if not waiting.done():  # the closed socket stops all motion, and ends the host
@@ -102,7 +103,7 @@ class HostedSession:
                 await self.end.finish(Message.of("the cell host {end}", end=describe_exit(status)))
             finally:
                 process.kill()
-                for task in (output, over):
+                for task in (output, over, alive):
                     task.cancel()
         except OSError as error:
             await self.end.finish(Message.of("the cell host cannot be started: {reason}", reason=error))
@@ -115,6 +116,13 @@ class HostedSession:
         ours, theirs = socket.socketpair()
         await asyncio.get_running_loop().create_unix_connection(lambda: self._stream, sock=ours)
         return await ChildProcess.start(COMMAND, theirs, environment)
+
+    async def _show_alive(self) -> None:
+        """Let the host notice when this service hangs, so that it does not execute anything unobserved."""
+        alive = _encode(m.Alive(self._limit + BEAT_PERIOD))
+        while True:
+            self._stream.send(alive)
+            await asyncio.sleep(BEAT_PERIOD)
 
     async def _pass_output_on(self, process: ChildProcess) -> None:
         async for line in process.output():

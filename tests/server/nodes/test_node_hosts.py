@@ -154,6 +154,26 @@ async def test_motion_stops_when_the_relay_of_the_server_is_killed(
         await call
 
 
+async def test_motion_stops_when_the_service_of_the_node_hangs(
+    node: Node, start_host: Callable[..., Any], tmp_path: Path
+) -> None:
+    """A suspended service keeps the socket of the host open."""
+    host, listener = await start_host()
+    await online(host)
+    call = moving(host, tmp_path / "moving")
+    await asyncio.to_thread(wait_for, (tmp_path / "moving").exists)
+    os.kill(node.process.pid, signal.SIGSTOP)
+    try:
+        await asyncio.to_thread(wait_for, (tmp_path / "moving.stopped").exists)
+        with pytest.raises(OutcomeUnknown):
+            await call
+    finally:
+        os.kill(node.process.pid, signal.SIGCONT)
+    assert f"the node {NODE}" in listener.reasons[0]
+    again, _ = await start_host()
+    await online(again)
+
+
 async def test_a_package_runs_with_its_files(node: Node, start_host: Callable[..., Any], tmp_path: Path) -> None:
     host, listener = await start_host()
     directory = tmp_path / "package"
