@@ -8,21 +8,31 @@ import hashlib
 import os
 import shutil
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
 import msgspec
+import structlog
 from msgspec.structs import replace
 
 from arcor2_hw.exceptions import InvalidData, NotFound, Refused
 from arcor2_hw.runtime import messages as m
 from arcor2_server.files import replace_file
 
+log = structlog.get_logger(__name__)
+
 WITH_FILES: Final = frozenset({"AddBody", "AddObject", "OpenScene", "RunPackage"})
 """Messages that name files."""
 HASH_SIZE: Final = 32
 """Length of a hash, bytes."""
+LARGEST_STORE: Final = 4 * 1024**3
+"""Size above which files are removed from the store of a node, bytes; on a small disk a quarter of it."""
+IN_USE: Final = 600.0
+"""Time for which a file is kept after its last use, s: messages on their way may need it, also those of other nodes."""
+PRUNE_PERIOD: Final = 60.0
+"""Time between two searches for files that can be removed, s."""
 _SCHEME: Final = "sha256:"
 
 
@@ -77,18 +87,53 @@ class Content:
 
 
 class ContentStore:
-    """The files that a node has received.
+    """The files that a node has received. Those that were not used for the longest time are removed.
+
+    Sessions use copies of the files, so a file that is removed does not concern a session that has started.
 
     Args:
         directory: is created when it is needed.
+        limit: size above which files are removed, bytes.
     """
 
-    def __init__(self, directory: Path) -> None:
-        self._directory = directory
+    def __init__(self, directory: Path, limit: int = LARGEST_STORE) -> None:
+        self._directory, self._limit = directory, limit
+        self._size: int | None = None
+        """Size of all files, bytes; None until they were listed."""
+        self._pruned_at = -PRUNE_PERIOD
 
     def missing(self, hashes: list[str]) -> list[str]:
-        """Return the hashes of files that the store does not have."""
-        return [digest for digest in hashes if not self._file(digest).exists()]
+        """Return the hashes of files that the store does not have. The others are kept for `IN_USE` at least."""
+        return [digest for digest in hashes if not self._used(self._file(digest))]
+
+    def _used(self, file: Path) -> bool:
+        """Note that a file is used; return whether it exists."""
+        try:
+            os.utime(file)
+        except FileNotFoundError:
+            return False
+        return True
+
+    def prune(self) -> None:
+        """Remove the files that were not used for the longest time while the store is too large."""
+        self._pruned_at = time.monotonic()
+        try:
+            self._prune()
+        except FileNotFoundError:
+            return  # there is no store yet, or another node removes files; the next file repeats it
+        except OSError as error:
+            log.warning("received files not removed", directory=str(self._directory), reason=str(error))
+
+    def _prune(self) -> None:
+        limit = min(self._limit, shutil.disk_usage(self._directory).total // 4)
+        with os.scandir(self._directory) as entries:
+            files = sorted((status.st_mtime, status.st_size, each.path) for each in entries if (status := each.stat()))
+        self._size = sum(size for _, size, _ in files)
+        for used, size, path in files:
+            if self._size <= limit or time.time() - used < IN_USE:
+                return
+            Path(path).unlink(missing_ok=True)
+            self._size -= size
 
     def add(self, received: bytes) -> None:
         """Store a file that follows its hash.
@@ -102,6 +147,10 @@ class ContentStore:
             raise InvalidData("A file was damaged on its way.")
         self._directory.mkdir(mode=0o700, parents=True, exist_ok=True)
         replace_file(self._file(digest.hex()), content, durable=False)
+        if self._size is not None:
+            self._size += len(content)
+        if self._size is None or (self._size > self._limit and time.monotonic() - self._pruned_at > PRUNE_PERIOD):
+            self.prune()
 
     def unpacked(self, body: bytes, folder: Path) -> bytes:
         """Replace the references of a message by names of files.

@@ -230,6 +230,7 @@ class NodeService:
 
     async def run(self) -> None:
         """Serve until cancelled. Connect again when the connection to the broker is lost."""
+        self._store.prune()
         reported = ""
         while True:
             refused = False

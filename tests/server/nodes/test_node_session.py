@@ -1,6 +1,7 @@
 """Parts of a session without a broker: clocks, lanes, and commands that must not be executed any more."""
 
 import hashlib
+import os
 import random
 import time
 from collections.abc import Iterator
@@ -271,6 +272,20 @@ def test_an_invalid_reference_is_refused(tmp_path: Path, reference: str) -> None
     body = m.AddBody(m.AddedBody("body", MESH, Pose(), file=reference))
     with pytest.raises(InvalidData):
         ContentStore(tmp_path).unpacked(encoded(body), tmp_path)
+
+
+def test_files_that_were_not_used_for_the_longest_time_are_removed(tmp_path: Path) -> None:
+    contents = [bytes([number]) * 1000 for number in range(5)]
+    digests = [hashlib.sha256(content).hexdigest() for content in contents]
+    store = ContentStore(tmp_path, limit=2500)
+    for age, digest, content in zip((7200, 3600, 5400, 0, 0), digests, contents, strict=True):
+        store.add(bytes.fromhex(digest) + content)
+        if age:
+            os.utime(tmp_path / digest, (time.time() - age, time.time() - age))
+    assert store.missing([digests[0]]) == []  # a session is about to use the oldest one
+    store.prune()
+    assert sorted(each.name for each in tmp_path.iterdir()) == sorted([digests[0], *digests[3:]])
+    assert store.missing(digests) == digests[1:3]
 
 
 def test_a_damaged_file_is_not_stored(tmp_path: Path) -> None:
