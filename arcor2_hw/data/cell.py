@@ -9,8 +9,9 @@ from msgspec import field
 
 from arcor2_hw.data.base import UNSET, Data, Unset, is_valid_name
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.nodes import NodeName
 from arcor2_hw.data.parameter import Parameter
-from arcor2_hw.data.scene import Scene, SceneObjectOverride
+from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.data.secret import is_reference
 from arcor2_hw.exceptions import InvalidData, NotFound
 
@@ -42,7 +43,7 @@ class CellDevice(Data, frozen=True, forbid_unknown_fields=True):
     bench: str | Unset = UNSET
     wire: list[str | int] | Unset = UNSET
     real: bool | Unset = UNSET
-    node: str | Unset = UNSET
+    node: NodeName | Unset = UNSET
 
     def __post_init__(self) -> None:
         if not is_valid_name(self.name):
@@ -115,25 +116,40 @@ def overlay(cell: Cell, scene: Scene) -> list[SceneObjectOverride]:
     return found
 
 
-def node_of(cell: Cell | None, names: Collection[str]) -> str:
-    """Return the node on which the objects with these names run; empty for this computer.
+def node_of(cell: Cell | None, objects: Iterable[SceneObject]) -> str:
+    """Return the node on which these objects of a scene run; empty for this computer.
 
     All objects of a scene run in one process, so one that names no node runs on the node of the others.
 
     Raises:
         InvalidData: The objects are on different nodes.
     """
-    found = {
-        device.node: device.name
-        for device in ([] if cell is None else cell.devices)
-        if device.name in names and not isinstance(device.node, Unset)
-    }
+    found = objects_by_node(cell, objects)
     if len(found) > 1:
         raise InvalidData(
             "The devices of a scene must be on one node: {devices}.",
-            devices=", ".join(f"{name} ({node})" for node, name in found.items()),
+            devices=", ".join(f"{name} ({node})" for node, names in found.items() for name in names),
         )
     return next(iter(found), "")
+
+
+def objects_by_node(cell: Cell | None, objects: Iterable[SceneObject]) -> dict[str, list[str]]:
+    """Return the names of the objects on each node. The cell file has precedence over the scene."""
+    given = assigned_nodes(cell)
+    found: dict[str, list[str]] = {}
+    for each in objects:
+        if node := given.get(each.name, "" if isinstance(each.node, Unset) else each.node):
+            found.setdefault(node, []).append(each.name)
+    return found
+
+
+def assigned_nodes(cell: Cell | None) -> dict[str, str]:
+    """Return the nodes that a cell file names, by name of the device."""
+    return {
+        device.name: device.node
+        for device in ([] if cell is None else cell.devices)
+        if not isinstance(device.node, Unset)
+    }
 
 
 def parameters_of(device: CellDevice) -> list[Parameter]:
@@ -156,6 +172,7 @@ def exported(scene: Scene, left_out: Collection[str] = ()) -> Cell:
                     if not is_reference(value := msgspec.json.decode(one.value))
                 },
                 scene_object.pose,
+                node=scene_object.node,
             )
             for scene_object in scene.objects
             if scene_object.type not in left_out

@@ -26,6 +26,7 @@ from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.held import HeldData, HoldDecidedData
 from arcor2_hw.data.interlocks import Interlock, InterlockStates
 from arcor2_hw.data.maintenance import DeviceCard
+from arcor2_hw.data.nodes import NodesData
 from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHoldData
 from arcor2_hw.data.package import CollisionModels, PackageStateEnum, PackageSummary
@@ -391,6 +392,7 @@ EVENTS: Final = {
         EventType("InterlockStates", InterlockStates, Role.OPERATOR, additional=True),
         EventType("LogOnChanged", LogOnChangedData, Role.OPERATOR, additional=True),
         EventType("MovePreview", MovePreviewData, Role.OPERATOR, additional=True),
+        EventType("NodesChanged", NodesData, Role.OPERATOR, additional=True),
         EventType("PartsChanged", PartBooks, Role.OPERATOR, additional=True),
         EventType("PersonChanged", Person, Role.OPERATOR, additional=True),
         EventType("ProgramPosition", ProgramPosition, Role.OPERATOR, additional=True),

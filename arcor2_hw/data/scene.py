@@ -5,17 +5,22 @@ from msgspec import field
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.interlocks import Interlock
+from arcor2_hw.data.nodes import NodeName
 from arcor2_hw.data.parameter import Parameter
 
 
 class SceneObject(Data, frozen=True):
-    """One object; `pose` is set exactly when its type has one."""
+    """One object; `pose` is set exactly when its type has one.
+
+    node (not in ARCOR2): name of the computer (`arcor2-hw node`) on which it runs; omitted if it needs none.
+    """
 
     name: str
     type: str
     pose: Pose | Unset = UNSET
     parameters: list[Parameter] = field(default_factory=list)
     id: str = ""
+    node: NodeName | Unset = UNSET
 
 
 class BareScene(Data, frozen=True):

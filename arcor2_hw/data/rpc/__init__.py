@@ -16,6 +16,7 @@ from arcor2_hw.data.rpc.history import *
 from arcor2_hw.data.rpc.interlocks import *
 from arcor2_hw.data.rpc.locks import *
 from arcor2_hw.data.rpc.maintenance import *
+from arcor2_hw.data.rpc.nodes import *
 from arcor2_hw.data.rpc.object_types import *
 from arcor2_hw.data.rpc.operation import *
 from arcor2_hw.data.rpc.persons import *
@@ -41,6 +42,7 @@ _ALL: Final = (
     *INTERLOCK_RPCS,
     *LOCK_RPCS,
     *MAINTENANCE_RPCS,
+    *NODE_RPCS,
     *OBJECT_TYPE_RPCS,
     *OPERATION_RPCS,
     *PERSON_RPCS,

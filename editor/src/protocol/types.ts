@@ -2033,6 +2033,77 @@ export interface NewSceneArgs {
   description?: string;
 }
 
+/** The last error of a node: its text, and when it happened. `key` and `values` translate the text. */
+export interface NodeError {
+  text: string;
+  at: string;
+  key?: string;
+  values?: Record<string, string | Message>;
+}
+
+/**
+ * What runs on a node.
+ *
+ * kind: `scene` or `program`; empty while it is being opened. name: of the scene; of a program, the id of its package.
+ * since: when it was started.
+ */
+export interface NodeSession {
+  kind: string;
+  name: string;
+  since: string;
+}
+
+/** Whether a node can be used. */
+export type NodeState = "connected" | "silent" | "other_version";
+
+/**
+ * A node, as it was announced last.
+ *
+ * Attributes:
+ *     name: Its name.
+ *     state: Whether it can be used.
+ *     version: Version of its installation; empty if it has never announced itself.
+ *     computer: Name of the computer.
+ *     since: When its service started. Omitted, as all that follows, if it has never announced itself.
+ *     seen: When it was last heard, for a silent node.
+ *     load: Average load of the last minute, per processor core: 1 for as many running tasks as cores.
+ *     free: Free space of its disk, bytes.
+ *     sessions: What runs on it.
+ *     error: Its last error since its start.
+ *     objects: Names of the objects of the open scene that run on it.
+ */
+export interface NodeStatus {
+  name: string;
+  state: NodeState;
+  version: string;
+  computer: string;
+  since?: string;
+  seen?: string;
+  load?: number;
+  free?: number;
+  sessions: NodeSession[];
+  error?: NodeError;
+  objects: string[];
+}
+
+/**
+ * The nodes of a server.
+ *
+ * Attributes:
+ *     configured: Whether the server uses nodes: it has the address of a broker, or its cell file names a node.
+ *     nodes: The nodes by name: those that announced themselves, and those that the open scene or the cell file names.
+ *     assigned: The nodes that the cell file of the server sets, by name of the object. They override those of scenes.
+ *     problem: Why the state of the nodes is unknown; `key` and `values` translate it.
+ */
+export interface NodesData {
+  configured: boolean;
+  nodes: NodeStatus[];
+  assigned: Record<string, string>;
+  problem?: string;
+  key?: string;
+  values?: Record<string, string | Message>;
+}
+
 /** Data of the event Notification. */
 export interface NotificationData {
   message: string;
@@ -3264,13 +3335,18 @@ export interface Scene {
   interlocks?: Interlock[];
 }
 
-/** One object; `pose` is set exactly when its type has one. */
+/**
+ * One object; `pose` is set exactly when its type has one.
+ *
+ * node (not in ARCOR2): name of the computer (`arcor2-hw node`) on which it runs; omitted if it needs none.
+ */
 export interface SceneObject {
   name: string;
   type: string;
   pose?: Pose;
   parameters: Parameter[];
   id: string;
+  node?: string;
 }
 
 /** Settings of one scene object that a project overrides. */
@@ -3335,6 +3411,12 @@ export interface SetEefPerpendicularToWorldArgs {
   speed?: number;
   linear?: boolean;
   arm_id?: string;
+}
+
+/** Arguments of SetObjectNode: the scene object, and the name of its node; empty for none. */
+export interface SetObjectNodeArgs {
+  id: string;
+  node: string;
 }
 
 /** Arguments of SetViewState: values by key; null removes a value, other keys are unchanged. */
@@ -4076,6 +4158,7 @@ export interface Requests {
   ListDeviceCards: { args: undefined; data: ListDeviceCardsData };
   ListInterlocks: { args: undefined; data: ListInterlocksData };
   ListLocks: { args: undefined; data: LockHolder[] };
+  ListNodes: { args: undefined; data: NodesData };
   ListPackages: { args: undefined; data: PackageSummary[] };
   ListPersons: { args: undefined; data: ListPersonsData };
   ListProjects: { args: undefined; data: ListProjectsData[] };
@@ -4148,6 +4231,7 @@ export interface Requests {
   SetCellJobs: { args: SetCellJobsArgs; data: CellStatus };
   SetCellMode: { args: SetCellModeArgs; data: CellStatus };
   SetEefPerpendicularToWorld: { args: SetEefPerpendicularToWorldArgs; data: undefined };
+  SetObjectNode: { args: SetObjectNodeArgs; data: undefined };
   SetViewState: { args: SetViewStateArgs; data: SetViewStateData };
   ShelveAlarm: { args: ShelveAlarmArgs; data: undefined };
   SignRecipe: { args: SignRecipeArgs; data: Recipe };
@@ -4228,6 +4312,7 @@ export interface Events {
   LogOnChanged: LogOnChangedData;
   LogicItemChanged: LogicItem;
   MovePreview: MovePreviewData;
+  NodesChanged: NodesData;
   Notification: NotificationData;
   ObjectHealth: ObjectHealthData;
   ObjectObservations: ObjectObservationsData;
@@ -4397,6 +4482,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   ListDeviceCards: 1,
   ListInterlocks: 1,
   ListLocks: 1,
+  ListNodes: 1,
   ListPackages: 1,
   ListPersons: 1,
   ListProjects: 1,
@@ -4469,6 +4555,7 @@ export const LEAST_ROLE: Record<keyof Requests, number> = {
   SetCellJobs: 4,
   SetCellMode: 4,
   SetEefPerpendicularToWorld: 2,
+  SetObjectNode: 4,
   SetViewState: 1,
   ShelveAlarm: 4,
   SignRecipe: 3,
@@ -4538,6 +4625,7 @@ export const ADDITIONAL_EVENTS = [
   "InterlockStates",
   "LogOnChanged",
   "MovePreview",
+  "NodesChanged",
   "ObjectHealth",
   "ObjectObservations",
   "ObjectPoints",

@@ -4,7 +4,7 @@ import asyncio
 import shutil
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
@@ -45,16 +45,25 @@ class SystemAlarms:
         data_dir: the directory whose disk is checked.
         certificate: the certificate of the server, None without TLS.
         starter: returns who started the running program; empty if none runs.
+        lost_nodes: returns the nodes that the open scene needs and that cannot be used, each with its objects.
     """
 
     def __init__(
-        self, alarms: Alarms, hub: EventHub, data_dir: Path, certificate: Path | None, starter: Callable[[], str]
+        self,
+        alarms: Alarms,
+        hub: EventHub,
+        data_dir: Path,
+        certificate: Path | None,
+        starter: Callable[[], str],
+        lost_nodes: Callable[[], Mapping[str, list[str]]] = dict,
     ) -> None:
         self._alarms = alarms
         self._hub = hub
         self._data_dir = data_dir
         self._certificate = certificate
         self._starter = starter
+        self._lost_nodes = lost_nodes
+        self._lost: frozenset[str] = frozenset()
         self._lost_user = ""
         self._slow_until: float | None = None
         self._offset = time.time() - time.monotonic()
@@ -88,6 +97,7 @@ class SystemAlarms:
             self.check_load(time.monotonic() - due)
             self.check_clock(time.time() - time.monotonic())
             self._check_tablet()
+            self.check_nodes(self._lost_nodes())
 
     def _slow_values(self) -> tuple[int, datetime | None]:
         try:
@@ -126,6 +136,16 @@ class SystemAlarms:
             self._alarms.system(
                 "clock_jumped", None, Message.of("The clock of the server jumped by {jump:.0f} s.", jump=jump)
             )
+
+    def check_nodes(self, lost: Mapping[str, list[str]]) -> None:
+        """Check which nodes that the open scene needs cannot be used. Each has an alarm of its own."""
+        for node in self._lost - lost.keys():
+            self._alarms.system(f"node_lost:{node}", False)
+        for node in sorted(lost.keys() - self._lost):
+            names = ", ".join(lost[node])
+            text = Message.of("The node {node}, on which {objects} run, is not connected.", node=node, objects=names)
+            self._alarms.system(f"node_lost:{node}", True, text)
+        self._lost = frozenset(lost)
 
     def _left(self, client: Connection) -> None:
         """Raise an alarm if a user who started the running program has no other connection."""

@@ -50,6 +50,7 @@ from arcor2_server.rpc.lists import ListRequests
 from arcor2_server.rpc.locking import LockRequests
 from arcor2_server.rpc.logic import LogicRequests
 from arcor2_server.rpc.maintenance import MaintenanceRequests
+from arcor2_server.rpc.nodes import NodeRequests
 from arcor2_server.rpc.object_aiming import ObjectAimingRequests
 from arcor2_server.rpc.object_types import ObjectTypeRequests
 from arcor2_server.rpc.operation import OperationRequests
@@ -110,6 +111,7 @@ def request_handlers(s: Server) -> Handlers:
             s.edit_notifications,
             s.reachability,
             s.settings,
+            s.nodes,
         ),
         HistoryRequests(s.session, s.undo, editing),
         InterlockRequests(s.locks, s.types, s.session, s.online, s.execution, editing),
@@ -118,6 +120,7 @@ def request_handlers(s: Server) -> Handlers:
         LockRequests(s.users, s.locks, s.lock_takeover),
         LogicRequests(s.locks, s.types, s.session, editing),
         MaintenanceRequests(s.devices, s.parameters),
+        NodeRequests(s.locks, s.session, s.online, s.nodes, editing),
         ObjectAimingRequests(s.types, s.session, s.online, s.object_aiming, editing, objects),
         ObjectTypeRequests(s.locks, s.storage, s.assets, s.types, s.session, s.online, answers),
         OperationRequests(s.types, s.session, s.online, s.execution, s.motion, s.stop_all),

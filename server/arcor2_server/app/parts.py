@@ -1,10 +1,12 @@
 """Builds the parts of the server from the bottom up and passes each its collaborators."""
 
+import os
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from arcor2_hw.data.audit import AuditOutcome
+from arcor2_hw.data.cell import BROKER_CREDENTIALS, BROKER_URL, assigned_nodes, objects_by_node
 from arcor2_hw.data.events import Event
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime.messages import ToHost
@@ -49,6 +51,7 @@ from arcor2_server.hosts.session import HostSession
 from arcor2_server.log.redaction import REDACTION
 from arcor2_server.maintenance.devices import Devices
 from arcor2_server.maintenance.parameters import Parameters
+from arcor2_server.nodes.board import NodeBoard
 from arcor2_server.object_types.catalog import KnownTypes
 from arcor2_server.object_types.installations import InstallationWatch
 from arcor2_server.object_types.notifications import TypeNotifications
@@ -156,6 +159,8 @@ class Server:
         session = self.session = Session(settings, storage, types, damage, secrets)
         await session.open()
         closed(session)
+        nodes = self.nodes = closed(board_of_nodes(settings, hub, session))
+        nodes.start()
         dependents = self.dependents = Dependents(storage, types, session)
         self.saved_problems = closed(SavedProblems(storage, types, settings.problems_file))
         edit_notifications = self.edit_notifications = closed(EditNotifications(hub, session))
@@ -278,6 +283,7 @@ class Server:
                 settings.data_dir,
                 settings.certificate,
                 lambda: runs.starter(execution.program.number) if execution.running else "",
+                nodes.lost,
             )
         )
         system_alarms.start()
@@ -341,6 +347,21 @@ def stored_name(types: ObjectTypes, storage: Storage) -> Callable[[str], Awaitab
         return item if types.known(item) else await storage.name_of(item)
 
     return find
+
+
+def board_of_nodes(settings: ServerSettings, hub: Hub, session: Session) -> NodeBoard:
+    """Return the board of nodes, which follows the open scene."""
+    assigned = assigned_nodes(settings.cell)
+
+    def needed() -> dict[str, list[str]]:
+        scene = session.document.scene
+        return {} if scene is None else objects_by_node(settings.cell, scene.objects)
+
+    def configured() -> bool:
+        return bool(assigned or os.environ.get(BROKER_URL)) or settings.broker_credentials.is_file()
+
+    environment = os.environ | {BROKER_CREDENTIALS: str(settings.broker_credentials)}
+    return NodeBoard(hub, assigned, needed, configured, environment)
 
 
 def connect_alarms(

@@ -56,9 +56,7 @@ class RunMessages:
         )
 
     async def objects(self, message: m.RunPackage) -> list[SceneObject]:
-        """Return the objects of a package, if some may be on nodes; none if it is damaged, which its host reports."""
-        if self._settings.cell is None:
-            return []
+        """Return the objects of a package; none if it is damaged, which its host reports."""
         file = Path(message.directory) / "data" / "scene.json"
         try:
             return (await asyncio.to_thread(read_document, file, Scene)).objects

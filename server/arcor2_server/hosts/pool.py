@@ -48,6 +48,14 @@ class CellHosts:
             self._spare = asyncio.create_task(self._start(), name="spare cell host")
             self._spare.add_done_callback(_log_failure)
 
+    def node_of(self, objects: Iterable[SceneObject]) -> str:
+        """Return the node on which objects of a scene run; empty for this computer.
+
+        Raises:
+            InvalidData: they are on different nodes.
+        """
+        return node_of(self._cell, objects)
+
     async def take(self, user: HostUser, objects: Iterable[SceneObject] = ()) -> CellHost:
         """Return the spare host, or a new one. Raise Arcor2Error if no host can be started.
 
@@ -55,7 +63,7 @@ class CellHosts:
             user: receives the messages of the host.
             objects: the objects that will run in it, which decide on which computer it runs.
         """
-        node = node_of(self._cell, [each.name for each in objects])
+        node = self.node_of(objects)
         if node and find_spec("nats") is None:
             raise Arcor2Error("Devices on nodes need the extra `nodes` of arcor2-hw. Install it on the server.")
         host = await (self._start(node) if node else self._take_local())

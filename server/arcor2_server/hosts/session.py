@@ -75,6 +75,10 @@ class HostSession:
         """
         return await self._pool.take(self, objects)
 
+    def node_of(self, objects: Iterable[SceneObject]) -> str:
+        """Return the node on which objects run; empty for this computer. Raise InvalidData for different nodes."""
+        return self._pool.node_of(objects)
+
     def prepare(self) -> None:
         """Start a spare host if there is none."""
         self._pool.prepare()

@@ -18,8 +18,9 @@ from arcor2_hw.data.base import now
 from arcor2_hw.exceptions import Conflict, ConnectionLost, NotFound, StorageError
 from arcor2_server.files import DIRECTORY_MODE, FILE_MODE, write_private
 from arcor2_server.nodes import claims
-from arcor2_server.nodes.connections import PREFIX, connect_client
+from arcor2_server.nodes.connections import connect_client
 from arcor2_server.nodes.credentials import Credentials, address_of, check_name, load, require_tls
+from arcor2_server.nodes.lanes import PREFIX
 from arcor2_server.nodes.nkeys import Kind, SigningKey
 from arcor2_server.settings import ServerSettings
 

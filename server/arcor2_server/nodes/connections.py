@@ -10,11 +10,9 @@ from nats.errors import Error as NatsError
 
 from arcor2_hw.exceptions import ConnectionLost
 from arcor2_server.nodes.credentials import Credentials, address_of
-from arcor2_server.nodes.lanes import Lane
+from arcor2_server.nodes.lanes import PREFIX, Lane
 from arcor2_server.nodes.session import Connections
 
-PREFIX: Final = "arcor2"
-"""First token of all subjects."""
 CONNECT_WITHIN: Final = 2.0
 """Time limit for a connection, s."""
 REFUSAL: Final = "authorization violation"

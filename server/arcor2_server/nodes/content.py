@@ -97,7 +97,7 @@ class ContentStore:
     """
 
     def __init__(self, directory: Path, limit: int = LARGEST_STORE) -> None:
-        self._directory, self._limit = directory, limit
+        self.directory, self._limit = directory, limit
         self._size: int | None = None
         """Size of all files, bytes; None until they were listed."""
         self._pruned_at = -PRUNE_PERIOD
@@ -122,11 +122,11 @@ class ContentStore:
         except FileNotFoundError:
             return  # there is no store yet, or another node removes files; the next file repeats it
         except OSError as error:
-            log.warning("received files not removed", directory=str(self._directory), reason=str(error))
+            log.warning("received files not removed", directory=str(self.directory), reason=str(error))
 
     def _prune(self) -> None:
-        limit = min(self._limit, shutil.disk_usage(self._directory).total // 4)
-        with os.scandir(self._directory) as entries:
+        limit = min(self._limit, shutil.disk_usage(self.directory).total // 4)
+        with os.scandir(self.directory) as entries:
             files = sorted((status.st_mtime, status.st_size, each.path) for each in entries if (status := each.stat()))
         self._size = sum(size for _, size, _ in files)
         for used, size, path in files:
@@ -145,7 +145,7 @@ class ContentStore:
         digest, content = received[:HASH_SIZE], received[HASH_SIZE:]
         if hashlib.sha256(content).digest() != digest:
             raise InvalidData("A file was damaged on its way.")
-        self._directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+        self.directory.mkdir(mode=0o700, parents=True, exist_ok=True)
         replace_file(self._file(digest.hex()), content, durable=False)
         if self._size is not None:
             self._size += len(content)
@@ -199,7 +199,7 @@ class ContentStore:
     def _file(self, digest: str) -> Path:
         if len(digest) != 2 * HASH_SIZE or not set(digest) <= set("0123456789abcdef"):
             raise InvalidData("{digest!r} is not a hash.", digest=digest)
-        return self._directory / digest
+        return self.directory / digest
 
 
 def default_store() -> Path:

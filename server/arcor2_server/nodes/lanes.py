@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from enum import StrEnum
 from typing import Final, NamedTuple
 
+PREFIX: Final = "arcor2"
+"""First token of all subjects."""
 PART_SIZE: Final = 256 * 1024
 """Maximum size of a part of a message, bytes; a broker accepts 1 MiB unless configured otherwise."""
 MORE: Final = 1

@@ -3,14 +3,17 @@
 import asyncio
 import contextlib
 import os
+import secrets
 import socket
 import tempfile
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
 
 import msgspec
 import structlog
+from nats.aio.client import Client
 from nats.aio.msg import Msg
 from nats.errors import Error as NatsError
 
@@ -23,7 +26,17 @@ from arcor2_server.nodes.content import WITH_FILES, ContentStore, default_store
 from arcor2_server.nodes.conversion import FRAMES, LARGE, Outline, for_host, outline
 from arcor2_server.nodes.credentials import Credentials, environment_without
 from arcor2_server.nodes.lanes import Header, Lane
-from arcor2_server.nodes.opening import Opened, Opening, refusal_of
+from arcor2_server.nodes.opening import Opened, Opening, own_version, refusal_of
+from arcor2_server.nodes.presence import (
+    PERIOD,
+    Announcement,
+    LastError,
+    RunningSession,
+    computer,
+    free_space,
+    load,
+    presence_subject,
+)
 from arcor2_server.nodes.session import BEAT_PERIOD, Connections, SessionEnd
 from arcor2_server.nodes.stream import MessageStream
 
@@ -49,10 +62,21 @@ class HostedSession:
         node: name of this node.
         opening: the request.
         store: the files that the node has received.
+        failed: called with each error.
     """
 
-    def __init__(self, connections: Connections, node: str, opening: Opening, store: ContentStore) -> None:
+    def __init__(
+        self,
+        connections: Connections,
+        node: str,
+        opening: Opening,
+        store: ContentStore,
+        failed: Callable[[Message], None] = lambda _: None,
+    ) -> None:
         self.id = opening.session
+        self._failed = failed
+        self._started = time.monotonic()
+        self._runs = ("", "")
         self._store = store
         self._folder = tempfile.TemporaryDirectory(prefix="arcor2-hw-session-", ignore_cleanup_errors=True)
         self.end = SessionEnd(
@@ -72,6 +96,11 @@ class HostedSession:
         self._stop_ids: set[int] = set()
         self._stopped: dict[str, int] = {}
         """Number of the last stop of each device, and with the key "" of all devices."""
+
+    @property
+    def running(self) -> RunningSession:
+        """What runs in this session."""
+        return RunningSession(self.id, *self._runs, time.monotonic() - self._started)
 
     async def open(self) -> None:
         """Subscribe to the messages of the server."""
@@ -100,13 +129,18 @@ class HostedSession:
                     async with asyncio.timeout(LAST_MESSAGES_WITHIN):
                         await self._closed.wait()
                         await output
-                await self.end.finish(Message.of("the cell host {end}", end=describe_exit(status)))
+                end = Message.of("the cell host {end}", end=describe_exit(status))
+                if status and not self._over.is_set():
+                    self._failed(end)
+                await self.end.finish(end)
             finally:
                 process.kill()
                 for task in (output, over, alive):
                     task.cancel()
         except OSError as error:
-            await self.end.finish(Message.of("the cell host cannot be started: {reason}", reason=error))
+            reason = Message.of("the cell host cannot be started: {reason}", reason=error)
+            self._failed(reason)
+            await self.end.finish(reason)
         finally:
             self.end.end(Message.of("the session has ended"))
             await self.end.close()
@@ -157,6 +191,8 @@ class HostedSession:
             if refusal is not None:
                 self._refuse(found, refusal)
                 return
+        if found.type in ("OpenScene", "RunPackage"):
+            self._runs = _runs(found.type, body)
         if found.type in WITH_FILES:
             try:
                 body = self._store.unpacked(body, Path(self._folder.name))
@@ -173,6 +209,7 @@ class HostedSession:
 
     def _fail(self, reason: Message) -> None:
         """End the session, and report why."""
+        self._failed(reason)
         self._stream.close()
         self._failing = asyncio.create_task(self.end.finish(reason), name=f"end of session {self.id}")
 
@@ -199,8 +236,27 @@ class HostedSession:
     def ended(self, reason: Message, by_peer: bool) -> None:
         """Close the socket of the host, on which it stops all motion, disconnects and ends."""
         log.info("session ended", session=self.id, reason=str(reason), by_server=by_peer)
+        if not by_peer and not self._closed.is_set():  # the connection was lost while the host ran
+            self._failed(reason)
         self._stream.close()
         self._over.set()
+
+
+class _Scene(msgspec.Struct, frozen=True):
+    name: str = ""
+
+
+class _Run(msgspec.Struct, frozen=True):
+    """The fields of OpenScene and RunPackage that name what runs."""
+
+    scene: _Scene = _Scene()
+    package_id: str = ""
+
+
+def _runs(kind: str, body: bytes) -> tuple[str, str]:
+    """Return kind and name of what a message starts."""
+    run = msgspec.msgpack.decode(body, type=_Run)
+    return ("scene", run.scene.name) if kind == "OpenScene" else ("program", run.package_id)
 
 
 class NodeService:
@@ -227,6 +283,9 @@ class NodeService:
         self._sessions: set[HostedSession] = set()
         self._tasks: set[asyncio.Task[None]] = set()
         self._lost = asyncio.Event()
+        self._id = secrets.token_hex(8)
+        self._started = time.monotonic()
+        self._error: tuple[Message, float] | None = None
 
     async def run(self) -> None:
         """Serve until cancelled. Connect again when the connection to the broker is lost."""
@@ -246,6 +305,7 @@ class NodeService:
     async def _serve(self) -> None:
         """Serve until the connection is lost. Raise ConnectionLost if there is none."""
         self._lost.clear()
+        announcing: asyncio.Task[None] | None = None
         try:
             self._connections = await broker.connect(self._credentials(), self._name, self._lose)
             try:
@@ -256,13 +316,44 @@ class NodeService:
                 raise ConnectionLost("The broker closed the connection.", str(error)) from error
             log.info("node ready", node=self._name)
             self._ready()
+            announcing = asyncio.create_task(self._announce(calls), name="announcements")
             await self._lost.wait()
             log.warning("connection to the broker lost", node=self._name)
+            self._note(Message.of("the connection to the broker was lost"))
         finally:
+            if announcing is not None:
+                announcing.cancel()
             self._end_sessions()
             if self._tasks:
                 await asyncio.wait(set(self._tasks))
             await broker.close(self._connections)
+
+    async def _announce(self, client: Client) -> None:
+        """Announce this node periodically."""
+        subject = presence_subject(self._name)
+        while True:
+            free = await asyncio.to_thread(free_space, self._store.directory)
+            with contextlib.suppress(NatsError, OSError):  # the end of the connection is noticed elsewhere
+                await client.publish(subject, msgspec.json.encode(self._announcement(free)))
+            await asyncio.sleep(PERIOD)
+
+    def _announcement(self, free: int) -> Announcement:
+        now = time.monotonic()
+        return Announcement(
+            self._name,
+            own_version(),
+            computer(),
+            self._id,
+            now - self._started,
+            load(),
+            free,
+            [each.running for each in self._sessions],
+            None if self._error is None else LastError(self._error[0], now - self._error[1]),
+        )
+
+    def _note(self, error: Message) -> None:
+        """Store the last error, for announcements."""
+        self._error = (error, time.monotonic())
 
     def _lose(self) -> None:
         self._lost.set()
@@ -281,11 +372,12 @@ class NodeService:
             return
         refusal = refusal_of(self._name, opening)
         if refusal is None:
-            session = HostedSession(self._connections, self._name, opening, self._store)
+            session = HostedSession(self._connections, self._name, opening, self._store, self._note)
             await session.open()
         await message.respond(msgspec.json.encode(Opened(refusal)))
         if refusal is not None:
             log.warning("session refused", reason=str(refusal))
+            self._note(refusal)
             return
         log.info("session opened", session=session.id)
         self._sessions.add(session)

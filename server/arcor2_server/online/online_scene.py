@@ -155,10 +155,12 @@ class OnlineScene:
 
         Raises:
             RequestRefused: the scene cannot go online now.
+            InvalidData: its devices are on different nodes.
             Locked: a user is editing the scene or project.
         """
         self._session.require_scene_open()
         self.require_offline()
+        self.host.node_of(self._session.require_scene().objects)
         for check in self.before_start:
             check()
         if self._session.project is None and (locked := self._locks.write_locked_roots()):
@@ -235,6 +237,19 @@ class OnlineScene:
         self.streams.clear()
         self._done(SceneStateEnum.STOPPED, message)
         self.host.prepare()
+
+    def require_connectable(self, obj: SceneObject) -> None:
+        """Raise RequestRefused if the scene is online on a computer on which an added object does not run."""
+        if not self.online or (host := self.host.host) is None:
+            return
+        node = self.host.node_of([obj])
+        if node and node != host.node:
+            raise RequestRefused(
+                "{name} runs on the node {node}, and the scene is online on {computer}. Go offline first.",
+                name=obj.name,
+                node=node,
+                computer=host.node or Message.of("this computer"),
+            )
 
     def connect_added(self, obj: SceneObject) -> None:
         """Create and connect an object that was added to the online scene. ObjectState reports the result."""

@@ -3,6 +3,8 @@
 import contextlib
 from dataclasses import dataclass
 
+from msgspec.structs import replace
+
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.scene import Scene
@@ -31,6 +33,21 @@ class PutQuery(Data, frozen=True):
     """`exact`: store the document exactly as it is in the body."""
 
     exact: bool = False
+
+
+def keep_nodes(sent: Scene, stored: Scene) -> Scene:
+    """Return a sent scene with the nodes of objects that it lacks, because its client does not know them.
+
+    An empty name removes a node.
+    """
+    nodes = {obj.id: obj.node for obj in stored.objects}
+    return replace(
+        sent,
+        objects=[
+            replace(obj, node=nodes.get(obj.id, UNSET) if isinstance(obj.node, Unset) else obj.node or UNSET)
+            for obj in sent.objects
+        ],
+    )
 
 
 def check_id(key: str, what: str) -> None:
@@ -68,12 +85,13 @@ class SceneOperations:
     async def put_scene(self, body: Scene, query: PutQuery) -> Timestamp:
         """Save a new or changed scene; return the time. All its object types must be known.
 
-        Interlocks that the body lacks are kept, unless `exact`.
+        Interlocks and nodes of objects that the body lacks are kept, unless `exact`.
         """
         check_id(body.id, "scene")
         if not query.exact:
             with contextlib.suppress(NotFound):
-                body = keep_interlocks(body, await self._storage.scene(body.id))
+                stored = await self._storage.scene(body.id)
+                body = keep_nodes(keep_interlocks(body, stored), stored)
         if problems := interlock_problems(body, self._types):
             raise InvalidData(Message.joined(problems))
         for placed in body.objects:

@@ -29,6 +29,7 @@ from arcor2_server.documents.edit_notifications import EditNotifications
 from arcor2_server.errors import LogOnNeeded, RequestRefused
 from arcor2_server.events import encode, make_event
 from arcor2_server.execution.service import Execution
+from arcor2_server.nodes.board import NodeBoard
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.rpc.registry import DECLARED, Context, cached, rpc
 from arcor2_server.settings import API_VERSION, VERSION, ServerSettings
@@ -77,6 +78,7 @@ class GeneralRequests:
     _edit_notifications: EditNotifications
     _reachability: ReachabilityBoard
     _settings: ServerSettings
+    _nodes: NodeBoard
 
     def _system_info(self) -> Raw:
         return _system_info(len(DECLARED), self._settings.cell_name, self._settings.fleet_address)
@@ -166,6 +168,8 @@ class GeneralRequests:
             events += [make_event("RobotHold", hold) for hold in self._online.held.states()]
         if "ForcesChanged" in args.events:
             events.append(make_event("ForcesChanged", self._online.forces.states()))
+        if "NodesChanged" in args.events:
+            events.append(make_event("NodesChanged", self._nodes.data()))
         if "UserPresence" in args.events:
             events += self._presence.all_events()
         if "TaskState" in args.events:

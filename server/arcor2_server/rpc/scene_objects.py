@@ -94,6 +94,7 @@ class SceneObjectRequests:
         """Add an object also while a project is open or the scene is online; then it is connected, too."""
         async with self._locks.auto(context.user, SCENE):
             self._session.require_scene_open()
+            self._online.require_connectable(SceneObject(args.name, args.type))
             obj = await self._add_object(context, args)
         if not context.dry_run and self._online.online:
             self._online.connect_added(obj)
@@ -149,10 +150,16 @@ class SceneObjectRequests:
         if args.id and self._online.state is not SceneStateEnum.STOPPED:
             raise RequestRefused("The scene is online. Its devices are connected already.")
         pose = Pose() if self._types.meta(args.type).has_pose else UNSET
-        obj = SceneObject(args.type, args.type, pose, args.parameters, args.id or new_id("obj"))
+        obj = SceneObject(args.type, args.type, pose, args.parameters, args.id or new_id("obj"), self._node_of(args.id))
         if problems := object_problems(obj, self._types):
             raise InvalidData(Message.joined(problems))
         return await self._connection_check.run(obj)
+
+    def _node_of(self, object_id: str) -> str | Unset:
+        """Return the node of an object of the open scene; unset for an object that is not in the scene."""
+        scene = self._session.document.scene
+        found = [each for each in (scene.objects if scene else ()) if each.id == object_id]
+        return (self._online.host.node_of(found) or UNSET) if found else UNSET
 
     @rpc("FindDevices")
     async def find_devices(self, context: Context, args: FindDevicesArgs) -> list[FoundDevice]:

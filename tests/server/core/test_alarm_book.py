@@ -170,9 +170,18 @@ async def test_roles_shelving_that_ends_by_itself_and_clock() -> None:
     alarms = Alarms(hub, store, AlarmKinds(lambda _: None), lambda: 0)
     system = SystemAlarms(alarms, hub, Path(), None, lambda: "")
     system.check_disk(1_000_000)
+    system.check_nodes({"press": ["arm", "belt"]})
+    [lost] = await alarms.find(ListAlarmsArgs(AlarmFilter.ALL, limit=1))
+    assert (lost.code, lost.active, lost.text) == (
+        "node_lost:press",
+        True,
+        "The node press, on which arm, belt run, is not connected.",
+    )
+    system.check_nodes({})
     system.check_clock(time.time() - time.monotonic() - 60.0)
     system.check_clock(time.time() - time.monotonic() - 60.0)
-    clock, disk = await alarms.find(ListAlarmsArgs(AlarmFilter.ALL))
+    clock, back, disk = await alarms.find(ListAlarmsArgs(AlarmFilter.ALL))
+    assert (back.code, back.active) == ("node_lost:press", False)
     assert (disk.code, disk.text, disk.active) == (
         "disk_nearly_full",
         "The disk of the server has only 1 MB left.",

@@ -32,6 +32,7 @@ ADDED = {
     "RobotJoints.Data": {"time_ms"},
     "ListProjects.Response.Data": {"problem_messages"},
     "ListScenes.Response.Data": {"problem_messages"},
+    "SceneObject": {"node"},
     "ActionResult.Data": TRANSLATION,
     "Notification.Data": TRANSLATION,
     "ProcessState.Data": TRANSLATION,

@@ -165,6 +165,17 @@ async def test_interlocks_survive_a_client_that_does_not_know_them(http: httpx.A
     assert "interlocks" not in granted(await http.get("/scenes/scn_i"))
 
 
+async def test_nodes_survive_a_client_that_does_not_know_them(http: httpx.AsyncClient) -> None:
+    sent = scene("scn_n", "FlowActions")
+    [flow] = sent["objects"]
+    granted(await http.put("/scenes", json=sent | {"objects": [flow | {"node": "press"}]}))
+    granted(await http.put("/scenes", json=sent | {"description": "theirs"}))
+    assert granted(await http.get("/scenes/scn_n"))["objects"][0]["node"] == "press"
+    granted(await http.put("/scenes", json=sent | {"objects": [flow | {"node": ""}]}))
+    assert "node" not in granted(await http.get("/scenes/scn_n"))["objects"][0]
+    refused(await http.put("/scenes", json=sent | {"objects": [flow | {"node": "*"}]}), 400, "Argument")
+
+
 async def test_comparisons_survive_a_client_that_does_not_know_them(http: httpx.AsyncClient) -> None:
     granted(await http.put("/scenes", json=scene("scn_w", "FlowActions")))
     point = {"id": "acp_1", "name": "point", "position": POSE["position"]}

@@ -26,6 +26,7 @@ from arcor2_hw.data.object_type import (
     ParameterMeta,
 )
 from arcor2_hw.data.robot import Joint, RobotMeta, RobotType
+from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import NotFound
 from arcor2_server.access.admission import Access
 from arcor2_server.app import Server
@@ -177,6 +178,8 @@ class FakeCell:
     def require_online(self) -> None:
         if not self.online:
             raise RequestRefused("The scene is offline.")
+
+    def require_connectable(self, obj: SceneObject) -> None: ...
 
     async def end_effector_pose(self, robot_id: str, end_effector: str, arm_id: str | None) -> Pose:
         return self.pose

@@ -2,6 +2,7 @@
 
 import pytest
 
+from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.events import SceneStateEnum
 from tests.server.session.session_server import Person, Refused, SessionServer
 from tests.server.session.work import POSE, Work
@@ -118,3 +119,21 @@ async def test_settings_and_shapes_change_only_offline(server: SessionServer, wo
         await alice.ask("UpdateSceneObjectSettings", id=scale, parameters=[])
     server.cell.state = SceneStateEnum.STOPPED
     await alice.ask("UpdateSceneObjectSettings", id=scale, parameters=[])
+
+
+async def test_an_object_runs_on_a_node(server: SessionServer, work: Work, alice: Person) -> None:
+    await work.project()
+    scale = work.object("scale")
+    await alice.ask("SetObjectNode", id=scale, node="press")
+    assert server.session.document.scene_object(scale).node == "press"
+    alice.take()
+    await alice.ask("SaveProject")
+    stored = await server.services.storage.scene(work.session.require_scene().id)
+    assert {each.name: each.node for each in stored.objects if each.node} == {"scale": "press"}
+    with pytest.raises(Refused, match="node"):
+        await alice.ask("SetObjectNode", id=scale, node="press.>")
+    await alice.ask("Undo")
+    assert server.session.document.scene_object(scale).node is UNSET
+    server.cell.state = SceneStateEnum.STARTED
+    with pytest.raises(Refused, match="online"):
+        await alice.ask("SetObjectNode", id=scale, node="oven")
