@@ -116,6 +116,8 @@ export function reduce(state: State, event: ServerEvent, time: number): Partial<
       return viewState(state, event.data);
     case "ForcesChanged":
       return { forces: event.data.forces };
+    case "NodesChanged":
+      return { nodes: event.data };
     case "Notification": {
       const level = event.data.level === "Info" ? "info" : event.data.level === "Warn" ? "warn" : "error";
       return notice(state, level, event.data.message, time);

@@ -19,6 +19,7 @@ import type {
   LogicItem,
   MovePreviewData,
   NamedOrientation,
+  NodesData,
   ObjectAction,
   ObjectHealthData,
   ObjectStateData,
@@ -219,6 +220,8 @@ export interface State {
   tried: Tried[];
   /** Outputs that persons force, on any device. */
   forces: readonly ForcedPoint[];
+  /** The computers on which devices run; null until they are known. */
+  nodes: NodesData | null;
   tasks: Record<string, TaskStateData>;
   notices: Notice[];
   /** All messages since the page was opened, including dismissed ones and finished tasks; newest last. */
@@ -285,6 +288,7 @@ export function initialState(): State {
     program: NO_PROGRAM,
     tried: [],
     forces: [],
+    nodes: null,
     tasks: {},
     notices: [],
     messageLog: [],

@@ -1,6 +1,7 @@
 /** Sections about objects of the scene, loaded when they are needed. */
 
 import { msg } from "@lingui/core/macro";
+import { derivesFrom } from "../../store/selectors";
 import { lazyComponent } from "../kit/lazy";
 import type { Section } from "../workplace/section";
 
@@ -10,6 +11,15 @@ export const objectSections: readonly Section[] = [
     title: msg`Object`,
     applies: ({ kind }) => kind === "object",
     Body: lazyComponent(() => import("./ObjectSection")),
+  },
+  {
+    id: "node",
+    title: msg`Computer`,
+    applies: ({ kind, id }, state) =>
+      kind === "object" &&
+      state.nodes?.configured === true &&
+      !derivesFrom(state, state.doc?.objects[id]?.type ?? "", "VirtualCollisionObject"),
+    Body: lazyComponent(() => import("../nodes/RunsOn")),
   },
 ];
 

@@ -18,6 +18,7 @@ import { uncontrolledOnline } from "../uncontrolled";
 import "../../alarms/alarms.css";
 
 const DeviceCards = lazy(() => import("../../maintenance/DeviceCards"));
+const NodeList = lazy(() => import("../../nodes/NodeList"));
 const AlarmList = lazy(() => import("../../alarms/AlarmList"));
 
 export default function Panel() {
@@ -36,6 +37,7 @@ export default function Panel() {
     (each) => isFaulty(each.id) || !inert.split(",").includes(each.id),
   );
   const limited = useEditor(uncontrolledOnline);
+  const hasNodes = useEditor((state) => state.nodes?.configured === true);
   const [card, setCard] = useState<string | null>(null);
   // Faulty devices first.
   const objects = devices.sort((a, b) => Number(isFaulty(b.id)) - Number(isFaulty(a.id)) || byName(a, b));
@@ -92,6 +94,11 @@ export default function Panel() {
           );
         })}
       </ul>
+      {hasNodes && (
+        <Suspense fallback={null}>
+          <NodeList />
+        </Suspense>
+      )}
       {doc && serves("StreamPoints") && <Button onPress={openPoints}>{t`Inputs and outputs`}</Button>}
       {serves("ListDeviceCards") && <Button onPress={() => setCard("")}>{t`Device cards`}</Button>}
       {card !== null && (
