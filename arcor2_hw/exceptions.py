@@ -214,6 +214,12 @@ class AddressChanged(InvalidData):
     code = "address_changed"
 
 
+class SeveralNodes(InvalidData):
+    """Objects of a scene name different nodes, on which it cannot run. The message names all objects and nodes."""
+
+    code = "several_nodes"
+
+
 class TextTooLong(InvalidData):
     """A text is longer than its field allows. The message names the field and the limit."""
 

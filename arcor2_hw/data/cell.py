@@ -13,7 +13,7 @@ from arcor2_hw.data.nodes import NodeName
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.data.secret import is_reference
-from arcor2_hw.exceptions import InvalidData, NotFound
+from arcor2_hw.exceptions import InvalidData, NotFound, SeveralNodes
 
 MAX_SIZE: Final = 1 << 20
 """Maximum size, bytes; a cell of hundreds of devices has some ten thousand."""
@@ -122,11 +122,11 @@ def node_of(cell: Cell | None, objects: Iterable[SceneObject]) -> str:
     All objects of a scene run in one process, so one that names no node runs on the node of the others.
 
     Raises:
-        InvalidData: The objects are on different nodes.
+        SeveralNodes: The objects are on different nodes.
     """
     found = objects_by_node(cell, objects)
     if len(found) > 1:
-        raise InvalidData(
+        raise SeveralNodes(
             "The devices of a scene must be on one node: {devices}.",
             devices=", ".join(f"{name} ({node})" for node, names in found.items() for name in names),
         )

@@ -143,7 +143,7 @@ class SystemAlarms:
             self._alarms.system(f"node_lost:{node}", False)
         for node in sorted(lost.keys() - self._lost):
             names = ", ".join(lost[node])
-            text = Message.of("The node {node}, on which {objects} run, is not connected.", node=node, objects=names)
+            text = Message.of("The node {node} is not connected. Needed for: {objects}.", node=node, objects=names)
             self._alarms.system(f"node_lost:{node}", True, text)
         self._lost = frozenset(lost)
 

@@ -52,7 +52,7 @@ class CellHosts:
         """Return the node on which objects of a scene run; empty for this computer.
 
         Raises:
-            InvalidData: they are on different nodes.
+            SeveralNodes: they are on different nodes.
         """
         return node_of(self._cell, objects)
 

@@ -76,7 +76,7 @@ class HostSession:
         return await self._pool.take(self, objects)
 
     def node_of(self, objects: Iterable[SceneObject]) -> str:
-        """Return the node on which objects run; empty for this computer. Raise InvalidData for different nodes."""
+        """Return the node on which objects run; empty for this computer. Raise SeveralNodes for different nodes."""
         return self._pool.node_of(objects)
 
     def prepare(self) -> None:

@@ -155,7 +155,7 @@ class OnlineScene:
 
         Raises:
             RequestRefused: the scene cannot go online now.
-            InvalidData: its devices are on different nodes.
+            SeveralNodes: its devices are on different nodes.
             Locked: a user is editing the scene or project.
         """
         self._session.require_scene_open()

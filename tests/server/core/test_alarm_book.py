@@ -175,7 +175,7 @@ async def test_roles_shelving_that_ends_by_itself_and_clock() -> None:
     assert (lost.code, lost.active, lost.text) == (
         "node_lost:press",
         True,
-        "The node press, on which arm, belt run, is not connected.",
+        "The node press is not connected. Needed for: arm, belt.",
     )
     system.check_nodes({})
     system.check_clock(time.time() - time.monotonic() - 60.0)

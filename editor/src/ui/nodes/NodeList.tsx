@@ -7,6 +7,7 @@ import { translate } from "../../i18n/serverMessages";
 import type { NodeState, NodeStatus } from "../../protocol/types";
 import { useEditor } from "../../store/store";
 import { useTicking } from "../times";
+import "./nodes.css";
 
 const STATES: Record<NodeState, MessageDescriptor> = {
   connected: msg`connected`,

@@ -12,6 +12,9 @@ export const objectSections: readonly Section[] = [
     applies: ({ kind }) => kind === "object",
     Body: lazyComponent(() => import("./ObjectSection")),
   },
+];
+
+export const settingsSections: readonly Section[] = [
   {
     id: "node",
     title: msg`Computer`,
@@ -21,9 +24,6 @@ export const objectSections: readonly Section[] = [
       !derivesFrom(state, state.doc?.objects[id]?.type ?? "", "VirtualCollisionObject"),
     Body: lazyComponent(() => import("../nodes/RunsOn")),
   },
-];
-
-export const settingsSections: readonly Section[] = [
   {
     id: "settings",
     title: msg`Settings`,

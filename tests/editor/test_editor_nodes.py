@@ -1,0 +1,67 @@
+"""Nodes: a user sees which computers can be used, and sets on which one a device runs."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import Browser, expect
+
+from arcor2_hw.data import rpc
+from tests.e2e.harness import Cell
+from tests.editor import texts
+from tests.editor.screen import screen_of
+from tests.server.nodes.conftest import Broker, Node
+
+pytestmark = pytest.mark.asyncio(loop_scope="session")
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def broker(tmp_path: Path) -> AsyncIterator[Broker]:
+    running = Broker(tmp_path)
+    yield running
+    running.end()
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def node(broker: Broker, tmp_path: Path) -> AsyncIterator[Node]:
+    running = await asyncio.to_thread(Node, broker.url, tmp_path)
+    yield running
+    running.end()
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def served(
+    broker: Broker, tmp_path: Path, built_editor: Path, monkeypatch: pytest.MonkeyPatch
+) -> AsyncIterator[Cell]:
+    """A server of its own, with a broker and without devices."""
+    monkeypatch.setenv("ARCOR2_HW_NATS_URL", broker.url)
+    cell = Cell(tmp_path)
+    await cell.start_server()
+    yield cell
+    await cell.stop()
+
+
+async def test_a_device_is_set_on_a_node_that_is_lost(node: Node, served: Cell, browser: Browser) -> None:
+    client = await served.client("colleague")
+    await client.call("NewScene", rpc.NewSceneArgs("workplace"))
+    await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs("clock", "TimeActions"))
+    async with screen_of(browser, served.url, touch=True) as screen:
+        page = screen.page
+        await screen.join("Eva")
+        tools = page.get_by_role("navigation")
+        await tools.get_by_role("button", name=texts.OBJECTS, exact=True).click()
+        await page.get_by_role("treegrid", name="Without a pose").get_by_role("row").filter(has_text="clock").click()
+        await page.get_by_label("Runs on").select_option("press")
+        await tools.get_by_role("button", name=texts.DEVICES, exact=True).click()
+        row = page.get_by_role("region", name="Nodes").get_by_role("listitem")
+        await expect(row).to_contain_text("Devices of this scene: clock")
+        await expect(row.locator(".tag")).to_have_text("connected")
+        node.end()
+        await expect(row.locator(".tag")).to_have_text("not connected")
+        await expect(row).to_contain_text("arcor2-hw node run press")
+        await screen.settle()
+        assert await screen.faults() == []
+        assert await screen.barriers() == []
+        await screen.picture("nodes")
