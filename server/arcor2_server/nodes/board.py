@@ -114,6 +114,18 @@ class NodeBoard:
         else:
             known.take(announced, moment)
 
+    def take_encoded(self, subject: str, body: bytes) -> None:
+        """Store an encoded announcement, unless it is invalid or another node pretends to be this one."""
+        try:
+            announced = msgspec.json.decode(body, type=Announcement)
+        except msgspec.MsgspecError as error:
+            log.warning("invalid announcement of a node", subject=subject, reason=str(error))
+            return
+        if subject == presence_subject(announced.name):  # what a node may publish depends on the subject
+            self.take(announced)
+        else:
+            log.warning("announcement of a node with the name of another one", subject=subject, name=announced.name)
+
     async def _follow(self) -> None:
         """Receive announcements, and connect again when the broker was lost."""
         while True:
@@ -141,10 +153,7 @@ class NodeBoard:
         lost = asyncio.Event()
 
         async def received(message: Msg) -> None:
-            try:
-                self.take(msgspec.json.decode(message.data, type=Announcement))
-            except msgspec.MsgspecError as error:
-                log.warning("invalid announcement of a node", subject=message.subject, reason=str(error))
+            self.take_encoded(message.subject, message.data)
 
         client = await connect_client(of_environment(self._environment), "arcor2-hw nodes", lost.set)
         try:

@@ -98,6 +98,17 @@ def test_nodes_that_the_scene_needs_are_lost_after_a_while() -> None:
     assert board.board.lost() == {}
 
 
+def test_a_node_cannot_pretend_to_be_another_one() -> None:
+    board = Board({})
+    for subject, body in (
+        ("arcor2.oven.presence", msgspec.json.encode(PRESS)),
+        ("arcor2.press.presence", b"{}"),
+        ("arcor2.oven.presence", msgspec.json.encode(replace(PRESS, name="oven"))),
+    ):
+        board.board.take_encoded(subject, body)
+    assert [each.name for each in board.board.data().nodes] == ["oven"]
+
+
 def test_without_a_broker_nothing_is_known_or_lost() -> None:
     board = Board({}, configured=False)
     board.needed = {"press": ["arm"]}
