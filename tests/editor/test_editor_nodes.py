@@ -1,7 +1,6 @@
 """Nodes: a user sees which computers can be used, and sets on which one a device runs."""
 
-import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 
 import pytest
@@ -17,16 +16,16 @@ from tests.server.nodes.conftest import Broker, Node
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 
-@pytest_asyncio.fixture(loop_scope="session")
-async def broker(tmp_path: Path) -> AsyncIterator[Broker]:
+@pytest.fixture
+def broker(tmp_path: Path) -> Iterator[Broker]:
     running = Broker(tmp_path)
     yield running
     running.end()
 
 
-@pytest_asyncio.fixture(loop_scope="session")
-async def node(broker: Broker, tmp_path: Path) -> AsyncIterator[Node]:
-    running = await asyncio.to_thread(Node, broker.url, tmp_path)
+@pytest.fixture
+def node(broker: Broker, tmp_path: Path) -> Iterator[Node]:
+    running = Node(broker.url, tmp_path)
     yield running
     running.end()
 
