@@ -2090,7 +2090,7 @@ export interface NodeStatus {
  * The nodes of a server.
  *
  * Attributes:
- *     configured: Whether the server uses nodes: it has the address of a broker, or its cell file names a node.
+ *     configured: Whether the server uses nodes: it has a broker, or its cell file or the open scene names a node.
  *     nodes: The nodes by name: those that announced themselves, and those that the open scene or the cell file names.
  *     assigned: The nodes that the cell file of the server sets, by name of the object. They override those of scenes.
  *     problem: Why the state of the nodes is unknown; `key` and `values` translate it.

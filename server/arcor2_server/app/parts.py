@@ -3,6 +3,7 @@
 import os
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from arcor2_hw.data.audit import AuditOutcome
@@ -357,10 +358,12 @@ def board_of_nodes(settings: ServerSettings, hub: Hub, session: Session) -> Node
         scene = session.document.scene
         return {} if scene is None else objects_by_node(settings.cell, scene.objects)
 
-    def configured() -> bool:
-        return bool(assigned or os.environ.get(BROKER_URL)) or settings.broker_credentials.is_file()
+    environment = {BROKER_CREDENTIALS: str(settings.broker_credentials)} | os.environ
+    credentials = Path(environment[BROKER_CREDENTIALS])
 
-    environment = os.environ | {BROKER_CREDENTIALS: str(settings.broker_credentials)}
+    def configured() -> bool:
+        return bool(environment.get(BROKER_URL) or assigned or needed()) or credentials.is_file()
+
     return NodeBoard(hub, assigned, needed, configured, environment)
 
 

@@ -1,5 +1,6 @@
 """The request that opens a session at a node, and its answer."""
 
+from functools import cache
 from importlib.metadata import version
 
 import msgspec
@@ -25,6 +26,7 @@ class Opened(msgspec.Struct, frozen=True):
     refusal: Message | None = None
 
 
+@cache
 def own_version() -> str:
     """Return the version of this installation."""
     return version("arcor2-hw")
