@@ -7,6 +7,7 @@ import pytest
 import pytest_asyncio
 from playwright.async_api import Browser, expect
 
+from arcor2_hw.client.errors import RequestFailed
 from arcor2_hw.data import rpc
 from tests.e2e.harness import Cell
 from tests.editor import texts
@@ -54,9 +55,19 @@ async def test_a_device_is_set_on_a_node_that_is_lost(node: Node, served: Cell, 
         await page.get_by_role("treegrid", name="Without a pose").get_by_role("row").filter(has_text="clock").click()
         await page.get_by_label("Runs on").select_option("press")
         await tools.get_by_role("button", name=texts.DEVICES, exact=True).click()
-        row = page.get_by_role("region", name="Nodes").get_by_role("listitem")
+        row = page.get_by_role("region", name="Nodes").get_by_role("listitem").filter(has_text="press")
         await expect(row).to_contain_text("Devices of this scene: clock")
         await expect(row.locator(".tag")).to_have_text("connected")
+
+        await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs("second", "TimeActions"))
+        while (second := (await client.next_event("SceneObjectChanged")).data).name != "second":
+            continue
+        await client.call("SetObjectNode", rpc.SetObjectNodeArgs(second.id, "oven"))
+        with pytest.raises(RequestFailed, match=r"on one node: clock \(press\), second \(oven\)") as refused:
+            await client.call("StartScene")
+        assert refused.value.reason == "several_nodes"
+        await client.call("Undo")
+
         node.end()
         await expect(row.locator(".tag")).to_have_text("not connected")
         await expect(row).to_contain_text("arcor2-hw node run press")

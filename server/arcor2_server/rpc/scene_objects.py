@@ -156,10 +156,11 @@ class SceneObjectRequests:
         return await self._connection_check.run(obj)
 
     def _node_of(self, object_id: str) -> str | Unset:
-        """Return the node of an object of the open scene; unset for an object that is not in the scene."""
+        """Return the node on which an object of the open scene runs, or on which another one would run with it."""
         scene = self._session.document.scene
-        found = [each for each in (scene.objects if scene else ()) if each.id == object_id]
-        return (self._online.host.node_of(found) or UNSET) if found else UNSET
+        objects = scene.objects if scene else []
+        own = self._online.host.node_of([each for each in objects if each.id == object_id])
+        return own or self._online.host.node_of(objects) or UNSET
 
     @rpc("FindDevices")
     async def find_devices(self, context: Context, args: FindDevicesArgs) -> list[FoundDevice]:
