@@ -9,16 +9,19 @@ import subprocess
 import sys
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from arcor2_hw.data.cell import BROKER_CREDENTIALS
+from arcor2_hw.data.nodes import NodeState
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.access.authority import Authority
 from arcor2_server.hosts.process import CellHost
 from arcor2_server.nodes.accounts import Accounts
+from arcor2_server.nodes.board import NodeBoard
 from arcor2_server.settings import ServerSettings
 from tests.waiting import wait_for
 
@@ -126,6 +129,27 @@ def node(broker: Broker, tmp_path_factory: pytest.TempPathFactory) -> Iterator[N
     running = Node(broker.url, tmp_path_factory.mktemp("cache"))
     yield running
     running.end()
+
+
+@contextlib.asynccontextmanager
+async def followed(environment: Mapping[str, str]) -> AsyncIterator[Callable[..., Any]]:
+    """Follow the announcements of nodes; yield a function that waits for a state of `NODE` and kinds of sessions."""
+    board = NodeBoard(SimpleNamespace(broadcast=lambda _: None), {}, dict, lambda: True, environment)
+    board.start()
+
+    async def until(state: NodeState, kinds: list[str]) -> None:
+        async with asyncio.timeout(PATIENCE):
+            while (state, kinds) not in [
+                (each.state, [session.kind for session in each.sessions])
+                for each in board.data().nodes
+                if each.name == NODE
+            ]:
+                await asyncio.sleep(0.02)
+
+    try:
+        yield until
+    finally:
+        await board.close()
 
 
 class Listener:

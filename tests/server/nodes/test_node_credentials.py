@@ -16,6 +16,7 @@ from nats.aio.client import Client
 from nats.aio.msg import Msg
 
 from arcor2_hw.data.cell import BROKER_URL
+from arcor2_hw.data.nodes import NodeState
 from arcor2_hw.exceptions import Arcor2Error, Conflict, ConnectionLost, InvalidData, NotFound, OutcomeUnknown, Refused
 from arcor2_server.audit.chain import AuditFile
 from arcor2_server.cli import node as cli
@@ -27,7 +28,7 @@ from arcor2_server.nodes.connections import answer_subject, connect_client
 from arcor2_server.nodes.credentials import Credentials, load, node_file, require_tls
 from arcor2_server.nodes.nkeys import Kind, SigningKey, is_user_key
 from arcor2_server.settings import ServerSettings
-from tests.server.nodes.conftest import CLI, NODE, PATIENCE, Node, Server
+from tests.server.nodes.conftest import CLI, NODE, PATIENCE, Node, Server, followed
 from tests.server.nodes.test_node_hosts import moving, online
 from tests.waiting import wait_for
 
@@ -77,6 +78,8 @@ async def test_a_node_is_paired_works_is_revoked_and_paired_again(
         host, _ = await start_host(environment=server.environment)
         await online(host)
         assert await host.call("obj_arm", "add", {"a": b"1", "b": b"2"}) == b"3"
+        async with followed(server.environment) as until:
+            await until(NodeState.CONNECTED, ["scene"])
         call = moving(host, tmp_path / "moving")
         await asyncio.to_thread(wait_for, (tmp_path / "moving").exists)
 

@@ -7,7 +7,6 @@ import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -18,11 +17,10 @@ from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.exceptions import Arcor2Error, OutcomeUnknown
 from arcor2_hw.runtime import messages as m
 from arcor2_server.hosts.process import CellError, CellHost
-from arcor2_server.nodes.board import NodeBoard
 from tests.runtime.conftest import Package, open_scene, scene_object, type_code
 from tests.runtime.test_host_holding import ARM
 from tests.runtime.test_host_program import Run
-from tests.server.nodes.conftest import NODE, PATIENCE, Broker, Node, tls_configuration
+from tests.server.nodes.conftest import NODE, PATIENCE, Broker, Node, followed, tls_configuration
 from tests.waiting import wait_for
 
 pytestmark = pytest.mark.xdist_group("nodes")  # its tests share a broker and a node
@@ -180,25 +178,12 @@ async def test_motion_stops_when_the_service_of_the_node_hangs(
 async def test_a_node_announces_itself_and_what_runs_on_it(
     broker: Broker, node: Node, start_host: Callable[..., Any]
 ) -> None:
-    hub: Any = SimpleNamespace(broadcast=lambda _: None)
-    board = NodeBoard(hub, {}, dict, lambda: True, os.environ | {"ARCOR2_HW_NATS_URL": broker.url})
-    board.start()
-    try:
+    async with followed(os.environ | {"ARCOR2_HW_NATS_URL": broker.url}) as until:
         host, _ = await start_host()
         await online(host)
-
-        def running() -> list[tuple[NodeState, list[str]]]:
-            found = [each for each in board.data().nodes if each.name == NODE]
-            return [(each.state, [session.kind for session in each.sessions]) for each in found]
-
-        async with asyncio.timeout(PATIENCE):
-            while running() != [(NodeState.CONNECTED, ["scene"])]:
-                await asyncio.sleep(0.02)
-            await host.close()
-            while running() != [(NodeState.CONNECTED, [])]:
-                await asyncio.sleep(0.02)
-    finally:
-        await board.close()
+        await until(NodeState.CONNECTED, ["scene"])
+        await host.close()
+        await until(NodeState.CONNECTED, [])
 
 
 async def test_a_package_runs_with_its_files(node: Node, start_host: Callable[..., Any], tmp_path: Path) -> None:
