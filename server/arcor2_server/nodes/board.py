@@ -18,8 +18,7 @@ from arcor2_hw.exceptions import Arcor2Error, ConnectionLost
 from arcor2_hw.messages import Message
 from arcor2_server.background import BackgroundTasks
 from arcor2_server.events import EventHub, make_event
-from arcor2_server.nodes.opening import own_version
-from arcor2_server.nodes.presence import PERIOD, Announcement, presence_subject
+from arcor2_server.nodes.presence import PERIOD, Announcement, own_version, presence_subject
 
 log = structlog.get_logger(__name__)
 

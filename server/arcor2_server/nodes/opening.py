@@ -1,11 +1,9 @@
 """The request that opens a session at a node, and its answer."""
 
-from functools import cache
-from importlib.metadata import version
-
 import msgspec
 
 from arcor2_hw.messages import Message
+from arcor2_server.nodes.presence import own_version
 from arcor2_server.nodes.session import SILENCE
 
 
@@ -24,12 +22,6 @@ class Opened(msgspec.Struct, frozen=True):
     """The answer of a node. refusal: why it does not open a session; None if it does."""
 
     refusal: Message | None = None
-
-
-@cache
-def own_version() -> str:
-    """Return the version of this installation."""
-    return version("arcor2-hw")
 
 
 def refusal_of(node: str, opening: Opening) -> Message | None:

@@ -27,7 +27,8 @@ from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, Refused
 from arcor2_hw.messages import Message
 from arcor2_server.nodes.credentials import Credentials, check_name
 from arcor2_server.nodes.nkeys import Kind, SigningKey, is_user_key
-from arcor2_server.nodes.opening import Opening, own_version, refusal_of
+from arcor2_server.nodes.opening import Opening, refusal_of
+from arcor2_server.nodes.presence import own_version
 
 PORT: Final = 4223
 """Default port of the server for pairing."""

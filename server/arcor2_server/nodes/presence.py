@@ -3,6 +3,8 @@
 import os
 import shutil
 import socket
+from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
@@ -52,6 +54,12 @@ class Announcement(msgspec.Struct, frozen=True):
 def presence_subject(node: str) -> str:
     """Return the subject of the announcements of a node; `*` for those of all nodes."""
     return f"{PREFIX}.{node}.presence"
+
+
+@cache
+def own_version() -> str:
+    """Return the version of this installation."""
+    return version("arcor2-hw")
 
 
 def computer() -> str:

@@ -25,7 +25,8 @@ from arcor2_server.nodes.content import WITH_FILES, Content
 from arcor2_server.nodes.conversion import STOPS, for_server, outline
 from arcor2_server.nodes.credentials import of_environment
 from arcor2_server.nodes.lanes import Header, Lane
-from arcor2_server.nodes.opening import Opened, Opening, own_version
+from arcor2_server.nodes.opening import Opened, Opening
+from arcor2_server.nodes.presence import own_version
 from arcor2_server.nodes.session import SILENCE, Connections, SessionEnd
 from arcor2_server.nodes.stream import MessageStream
 

@@ -26,7 +26,7 @@ from arcor2_server.nodes.content import WITH_FILES, ContentStore, default_store
 from arcor2_server.nodes.conversion import FRAMES, LARGE, Outline, for_host, outline
 from arcor2_server.nodes.credentials import Credentials, environment_without
 from arcor2_server.nodes.lanes import Header, Lane
-from arcor2_server.nodes.opening import Opened, Opening, own_version, refusal_of
+from arcor2_server.nodes.opening import Opened, Opening, refusal_of
 from arcor2_server.nodes.presence import (
     PERIOD,
     Announcement,
@@ -35,6 +35,7 @@ from arcor2_server.nodes.presence import (
     computer,
     free_space,
     load,
+    own_version,
     presence_subject,
 )
 from arcor2_server.nodes.session import BEAT_PERIOD, Connections, SessionEnd

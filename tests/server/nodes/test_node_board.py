@@ -14,8 +14,7 @@ from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import SeveralNodes
 from arcor2_hw.messages import Message
 from arcor2_server.nodes.board import FORGOTTEN_AFTER, LOAD_PERIOD, SILENT_AFTER, NodeBoard
-from arcor2_server.nodes.opening import own_version
-from arcor2_server.nodes.presence import Announcement, LastError, RunningSession
+from arcor2_server.nodes.presence import Announcement, LastError, RunningSession, own_version
 
 PRESS = Announcement("press", own_version(), "pc-7", "run-1", 60.0, 0.5, 10**9, [])
 

@@ -27,6 +27,7 @@ from arcor2_server.nodes.accounts import Accounts
 from arcor2_server.nodes.connections import answer_subject, connect_client
 from arcor2_server.nodes.credentials import Credentials, load, node_file, require_tls
 from arcor2_server.nodes.nkeys import Kind, SigningKey, is_user_key
+from arcor2_server.nodes.presence import own_version
 from arcor2_server.settings import ServerSettings
 from tests.server.nodes.conftest import CLI, NODE, PATIENCE, Node, Server, followed
 from tests.server.nodes.test_node_hosts import moving, online
@@ -303,7 +304,7 @@ async def test_a_code_is_void_after_wrong_ones_and_when_it_expires() -> None:
 @pytest.mark.usefixtures("cheap")
 async def test_another_version_is_refused_and_does_not_use_up_the_code(monkeypatch: pytest.MonkeyPatch) -> None:
     async with offered() as offer:
-        versions = iter(["9.9.9", opening.own_version(), opening.own_version()])
+        versions = iter(["9.9.9", own_version(), own_version()])
         with monkeypatch.context() as patch:
             patch.setattr(pairing, "own_version", versions.__next__)
             patch.setattr(opening, "own_version", lambda: "9.9.9")

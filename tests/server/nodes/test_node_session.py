@@ -24,7 +24,8 @@ from arcor2_hw.runtime import messages as m
 from arcor2_server.nodes.content import Content, ContentStore
 from arcor2_server.nodes.conversion import for_host, for_server
 from arcor2_server.nodes.lanes import END, PART_SIZE, Header, Lane, LaneReader, LaneWriter, MessageLost
-from arcor2_server.nodes.opening import Opening, own_version, refusal_of
+from arcor2_server.nodes.opening import Opening, refusal_of
+from arcor2_server.nodes.presence import own_version
 from arcor2_server.nodes.service import HostedSession
 from arcor2_server.nodes.session_clock import SessionClock
 
