@@ -57,6 +57,7 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.held import HeldData, HoldChoice, HoldDecidedData, OnError
 from arcor2_hw.data.interlocks import Interlock, InterlockStates
 from arcor2_hw.data.maintenance import BackupInfo, DeviceCard, ParameterBackup
+from arcor2_hw.data.nodes import NodesData
 from arcor2_hw.data.object_type import ObjectAction, ObjectModel, ObjectTypeMeta, ObservationMeta, ParameterMeta
 from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHoldData
 from arcor2_hw.data.package import PackageSummary
@@ -740,6 +741,9 @@ class Requests(ABC):
     async def list_locks(self, *, timeout: float | None = None) -> list[LockHolder]:
         """ListLocks. Needs the role operator."""
 
+    async def list_nodes(self, *, timeout: float | None = None) -> NodesData:
+        """ListNodes. Needs the role operator."""
+
     async def list_packages(self, *, timeout: float | None = None) -> list[PackageSummary]:
         """ListPackages. Needs the role operator."""
 
@@ -1189,6 +1193,9 @@ class Requests(ABC):
     ) -> None:
         """SetEefPerpendicularToWorld. Needs the role standard user."""
 
+    async def set_object_node(self, *, id: str, node: str, dry_run: bool = False, timeout: float | None = None) -> None:
+        """SetObjectNode: the scene object, and the name of its node; empty for none. Needs the role technician."""
+
     async def set_view_state(
         self, *, scope: ViewScope, values: dict[str, Any], document: str = "", timeout: float | None = None
     ) -> SetViewStateData:
@@ -1594,6 +1601,8 @@ class Requests(ABC):
     def follow(
         self, name: Literal["MovePreview"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[MovePreviewData]]: ...
+    @overload
+    def follow(self, name: Literal["NodesChanged"], /, *, limit: int = LIMIT) -> EventStream[TypedEvent[NodesData]]: ...
     @overload
     def follow(
         self, name: Literal["Notification"], /, *, limit: int = LIMIT
