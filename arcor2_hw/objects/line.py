@@ -4,12 +4,12 @@ import contextlib
 import select
 import socket
 import threading
-import time
 import urllib.parse
 from collections.abc import Callable, Iterator
 from typing import Any, Final, Protocol, TypeVar
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.keep_alive import RunningTime
 from arcor2_hw.messages import Message
 from arcor2_hw.objects.settings import check_serial_port
 
@@ -164,10 +164,10 @@ class Line:
                 raise loss
             self.waiting()
             self.send(question)
-            deadline, received = time.monotonic() + limit, b""
+            clock, received = RunningTime(), b""
             late = False
             while not late:
-                late = time.monotonic() >= deadline  # then read once more: this process may have been suspended
+                late = clock() >= limit  # then read once more: this process may have been suspended
                 if data := self.receive():
                     received = (received + data)[-LONGEST_ANSWER:]
                     if (found := answer(received)) is not None:

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -119,6 +120,7 @@ async def test_the_arm_enters_only_while_the_door_is_confirmed_open(tmp_path: Pa
             assert ("open", "inside") in log.lines
             # The door closes while the arm moves slowly out.
             await arm.move(start, 0.02)
+            await until(partial(moves, cell, "robot"), "the arm moves")
             await cell.command_fake("tester", "push_door", opening=False)
             why = await arm.ended()
             assert why.startswith("robot: move_to_pose was stopped. Interlock Door: tester: door open is not met")
@@ -204,6 +206,11 @@ def lowered(pose: Pose) -> Pose:
 async def height(cell: Cell, robot: str) -> float:
     """Return the height of the tool in the fake, m."""
     return float((await cell.command_fake(robot, "truth"))["tcp_pose"][2])
+
+
+async def moves(cell: Cell, robot: str) -> bool:
+    """Return whether the fake arm moves."""
+    return any(abs(speed) > 1e-3 for speed in (await cell.command_fake(robot, "truth"))["qd"])
 
 
 async def states(client: Client) -> InterlockStates:

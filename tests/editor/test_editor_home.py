@@ -142,6 +142,7 @@ async def test_projects_of_a_scene_pictures_and_templates(
         await client.call("AddActionPoint", rpc.AddActionPointArgs("here", project.action_points[0].position))
         await screen.sees(texts.NOT_SAVED)
         await screen.press(texts.SAVE)
+        await expect(screen.page.get_by_text(texts.NOT_SAVED)).to_have_count(0)
         await screen.press(texts.CLOSE_DOCUMENT)
         picture = screen.page.locator(f".card[data-id='{project.id}'] img")
         await picture.wait_for()

@@ -157,7 +157,7 @@ async def test_object_is_dragged_previewed_to_others_and_undone(opened: Open, br
         assert await opened.pose("tester") == after
 
         # An edit of another user in between blocks Undo; the message names the user.
-        await client.call("WriteLock", rpc.WriteLockArgs(tester.id))
+        await until(lambda: _granted(client, "WriteLock", rpc.WriteLockArgs(tester.id)), "the lock is given back")
         await screen.sees("In use by colleague")
         assert await screen.page.evaluate("window.__engine.gizmo.shown") is False
         await client.call("UpdateObjectPose", rpc.UpdateObjectPoseArgs(tester.id, before))

@@ -163,7 +163,6 @@ class Observer(StateObserver[Sample]):
     """Observes the controller. `on_sample` is called after each reading on the observing thread."""
 
     busy_period = 0.02
-    answers_within = 1.0
 
     def __init__(self, name: str, settings: YumiSettings) -> None:
         self.rws = Rws(name, settings.host, settings.rws_port, settings.user, settings.password)

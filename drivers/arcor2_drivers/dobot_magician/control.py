@@ -10,9 +10,11 @@ from arcor2_hw.messages import Phrase
 from arcor2_hw.objects.arm import StopCounter
 
 from .frames import Command
-from .observer import STANDSTILL_AFTER, Observer
+from .observer import Observer
 from .settings import DobotMagicianSettings
 
+SEEN_AT_REST_WITHIN: Final = 1.0
+"""Time in which the observer sees an arm that has just stopped at standstill, s: 0.1 s, more on a busy computer."""
 REST_WITHIN: Final = 2.0
 """Time after which a stopped arm must be at standstill, s."""
 
@@ -47,7 +49,7 @@ class Control:
         if self.ours:
             return
         try:  # an arm counts as moving for a moment after it has stopped
-            self._observer.wait(lambda sample: not sample.moving, 3.0 * STANDSTILL_AFTER, "standstill")
+            self._observer.wait(lambda sample: not sample.moving, SEEN_AT_REST_WITHIN, "standstill")
         except DeviceTimeout as e:
             raise NotInControl(
                 "{device} is being moved by another client. Wait until it stops.", device=self.who

@@ -44,7 +44,6 @@ class Observer(StateObserver[State]):
     period = 0.03
     busy_period = 0.01
     fresh_for = 0.25
-    answers_within = 1.0
 
     def __init__(self, name: str, settings: TwoAxisRobotSettings) -> None:
         self.bus = Bus(name, settings.port, settings.baud_rate)

@@ -41,6 +41,8 @@ _TOO_SLOW: Final = {
 """Causes by exit status of the control process, where the computer was busy."""
 _BROKEN: Final = (b"disconnected", b"could not receive", b"closed the connection", b"lost connection", b"reconnecting")
 """Texts that ur_rtde 1.6.5 prints, in lower case, when its connection breaks and before it reconnects."""
+ASKED: Final = 3
+"""Attempts of a repeatable command."""
 log = logging.getLogger(__name__)
 
 
@@ -191,18 +193,19 @@ class ControlSession:
             raise error from None
 
     def ask(self, what: str, question: str, *arguments: Any) -> Any:
-        """Execute a repeatable command; twice if the library fails or denies, as it may on a busy computer."""
-        try:
-            if answer := self.call(what, question, *arguments):
-                return answer
-            reason = f"the answer was {answer}"
-        except DeviceFault as e:
-            reason = e.detail
-        log.info("%s: asking again for %s: %s", self.who, what, reason)
+        """Execute a repeatable command, up to ASKED times if the library fails or denies, as on a busy computer."""
+        for _ in range(ASKED - 1):
+            try:
+                if answer := self.call(what, question, *arguments):
+                    return answer
+                reason = f"the answer was {answer}"
+            except DeviceFault as e:
+                reason = e.detail
+            log.info("%s: asking again for %s: %s", self.who, what, reason)
         return self.call(what, question, *arguments)
 
     def set(self, what: str, command: str, *arguments: Any) -> None:
-        """Execute a command that sets values and returns whether it was accepted; twice, as `ask`. Raise as `do`."""
+        """Execute a command that sets values and returns whether it was accepted, as `ask`. Raise as `do`."""
         if not self.ask(what, command, *arguments):
             self._not_accepted(what)
 

@@ -145,7 +145,7 @@ def test_stop_after_a_reconnect_stops_a_motion_left_running(
 def test_control_is_refused_while_another_client_moves_the_arm(
     fake: FakeProcess, make: Callable[..., DobotMagician]
 ) -> None:
-    ratio = encode(83, 1, struct.pack("<2f", 5.0, 50.0))
+    ratio = encode(83, 1, struct.pack("<2f", 1.0, 50.0))
     write(fake.ready["port"], ratio, ptp(30.0), encode(240, 1))
     fake.control.wait_until(lambda truth: truth["moving"])
     arm = make(fake.ready["port"])

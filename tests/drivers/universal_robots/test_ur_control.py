@@ -268,7 +268,7 @@ def test_one_motion_at_a_time(ready: UR5e, fake: FakeUr) -> None:
     doing = far_move(ready, fake)
     with pytest.raises(Refused, match="moving already"):
         ready.move_to_joints(ready.robot_joints(), 0.5)
-    assert ready.state().moving
+    wait_for(lambda: ready.state().moving)
     ready.stop()
     with pytest.raises(Cancelled):
         doing.result()

@@ -63,8 +63,7 @@ def test_the_camera_sees_the_arm_follow_its_joints_and_the_markers(cell: tuple[A
     host, port = ur.ready["script"].split(":")
     with socket.create_connection((host, int(port)), 2.0) as script:
         script.sendall(MOVE.encode())
-    ur.control.wait_until(lambda truth: truth["program"] == "nod")
-    ur.control.wait_until(lambda truth: truth["program"] is None, within=30.0)
+    ur.control.wait_until(lambda truth: truth["program"] is None and truth["q"][0] > 0.4, within=30.0)
     after = camera.control.wait_until(in_place, within=20.0)
     first, second = flange_seen(before["things"]), flange_seen(after["things"])
     assert first is not None
