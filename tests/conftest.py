@@ -44,16 +44,21 @@ APART = (
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--matrix", action="store_true", help="show screens in all languages, not only the longest")
+    parser.addoption("--matrix", action="store_true", help="run all combinations, as before a change is merged")
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Sort the tests of a parallel run for a queue that is read from both ends, so that short tests run last.
+    """Deselect the tests of the matrix unless it is wanted, and sort the others.
+
+    The tests of a parallel run are sorted for a queue that is read from both ends, so that short tests run last.
 
     At the beginning of the queue are the crowded tests and those that wait for devices, at its end browser tests and
     before them long ones.
     """
+    if not config.getoption("--matrix") and (left_out := [each for each in items if each.get_closest_marker("matrix")]):
+        items[:] = [each for each in items if each not in left_out]
+        config.hook.pytest_deselected(items=left_out)
     if hasattr(config, "workerinput"):
         items.sort(key=_order)
 

@@ -10,13 +10,22 @@ from playwright.async_api import Browser
 from arcor2_server.web.editor import FILES
 from tests.e2e.harness import Cell, running_cell
 from tests.editor.reset import reset
-from tests.editor.screen import running_browser
+from tests.editor.screen import VIEWPORTS, running_browser
+
+USUAL = ("tablet", "portrait", "phone")
+"""Sizes in which layouts are checked without `--matrix`."""
 
 
 @pytest.fixture(scope="session")
 def built_editor() -> Path:
     assert (FILES / "index.html").is_file(), "the editor is not built: make .make/editor"
     return FILES
+
+
+@pytest.fixture(scope="session")
+def sizes(pytestconfig: pytest.Config) -> list[str]:
+    """The sizes in which layouts are checked."""
+    return list(VIEWPORTS) if pytestconfig.getoption("--matrix") else list(USUAL)
 
 
 @pytest_asyncio.fixture(scope="package", loop_scope="session")

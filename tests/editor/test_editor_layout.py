@@ -1,7 +1,7 @@
-"""Layout of every screen in all sizes, light and dark, with large text, a wide font, and in two sizes a narrow one.
+"""Layout of every screen, light and dark, with large text, a wide font, and in two sizes a narrow one.
 
-Controls that are too small, covered, off the screen or overlapping are searched for in all sizes, accessibility
-violations (axe) once in light and once in dark.
+Controls that are too small, covered, off the screen or overlapping are searched for on a phone and on a tablet in both
+directions, with `--matrix` in all sizes; accessibility violations (axe) in one size, in light and dark by turns.
 """
 
 from collections.abc import AsyncIterator, Iterable
@@ -40,8 +40,8 @@ class Looks:
         self.found: dict[str, list[str]] = {}
         self._dark = not dark
 
-    async def at(self, what: str, sizes: Iterable[str] = VIEWPORTS) -> None:
-        """Check the screen in every size, or in these."""
+    async def at(self, what: str, sizes: Iterable[str]) -> None:
+        """Check the screen in these sizes."""
         page = self.screen.page
         self._dark = not self._dark
         await page.emulate_media(color_scheme="dark" if self._dark else "light")
@@ -88,13 +88,13 @@ async def open_tool(screen: Screen, name: str) -> None:
     await screen.page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
 
 
-async def test_join_and_home(cell: Cell, project: Project, browser: Browser) -> None:
+async def test_join_and_home(cell: Cell, project: Project, browser: Browser, sizes: list[str]) -> None:
     async with screen_of(browser, cell.url, touch=True) as screen:
         looks = Looks(screen)
         page = screen.page
         await page.goto(f"{screen.url}/?q=low")
         await page.get_by_label(texts.YOUR_NAME).wait_for()
-        await looks.at("join")
+        await looks.at("join", sizes)
         await looks.with_large_text("join")
         await page.get_by_label(texts.YOUR_NAME).fill("colleague")
         await screen.press(texts.JOIN)
@@ -102,7 +102,7 @@ async def test_join_and_home(cell: Cell, project: Project, browser: Browser) -> 
         await looks.at("join refused", FEW)
         await screen.join("Eva")
         await screen.sees("on PCB testing")
-        await looks.at("home")
+        await looks.at("home", sizes)
         await looks.with_large_text("home")
         await page.get_by_role("radio", name=texts.SCENES).click()
         await screen.press(texts.NEW_SCENE)
@@ -124,9 +124,9 @@ async def at_work(cell: Cell, project: Project, browser: Browser, *, dark: bool)
         assert not looks.found, looks.report()
 
 
-async def test_the_workplace(cell: Cell, project: Project, browser: Browser) -> None:
+async def test_the_workplace(cell: Cell, project: Project, browser: Browser, sizes: list[str]) -> None:
     async with at_work(cell, project, browser, dark=True) as (_, looks):
-        await looks.at("workplace")
+        await looks.at("workplace", sizes)
         await looks.with_large_text("workplace")
 
 
@@ -172,16 +172,16 @@ async def test_search_and_views(cell: Cell, project: Project, browser: Browser) 
             await looks.at(f"shown as {name}", FEW)
 
 
-async def test_online(cell: Cell, project: Project, browser: Browser) -> None:
+async def test_online(cell: Cell, project: Project, browser: Browser, sizes: list[str]) -> None:
     async with at_work(cell, project, browser, dark=False) as (screen, looks):
         page = screen.page
         await screen.press(texts.GO_ONLINE)
         await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=60_000)
         await open_tool(screen, texts.ROBOT)
-        await looks.at("online")
+        await looks.at("online", sizes)
 
 
-async def test_left_handed_controls(cell: Cell, project: Project, browser: Browser) -> None:
+async def test_left_handed_controls(cell: Cell, project: Project, browser: Browser, sizes: list[str]) -> None:
     async with at_work(cell, project, browser, dark=True) as (screen, looks):
         page = screen.page
         await screen.press(texts.GO_ONLINE)
@@ -189,7 +189,7 @@ async def test_left_handed_controls(cell: Cell, project: Project, browser: Brows
         await open_tool(screen, texts.ROBOT)
         await screen.press(texts.SETTINGS)
         await page.get_by_role("menuitem", name="Left-handed controls").click()
-        await looks.at("left hand")
+        await looks.at("left hand", sizes)
         await page.set_viewport_size(VIEWPORTS["phone"])  # type: ignore[arg-type]
         await screen.press(texts.LARGER_PANEL)
         await looks.at("large panel", ("phone", "portrait"))
@@ -209,7 +209,7 @@ async def test_reduced_motion_stops_animations(cell: Cell, project: Project, bro
         assert await screen.page.evaluate(running) == []
 
 
-async def test_lost_server(cell: Cell, project: Project, browser: Browser) -> None:
+async def test_lost_server(cell: Cell, project: Project, browser: Browser, sizes: list[str]) -> None:
     async with screen_of(browser, cell.url, touch=True) as screen:
         screen.expected_errors = SERVER_GONE
         await at_the_project(screen, "Cecil", project)
@@ -217,5 +217,5 @@ async def test_lost_server(cell: Cell, project: Project, browser: Browser) -> No
         await cell.kill("server")
         await screen.sees(texts.NO_CONNECTION)
         looks = Looks(screen)
-        await looks.at("lost server")
+        await looks.at("lost server", sizes)
         assert not looks.found, looks.report()

@@ -3,7 +3,7 @@
 import contextlib
 import json
 import re
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterable, Iterator
 from pathlib import Path
 
 import pytest
@@ -73,13 +73,13 @@ async def built(cell: Cell, colleague: Client, message: str = "", method: str = 
     return next(each for each in await colleague.list_packages() if each.id == package_id)
 
 
-async def reads_who_commands(screen: Screen, technician: Client) -> None:
+async def reads_who_commands(screen: Screen, technician: Client, sizes: Iterable[str]) -> None:
     """Open the dialog from the note on the screen. An operator may only read it; it follows what a technician does."""
     start = screen.page.get_by_role("button", name=re.compile("^Start"))
     await technician.call("SetCellAuthority", rpc.SetCellAuthorityArgs(CellAuthority.NOBODY))
     await expect(start).to_have_attribute("aria-disabled", "true")
     await screen.sees("No program starts until a technician gives the authority")
-    await pictures(screen, "operator, nobody commands")
+    await pictures(screen, "operator, nobody commands", sizes)
     await screen.press("Nobody commands this cell.")
     dialog = screen.page.get_by_role("dialog", name="Mode and authority")
     hub = dialog.get_by_role("button", name=re.compile("^This server"))
@@ -94,7 +94,7 @@ async def reads_who_commands(screen: Screen, technician: Client) -> None:
 
 
 async def test_built_package_appears_runs_and_its_error_is_shown(
-    cell: Cell, colleague: Client, browser: Browser, token: str
+    cell: Cell, colleague: Client, browser: Browser, token: str, sizes: list[str]
 ) -> None:
     async with screen_of(browser, cell.url, touch=True) as screen:
         page = screen.page
@@ -105,7 +105,7 @@ async def test_built_package_appears_runs_and_its_error_is_shown(
         _, project = await cell.open(colleague)
         await cell.build(colleague, project)
         await page.get_by_role("radio", name=project.name).wait_for()
-        await reads_who_commands(screen, colleague)
+        await reads_who_commands(screen, colleague, sizes)
         await screen.press("Start")
         await page.get_by_role("button", name=texts.STOP_MOTION).wait_for(timeout=BEGUN)
         # Without a board, the reader finds no code. The operator enters it.
@@ -115,11 +115,11 @@ async def test_built_package_appears_runs_and_its_error_is_shown(
         state = page.get_by_role("status", name="State")
         await expect(state).to_have_count(0)
         await expect(page.get_by_role("button", name=texts.RESUME)).to_have_count(0)
-        await pictures(screen, "held")
+        await pictures(screen, "held", sizes)
         await card.get_by_role("button", name="Enter the result").click()
         code = card.get_by_label("code")
         await code.fill("B-1")
-        await pictures(screen, "held, result")
+        await pictures(screen, "held, result", sizes)
         await screen.press("Continue with this result")
         # Nothing can be picked in this cell. The retry asks first and fails again; then the operator ends the program.
         for _ in ("pick", "pick again"):
@@ -134,7 +134,7 @@ async def test_built_package_appears_runs_and_its_error_is_shown(
         await cell.command_fake("robot", "protective_stop")
         recognised = card.get_by_role("button", name="Acknowledge")
         await expect(card).to_contain_text("Find out why the arm was stopped, then acknowledge the protective stop.")
-        await pictures(screen, "held, protective stop", scrolled="phone")
+        await pictures(screen, "held, protective stop", sizes, scrolled="phone")
         while await recognised.count():  # the controller refuses for 5 s
             with contextlib.suppress(Error):  # the button is replaced meanwhile
                 await recognised.click(timeout=2000)
@@ -144,13 +144,13 @@ async def test_built_package_appears_runs_and_its_error_is_shown(
         await expect(state).to_contain_text("Run failed in pick")
         await expect(card).to_have_count(0)
         assert [each.end.value for each in (await colleague.call("ListRuns")).runs] == ["failed"]
-        await pictures(screen, "operator")
+        await pictures(screen, "operator", sizes)
 
 
-async def pictures(screen: Screen, name: str, scrolled: str = "") -> None:
-    """Check the layout on every device, and take pictures. On the device `scrolled`, the page is longer."""
-    for device, size in VIEWPORTS.items():
-        await screen.page.set_viewport_size(size)  # type: ignore[arg-type]
+async def pictures(screen: Screen, name: str, sizes: Iterable[str], scrolled: str = "") -> None:
+    """Check the layout in these sizes, and take pictures. In the size `scrolled`, the page is longer."""
+    for device in sizes:
+        await screen.page.set_viewport_size(VIEWPORTS[device])  # type: ignore[arg-type]
         await screen.settle()
         await screen.picture(f"{name} {device}")
         if device != scrolled:
@@ -247,7 +247,7 @@ async def test_pause_step_and_stop(cell: Cell, colleague: Client, browser: Brows
         await page.get_by_role("heading", name=texts.HOME_HEADING).wait_for()
 
 
-async def recording_is_shown(screen: Screen, alarms: Locator) -> None:
+async def recording_is_shown(screen: Screen, alarms: Locator, sizes: Iterable[str]) -> None:
     """Open the recording of an alarm, read values, and zoom."""
     page = screen.page
     await alarms.get_by_role("button", name="Recording").first.click()
@@ -262,8 +262,8 @@ async def recording_is_shown(screen: Screen, alarms: Locator) -> None:
     assert everything is not None
     await window.get_by_role("button", name="Zoom in").click()
     await expect(band).not_to_have_attribute("style", everything)
-    for name, size in VIEWPORTS.items():
-        await page.set_viewport_size(size)  # type: ignore[arg-type]
+    for name in sizes:
+        await page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
         await screen.settle()
         assert await screen.faults() == [], name
         await screen.picture(f"recording {name}")
@@ -276,7 +276,9 @@ async def recording_is_shown(screen: Screen, alarms: Locator) -> None:
     await expect(window).to_have_count(0)
 
 
-async def test_alarm_is_acknowledged_during_a_run(cell: Cell, colleague: Client, browser: Browser, token: str) -> None:
+async def test_alarm_is_acknowledged_during_a_run(
+    cell: Cell, colleague: Client, browser: Browser, token: str, sizes: list[str]
+) -> None:
     text = "The box for bad parts is full."
     package = await built(cell, colleague, text, "raise_alarm")
     async with screen_of(browser, cell.url, touch=True) as screen:
@@ -288,8 +290,8 @@ async def test_alarm_is_acknowledged_during_a_run(cell: Cell, colleague: Client,
         card = page.get_by_role("region", name="Alarm", exact=True)
         await expect(card.get_by_role("heading", name=text)).to_be_visible()
         await expect(card).to_contain_text("Do what the text says")
-        for name, size in VIEWPORTS.items():
-            await page.set_viewport_size(size)  # type: ignore[arg-type]
+        for name in sizes:
+            await page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
             await screen.settle()
             assert await screen.faults() == [], name
             await screen.picture(f"operator, alarm {name}")
@@ -313,7 +315,7 @@ async def test_alarm_is_acknowledged_during_a_run(cell: Cell, colleague: Client,
         await screen.press("All alarms")
         await everything.get_by_role("radio", name="History").check(force=True)
         await expect(everything).to_contain_text("acknowledged by Olga")
-        await recording_is_shown(screen, everything)
+        await recording_is_shown(screen, everything, sizes)
         await everything.get_by_role("radio", name="Statistics").check(force=True)
         await expect(everything).to_contain_text("Most frequent in 7 days")
     # A technician finds the same list in the workplace.
@@ -325,15 +327,15 @@ async def test_alarm_is_acknowledged_during_a_run(cell: Cell, colleague: Client,
         listed = screen.page.get_by_role("group", name="All alarms")
         await listed.get_by_role("radio", name="History").check(force=True)
         await expect(listed).to_contain_text("acknowledged by Olga")
-        for name, size in VIEWPORTS.items():
-            await screen.page.set_viewport_size(size)  # type: ignore[arg-type]
+        for name in sizes:
+            await screen.page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
             await screen.settle()
             assert await screen.faults() == [], name
             await screen.picture(f"workplace, all alarms {name}")
 
 
 async def test_operator_takes_over_a_project_left_open_and_locked(
-    cell: Cell, colleague: Client, browser: Browser
+    cell: Cell, colleague: Client, browser: Browser, sizes: list[str]
 ) -> None:
     await colleague.update_presence(view="test")  # shows no project
     await built(cell, colleague)
@@ -352,8 +354,8 @@ async def test_operator_takes_over_a_project_left_open_and_locked(
         gone = page.get_by_role("button", name="Wendy left and still holds locks")
         await gone.wait_for()
         asked = page.get_by_role("alertdialog", name="Take over from Wendy?")
-        for name, size in VIEWPORTS.items():
-            await page.set_viewport_size(size)  # type: ignore[arg-type]
+        for name in sizes:
+            await page.set_viewport_size(VIEWPORTS[name])  # type: ignore[arg-type]
             await screen.settle()
             assert await screen.faults() == [], name
             await screen.picture(f"left open {name}")

@@ -60,7 +60,9 @@ async def open_tool(page: Page, name: str) -> None:
     await page.get_by_role("complementary").get_by_role("heading", name=name, exact=True).wait_for()
 
 
-async def test_no_control_reaches_into_the_stop_dock(online: Online, module_cell: Cell, browser: Browser) -> None:
+async def test_no_control_reaches_into_the_stop_dock(
+    online: Online, module_cell: Cell, browser: Browser, sizes: list[str]
+) -> None:
     async with screen_of(browser, module_cell.url, touch=True) as screen:
         page = screen.page
         stop = page.get_by_role("button", name=texts.STOP_MOTION)
@@ -75,7 +77,7 @@ async def test_no_control_reaches_into_the_stop_dock(online: Online, module_cell
 
         await screen.join("Eva")
         await stop.wait_for()
-        for size in SIZES:
+        for size in filter(sizes.__contains__, SIZES):
             await resize(screen, size)
             for tool in texts.TOOLS:
                 await open_tool(page, tool)
@@ -99,7 +101,7 @@ async def test_no_control_reaches_into_the_stop_dock(online: Online, module_cell
         await check("large text, tablet")
         await page.evaluate("() => { document.documentElement.style.fontSize = ''; }")
         await page.evaluate("location.hash = '#/operator'")
-        for size in SIZES:
+        for size in filter(sizes.__contains__, SIZES):
             await resize(screen, size)
             await stop.wait_for()
             await check(f"operator, {size}")
@@ -147,13 +149,15 @@ async def faults_during_hold(online: Online, screen: Screen, tab: str, size: str
     return faults
 
 
-async def test_nothing_moves_or_is_covered_during_a_hold(online: Online, module_cell: Cell, browser: Browser) -> None:
+async def test_nothing_moves_or_is_covered_during_a_hold(
+    online: Online, module_cell: Cell, browser: Browser, sizes: list[str]
+) -> None:
     async with screen_of(browser, module_cell.url) as screen:
         await screen.join("Eva")
         await screen.page.get_by_role("button", name=texts.STOP_MOTION).wait_for()
         await open_tool(screen.page, texts.ROBOT)
         found = {}
-        for size in SIZES:
+        for size in filter(sizes.__contains__, SIZES):
             await resize(screen, size)
             for tab in ("Tool", "Joints", "By hand"):
                 if faults := await faults_during_hold(online, screen, tab, size):

@@ -35,9 +35,17 @@ def test_there_is_a_broken_driver_for_each_case() -> None:
     assert set(map(case_of, BROKEN)) == Conformance.cases()
 
 
-def test_each_broken_driver_fails_only_its_case(tmp_path: Path) -> None:
-    options = ("-pxdist", "-n4", "--dist=load", "--phases=1", "-rfE", "--tb=short")
-    output = run(tmp_path, "test_toy.py::TestBroken", *options, selected="not test_level", cases=BROKEN)
+@pytest.mark.parametrize(
+    ("cases", "options"),
+    [
+        ([f"test_toy.py::TestBroken::test_{case_of(name)}[{name}]" for name in BROKEN], ()),
+        pytest.param(["test_toy.py::TestBroken"], ("-pxdist", "-n4", "--dist=load"), marks=pytest.mark.matrix),
+    ],
+    ids=["its case", "all cases"],
+)
+def test_each_broken_driver_fails_only_its_case(tmp_path: Path, cases: list[str], options: tuple[str, ...]) -> None:
+    selection = (*cases, *options, "--phases=1", "-rfE", "--tb=short")
+    output = run(tmp_path, *selection, selected="not test_level", cases=BROKEN)
     found: dict[str, set[str]] = {}
     for case, bench in re.findall(r"^(?:FAILED|ERROR) test_toy.py::TestBroken::test_(\w+)\[(\w+)\]", output, re.M):
         found.setdefault(bench, set()).add(case)

@@ -56,6 +56,7 @@ def _blocks(page: str) -> list[str]:
     return re.findall(r"^```sh\n(.*?)^```$", (DOCS / page).read_text(), re.MULTILINE | re.DOTALL)
 
 
+@pytest.mark.matrix
 @pytest.mark.skipif(not _possible(), reason="this machine does not allow namespaces")
 def test_the_pages_about_installation(tmp_path: Path) -> None:
     signer = Signer()
