@@ -32,6 +32,8 @@ ATTEMPTS = 5
 SLOWLY_UP = Position(0.0, 0.0, 0.05)
 LATE = re.compile("not renewed in time|ms late|had expired|has ended|is ending|still stopping")
 """Answers to a client that renews too late."""
+FAST = 0.2
+"""Speed of the TCP that a motion at the speed limit exceeds, m/s."""
 SETTLED = 0.4
 """Time for which an arm must stay stopped, s."""
 
@@ -281,9 +283,9 @@ async def _a_host_that_freezes(place: Site) -> None:
 
 
 async def _fastest(place: Site, seconds: float, **motion: Any) -> tuple[float, float]:
-    """Hold until the arm has moved for a while; return the highest speed of the TCP, m/s, and the lowest scale.
+    """Hold until the arm has moved for a while and fast; return its highest speed, m/s, and the lowest scale.
 
-    The speed is measured by the arm itself, on its own clock.
+    The speed is measured by the arm itself, on its own clock. On a busy machine, the arm slows down between renewals.
     """
     poses: list[tuple[float, list[float]]] = []
     speeds: list[float] = []
@@ -298,7 +300,7 @@ async def _fastest(place: Site, seconds: float, **motion: Any) -> tuple[float, f
             moved += (at - poses[-1][0]) * (speeds[-1] > 0.01)
         if not poses or at > poses[-1][0] + 0.02:
             poses.append((at, pose))
-        return moved > seconds
+        return moved > seconds and max(speeds) > FAST
 
     async with place.holding(lambda: place.jog(**motion)) as held:
         await until(watched, "the arm has moved long enough")
@@ -331,10 +333,10 @@ async def test_the_tcp_keeps_its_speed_and_protective_stops_are_acknowledged(fak
         await client.call("WriteLock", rpc.WriteLockArgs(place.robot))
         await _move(place)
         fastest, _ = await _fastest(place, 0.5, linear=Position(0.0, 0.0, -0.6))
-        assert 0.2 < fastest < 0.255
+        assert FAST < fastest < 0.255
         turn = [Joint("shoulder_pan_joint", 1.0)]
         fastest, scale = await _fastest(place, 0.5, joints=turn)
-        assert 0.2 < fastest < 0.255
+        assert FAST < fastest < 0.255
         assert scale < 0.9
 
         await _teach(place)

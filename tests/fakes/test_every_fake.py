@@ -8,11 +8,12 @@ from typing import Any
 import pytest
 
 from arcor2_fakes.two_axis_robot.servo import Servo
+from arcor2_hw.testing.addresses import own_loopback
 from arcor2_server.cli.installed_fakes import InstalledFake, installed_fakes
 from tests.fakes.conftest import FakeProcess
 
 FAULTS = {"silence", "reset", "half_frame", "garbage", "slow", "refuse", "heal"}
-ARGUMENTS = {"ur": ("--host", "127.83.1.7"), "abb_yumi": ("--host", "127.83.1.8")}
+ARGUMENTS = {name: ("--host", own_loopback()) for name in ("ur", "abb_yumi")}
 """These controllers have fixed ports, so each gets its own address."""
 WORLD = "cell"
 """The world is not a device: it has a control channel and no wire."""

@@ -14,6 +14,7 @@ from arcor2_fakes.abb_yumi.http_port import HttpPort
 from arcor2_fakes.abb_yumi.motion_server import MotionServer
 from arcor2_fakes.abb_yumi.services import Services
 from arcor2_fakes.control import one_of, within
+from arcor2_fakes.process import OwnTime
 from arcor2_fakes.program import program
 from arcor2_fakes.serving import Fake
 from arcor2_fakes.wire import TcpWire
@@ -104,7 +105,8 @@ async def main(
     """
     controller = Controller(time_scale)
     http = HttpPort(user, password, Services(controller).handle, controller.session_ended)
-    servers = {name: MotionServer(controller, name) for name in TASKS}
+    own_time = OwnTime()
+    servers = {name: MotionServer(controller, name, own_time) for name in TASKS}
     servers["left"].partner, servers["right"].partner = servers["right"], servers["left"]
     wires = {"rws": TcpWire("rws", host, rws_port, http.opened)}
     for name, port in (("left", left_port), ("right", right_port)):
@@ -126,6 +128,7 @@ async def main(
     fake.wires(**wires)
     fake.truth(lambda: controller.truth() | {"requests": http.requests})
     fake.simulate(advance, _TICK)
+    own_time.run()
     await fake.run(**wires, host=lambda: host)
 
 

@@ -56,10 +56,11 @@ class Meeting(NamedTuple):
 
 
 class MotionServer:
-    """The server of one arm. `partner` is set to that of the other arm."""
+    """The server of one arm. `partner` is set to that of the other arm. `own_time` is the clock of the watchdog."""
 
-    def __init__(self, controller: Controller, name: str) -> None:
+    def __init__(self, controller: Controller, name: str, own_time: Callable[[], float]) -> None:
         self.name = name
+        self._own_time = own_time
         self.controller = controller
         self.arm: Arm = controller.arms[name]
         self.staging = Staging(self.arm)
@@ -128,7 +129,7 @@ class MotionServer:
             self._last_trap = now
             while self.watch is not None and self.watch.waiting:
                 self._execute(self.watch, self.watch.waiting.popleft(), self._do_watch)
-        if self._watchdog and now - self._last_keep_alive > self._watchdog:
+        if self._watchdog and self._own_time() - self._last_keep_alive > self._watchdog:
             self._watchdog = 0.0
             self._brake(WATCHDOG_STOPPED)
         if self._stops and not self.arm.moving:
@@ -166,7 +167,7 @@ class MotionServer:
         if values:
             raise Rejected(BAD_COUNT)
         if code == KEEP_ALIVE:
-            self._last_keep_alive = time.monotonic()
+            self._last_keep_alive = self._own_time()
             return [float(self.arm.moving), float(self._watchdog > 0.0)]
         if code != STOP:
             raise Rejected(BAD_CODE)
@@ -212,7 +213,7 @@ class MotionServer:
             return [float(VERSION), 1.0 if self.name == "left" else 2.0]
         if code == 2:
             require(self.watch is not None and WATCHDOG[0] <= values[0] <= WATCHDOG[1])
-            self._watchdog, self._last_keep_alive = values[0], time.monotonic()
+            self._watchdog, self._last_keep_alive = values[0], self._own_time()
         elif code == 3:
             self._watchdog = 0.0
         elif code == 4:

@@ -14,9 +14,10 @@ import pytest
 from arcor2_fakes.abb_yumi.arm import Motion
 from arcor2_fakes.abb_yumi.kinematics import HOME, LIMITS, Kinematics, NotReachable, quaternion
 from arcor2_fakes.abb_yumi.protocol import Rejected, framed, parsed
+from arcor2_hw.testing.addresses import own_loopback
 from tests.fakes.conftest import FakeProcess
 
-HOST = "127.77.3.1"
+HOST = own_loopback()
 RWS, LEFT, RIGHT = 8080, 6101, 6111
 AUTH = ("Default User", "robotics", "validusers@robapi.abb")
 
