@@ -1,5 +1,5 @@
 # Two commands: `make run` and `make test`. Both do all the set-up; the second time they start at once.
-.PHONY: run test bench bench-compare bench-long bench-editor mutation dist lint types layers check-editor check lock clean
+.PHONY: run test bench bench-compare bench-long bench-editor mutation dist dist-try lint types layers check-editor check lock clean
 .DEFAULT_GOAL := run
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
@@ -52,6 +52,10 @@ mutation: .make/mutation
 # Build a bundle that installs without a network, and a Debian package; sign them: make dist MINISIGN_KEY=FILE
 dist: .make/release .make/editor
 	$(BIN)/python .ci/release.py $(ARGS)
+
+# Install, break and upgrade the Debian package of `make dist` in a container with systemd. Needs root and debootstrap.
+dist-try: .make/release
+	$(BIN)/python .ci/try_release.py
 
 check: lint types layers check-editor
 

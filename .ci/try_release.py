@@ -1,0 +1,181 @@
+"""Try the Debian package of `make dist` in a Debian with systemd: `make dist-try`, as root, with debootstrap.
+
+A container without a network installs the package. Its service is killed, frozen and backed up while it runs, upgraded,
+upgraded to a version that does not start, and removed. Each result is printed; the first wrong one ends the program.
+"""
+
+import contextlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from release import BUNDLE, ROOT, build_debian, run, write_requirements, write_sums
+
+INCLUDED = "systemd,systemd-sysv,dbus,python3,python3-venv,libegl1,libgl1,libgomp1,libusb-1.0-0"
+"""Packages of the Debian system: systemd, and what ours depends on."""
+RESTARTED_WITHIN = 10.0
+"""Time until a service that hangs or was killed runs again, s."""
+DATA = "/var/lib/arcor2-hw"
+SERVE = "arcor2_server/cli/serve.py"
+
+
+class Machine:
+    """A booted container. Commands run as root inside."""
+
+    def __init__(self, leader: int) -> None:
+        self._enter = ("/usr/bin/nsenter", "--target", str(leader), "--all", "--root", "--wd", "/bin/sh", "-c")
+
+    def try_run(self, command: str) -> tuple[int, str]:
+        """Run a command of the shell; return its status and its output."""
+        done = subprocess.run(  # noqa: S603 - the commands are ours
+            (*self._enter, command),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            check=False,
+            timeout=900,
+            env={"PATH": "/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin", "DEBIAN_FRONTEND": "noninteractive"},
+        )
+        return done.returncode, done.stdout.strip()
+
+    def run(self, command: str) -> str:
+        """Run a command of the shell, and return its output. End this program if it fails."""
+        status, output = self.try_run(command)
+        if status:
+            sys.exit(f"{command} failed with status {status}:\n{output}")
+        return output
+
+    def server(self) -> str:
+        """Return the process id of the server; empty if the service is not active."""
+        shown = self.run("systemctl show --property ActiveState,MainPID arcor2-hw").splitlines()
+        state = dict(line.split("=", 1) for line in shown)
+        return state["MainPID"] if state["ActiveState"] == "active" else ""
+
+    def restarted(self, former: str) -> float:
+        """Wait until the service has another process, and return how long it took, s."""
+        return wait(lambda: self.server() not in ("", former), RESTARTED_WITHIN, "restart of the service")
+
+
+@contextlib.contextmanager
+def booted(system: Path) -> Iterator[Machine]:
+    """Boot a system without a network, and stop it at the end."""
+    options = ("--quiet", "--register=no", "--keep-unit", "--private-network", "--boot", "--console=read-only")
+    with (system.parent / "console.log").open("wb") as console:
+        container = subprocess.Popen(  # noqa: S603 - the command is ours
+            ("/usr/bin/systemd-nspawn", *options, "--directory", system), stdout=console, stderr=console
+        )
+    try:
+        children = Path(f"/proc/{container.pid}/task/{container.pid}/children")
+        wait(lambda: children.read_text().split(), 30.0, "start of the container")
+        machine = Machine(int(children.read_text().split()[0]))
+        ready = ("running", "degraded")
+        wait(lambda: machine.try_run("systemctl is-system-running")[1] in ready, 180.0, "boot of the container")
+        yield machine
+    finally:
+        container.terminate()  # an orderly shutdown
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            container.wait(60.0)
+        container.kill()
+        container.wait()
+
+
+def wait(condition: Callable[[], object], seconds: float, what: str) -> float:
+    """Wait for a condition, and return how long it took, s. End this program if it takes longer than permitted."""
+    start = time.monotonic()
+    while not condition():
+        if time.monotonic() - start > seconds:
+            sys.exit(f"{what}: not within {seconds:g} s")
+        time.sleep(0.1)
+    return time.monotonic() - start
+
+
+def expect(what: str, right: object, shown: object = "") -> None:
+    """Print a result, and end this program if it is wrong."""
+    sys.stdout.write(f"{what:70} {'ok' if right else 'WRONG'}  {shown}\n")
+    sys.stdout.flush()
+    if not right:
+        sys.exit(1)
+
+
+def change_version(bundle: Path, version: str, *, broken: bool) -> None:
+    """Give a bundle another version. broken: its server ends at once."""
+    (wheel,) = (bundle / "wheels").glob("arcor2_hw-*.whl")
+    former = wheel.name.split("-")[1]
+    names = []
+    changed = wheel.with_name(wheel.name.replace(former, version))
+    with zipfile.ZipFile(wheel) as source, zipfile.ZipFile(changed, "w") as target:
+        for entry in source.infolist():
+            name, content = entry.filename.replace(f"arcor2_hw-{former}.", f"arcor2_hw-{version}."), source.read(entry)
+            if name.endswith(".dist-info/METADATA"):
+                content = content.replace(f"\nVersion: {former}\n".encode(), f"\nVersion: {version}\n".encode(), 1)
+            if name == SERVE and broken:
+                content = b"raise SystemExit('this version does not start')\n"
+            if not name.endswith(".dist-info/RECORD"):
+                target.writestr(name, content)
+                names.append(name)
+        record = f"arcor2_hw-{version}.dist-info/RECORD"
+        target.writestr(record, "".join(f"{name},,\n" for name in [*names, record]))
+    wheel.unlink()
+    write_requirements(bundle)
+    write_sums(bundle)
+
+
+def try_service(machine: Machine) -> None:
+    """Install the package, and let its service fail."""
+    machine.run("apt-get install --yes /release/first.deb")
+    expect("apt install starts the service", pid := machine.server(), machine.run("arcor2-hw --version"))
+    who = machine.run(f"ps -o user= -p {pid}")
+    expect("the server is not root", who == "arcor2-hw", who)
+    modes = machine.run(f"stat -c %U:%a {DATA} {DATA}/*.sqlite").split()
+    expect("data can be read by its user only", set(modes) == {"arcor2-hw:700", "arcor2-hw:600"}, " ".join(modes))
+    rating = machine.run("systemd-analyze security arcor2-hw").splitlines()[-1]
+    expect("the unit is hardened", float(rating.split(":")[1].split()[0]) <= 3.0, rating.strip("→ "))
+    machine.run(f"kill -KILL {pid}")
+    expect("a killed server is started again", True, f"{machine.restarted(pid):.1f} s")
+    pid = machine.server()
+    machine.run(f"kill -STOP {pid}")
+    expect("a frozen server is started again", True, f"{machine.restarted(pid):.1f} s")
+    machine.run(f"runuser -u arcor2-hw -- arcor2-hw backup /tmp/copy.zip --data-dir {DATA}")
+    expect("backup while it runs", machine.server())
+
+
+def try_upgrades(machine: Machine) -> None:
+    """Upgrade the package, and try one that does not start."""
+    before = machine.run("systemctl show --value --property ExecMainStartTimestamp arcor2-hw")
+    status, output = machine.try_run("apt-get install --yes /release/broken.deb")
+    expect("a version that does not start is refused", status and "runs again" in output, output)
+    expect("the old version runs again", machine.server() and "0.1.0" in machine.run("arcor2-hw --version"), before)
+    machine.run("apt-get install --yes /release/second.deb")
+    expect("upgrade", machine.server() and "0.1.2" in machine.run("arcor2-hw --version"))
+    machine.run("apt-get remove --yes arcor2-hw")
+    left = machine.run(f"ls -d {DATA}/*.sqlite; test ! -e /opt/arcor2-hw && systemctl is-active arcor2-hw || true")
+    expect("after removal, the data is left", DATA in left and "inactive" in left, left.splitlines()[0])
+
+
+def main() -> None:
+    """Try dist/arcor2-hw_*.deb."""
+    (package,) = (ROOT / "dist").glob("arcor2-hw_*.deb")
+    with tempfile.TemporaryDirectory(prefix="arcor2-hw-try-") as folder:
+        system = Path(folder, "system")
+        run("debootstrap", "--variant=minbase", f"--include={INCLUDED}", "bookworm", system)
+        releases = system / "release"
+        releases.mkdir()
+        shutil.copy(package, releases / "first.deb")
+        tree = Path(folder, "tree")
+        run("dpkg-deb", "--extract", package, tree)
+        for version, name in (("0.1.1", "broken"), ("0.1.2", "second")):
+            change_version(tree / BUNDLE, version, broken=name == "broken")
+            build_debian(tree / BUNDLE, version, releases / f"{name}.deb")
+        shutil.rmtree(tree)
+        with booted(system) as machine:
+            try_service(machine)
+            try_upgrades(machine)
+
+
+if __name__ == "__main__":
+    main()
