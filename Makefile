@@ -6,9 +6,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 ARGS ?=
-FAMILIES := --extra ur --extra modbus --extra serial --extra can --extra dynamixel --extra depthai --extra vision --extra kinematics --extra nodes --extra history
-# Drivers beyond the demo are tested too.
-TESTED := $(FAMILIES) --extra opcua --extra mqtt --extra postgresql
+EXTRAS := $(foreach extra,ur modbus serial can dynamixel depthai opcua mqtt nodes history postgresql vision kinematics,--extra $(extra))
 
 # Compiled modules are kept, whatever the environment says: a test run starts some hundred Python processes, and each of
 # them would compile all of ours again.
@@ -166,9 +164,12 @@ EDITOR := $(shell find editor -name node_modules -prune -o -name __pycache__ -pr
 # Run by a maintainer with pip-tools at hand. No index address gets into the locks.
 COMPILE := pip-compile --quiet --upgrade --generate-hashes --allow-unsafe --strip-extras \
 	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host --no-header
+# pip-tools lists this project too, because some extras name others of it.
+OURS := -e '/^\# WARNING: pip install/d' -e '/^\# Consider using a hashable/d' -e '/^arcor2-hw @ /,+1d'
 lock:
-	$(COMPILE) $(TESTED) --extra build --extra dev --output-file requirements/dev.txt pyproject.toml
-	$(COMPILE) $(FAMILIES) --extra build --constraint requirements/dev.txt --output-file requirements/run.txt pyproject.toml
+	$(COMPILE) $(EXTRAS) --extra build --extra dev --output-file requirements/dev.txt pyproject.toml
+	$(COMPILE) $(EXTRAS) --extra build --constraint requirements/dev.txt --output-file requirements/run.txt pyproject.toml
+	sed -i $(OURS) requirements/dev.txt requirements/run.txt
 	echo cyclonedx-bom | $(COMPILE) --constraint requirements/dev.txt --output-file requirements/release.txt -
 	echo cosmic-ray | $(COMPILE) --constraint requirements/dev.txt --output-file requirements/mutation.txt -
 
