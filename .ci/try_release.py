@@ -27,13 +27,15 @@ SERVE = "arcor2_server/cli/serve.py"
 class Machine:
     """A booted container. Commands run as root inside."""
 
-    def __init__(self, leader: int) -> None:
-        self._enter = ("/usr/bin/nsenter", "--target", str(leader), "--all", "--root", "--wd", "/bin/sh", "-c")
+    def __init__(self, children: Path) -> None:
+        self._children = children  # of the process of the container; while it starts, they are others than its systemd
 
     def try_run(self, command: str) -> tuple[int, str]:
         """Run a command of the shell; return its status and its output."""
+        leader, *_ = self._children.read_text().split() or ["0"]
+        enter = ("/usr/bin/nsenter", "--target", leader, "--all", "--root", "--wd", "/bin/sh", "-c")
         done = subprocess.run(  # noqa: S603 - the commands are ours
-            (*self._enter, command),
+            (*enter, command),
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -70,9 +72,7 @@ def booted(system: Path) -> Iterator[Machine]:
             ("/usr/bin/systemd-nspawn", *options, "--directory", system), stdout=console, stderr=console
         )
     try:
-        children = Path(f"/proc/{container.pid}/task/{container.pid}/children")
-        wait(lambda: children.read_text().split(), 30.0, "start of the container")
-        machine = Machine(int(children.read_text().split()[0]))
+        machine = Machine(Path(f"/proc/{container.pid}/task/{container.pid}/children"))
         ready = ("running", "degraded")
         wait(lambda: machine.try_run("systemctl is-system-running")[1] in ready, 180.0, "boot of the container")
         yield machine
