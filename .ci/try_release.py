@@ -32,7 +32,9 @@ class Machine:
 
     def try_run(self, command: str) -> tuple[int, str]:
         """Run a command of the shell; return its status and its output."""
-        leader, *_ = self._children.read_text().split() or ["0"]
+        leader, *_ = self._children.read_text().split() or ["self"]
+        if Path(f"/proc/{leader}/root").samefile("/"):  # never run a command on this machine
+            return 1, "the container is starting"
         enter = ("/usr/bin/nsenter", "--target", leader, "--all", "--root", "--wd", "/bin/sh", "-c")
         done = subprocess.run(  # noqa: S603 - the commands are ours
             (*enter, command),
