@@ -6,8 +6,7 @@ import { persistently } from "../persistently";
 import { remembered, takeTokenFromAddress } from "../session/localStorage";
 import { FleetPage } from "./FleetPage";
 import { FleetFeed } from "./feed";
-import "../ui/tokens.css";
-import "../ui/base.css";
+import "./styles.css";
 
 async function start(): Promise<void> {
   takeTokenFromAddress();
