@@ -1,14 +1,16 @@
 """Nodes: the computers on which the devices of scenes run, and their state."""
 
 from enum import StrEnum, auto
-from typing import Annotated
+from typing import Annotated, Final
 
 from msgspec import Meta, field
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, TranslatableData, Unset
 
-NodeName = Annotated[str, Meta(pattern=r"^([a-z0-9][a-z0-9_-]{0,62})?$(?!\n)")]
-"""Name of a node; empty for none. It is part of subjects, in which dots, spaces and wildcards have a meaning."""
+NAME: Final = r"[a-z0-9][a-z0-9_-]{0,62}"
+"""Pattern of a name of a node. It is part of subjects, in which dots, spaces and wildcards have a meaning."""
+NodeName = Annotated[str, Meta(pattern=rf"^({NAME})?$(?!\n)")]
+"""Name of a node; empty for none."""
 
 
 class NodeState(StrEnum):

@@ -5,19 +5,17 @@ import re
 import ssl
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 from urllib.parse import urlsplit
 
 import msgspec
 
 from arcor2_hw.data.cell import BROKER_AUTHORITY, BROKER_CREDENTIALS, BROKER_URL, LOCAL_BROKER
+from arcor2_hw.data.nodes import NAME
 from arcor2_hw.exceptions import InvalidData, NotFound, StorageError
 from arcor2_server.files import DIRECTORY_MODE, write_private
 from arcor2_server.nodes.nkeys import SigningKey
 from arcor2_server.settings import is_loopback
-
-NAME: Final = re.compile(r"[a-z0-9][a-z0-9_-]{0,62}")
-"""A name of a node. It is part of subjects, in which dots, spaces and wildcards have a meaning."""
 
 
 class Credentials(msgspec.Struct, frozen=True):
@@ -142,7 +140,7 @@ def check_name(node: str) -> None:
     Raises:
         InvalidData: the text is not a name of a node.
     """
-    if not NAME.fullmatch(node):
+    if not re.fullmatch(NAME, node):
         raise InvalidData("{name!r} is not a name of a node: use lower-case letters, digits, - and _.", name=node)
 
 
