@@ -258,7 +258,7 @@ async def recording_is_shown(screen: Screen, alarms: Locator, sizes: Iterable[st
     band = actions.get_by_title("say", exact=True)
     await expect(band).to_have_count(1)
     await window.get_by_role("slider", name="Values at").press("ArrowLeft")
-    await expect(window).to_contain_text(re.compile(r"−0\.0[12] s"))  # at the value before
+    await expect(window).to_contain_text(re.compile(r"−0\.0[12]\ss"))  # at the value before
     everything = await band.get_attribute("style")
     assert everything is not None
     await window.get_by_role("button", name="Zoom in").click()
