@@ -90,6 +90,7 @@ GOALS: Final[dict[str, tuple[str, str]]] = {
     "node_cut_named_s": ("s", "<= 1"),
     "node_broker_p99_ms": ("ms", ""),
     "node_socket_p99_ms": ("ms", ""),
+    "node_zenoh_p99_ms": ("ms", ""),
     "recovery_p95_s": ("s", "<= 5"),
     "recovery_growth": ("threads, descriptors, tasks", "<= 0"),
     "driver_stop_p99_ms": ("ms", "<= 100"),

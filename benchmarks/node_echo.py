@@ -1,13 +1,15 @@
-"""A process that answers messages, over NATS or a TLS socket.
+"""A process that answers messages, over NATS, a TLS socket, or Zenoh.
 
-`python -m benchmarks.node_echo FOLDER nats|socket PORT`
+`python -m benchmarks.node_echo FOLDER nats|socket|zenoh PORT`
 """
 
 import asyncio
+import importlib
+import json
 import ssl
 import sys
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import nats
 import uvloop
@@ -28,6 +30,25 @@ def context(folder: Path, *, server: bool) -> ssl.SSLContext:
     else:
         made.load_verify_locations(folder / "authority.pem")
     return made
+
+
+def zenoh_session(folder: Path, port: int, *, server: bool) -> Any:
+    """Open a session of Zenoh over TLS: one end listens, the other connects, and none searches the network."""
+    zenoh = importlib.import_module("zenoh")  # not among our dependencies
+    config = zenoh.Config()
+    settings: dict[str, object] = {
+        "mode": "peer",
+        "scouting/multicast/enabled": False,
+        "listen/endpoints": [f"tls/localhost:{port}"] if server else [],
+        "connect/endpoints": [] if server else [f"tls/localhost:{port}"],
+        "transport/link/tls/root_ca_certificate": str(folder / "authority.pem"),
+    }
+    if server:
+        settings["transport/link/tls/listen_certificate"] = str(folder / "chain.pem")
+        settings["transport/link/tls/listen_private_key"] = str(folder / "key.pem")
+    for name, value in settings.items():
+        config.insert_json5(name, json.dumps(value))
+    return zenoh.open(config)
 
 
 class Frames(asyncio.Protocol):
@@ -69,6 +90,10 @@ async def main(folder: Path, kind: str, port: int) -> None:
         await client.subscribe(SUBJECT, cb=answer)
         await client.flush()
         print("ready", flush=True)
+    elif kind == "zenoh":
+        session = zenoh_session(folder, port, server=True)
+        answering = session.declare_queryable(SUBJECT, lambda query: query.reply(SUBJECT, query.payload))
+        print(answering.key_expr, flush=True)
     else:
         loop = asyncio.get_running_loop()
         server = await loop.create_server(Frames, "127.0.0.1", 0, ssl=context(folder, server=True))

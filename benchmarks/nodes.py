@@ -1,7 +1,11 @@
-"""Cell hosts on a node: calls, stops next to pictures, and a cut cable; the broker and a bare socket side by side."""
+"""Cell hosts on a node: calls, stops next to pictures, and a cut cable; broker, bare socket and Zenoh side by side.
+
+Zenoh is measured if it is installed: `pip install eclipse-zenoh`.
+"""
 
 import asyncio
 import contextlib
+import importlib.util
 import os
 import shutil
 import subprocess
@@ -9,6 +13,7 @@ import sys
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
+from typing import Any
 
 import nats
 from nats.aio.client import Client
@@ -17,8 +22,9 @@ from arcor2_hw.runtime import messages as m
 from arcor2_server.access.authority import Authority
 from arcor2_server.hosts.process import CellHost
 from benchmarks.metrics import Metric, Report, percentile
-from benchmarks.node_echo import SUBJECT, Frames, context
+from benchmarks.node_echo import SUBJECT, Frames, context, zenoh_session
 from tests.runtime.conftest import open_scene, scene_object, type_code
+from tests.server.fleet.broker import free_port
 from tests.server.nodes.cable import Cable, CannotIsolate
 from tests.server.nodes.conftest import NODE, Broker, Node
 from tests.server.nodes.test_cut_cable import cut_and_heal
@@ -167,6 +173,32 @@ class _Asking(Frames):
         return await self.answer
 
 
+@contextlib.asynccontextmanager
+async def asking_zenoh(folder: Path, payload: bytes) -> AsyncIterator[Callable[[], Awaitable[object]] | None]:
+    """Run an echo process of Zenoh in this context; return a function that asks it, None if Zenoh is not installed."""
+    if importlib.util.find_spec("zenoh") is None:
+        yield None
+        return
+    port = free_port()
+    async with echo(folder, "zenoh", port):
+        session = zenoh_session(folder, port, server=False)
+        loop = asyncio.get_running_loop()
+
+        async def ask() -> bytes:
+            answer: asyncio.Future[bytes] = loop.create_future()
+
+            def answered(reply: Any) -> None:
+                loop.call_soon_threadsafe(answer.set_result, bytes(reply.ok.payload))
+
+            session.get(SUBJECT, answered, payload=payload)
+            return await asyncio.wait_for(answer, WITHIN)
+
+        try:
+            yield ask
+        finally:
+            session.close()
+
+
 async def _engines(report: Report, folder: Path) -> None:
     certificates(folder)
     config = folder / "nats.conf"
@@ -176,7 +208,11 @@ async def _engines(report: Report, folder: Path) -> None:
     try:
         port = int(broker.url.rpartition(":")[2])
         tls = context(folder, server=False)
-        async with echo(folder, "nats", port), echo(folder, "socket") as number:
+        async with (
+            echo(folder, "nats", port),
+            echo(folder, "socket") as number,
+            asking_zenoh(folder, payload) as ask_zenoh,
+        ):
             client: Client = await nats.connect(f"tls://localhost:{port}", tls=tls)
             _, asking = await asyncio.get_running_loop().create_connection(
                 _Asking, "127.0.0.1", int(number), ssl=tls, server_hostname="localhost"
@@ -185,6 +221,8 @@ async def _engines(report: Report, folder: Path) -> None:
                 "broker": lambda: client.request(SUBJECT, payload, WITHIN),
                 "socket": lambda: asking.ask(payload),
             }
+            if ask_zenoh is not None:
+                ways["zenoh"] = ask_zenoh
             samples: dict[str, list[float]] = {name: [] for name in ways}
             for repetition in range(CALLS + 50):
                 for name, ask in ways.items():
