@@ -22,7 +22,7 @@ from arcor2_server.nodes.connections import connect_client
 from arcor2_server.nodes.credentials import Credentials, address_of, check_name, load, require_tls
 from arcor2_server.nodes.lanes import PREFIX
 from arcor2_server.nodes.nkeys import Kind, SigningKey
-from arcor2_server.settings import ServerSettings
+from arcor2_server.settings import ServerSettings, is_loopback
 
 FILE: Final = "accounts.json"
 ACCOUNT_NAME: Final = "ARCOR2-HW"
@@ -102,7 +102,7 @@ class Accounts:
             self._save(state)
         operator = SigningKey.from_seed(state.operator)
         system = SigningKey.from_seed(state.system).public
-        lines = [f"listen: {_listen(url)}"]
+        lines = [f"listen: {listening_address(url)}"]
         if url.startswith("tls://"):
             lines.append(f'tls {{ cert_file: "{certificate}", key_file: "{key_file}" }}')
         lines += [
@@ -258,7 +258,7 @@ def _check(name: str, state: _State) -> None:
         raise Conflict("There is a node {node} already. Revoke it first: arcor2-hw node revoke {node}", node=name)
 
 
-def _listen(url: str) -> str:
+def listening_address(url: str) -> str:
     """Return the address on which a broker listens."""
     host, _, port = address_of(url).rpartition(":")
-    return f"0.0.0.0:{port}" if url.startswith("tls://") else f"{host}:{port}"
+    return f"{host}:{port}" if is_loopback(host) else f"0.0.0.0:{port}"

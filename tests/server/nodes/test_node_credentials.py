@@ -23,7 +23,7 @@ from arcor2_server.cli import node as cli
 from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.hosts.process import CellHost
 from arcor2_server.nodes import opening, pairing
-from arcor2_server.nodes.accounts import Accounts
+from arcor2_server.nodes.accounts import Accounts, listening_address
 from arcor2_server.nodes.connections import answer_subject, connect_client
 from arcor2_server.nodes.credentials import Credentials, load, node_file, require_tls
 from arcor2_server.nodes.nkeys import Kind, SigningKey, is_user_key
@@ -100,6 +100,18 @@ async def test_a_node_is_paired_works_is_revoked_and_paired_again(
     with contextlib.closing(AuditFile(server.settings.audit_file)) as file:
         noted = [(entry.request, entry.target.split(",")[0]) for entry in file.all()]
     assert noted == [("arcor2-hw node accept", NODE), ("arcor2-hw node revoke", NODE)]
+
+
+@pytest.mark.parametrize(
+    ("url", "address"),
+    [
+        ("tls://hub.local:4222", "0.0.0.0:4222"),
+        ("tls://127.0.0.1:4222", "127.0.0.1:4222"),
+        ("nats://127.0.0.1:4222", "127.0.0.1:4222"),
+    ],
+)
+def test_a_broker_on_loopback_listens_only_there(url: str, address: str) -> None:
+    assert listening_address(url) == address
 
 
 def test_nodes_are_listed(server: Server, capsys: pytest.CaptureFixture[str]) -> None:
