@@ -17,6 +17,7 @@ import { valueText } from "./points";
 import "uplot/dist/uPlot.min.css";
 import "../trends/trends.css";
 import "./history.css";
+import { plotStyle } from "../trends/plotStyle";
 
 const HEIGHT = 260;
 const DAY = 86_400;
@@ -133,14 +134,7 @@ function Chart({ summary, digital, unit, label }: ContentProps) {
   useEffect(() => {
     const { current } = box;
     if (!current) return;
-    const style = getComputedStyle(current);
-    const colour = (name: string) => style.getPropertyValue(name).trim();
-    const axis: UPlot.Axis = {
-      stroke: colour("--ink-2"),
-      grid: { stroke: colour("--line"), width: 1 },
-      ticks: { stroke: colour("--line"), width: 1 },
-      font: `12px ${style.fontFamily}`,
-    };
+    const { colour, axis } = plotStyle(current);
     const [shown, factor] = digital ? ["", 1] : shownUnit("double", { unit });
     const { since, until } = summary;
     const days = (until - since) / 1000 > DAY;
@@ -163,7 +157,7 @@ function Chart({ summary, digital, unit, label }: ContentProps) {
             size: 68,
             space: 28,
             values: (_, splits) => splits.map((each) => (digital ? `${decimal(each * 100, 0)} %` : decimal(each, 6))),
-            ...(shown && { label: shown, labelSize: 20, labelFont: `12px ${style.fontFamily}` }),
+            ...(shown && { label: shown, labelSize: 20, labelFont: axis.font }),
           },
         ],
         series: [{}, { ...line, stroke: colour("--trend-1"), width: 2 }, edge, edge],

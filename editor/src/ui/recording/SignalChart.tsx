@@ -6,6 +6,7 @@ import { decimal } from "../../formats";
 import { useTheme } from "../settings/Settings";
 import { columns, type Range, STEP, type Trace } from "./layout";
 import "uplot/dist/uPlot.min.css";
+import { plotStyle } from "../trends/plotStyle";
 
 /** Width of the axis of values, and of the space on the right, pixels. The lanes of actions have the same. */
 export const AXIS = 76;
@@ -36,14 +37,7 @@ export function SignalChart({ traces, whole, range, cursor, alarms, label }: Sig
   useEffect(() => {
     const { current } = box;
     if (!current) return;
-    const style = getComputedStyle(current);
-    const colour = (name: string) => style.getPropertyValue(name).trim();
-    const axis: UPlot.Axis = {
-      stroke: colour("--ink-2"),
-      grid: { stroke: colour("--line"), width: 1 },
-      ticks: { stroke: colour("--line"), width: 1 },
-      font: `12px ${style.fontFamily}`,
-    };
+    const { colour, axis } = plotStyle(current);
     const lines = { alarm: colour("--bad"), cursor: colour("--focus") };
     const made = new UPlot(
       {

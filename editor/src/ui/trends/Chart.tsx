@@ -7,6 +7,7 @@ import { clock, compared, decimal } from "../../formats";
 import { useTheme } from "../settings/Settings";
 import { type Series, SPAN } from "./history";
 import "uplot/dist/uPlot.min.css";
+import { plotStyle } from "./plotStyle";
 
 /** Height of a chart, pixels. */
 const HEIGHT = 150;
@@ -29,14 +30,7 @@ export function Chart({ times, series }: { times: number[]; series: Series[] }) 
   useEffect(() => {
     const { current } = box;
     if (!current) return;
-    const style = getComputedStyle(current);
-    const colour = (name: string) => style.getPropertyValue(name).trim();
-    const axis: UPlot.Axis = {
-      stroke: colour("--ink-2"),
-      grid: { stroke: colour("--line"), width: 1 },
-      ticks: { stroke: colour("--line"), width: 1 },
-      font: `12px ${style.fontFamily}`,
-    };
+    const { colour, axis } = plotStyle(current);
     const made = new UPlot(
       {
         width: current.clientWidth,
