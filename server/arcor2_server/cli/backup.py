@@ -11,8 +11,8 @@ from typing import Annotated, Final
 from cyclopts import Parameter
 
 from arcor2_hw.exceptions import InvalidData, StorageError
-from arcor2_server.cli.exit_status import ExitStatus, fail
-from arcor2_server.cli.serve import CannotServe, data_directory
+from arcor2_server.cli.exit_status import CannotServe, ExitStatus, fail
+from arcor2_server.cli.serve import data_directory
 from arcor2_server.deployment.backup import Manifest, restore_backup, write_backup
 from arcor2_server.settings import ServerSettings, default_data_dir
 

@@ -9,8 +9,8 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from arcor2_hw.exceptions import Arcor2Error, Conflict, DatabaseInUse, InvalidData, NotFound
-from arcor2_server.cli.exit_status import ExitStatus, fail
-from arcor2_server.cli.serve import CannotServe, data_directory
+from arcor2_server.cli.exit_status import CannotServe, ExitStatus, fail
+from arcor2_server.cli.serve import data_directory
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage.copying import copy_to_postgresql
 

@@ -48,6 +48,14 @@ class ExitStatus(enum.IntEnum):
     """Ctrl-C (128 + SIGINT)."""
 
 
+class CannotServe(Exception):
+    """The server cannot start for a reason that the user can fix."""
+
+    def __init__(self, status: ExitStatus, reason: str) -> None:
+        super().__init__(reason)
+        self.status = status
+
+
 def fail(command: str, reason: object, status: ExitStatus) -> ExitStatus:
     """Print why a command failed on standard error; return the status."""
     sys.stderr.write(f"arcor2-hw {command}: {reason}\n")

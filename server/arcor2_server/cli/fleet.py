@@ -21,8 +21,9 @@ from arcor2_server.access.addresses import server_addresses
 from arcor2_server.access.admission import PARAMETER, Access, is_local
 from arcor2_server.access.tokens import TokenFile
 from arcor2_server.audit.command_line import note_command
-from arcor2_server.cli.exit_status import ExitStatus, fail
-from arcor2_server.cli.serve import CannotServe, certificate_of, data_directory, listen, renew_certificate
+from arcor2_server.cli.certificates import certificate_of, renew_certificate
+from arcor2_server.cli.exit_status import CannotServe, ExitStatus, fail
+from arcor2_server.cli.serve import data_directory, listen
 from arcor2_server.deployment.service_manager import ServiceManager
 from arcor2_server.log import setup as server_logging
 from arcor2_server.settings import FLEET_AUTHORITY, FLEET_BROKER, ServerSettings, default_data_dir

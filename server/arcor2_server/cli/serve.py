@@ -14,7 +14,7 @@ import ssl
 import sys
 from collections.abc import Generator
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Annotated, Literal, cast
+from typing import IO, Annotated, Literal, cast
 
 import msgspec
 import uvloop
@@ -31,11 +31,12 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.cell import BROKER_URL, Cell, read_cell
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Arcor2Error, DatabaseInUse, InvalidData, NotFound, StorageError
-from arcor2_server.access.addresses import certified_hosts, server_addresses
+from arcor2_server.access.addresses import server_addresses
 from arcor2_server.access.admission import PARAMETER, is_local
 from arcor2_server.access.tokens import TokenFile
 from arcor2_server.audit.command_line import note_command
-from arcor2_server.cli.exit_status import ExitStatus, fail
+from arcor2_server.cli.certificates import certificate_of, renew_certificate
+from arcor2_server.cli.exit_status import CannotServe, ExitStatus, fail
 from arcor2_server.deployment.service_manager import ServiceManager
 from arcor2_server.log import setup as server_logging
 from arcor2_server.settings import (
@@ -48,12 +49,8 @@ from arcor2_server.settings import (
     OpcUaListener,
     PlcListener,
     ServerSettings,
-    is_loopback,
 )
 from arcor2_server.websocket.classic_ports import ports_from_environment
-
-if TYPE_CHECKING:
-    from arcor2_server.access.authority import Authority
 
 log = arcor2_server.log.get_logger(__name__)
 
@@ -63,22 +60,11 @@ LegacyRole = Literal["operator", "standard_user", "advanced_user", "technician"]
 PREPARE_AFTER = 0.5
 """Delay after the start before a spare cell host is started, s, so that waiting clients are served first."""
 
-RENEW_PERIOD = 600.0
-"""Time between two checks of the certificate, s."""
-
 FIRST_DEVICE = "first device"
 """Name of the token that the first start on a network creates."""
 
 GC_THRESHOLD = (700, 10, 10)
 """The default thresholds of the interpreter, which `main` raises for the imports."""
-
-
-class CannotServe(Exception):
-    """The server cannot start for a reason that the user can fix."""
-
-    def __init__(self, status: ExitStatus, reason: str) -> None:
-        super().__init__(reason)
-        self.status = status
 
 
 def serve(
@@ -355,50 +341,6 @@ def _bind_legacy(
     role = legacy.role.name.lower()
     log.warning("clients without a token are admitted", host=legacy.host, port=legacy.port, role=role)
     return msgspec.structs.replace(settings, legacy=legacy), listener
-
-
-def certificate_of(
-    settings: ServerSettings, given: tuple[Path, Path] | None, self_signed: bool
-) -> tuple[ServerSettings, tuple[Path, Path] | None]:
-    """Return the settings with the certificate, and the files of certificate and key; None without TLS.
-
-    Raises:
-        CannotServe: the certificate cannot be used.
-    """
-    if given is None and not self_signed and (settings.insecure or is_loopback(settings.host)):
-        return settings, None
-    from arcor2_server.access import certificate  # slow to import, and not needed without TLS
-
-    authority = None
-    try:
-        if given is None:
-            issuer = _authority(settings)
-            issuer.renew()
-            given, authority = issuer.files, issuer.file
-            log.info("certificate authority", sha256=certificate.fingerprint(authority), file=str(authority))
-        log.info("certificate", sha256=certificate.check(given), file=str(given[0]))
-    except certificate.CertificateProblem as error:
-        raise CannotServe(ExitStatus.CERTIFICATE_UNUSABLE, str(error)) from error
-    return msgspec.structs.replace(settings, certificate=given[0], authority=authority), given
-
-
-def _authority(settings: ServerSettings) -> "Authority":
-    from arcor2_server.access.authority import Authority
-
-    return Authority(settings.data_dir, lambda: certified_hosts(settings.host))
-
-
-async def renew_certificate(settings: ServerSettings, used: ssl.SSLContext) -> None:
-    """Renew the certificate before it expires, and when the machine has a new address. Clients stay connected."""
-    authority = _authority(settings)
-    while True:
-        await asyncio.sleep(RENEW_PERIOD)
-        try:
-            if await asyncio.to_thread(authority.renew):
-                used.load_cert_chain(*authority.files)
-                log.info("certificate renewed", file=str(authority.files[0]))
-        except (Arcor2Error, OSError) as error:
-            log.error("the certificate cannot be renewed", reason=str(error))
 
 
 async def run(

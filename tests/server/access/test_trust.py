@@ -21,7 +21,7 @@ from arcor2_server.access.addresses import certified_hosts
 from arcor2_server.access.authority import Authority
 from arcor2_server.access.certificate import CertificateProblem, check, fingerprint
 from arcor2_server.access.tokens import TokenFile
-from arcor2_server.cli import serve as serve_module
+from arcor2_server.cli import certificates
 from arcor2_server.settings import ServerSettings
 from arcor2_server.web.trust_page import CERTIFICATE, PROFILE, preferred_language
 from tests.server.core.serving import ServerProcess, running
@@ -90,8 +90,8 @@ def test_an_expiring_certificate_is_renewed(tmp_path: Path, monkeypatch: pytest.
 
 async def test_a_running_server_uses_the_renewed_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     hosts = ["192.168.0.10"]
-    monkeypatch.setattr(serve_module, "RENEW_PERIOD", 0.01)
-    monkeypatch.setattr(serve_module, "certified_hosts", lambda _: tuple(hosts))
+    monkeypatch.setattr(certificates, "RENEW_PERIOD", 0.01)
+    monkeypatch.setattr(certificates, "certified_hosts", lambda _: tuple(hosts))
     Authority(tmp_path, lambda: hosts).renew()
     loaded: asyncio.Future[Path] = asyncio.get_running_loop().create_future()
 
@@ -100,7 +100,7 @@ async def test_a_running_server_uses_the_renewed_certificate(tmp_path: Path, mon
             loaded.set_result(certfile)
 
     context = Context(ssl.PROTOCOL_TLS_SERVER)
-    renewal = asyncio.create_task(serve_module.renew_certificate(ServerSettings(data_dir=tmp_path), context))
+    renewal = asyncio.create_task(certificates.renew_certificate(ServerSettings(data_dir=tmp_path), context))
     hosts.append("10.1.2.3")
     try:
         async with asyncio.timeout(60):
