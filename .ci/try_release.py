@@ -105,7 +105,7 @@ def expect(what: str, right: object, shown: object = "") -> None:
 
 
 def change_version(bundle: Path, version: str, *, broken: bool) -> None:
-    """Give a bundle another version. broken: its server ends at once."""
+    """Change the version of a bundle. If it is to be broken, its server ends at once."""
     (wheel,) = (bundle / "wheels").glob("arcor2_hw-*.whl")
     former = wheel.name.split("-")[1]
     names = []

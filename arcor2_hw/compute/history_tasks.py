@@ -43,7 +43,7 @@ class Written(Data, frozen=True):
     """The result of WriteColdFile.
 
     Attributes:
-        file: The file; None if there were no rows.
+        file: The file; None if no rows were found.
         last_id: Id of the newest row of the database that it contains.
     """
 

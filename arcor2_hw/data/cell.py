@@ -24,7 +24,7 @@ LOCAL_BROKER: Final = "nats://127.0.0.1:4222"
 BROKER_AUTHORITY: Final = "ARCOR2_HW_NATS_CA"
 """The variable with the file of the certificate to trust for tls://."""
 BROKER_CREDENTIALS: Final = "ARCOR2_HW_NATS_CREDENTIALS"
-"""The variable with the file of the credentials for the broker, which is used if there is no address."""
+"""The variable that names the file of the broker's credentials. BROKER_URL has precedence."""
 
 
 class CellDevice(Data, frozen=True, forbid_unknown_fields=True):

@@ -171,7 +171,7 @@ class CellState:
 
 
 def _invalidate(device: Device, quality: PointQuality, changes: Changes) -> None:
-    """Give all values of a device another quality. They keep value and time."""
+    """Change the quality of all values of a device, but neither value nor time."""
     for joint, points in ((False, device.points), (True, device.joints)):
         for name, point in points.items():
             if point.quality is not quality:

@@ -86,7 +86,7 @@ class PointRecorder:
             self._record(recorded, time, value, point.quality)
 
     def lost(self, object_id: str, quality: PointQuality, at: int) -> None:
-        """Record that the values of a device are no longer known."""
+        """Record that the device is not connected, so its values are unknown."""
         for recorded in self._points.get(object_id, {}).values():
             if recorded.quality not in _UNKNOWN:
                 self._record(recorded, at, None, quality)
