@@ -52,6 +52,7 @@ _CLIPPED: Final = Path(__file__).with_name("clipped.js").read_text()
 _AXE: Final = _NODE_MODULES / "axe-core" / "axe.min.js"
 _UNDRAWN: Final = """
 window.__drawn = { frame: -1, calls: 0, triangles: 0, most: { calls: 0, triangles: 0 } };
+window.__drawing = false;
 const drawn = (mode, indices, instances = 1) => {
   const tally = window.__drawn, frame = window.__engine?.frames ?? 0;
   if (frame !== tally.frame) Object.assign(tally, { frame, calls: 0, triangles: 0 });
@@ -59,13 +60,19 @@ const drawn = (mode, indices, instances = 1) => {
   if (mode === WebGL2RenderingContext.TRIANGLES) tally.triangles += (indices / 3) * instances;
   for (const key of ["calls", "triangles"]) tally.most[key] = Math.max(tally.most[key], tally[key]);
 };
-Object.assign(WebGL2RenderingContext.prototype, {
+const counted = {
   clear: () => {},
   drawArrays: (mode, first, count) => drawn(mode, count),
   drawArraysInstanced: (mode, first, count, instances) => drawn(mode, count, instances),
   drawElements: (mode, count) => drawn(mode, count),
   drawElementsInstanced: (mode, count, type, offset, instances) => drawn(mode, count, instances),
-});"""
+};
+for (const [name, count] of Object.entries(counted)) {
+  const draw = WebGL2RenderingContext.prototype[name];
+  WebGL2RenderingContext.prototype[name] = function (...given) {
+    return window.__drawing ? draw.apply(this, given) : count(...given);
+  };
+}"""
 _RULES: Final = """async () => {
   const tags = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"];
   const { violations } = await axe.run(document, { runOnly: tags, resultTypes: ["violations"] });

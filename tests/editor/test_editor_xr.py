@@ -83,7 +83,7 @@ async def joined(screen: Screen) -> str:
 
 async def test_tablet_follows_itself_and_markers_correct_it(server: ServerProcess, browser: Browser) -> None:
     async with (
-        screen_of(browser, server.url, "ipad", touch=True, drawn=True) as screen,
+        screen_of(browser, server.url, "ipad", touch=True) as screen,
         Client(server.url, "Adam", reconnect=False) as adam,
     ):
         page = screen.page
@@ -105,7 +105,7 @@ async def test_tablet_follows_itself_and_markers_correct_it(server: ServerProces
         await expect(quality).to_have_text(re.compile(r"Good ±\d+ mm, 2 markers, now"))
         await until_fitting(screen, SHOTS[0], [MIDDLE], MAX_NEAR)
         await until_fitting(screen, SHOTS[0], ASIDE, MAX_ASIDE)
-        assert await screen.page.evaluate("__xr.see().drawn") > 1000
+        assert await screen.page.evaluate("async () => (await __xr.see()).drawn") > 1000
         await check_stop(screen)
         assert await screen.faults() == []
         await screen.picture("xr tablet")
@@ -325,7 +325,7 @@ async def check_hold_ends(screen: Screen, hand: Controller) -> None:
 
 async def test_headset_registers_by_touch_selects_and_moves(server: ServerProcess, browser: Browser) -> None:
     async with (
-        screen_of(browser, server.url, "ipad", drawn=True) as screen,
+        screen_of(browser, server.url, "ipad") as screen,
         Client(server.url, "Adam", reconnect=False) as adam,
     ):
         page = screen.page

@@ -3,6 +3,10 @@
  * camera, and a framebuffer of its own. `window.__xr` moves the device and shows what its user sees.
  */
 (({ headset, pictures, overlay }) => {
+  // 20 frames a second: each of them takes processor time.
+  const nextFrame = window.requestAnimationFrame.bind(window);
+  window.requestAnimationFrame = (callback) => setTimeout(() => nextFrame(callback), 34);
+  window.cancelAnimationFrame = clearTimeout;
   const { XRDevice, metaQuest3 } = window.IWER;
   const features = ["viewer", "local", "local-floor", "anchors", "hit-test", "plane-detection"];
   const tablet = {
@@ -157,9 +161,12 @@
       device.position.set(...position);
       device.quaternion.set(x, y, z, w);
     },
-    /** Show what the session draws, over the picture of the camera. */
-    see() {
-      const { gl, framebuffer, shot } = state;
+    /** Let the session draw, and show it over the picture of the camera. Other frames are only counted. */
+    async see() {
+      const { gl, framebuffer, session, shot } = state;
+      window.__drawing = true;
+      for (let i = 0; i < 2; i++) await new Promise((done) => session.requestAnimationFrame(done));
+      window.__drawing = false;
       const [width, height] = [window.innerWidth, window.innerHeight];
       const pixels = new Uint8ClampedArray(4 * width * height);
       unbound(gl, () => {
