@@ -197,7 +197,7 @@ class Connection(asyncio.Protocol):
 class TcpWire:
     """A TCP port of a device. `opened` is called with each new `Connection`."""
 
-    def __init__(self, name: str, host: str, port: int, opened: Callable[[Connection], None]) -> None:
+    def __init__(self, name: str, host: str, port: int, opened: Callable[[Connection], object]) -> None:
         self.name = name
         self.faults = Faults()
         self.connections: set[Connection] = set()

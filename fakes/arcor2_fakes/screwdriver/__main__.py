@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from datetime import datetime
+from functools import partial
 from typing import Annotated, Any
 
 from cyclopts import Parameter, validators
@@ -11,6 +12,7 @@ from cyclopts import Parameter, validators
 from arcor2_fakes.control import within
 from arcor2_fakes.program import program
 from arcor2_fakes.screwdriver.controller import Controller, Options
+from arcor2_fakes.screwdriver.session import Session
 from arcor2_fakes.screwdriver.tool import Alarm, Tool
 from arcor2_fakes.serving import Fake
 from arcor2_fakes.wire import TcpWire
@@ -33,9 +35,9 @@ def truth(controller: Controller) -> dict[str, Any]:
         "pulls": tool.pulls,
         "last": None if last is None else {"ok": last.ok, "torque": last.torque, "angle": last.angle, "id": last.id},
         "alarm": None if tool.alarm is None else tool.alarm.code,
-        "clients": sum(session.started for session in controller.sessions),
-        "subscribed": sum(session.results is not None for session in controller.sessions),
-        "unacknowledged": sum(session.unacknowledged for session in controller.sessions),
+        "clients": sum(client.started for client in controller.clients),
+        "subscribed": sum(client.results is not None for client in controller.clients),
+        "unacknowledged": sum(client.unacknowledged for client in controller.clients),
         "received": list(controller.received),
     }
 
@@ -155,7 +157,7 @@ async def main(
         lock_on_loss=lock_on_loss,
     )
     controller = Controller(tool, options, response_timeout=response_timeout, keep_alive_timeout=keep_alive_timeout)
-    wire = TcpWire("open_protocol", host, port, controller.opened)
+    wire = TcpWire("open_protocol", host, port, partial(Session, controller))
     register_commands(fake, controller, wire)
     fake.wires(open_protocol=wire)
     fake.truth(lambda: truth(controller))

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import msgspec
 
-from arcor2_fakes.screwdriver.session import Session
 from arcor2_fakes.screwdriver.telegram import Message, numbered
-from arcor2_fakes.wire import Connection
 
 if TYPE_CHECKING:
     from arcor2_fakes.screwdriver.tool import Alarm, Tightening, Tool
@@ -35,6 +33,37 @@ class Options(msgspec.Struct, frozen=True):
     """Whether the tool is disabled when a client disconnects without MID 0003."""
 
 
+class Client(Protocol):
+    """A connected client, as the controller uses it."""
+
+    started: bool
+    """Whether the client has started the communication."""
+    results: tuple[int, bool] | None
+    """Revision and no-ack flag of its subscription to results."""
+    alarms: int | None
+    """Revision of its subscription to alarms."""
+
+    @property
+    def unacknowledged(self) -> int:
+        """Return the number of events that the client has not acknowledged."""
+        ...
+
+    def close(self) -> None:
+        """Stop the communication."""
+
+    def report_result(self, result: Tightening) -> None:
+        """Send a result if the client has subscribed."""
+
+    def report_alarm(self, alarm: Alarm) -> None:
+        """Send an alarm that has just been raised."""
+
+    def report_alarm_status(self, alarm: Alarm) -> None:
+        """Send an alarm that was active before the subscription."""
+
+    def report_cleared(self, alarm: Alarm) -> None:
+        """Send that an alarm was acknowledged at the controller."""
+
+
 class Controller:
     """A tightening controller with one tool.
 
@@ -48,7 +77,7 @@ class Controller:
     def __init__(self, tool: Tool, options: Options, *, response_timeout: float, keep_alive_timeout: float) -> None:
         self.tool, self.options = tool, options
         self.response_timeout, self.keep_alive_timeout = response_timeout, keep_alive_timeout
-        self.sessions: set[Session] = set()
+        self.clients: set[Client] = set()
         self.received: deque[str] = deque(maxlen=200)
         self.deaf = 0
         """Number of acknowledgements that get lost."""
@@ -59,33 +88,29 @@ class Controller:
         tool.alarm_raised = self._alarm_raised
         tool.alarm_cleared = self._alarm_cleared
 
-    def opened(self, connection: Connection) -> None:
-        """Serve a new connection."""
-        self.sessions.add(Session(self, connection))
-
-    def left(self, session: Session, was_started: bool) -> None:
-        """Remove a session whose connection is closed."""
-        self.sessions.discard(session)
+    def left(self, client: Client, was_started: bool) -> None:
+        """Remove a client whose connection is closed."""
+        self.clients.discard(client)
         if was_started and self.options.lock_on_loss:
             self.tool.enable(False)
 
     # ------------------------------------------------------------------------------------------------ events
 
     def _finished(self, result: Tightening) -> None:
-        for session in tuple(self.sessions):
-            session.report_result(result)
+        for client in tuple(self.clients):
+            client.report_result(result)
 
     def _alarm_raised(self, alarm: Alarm) -> None:
-        for session in tuple(self.sessions):
-            session.report_alarm(alarm)
+        for client in tuple(self.clients):
+            client.report_alarm(alarm)
 
     def _alarm_cleared(self, alarm: Alarm) -> None:
-        for session in tuple(self.sessions):
-            session.report_cleared(alarm)
+        for client in tuple(self.clients):
+            client.report_cleared(alarm)
 
     # ------------------------------------------------------------------------------------------------ messages
 
-    def refusal(self, session: Session, message: Message) -> int:
+    def refusal(self, client: Client, message: Message) -> int:
         """Return the error code that refuses a message; 0 if it is accepted."""
         limits = _PLAIN | {
             1: self.options.start_revision,
@@ -100,16 +125,16 @@ class Controller:
             return _REVISION
         match message.mid:
             case 1:
-                others = sum(each.started for each in self.sessions)
-                return _CLIENT_CONNECTED if session.started or others >= self.options.clients else 0
+                others = sum(each.started for each in self.clients)
+                return _CLIENT_CONNECTED if client.started or others >= self.options.clients else 0
             case 60:
-                return _RESULTS_EXIST if session.results is not None else 0
+                return _RESULTS_EXIST if client.results is not None else 0
             case 63:
-                return _NO_RESULTS if session.results is None else 0
+                return _NO_RESULTS if client.results is None else 0
             case 70:
-                return _ALARMS_EXIST if session.alarms is not None else 0
+                return _ALARMS_EXIST if client.alarms is not None else 0
             case 73:
-                return _NO_ALARMS if session.alarms is None else 0
+                return _NO_ALARMS if client.alarms is None else 0
             case 18 | 38 | 42 | 43 | 78 if self.commands_disabled:
                 return _DISABLED
             case 18:
@@ -128,11 +153,11 @@ class Controller:
             return missing
         return blocked if self.tool.running else 0
 
-    def execute(self, session: Session, message: Message) -> None:
+    def execute(self, client: Client, message: Message) -> None:
         """Execute an accepted message, after it was answered."""
         match message.mid:
             case 3:
-                session.close()
+                client.close()
             case 18:
                 self.tool.program = int(message.data)
             case 38:
@@ -140,15 +165,15 @@ class Controller:
             case 42 | 43:
                 self.tool.enable(message.mid == 43)
             case 60:
-                session.results = message.revision, message.no_ack
+                client.results = message.revision, message.no_ack
             case 63:
-                session.results = None
+                client.results = None
             case 70:
-                session.alarms = message.revision
+                client.alarms = message.revision
                 if self.tool.alarm is not None:
-                    session.report_alarm_status(self.tool.alarm)
+                    client.report_alarm_status(self.tool.alarm)
             case 73:
-                session.alarms = None
+                client.alarms = None
             case 78:
                 self.tool.clear_alarm()
 

@@ -43,6 +43,7 @@ class Session:
         self.alarms: int | None = None
         connection.received = self.feed
         connection.closed = self.end
+        controller.clients.add(self)
 
     @property
     def unacknowledged(self) -> int:

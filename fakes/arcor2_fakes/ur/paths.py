@@ -2,15 +2,24 @@
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from arcor2_fakes.trapezoid import Trapezoid
-from arcor2_fakes.ur.kinematics import Transform, compose, difference, from_pose, invert
-
-if TYPE_CHECKING:
-    from arcor2_fakes.ur.motion import Arm
+from arcor2_fakes.ur.kinematics import Chain, Transform, compose, difference, from_pose, invert
 
 Joints = Sequence[float]
+
+
+class MovingArm(Protocol):
+    """What a path needs to know of the arm."""
+
+    q: tuple[float, ...]
+    """Joint positions, rad."""
+    qd: tuple[float, ...]
+    """Joint velocities, rad/s."""
+    period: float
+    """Time between two set points, s."""
+    chain: Chain
 
 
 class MotionRefused(Exception):
@@ -66,7 +75,7 @@ class JointMove(_Move):
         self._way = tuple(g - s for s, g in zip(start, goal, strict=True))
         super().__init__(Trapezoid(max(map(abs, self._way)), velocity, acceleration))
 
-    def step(self, _: "Arm", dt: float) -> Joints:
+    def step(self, _: MovingArm, dt: float) -> Joints:
         """Return positions after `dt` seconds."""
         f = self._advance(dt)
         return self.goal if f == 1.0 else [s + f * w for s, w in zip(self._start, self._way, strict=True)]
@@ -80,7 +89,7 @@ class JointBlend(_Blend):
         self._leaving, self._entering = leaving, entering
         self.goal: tuple[float, ...] = entering.goal
 
-    def step(self, arm: "Arm", dt: float) -> Joints:
+    def step(self, arm: MovingArm, dt: float) -> Joints:
         """Return positions after `dt` seconds."""
         corner: tuple[float, ...] = self._leaving.goal
         parts = zip(self._leaving.step(arm, dt), self._entering.step(arm, dt), corner, strict=True)
@@ -108,7 +117,7 @@ class LinearMove(_Move):
         there = (origin[0] + f * self._shift[0], origin[1] + f * self._shift[1], origin[2] + f * self._shift[2])
         return (turned[0], turned[1], turned[2], there)
 
-    def step(self, arm: "Arm", dt: float) -> Joints:
+    def step(self, arm: MovingArm, dt: float) -> Joints:
         """Return positions after `dt` seconds. Raise `MotionRefused` in a singularity or out of reach."""
         return _follow(arm, self, dt)
 
@@ -130,12 +139,12 @@ class LinearBlend(_Blend):
         (ax, ay, az), (bx, by, bz), (cx, cy, cz) = a[3], b[3], corner[3]
         return (x, y, z, (ax + bx - cx, ay + by - cy, az + bz - cz))
 
-    def step(self, arm: "Arm", dt: float) -> Joints:
+    def step(self, arm: MovingArm, dt: float) -> Joints:
         """Return positions after `dt` seconds. Raise `MotionRefused` in a singularity or out of reach."""
         return _follow(arm, self, dt)
 
 
-def _follow(arm: "Arm", motion: LinearMove | LinearBlend, dt: float) -> Joints:
+def _follow(arm: MovingArm, motion: LinearMove | LinearBlend, dt: float) -> Joints:
     if motion.done or dt == 0.0:
         return arm.q
     guess = [a + v * arm.period for a, v in zip(arm.q, arm.qd, strict=True)]
