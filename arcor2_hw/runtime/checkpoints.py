@@ -4,7 +4,7 @@ import os
 import struct
 import zlib
 from pathlib import Path
-from typing import Final
+from typing import Final, Protocol
 from urllib.parse import quote, unquote
 
 import msgspec
@@ -18,6 +18,19 @@ _SUFFIXES: Final = (".0", ".1")
 
 _encode = msgspec.msgpack.Encoder().encode
 _decode = msgspec.msgpack.Decoder(PartBooks).decode
+
+
+class Checkpoints(Protocol):
+    """The checkpoints of a scene, of which the newest is stored."""
+
+    def write(self, books: PartBooks) -> None:
+        """Store a checkpoint. It is on disk when this returns. Raises StorageError."""
+
+    def read(self) -> PartBooks | None:
+        """Return the newest valid checkpoint, None if there is none. Raises StorageError."""
+
+    def close(self) -> None:
+        """End the use."""
 
 
 class CheckpointFile:

@@ -31,6 +31,8 @@ from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.calls import Calls, error_data
 from arcor2_hw.runtime.cell import Cell
+from arcor2_hw.runtime.checkpoints import CheckpointFile
+from arcor2_hw.runtime.checkpoints_at_server import CheckpointsAtServer
 from arcor2_hw.runtime.clock import Clock
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.forcing import CHECK_PERIOD, Forces
@@ -42,7 +44,7 @@ from arcor2_hw.runtime.program import Program, set_current
 from arcor2_hw.runtime.record import RunRecord
 from arcor2_hw.runtime.recorder import Recorder
 from arcor2_hw.runtime.ring import Ring
-from arcor2_hw.runtime.script import execute, save_traceback
+from arcor2_hw.runtime.script import execute, save_traceback, traceback_text
 from arcor2_hw.runtime.stopping import wait_stopped
 from arcor2_hw.runtime.streaming import RatedStreams, Streams
 from arcor2_hw.runtime.teaching import TEACHING_PERIOD, Teaching
@@ -111,6 +113,7 @@ class Host:
         self._stop_requested = threading.Event()
         self._scene = HostedScene(self._cell, self._watch, self.link)
         self._package: m.RunPackage | None = None
+        self._at_server = CheckpointsAtServer(self.link.post)
         self._wake, wake_up = socket.socketpair()
         wake_up.setblocking(False)
         signal.set_wakeup_fd(wake_up.detach(), warn_on_full_buffer=False)
@@ -217,6 +220,8 @@ class Host:
         failed = program.stop_requested or program.error is not None
         if program.error is not None and not (handled and isinstance(program.error, Arcor2Error)):
             save_traceback(directory, program.error)
+            if message.records_at_server:  # this directory is removed
+                self.link.post(m.LogLine("error", traceback_text(program.error)[:65536]))
         problem = program.settle(failed)
         self._calls.settle()  # before the devices are closed
         program.interlocks.close()
@@ -233,10 +238,12 @@ class Host:
         )
 
     def _record(self, message: m.RunPackage) -> RunRecord | None:
-        if not message.records:
+        if not (message.records or message.records_at_server):
             return None
         return RunRecord(
-            Path(message.records),
+            lambda scene: (
+                self._at_server if message.records_at_server else CheckpointFile(Path(message.records), scene)
+            ),
             message.run,
             message.package_id,
             lambda books: self.link.post(m.PartsChanged(books)),
@@ -344,8 +351,10 @@ class Host:
                 self._confirm_identity(message)
             case m.DecideHeld():
                 self._decide(message)
-            case m.ConfirmParts():
-                self._confirm_parts(message)
+            case m.ConfirmParts():  # waits for a disk, which must not delay stops
+                threading.Thread(target=self._confirm_parts, args=(message,), name="confirm parts", daemon=True).start()
+            case m.CheckpointAnswer():
+                self._at_server.answered(message)
 
     def _device_changed(self, report: m.DeviceChanged) -> None:
         self.link.post(report)
@@ -407,6 +416,7 @@ class Host:
         interrupted = self._package is not None and not (self.program is not None and self.program.ended)
         if self.program is not None and self.program.record is not None:
             self.program.record.interrupt()
+        self._at_server.abandon()
         self._cell.stop_all()
         self._stop_program()
         self._cell.abandon()

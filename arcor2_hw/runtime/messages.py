@@ -23,6 +23,7 @@ from arcor2_hw.runtime.messages_to_host import (
     Alive as Alive,
     Calibrate as Calibrate,
     Call as Call,
+    CheckpointAnswer as CheckpointAnswer,
     CloseScene as CloseScene,
     ConfirmIdentity as ConfirmIdentity,
     ConfirmParts as ConfirmParts,
@@ -66,10 +67,12 @@ from arcor2_hw.runtime.messages_to_server import (
     ProgramChanged as ProgramChanged,
     ProgramEvent as ProgramEvent,
     ProgramHeld as ProgramHeld,
+    ReadCheckpoint as ReadCheckpoint,
     Ready as Ready,
     SceneClosed as SceneClosed,
     SceneFailed as SceneFailed,
     SceneOpened as SceneOpened,
+    StoreCheckpoint as StoreCheckpoint,
     StreamEvent as StreamEvent,
     ToServer as ToServer,
 )
@@ -105,6 +108,7 @@ HostBound = (
     | SetBreakpoints
     | DecideHeld
     | ConfirmParts
+    | CheckpointAnswer
     | SetInterlocks
     | ConfirmIdentity
     | StopProgram
@@ -130,6 +134,8 @@ ServerBound = (
     | HeldChanged
     | PartsChanged
     | PartStep
+    | ReadCheckpoint
+    | StoreCheckpoint
     | InterlocksChanged
     | DeviceChanged
     | DeviceIdentified

@@ -10,12 +10,13 @@ from arcor2_hw.data.held import HoldChoice
 from arcor2_hw.data.interlocks import Interlock
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.operation import HoldKind
-from arcor2_hw.data.parts import ConfirmedPart
+from arcor2_hw.data.parts import ConfirmedPart, PartBooks
 from arcor2_hw.data.position import ProgramStep
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
 from arcor2_hw.data.secret import ObjectSecrets
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime.message_parts import AddedBody, TypeCode
 
 
@@ -71,7 +72,8 @@ class RunPackage(ToHost, frozen=True):
     program continues where it was interrupted. continue_at: how many actions of its cycle are not repeated. values:
     values of constants and variables of the project by their ids, JSON in a string, which replace those of the package.
     recordings: directory in which the host stores the recording of a run that the end of the server interrupts; empty
-    to store nothing.
+    to store nothing. records_at_server: whether the host reads and stores checkpoints by messages, because it runs on
+    another computer; `records` is empty then.
     """
 
     package_id: str
@@ -94,6 +96,7 @@ class RunPackage(ToHost, frozen=True):
     values: dict[str, str] = field(default_factory=dict)
     identities: dict[str, Identity] = field(default_factory=dict)
     recordings: str = ""
+    records_at_server: bool = False
 
 
 class AddBody(ToHost, frozen=True):
@@ -255,6 +258,17 @@ class ConfirmParts(ToHost, frozen=True):
 
     id: int
     parts: list[ConfirmedPart]
+
+
+class CheckpointAnswer(ToHost, frozen=True):
+    """Answer to ReadCheckpoint or StoreCheckpoint. A checkpoint is on disk when its answer is sent.
+
+    number: of the request. books: the newest checkpoint; None if there is none. problem: why the request failed.
+    """
+
+    number: int
+    books: PartBooks | None = None
+    problem: Message | None = None
 
 
 class ConfirmIdentity(ToHost, frozen=True):

@@ -150,6 +150,19 @@ class PartsChanged(ToServer, frozen=True):
     books: PartBooks
 
 
+class ReadCheckpoint(ToServer, frozen=True):
+    """Read the newest checkpoint of the scene of the run. Answer: CheckpointAnswer with this number."""
+
+    number: int
+
+
+class StoreCheckpoint(ToServer, frozen=True):
+    """Store a checkpoint of the run. Answer: CheckpointAnswer with this number."""
+
+    number: int
+    books: PartBooks
+
+
 class PartStep(ToServer, frozen=True):
     """An action that ends now concerned a part: the number of the action, and the part by its number or serial number.
 

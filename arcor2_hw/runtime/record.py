@@ -18,7 +18,7 @@ from arcor2_hw.data.project import START, Project
 from arcor2_hw.exceptions import Arcor2Error, Conflict, PartUnconfirmed, StorageError
 from arcor2_hw.runtime.branches import Action, Branch
 from arcor2_hw.runtime.cell import Cell
-from arcor2_hw.runtime.checkpoints import CheckpointFile
+from arcor2_hw.runtime.checkpoints import Checkpoints
 from arcor2_hw.runtime.continuing import Continuation, kind_of
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.part_tracking import PartTracking, Step
@@ -38,7 +38,7 @@ class RunRecord:
     """Keeps the books of parts and stores checkpoints. The threads of the script and the reader thread call it.
 
     Args:
-        directory: the directory of the checkpoints.
+        checkpoints: returns the checkpoints of a scene.
         run: number of the run.
         package_id: the package.
         changed: called with the books after each change of a part.
@@ -50,7 +50,7 @@ class RunRecord:
 
     def __init__(
         self,
-        directory: Path,
+        checkpoints: Callable[[str], Checkpoints],
         run: int,
         package_id: str,
         changed: Callable[[PartBooks], None],
@@ -60,11 +60,11 @@ class RunRecord:
         continues: bool = False,
         continue_at: int | None = None,
     ) -> None:
-        self._directory, self._changed, self._each_action = directory, changed, each_action
+        self._checkpoints, self._changed, self._each_action = checkpoints, changed, each_action
         self._concerned = concerned
         self._run = RunCheckpoint(run, package_id, "", now())
         self._lock = threading.Lock()
-        self._file: CheckpointFile | None = None
+        self._file: Checkpoints | None = None
         self._parts: PartTracking | None = None
         self._first = ""
         self._named: set[str] = set()
@@ -95,7 +95,7 @@ class RunRecord:
             PartUnconfirmed: a person has to confirm the place of a part first.
             Conflict: the program cannot continue, because it was not interrupted, or was changed since.
         """
-        file = CheckpointFile(self._directory, project.scene_id)
+        file = self._checkpoints(project.scene_id)
         former = file.read() or PartBooks(project.scene_id)
         if former.unconfirmed:
             raise PartUnconfirmed("Confirm where the parts are before the program starts: {parts}.",
@@ -261,7 +261,7 @@ class RunRecord:
 
     def former_variables(self, scene_id: str) -> Mapping[str, str]:
         """Return the values of the variables with which an interrupted program continues, by name, in JSON."""
-        former = CheckpointFile(self._directory, scene_id).read()
+        former = self._checkpoints(scene_id).read()
         return {} if former is None or isinstance(former.run, Unset) else former.run.variables
 
     def interrupt(self) -> None:

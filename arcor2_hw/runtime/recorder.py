@@ -1,6 +1,5 @@
 """The recorder of a cell host: writes the points, joints and actions that the host sees anyway to the ring."""
 
-import os
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -18,7 +17,7 @@ from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.messages import DeviceChanged
 from arcor2_hw.runtime.methods import overrides
-from arcor2_hw.runtime.ring import INTERRUPTED, Ring
+from arcor2_hw.runtime.ring import Ring, save
 from arcor2_hw.runtime.ring_records import (
     ActionEnded,
     ActionStarted,
@@ -218,20 +217,12 @@ class Recorder:
         self._ring.append(encoded)
 
     def save(self, directory: Path, run: int) -> None:
-        """Store the ring of a run that the end of the server interrupts. The next server makes a recording of it."""
+        """Store the ring of a run that the end of the server interrupts. Raises OSError."""
         if self._ring is None:
             return
         with self._lock:
             segments = self._ring.segments()
-        directory.mkdir(parents=True, exist_ok=True, mode=0o700)
-        path = directory / INTERRUPTED.format(run=run)
-        fresh = path.with_suffix(".new")
-        fresh.touch(0o600)
-        with fresh.open("wb") as file:
-            file.write(encode([time.monotonic(), time.time(), segments]))
-            file.flush()
-            os.fsync(file.fileno())
-        fresh.replace(path)
+        save(segments, directory, run)
 
 
 def _equal(a: Any, b: Any) -> bool:

@@ -6,8 +6,12 @@ It consists of segments that are written in turn. Each starts with all present v
 import mmap
 import os
 import struct
+import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Final
+
+import msgspec
 
 SEGMENTS: Final = 8
 SEGMENT_SIZE: Final = 512 * 1024
@@ -81,6 +85,44 @@ class Ring:
             if generation and _HEAD.unpack_from(self._memory, start)[0] == generation:
                 found[generation] = content
         return [found[generation] for generation in sorted(found)]
+
+    def appended(self, generation: int, length: int) -> Iterator[tuple[int, bytes]]:
+        """Yield what was appended after a position: the generations of segments, oldest first, and their new records.
+
+        Args:
+            generation: of the segment of the position; 0 for the start.
+            length: of the records of this segment before the position, bytes.
+        """
+        heads = [(*_HEAD.unpack_from(self._memory, number * SEGMENT_SIZE), number) for number in range(SEGMENTS)]
+        for found, used, number in sorted(heads):
+            begin = length if found == generation else 0
+            if found >= max(generation, 1) and used > begin:
+                start = number * SEGMENT_SIZE
+                content = self._memory[start + _HEAD.size + begin : start + _HEAD.size + min(used, ROOM)]
+                if _HEAD.unpack_from(self._memory, start)[0] == found:
+                    yield found, content
+
+
+def save(segments: list[bytes], directory: Path, run: int) -> None:
+    """Store the ring of a run that the end of the server interrupts. The next server makes a recording of it.
+
+    Args:
+        segments: the segments of the ring.
+        directory: the directory of recordings.
+        run: number of the run.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    directory.mkdir(parents=True, exist_ok=True, mode=0o700)
+    path = directory / INTERRUPTED.format(run=run)
+    fresh = path.with_suffix(".new")
+    fresh.touch(0o600)
+    with fresh.open("wb") as file:
+        file.write(msgspec.msgpack.encode([time.monotonic(), time.time(), segments]))
+        file.flush()
+        os.fsync(file.fileno())
+    fresh.replace(path)
 
 
 def records(segment: bytes) -> Iterator[memoryview]:

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import msgspec
 from msgspec import UNSET, Struct
+from msgspec.structs import replace
 
 from arcor2_hw.data.position import MAIN_BRANCH
 from arcor2_hw.data.recordings import RecordedAction, RecordedValues, Signal, SignalKind
@@ -61,6 +62,12 @@ Record = Names | Values | ActionStarted | ActionEnded
 
 encode: Final = msgspec.msgpack.Encoder().encode
 _decode: Final = msgspec.msgpack.Decoder(Record).decode
+
+
+def shifted(record: bytes | memoryview, offset: float) -> bytes:
+    """Return an encoded record with its time on another clock. offset: difference of the clocks, s."""
+    decoded = _decode(record)
+    return bytes(record) if isinstance(decoded, Names) else encode(replace(decoded, stamp=decoded.stamp + offset))
 
 
 class _Results(Struct):

@@ -17,7 +17,7 @@ def test_a_run_that_cannot_start_leaves_the_books_as_they_are(tmp_path: Path) ->
     file = CheckpointFile(tmp_path, "scn_1")
     file.write(books)
     file.close()
-    record = RunRecord(tmp_path, 7, "pkg_1", lambda _: None)
+    record = RunRecord(lambda scene: CheckpointFile(tmp_path, scene), 7, "pkg_1", lambda _: None)
     with pytest.raises(PartUnconfirmed, match="A-1"):
         record.open(Project(id="prj_1", name="project", scene_id="scn_1"), Cell(), tmp_path)
     with pytest.raises(Conflict):

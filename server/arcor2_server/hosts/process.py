@@ -140,12 +140,10 @@ class CellHost:
         try:
             # The connection first: nothing may be awaited between the start of the process and of its tasks.
             await asyncio.get_running_loop().create_unix_connection(lambda: connection, sock=ours)
-            if node:
-                process = await ChildProcess.start((*RELAY_COMMAND, "--node", node), theirs, environment)
-            else:
-                process = await ChildProcess.start(
-                    (*COMMAND, "--ring", str(memory)), theirs, environment, inherited=[memory]
-                )
+            command = (*RELAY_COMMAND, "--node", node) if node else COMMAND
+            process = await ChildProcess.start(
+                (*command, "--ring", str(memory)), theirs, environment, inherited=[memory]
+            )
         except BaseException:
             os.close(memory)
             if connection.transport is not None:

@@ -17,7 +17,7 @@ import msgspec
 import structlog
 from msgspec.structs import replace
 
-from arcor2_hw.exceptions import InvalidData, NotFound, Refused
+from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_hw.runtime import messages as m
 from arcor2_server.files import replace_file
 
@@ -57,14 +57,16 @@ class Content:
 
         Raises:
             NotFound: a file does not exist.
-            Refused: the message asks for what a node cannot do.
         """
         message = m.decode_host_bound(body)
         if isinstance(message, m.RunPackage):
-            if message.continues:
-                raise Refused("An interrupted program cannot be continued on a node. Start it from the beginning.")
-            # What a run records stays on this computer, which the node cannot write.
-            message = replace(message, directory=self._add_directory(message.directory), records="", recordings="")
+            message = replace(
+                message,
+                directory=self._add_directory(message.directory),
+                records="",
+                recordings="",  # the relay stores it
+                records_at_server=bool(message.records),
+            )
         return msgspec.msgpack.encode(_mapped(message, self._add_named))
 
     def _add_named(self, name: str) -> str:

@@ -12,8 +12,8 @@ STOPS: Final = frozenset({"StopAll", "StopMotion", "StopProgram"})
 """Messages that overtake calls."""
 PASSIVE: Final = frozenset(
     {
-        "AddBody", "Calibrate", "CloseScene", "ConfirmIdentity", "EndForce", "Pause", "RemoveBodies", "RenewForces",
-        "SetBreakpoints", "SetInterlocks", "Stream", "Subscribe",
+        "AddBody", "Calibrate", "CheckpointAnswer", "CloseScene", "ConfirmIdentity", "EndForce", "Pause",
+        "RemoveBodies", "RenewForces", "SetBreakpoints", "SetInterlocks", "Stream", "Subscribe",
     }
 )  # fmt: skip
 """Messages that start nothing at a device."""
@@ -23,7 +23,7 @@ LARGE: Final = 64 * 1024
 """Size from which results and streamed values are sent on the lane of frames, bytes."""
 FRAMES: Final = frozenset({"CallDone", "StreamEvent"})
 """Messages of the host that may overtake, or be overtaken by, any other one."""
-_STAMPED: Final = frozenset(
+STAMPED: Final = frozenset(
     {
         "CallFailed", "DeviceChanged", "ForceEnded", "HandTeachingEnded", "HoldEnded", "ProgramChanged", "ProgramHeld",
         "SceneClosed", "SceneFailed",
@@ -66,7 +66,7 @@ def for_host(kind: str, body: bytes, here: Callable[[float], float]) -> bytes:
 
 def for_server(kind: str, body: bytes, here: Callable[[float], float]) -> bytes:
     """Return a message of a cell host with its times on the clock of this computer. Arguments as of `for_host`."""
-    if kind not in _STAMPED:
+    if kind not in STAMPED:
         return body
     message = m.decode_server_bound(body)
     changed: dict[str, Any] = {}

@@ -1,7 +1,8 @@
 """The process that the server starts in place of a cell host that runs on a node.
 
-It passes the messages between the server's socket (`--fd N`) and the node on. Beats, and the detection of a lost node,
-do not depend on the load of the server. If the server ends, so does the session, and the node stops all motion.
+It passes the messages between the server's socket (`--fd N`) and the node on, and stores what a run records. Beats, and
+the detection of a lost node, do not depend on the load of the server. If the server ends, so does the session, and the
+node stops all motion.
 """
 
 import argparse
@@ -9,6 +10,7 @@ import asyncio
 import contextlib
 import os
 import secrets
+import signal
 import socket
 import sys
 from typing import Final
@@ -20,6 +22,7 @@ from nats.errors import Error as NatsError, NoRespondersError, TimeoutError as N
 from arcor2_hw.exceptions import Arcor2Error, message_of
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
+from arcor2_hw.runtime.ring import Ring
 from arcor2_server.nodes import connections as broker
 from arcor2_server.nodes.content import WITH_FILES, Content
 from arcor2_server.nodes.conversion import STOPS, for_server, outline
@@ -27,6 +30,7 @@ from arcor2_server.nodes.credentials import of_environment
 from arcor2_server.nodes.lanes import Header, Lane
 from arcor2_server.nodes.opening import Opened, Opening
 from arcor2_server.nodes.presence import own_version
+from arcor2_server.nodes.run_records import INTERCEPTED, RunRecords
 from arcor2_server.nodes.session import SILENCE, Connections, SessionEnd
 from arcor2_server.nodes.stream import MessageStream
 
@@ -44,19 +48,22 @@ class Relay:
     Args:
         node: name of the node.
         sock: socket to the server.
+        ring: the ring of the server; None if nothing is recorded.
     """
 
-    def __init__(self, node: str, sock: socket.socket) -> None:
+    def __init__(self, node: str, sock: socket.socket, ring: Ring | None = None) -> None:
         self._node = node
         self._socket = sock
         self._name = Message.of("the node {node}", node=node)
-        self._stream = MessageStream(self._from_server, self._server_closed)
+        self._stream = MessageStream(self._from_server, self.server_closed)
         self._end: SessionEnd | None = None
         self._over: asyncio.Future[Message] = asyncio.get_running_loop().create_future()
         self._closing: asyncio.Task[None] | None = None
         self._waiting: list[tuple[int, str, bytes]] = []
         """Messages that wait until the files of the first one are sent: number, type, message."""
         self._transfer: asyncio.Task[None] | None = None
+        self._ring = ring
+        self._records: RunRecords | None = None
 
     async def run(self, silence: float) -> None:
         """Serve until the session ends. Report the reason to the server."""
@@ -70,6 +77,8 @@ class Relay:
             reason = error.message
         self._stream.send(msgspec.msgpack.encode(m.HostLost(reason)))
         self._stream.close()
+        if self._records is not None:
+            await self._records.close()
         if self._end is not None:
             await self._end.close()
         await broker.close(connections)
@@ -79,6 +88,7 @@ class Relay:
         opening = Opening(secrets.token_hex(8), own_version(), silence)
         subject = broker.session_subject(self._node, opening.session)
         end = self._end = SessionEnd(connections, subject, "server", "node", self._name, self, silence)
+        self._records = RunRecords(self._ring, lambda body: end.send(Lane.CALLS, body), end.here)
         try:
             await end.open()
             answer = await connections[Lane.CALLS].request(
@@ -116,6 +126,8 @@ class Relay:
             if kind in WITH_FILES:
                 content = Content()
                 try:
+                    if kind == "RunPackage" and self._records is not None:
+                        await asyncio.to_thread(self._records.begin, m.decode_host_bound(body))
                     body = await asyncio.to_thread(content.packed, body)
                     await end.send_files(content)
                 except (Arcor2Error, OSError) as error:
@@ -129,7 +141,14 @@ class Relay:
     def received(self, lane: Lane, header: Header, body: bytes) -> None:  # noqa: ARG002 - its order does not matter here
         """Pass a message of the node on."""
         assert self._end is not None
-        self._stream.send(for_server(outline(body).type, body, self._end.here))
+        assert self._records is not None
+        kind = outline(body).type
+        if kind in INTERCEPTED:
+            self._records.handle(kind, body)
+            return
+        if kind == "ProgramChanged":
+            self._records.program_changed(m.decode_server_bound(body))
+        self._stream.send(for_server(kind, body, self._end.here))
 
     # -------------------------------------------------------------------------------- end
     def ended(self, reason: Message, by_peer: bool) -> None:  # noqa: ARG002
@@ -141,21 +160,28 @@ class Relay:
         if self._end is not None:
             self._end.connection_lost()
 
-    def _server_closed(self) -> None:
-        self._closing = asyncio.create_task(self._close(), name="end of the session")
+    def server_closed(self) -> None:
+        """Handle the end of the server."""
+        if self._closing is None:
+            self._closing = asyncio.create_task(self._close(), name="end of the session")
 
     async def _close(self) -> None:
         """End the session; wait until the host on the node has ended."""
         reason = Message.of("the server closed the connection")
         if self._end is not None:
             self._end.send_end(reason)
+            if self._records is not None and not self._over.done():
+                await self._records.server_ended()
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(asyncio.shield(self._over), ENDED_WITHIN)
         self.ended(reason, False)
 
 
-async def _main(node: str, sock: socket.socket, silence: float) -> None:
-    await Relay(node, sock).run(silence)
+async def _main(node: str, sock: socket.socket, silence: float, ring: Ring | None) -> None:
+    relay = Relay(node, sock, ring)
+    # A service manager ends all processes of the server.
+    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, relay.server_closed)
+    await relay.run(silence)
 
 
 def main() -> None:
@@ -164,10 +190,12 @@ def main() -> None:
     parser.add_argument("--fd", type=int, required=True, help="inherited socket to the server")
     parser.add_argument("--node", required=True, help="name of the node")
     parser.add_argument("--silence", type=float, default=SILENCE, help="time without a beat until the session ends, s")
+    parser.add_argument("--ring", type=int, help="inherited memory of the ring of recent values")
     options = parser.parse_args()
     with contextlib.suppress(OSError):  # not permitted without LimitNICE in the service file
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
-    uvloop.run(_main(options.node, socket.socket(fileno=options.fd), options.silence))
+    ring = None if options.ring is None else Ring(options.ring)
+    uvloop.run(_main(options.node, socket.socket(fileno=options.fd), options.silence, ring))
     sys.stdout.flush()
 
 

@@ -19,11 +19,11 @@ from nats.errors import Error as NatsError
 
 from arcor2_hw.exceptions import Arcor2Error, ArrivedLate, Cancelled, ConnectionLost, InvalidData, NotFound
 from arcor2_hw.messages import Message
-from arcor2_hw.runtime import messages as m
+from arcor2_hw.runtime import messages as m, ring
 from arcor2_server.child_process import ChildProcess, describe_exit
 from arcor2_server.nodes import connections as broker
 from arcor2_server.nodes.content import WITH_FILES, ContentStore, default_store
-from arcor2_server.nodes.conversion import FRAMES, LARGE, Outline, for_host, outline
+from arcor2_server.nodes.conversion import FRAMES, LARGE, STAMPED, Outline, for_host, outline
 from arcor2_server.nodes.credentials import Credentials, environment_without
 from arcor2_server.nodes.lanes import Header, Lane
 from arcor2_server.nodes.opening import Opened, Opening, refusal_of
@@ -38,6 +38,7 @@ from arcor2_server.nodes.presence import (
     own_version,
     presence_subject,
 )
+from arcor2_server.nodes.run_records import RingSender
 from arcor2_server.nodes.session import BEAT_PERIOD, Connections, SessionEnd
 from arcor2_server.nodes.stream import MessageStream
 
@@ -90,6 +91,7 @@ class HostedSession:
             opening.silence,
         )
         self._limit = opening.silence
+        self._recorded: RingSender | None = None
         self._stream = MessageStream(self._from_host, self._host_closed)
         self._closed = asyncio.Event()
         self._over = asyncio.Event()
@@ -130,6 +132,7 @@ class HostedSession:
                     async with asyncio.timeout(LAST_MESSAGES_WITHIN):
                         await self._closed.wait()
                         await output
+                self._send_recorded()
                 end = Message.of("the cell host {end}", end=describe_exit(status))
                 if status and not self._over.is_set():
                     self._failed(end)
@@ -149,15 +152,32 @@ class HostedSession:
 
     async def _start(self, environment: Mapping[str, str]) -> ChildProcess:
         ours, theirs = socket.socketpair()
-        await asyncio.get_running_loop().create_unix_connection(lambda: self._stream, sock=ours)
-        return await ChildProcess.start(COMMAND, theirs, environment)
+        memory = ring.create()
+        try:
+            await asyncio.get_running_loop().create_unix_connection(lambda: self._stream, sock=ours)
+            process = await ChildProcess.start(
+                (*COMMAND, "--ring", str(memory)), theirs, environment, inherited=[memory]
+            )
+        except BaseException:
+            os.close(memory)
+            raise
+        self._recorded = RingSender(ring.Ring(memory), lambda body: self.end.send(Lane.CALLS, body))
+        return process
 
     async def _show_alive(self) -> None:
-        """Let the host notice when this service hangs, so that it does not execute anything unobserved."""
+        """Let the host notice when this service hangs, so that it does not execute anything unobserved.
+
+        Send what the host has recorded, too.
+        """
         alive = _encode(m.Alive(self._limit + BEAT_PERIOD))
         while True:
             self._stream.send(alive)
+            self._send_recorded()
             await asyncio.sleep(BEAT_PERIOD)
+
+    def _send_recorded(self) -> None:
+        if self._recorded is not None:
+            self._recorded.flush()
 
     async def _pass_output_on(self, process: ChildProcess) -> None:
         async for line in process.output():
@@ -171,6 +191,8 @@ class HostedSession:
             lane = Lane.STOP
         else:
             lane = Lane.FRAMES if len(body) >= LARGE and found.type in FRAMES else Lane.CALLS
+            if found.type in STAMPED:  # an alarm or an end, of which the server makes a recording
+                self._send_recorded()
         self.end.send(lane, body, may_drop=lane is Lane.FRAMES and found.type == "StreamEvent")
 
     def _host_closed(self) -> None:

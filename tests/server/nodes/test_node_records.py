@@ -1,0 +1,310 @@
+"""Runs on a node are stored by the server as those of hosts on its computer: books, checkpoints and recordings."""
+
+import asyncio
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import msgspec
+import pytest
+from msgspec import UNSET
+from msgspec.structs import replace
+
+from arcor2_hw.data.held import HeldData, HoldChoice
+from arcor2_hw.data.parts import ConfirmedPart, Part, PartBooks, RunCheckpoint
+from arcor2_hw.data.recordings import SignalKind
+from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.runtime import messages as m
+from arcor2_hw.runtime.checkpoints import CheckpointFile
+from arcor2_hw.runtime.ring import Ring, records
+from arcor2_hw.runtime.ring_records import ActionEnded, ActionStarted, Names, converted, encode
+from arcor2_server.errors import RequestRefused
+from arcor2_server.hosts.process import CellHost
+from arcor2_server.nodes.run_records import RingSender, RunRecords
+from arcor2_server.storage.recordings import RecordingFiles
+from tests.e2e.harness import until
+from tests.runtime.conftest import Package
+from tests.runtime.test_host_parts import ONE, STEPS, write_package
+from tests.runtime.test_host_recording import check, running
+from tests.server.cell.conftest import running_server
+from tests.server.cell.test_execution_history import subscribe
+from tests.server.cell.test_part_books import CONFIRMED, CONTINUE
+from tests.server.nodes.conftest import NODE, PATIENCE, Broker, Listener, Node
+from tests.server.nodes.test_node_hosts import AN_HOUR_AHEAD
+from tests.waiting import wait_for
+
+pytestmark = pytest.mark.xdist_group("nodes")
+
+
+class Cell:
+    """Runs of one scene, whose arm writes notes to a directory."""
+
+    def __init__(self, directory: Path, start_host: Callable[..., Any]) -> None:
+        self.directory, self._start_host = directory, start_host
+        self.records = directory / "records"
+        self.host: CellHost
+        self.listener: Listener
+        self._runs = 0
+
+    async def start(self, body: str, url: str, **options: Any) -> None:
+        self._runs += 1
+        self.host, self.listener = await self._start_host(url)
+        path = write_package(self.directory / f"pkg_{self._runs}", self.directory, body)
+        more = {"records": str(self.records), "run": self._runs, "hold_on_error": True} | options
+        self.host.send(m.RunPackage("pkg_1", str(path), streaming_period=0, **more))
+
+    @property
+    def books(self) -> PartBooks:
+        found = CheckpointFile(self.records, "scn_1").read()
+        assert found is not None
+        return found
+
+    @property
+    def run(self) -> RunCheckpoint:
+        assert self.books.run is not UNSET
+        return self.books.run  # type: ignore[return-value]
+
+    def notes(self) -> list[str]:
+        path = self.directory / "notes"
+        return path.read_text().split() if path.exists() else []
+
+    async def moving(self) -> None:
+        """Wait until the arm moves."""
+        await asyncio.to_thread(wait_for, self.notes)
+
+    async def message(self, kind: type[Any]) -> Any:
+        async def found() -> Any:
+            while not (all_ := [each for each in self.listener.messages if isinstance(each, kind)]):
+                await asyncio.sleep(0.01)
+            return all_[-1]
+
+        return await asyncio.wait_for(found(), PATIENCE)
+
+    async def held(self) -> HeldData:
+        held: HeldData = (await self.message(m.ProgramHeld)).held
+        return held
+
+    async def ended(self) -> None:
+        async with asyncio.timeout(PATIENCE):
+            await asyncio.shield(self.host.ended)
+
+
+@pytest.fixture
+def cell(tmp_path: Path, start_host: Callable[..., Any]) -> Cell:
+    return Cell(tmp_path, start_host)
+
+
+def cut(broker: Broker, host: CellHost) -> None:
+    """A suspended broker delivers nothing, and later everything, as a cable that is cut and repaired."""
+    os.kill(broker.process.pid, signal.SIGSTOP)
+
+
+def kill_relay(broker: Broker, host: CellHost) -> None:
+    host.kill()
+
+
+@pytest.mark.parametrize("fault", [cut, kill_relay])
+async def test_a_run_that_a_fault_interrupts_continues(
+    cell: Cell, broker: Broker, node: Node, fault: Callable[[Broker, CellHost], None]
+) -> None:
+    (cell.directory / "hang").touch()
+    await cell.start(STEPS, broker.url)
+    await cell.moving()
+    assert [action.action_name for action in cell.run.actions] == ["pick"]  # stored before it has started
+    fault(broker, cell.host)
+    (cell.directory / "hang").unlink()  # the action ends, but the next one must not start
+    await cell.ended()
+    os.kill(broker.process.pid, signal.SIGCONT)
+    assert (cell.run.ended, cell.run.last, cell.run.results["act_scan"]) == (False, "act_scan", ['"A-1"'])
+    assert cell.books.parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm")]
+
+    await cell.start(STEPS, broker.url, continues=True)
+    held = await cell.held()
+    assert (held.kind, held.action_name) == ("program_interrupted", "pick")
+    assert cell.notes() == ["pick"]  # nothing has moved since
+    await cell.host.decide(held.number, HoldChoice.RETRY, [], "")
+    await cell.ended()
+    assert cell.notes() == ["pick", "pick", "place", "pick", "place"]
+    assert (cell.run.ended, cell.books.counts.fed, cell.books.counts.good, cell.books.parts) == (True, 1, 1, [])
+
+
+async def test_clients_inspect_and_continue_a_run_of_a_killed_node(
+    broker: Broker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ARCOR2_HW_NATS_URL", broker.url)
+    (tmp_path / "hang").touch()
+    node = Node(broker.url, tmp_path, name="lathe")
+    try:
+        async with running_server(tmp_path / "data") as server:
+            subscribe(server, "PartsChanged")
+            package = server.services.settings.packages_dir / "pkg_1"
+            write_package(package, tmp_path, ONE)
+            scene = msgspec.json.decode((package / "data" / "scene.json").read_bytes())
+            scene["objects"][0]["node"] = "lathe"
+            (package / "data" / "scene.json").write_bytes(msgspec.json.encode(scene))
+            await server.ask("RunPackage", {"id": "pkg_1", "on_error": "hold"})
+            await until((tmp_path / "notes").exists, "the arm picks the part")
+            (books,) = await server.ask("GetParts")
+            assert (books.parts[0].serial, books.parts[0].moving_to) == ("A-1", "obj_arm")
+            with pytest.raises(Arcor2Error, match="while an action runs: pick"):
+                await server.ask("ConfirmParts", CONFIRMED)
+            node.end()
+            await server.client.state("stopped", "PackageState")
+            published = await server.client.event("PartsChanged", lambda data: "run" in data)
+            assert [action["action_name"] for action in published["run"]["actions"]] == ["pick"]
+
+        async with running_server(tmp_path / "data") as server:  # a restart changes nothing
+            subscribe(server, "Held")
+            with pytest.raises(RequestRefused, match=r"Confirm where these parts are .*: A-1 \(feeder\)"):
+                await server.ask("RunPackage", CONTINUE)
+            await server.ask("ConfirmParts", CONFIRMED)
+            (tmp_path / "hang").unlink()
+            node = Node(broker.url, tmp_path, name="lathe")
+            await server.ask("RunPackage", CONTINUE)
+            held = await server.client.event("Held")
+            assert (held["kind"], held["action_name"]) == ("program_interrupted", "pick")
+            await server.ask("DecideHeld", {"number": held["number"], "choice": "skip"})  # the part is in the gripper
+            await server.client.state("stopped", "PackageState")
+            assert (tmp_path / "notes").read_text().split() == ["pick", "place"]
+            (books,) = await server.ask("GetParts")
+            assert [(part.serial, part.place) for part in books.parts] == [("A-1", "obj_nest")]
+    finally:
+        node.end()
+
+
+async def test_books_are_published_and_confirmed_during_a_run(cell: Cell, broker: Broker, node: Node) -> None:
+    (cell.directory / "fault").touch()
+    await cell.start(ONE, broker.url)
+    held = await cell.held()
+    assert cell.books.parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm", confirmed=False)]
+    assert (await cell.message(m.PartsChanged)).books.parts == cell.books.parts
+    assert (await cell.message(m.PartStep)).part == 1
+    await cell.host.confirm_parts([ConfirmedPart(1, "obj_nest")])
+    assert cell.books.parts == [Part(1, "obj_nest", "A-1")]
+    await cell.host.decide(held.number, HoldChoice.END, [], "")
+    await cell.ended()
+    assert cell.run.ended
+
+
+async def test_an_action_whose_checkpoint_is_not_stored_does_not_start(cell: Cell, broker: Broker, node: Node) -> None:
+    cell.records.write_text("no directory")
+    await cell.start(ONE, broker.url)
+    await cell.ended()
+    end = [each for each in cell.listener.messages if isinstance(each, m.ProgramChanged)][-1]
+    assert end.error is not None
+    assert "The state of the run cannot be stored" in str(end.error.message)
+    assert cell.notes() == []
+
+
+async def start_lift(start_host: Callable[..., Any], folder: Path, name: str = NODE) -> CellHost:
+    """Run a program until its last action is recorded."""
+    host, _ = await start_host(name=name)
+    (folder / "package").mkdir()
+    sender: Any = SimpleNamespace(send=host.send, expect=lambda *_: None)
+    running(sender, Package(folder / "package"), folder / "recordings")
+    await asyncio.to_thread(wait_for, lambda: [each.name for each in recorded(host.ring).actions] == ["a", "b", "c"])
+    return host  # type: ignore[no-any-return]
+
+
+def recorded(ring: Ring) -> Any:
+    moment = time.monotonic()
+    return converted(ring.segments(), moment, moment - 60.0, moment)[0]
+
+
+async def test_the_server_has_the_recording_of_a_killed_node(
+    broker: Broker, start_host: Callable[..., Any], tmp_path: Path
+) -> None:
+    node = Node(broker.url, tmp_path, name="lathe")
+    try:
+        host = await start_lift(start_host, tmp_path, "lathe")
+        node.process.kill()
+        async with asyncio.timeout(PATIENCE):
+            await asyncio.shield(host.ended)
+        check(recorded(host.ring))
+        assert not (tmp_path / "recordings").exists()
+    finally:
+        node.end()
+
+
+async def test_a_failed_run_is_recorded_to_its_end_on_the_clock_of_the_server(
+    broker: Broker, start_host: Callable[..., Any], tmp_path: Path
+) -> None:
+    """The recording is made when the end of the program is reported."""
+    if subprocess.run([*AN_HOUR_AHEAD, "true"], capture_output=True, check=False).returncode:
+        pytest.skip("this user may not create a time namespace (needs root and Linux 5.6)")
+    node = Node(broker.url, tmp_path, name="ahead", wrapper=AN_HOUR_AHEAD)
+    try:
+        host, listener = await start_host(broker.url, "ahead")
+        found: list[Any] = []
+
+        def watch(source: CellHost, message: m.ServerBound) -> None:
+            if isinstance(message, m.ProgramChanged) and message.state == "stopped":
+                found.append(recorded(source.ring))
+
+        listener.host_message = watch  # type: ignore[method-assign]
+        (tmp_path / "fault").touch()
+        path = write_package(tmp_path / "pkg", tmp_path, ONE)
+        host.send(m.RunPackage("pkg_1", str(path), streaming_period=0))
+        async with asyncio.timeout(PATIENCE):
+            await asyncio.shield(host.ended)
+        actions = found[0].actions
+        assert [each.name for each in actions] == ["scan", "pick"]
+        assert "the part sticks" in actions[1].error
+    finally:
+        node.end()
+
+
+async def test_the_relay_stores_the_recording_of_a_run_that_the_end_of_the_server_interrupts(
+    broker: Broker, node: Node, start_host: Callable[..., Any], tmp_path: Path
+) -> None:
+    host = await start_lift(start_host, tmp_path)
+    await host.close()
+    [saved] = RecordingFiles(tmp_path / "recordings").saved_rings()
+    assert saved.run == 3
+    check(converted(saved.segments, saved.monotonic, saved.monotonic - 60.0, saved.monotonic)[0])
+
+
+# ------------------------------------------------------------------------------------------------ without a broker
+async def test_a_node_cannot_change_the_books_of_another_scene(tmp_path: Path) -> None:
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "project.json").write_text('{"scene_id": "scn_1"}')
+    answers: list[m.CheckpointAnswer] = []
+    records = RunRecords(None, lambda body: answers.append(m.decode_host_bound(body)), lambda moment: moment)
+    records.begin(m.RunPackage("pkg_1", str(tmp_path), records=str(tmp_path / "records")))
+    for number, scene in enumerate(("scn_2", "../scn_1", "scn_1")):
+        records.handle("StoreCheckpoint", msgspec.msgpack.encode(m.StoreCheckpoint(number, PartBooks(scene))))
+    records.handle("ReadCheckpoint", msgspec.msgpack.encode(m.ReadCheckpoint(3)))
+    await records.close()
+    assert [each.number for each in answers if each.problem is not None] == [0, 1]
+    assert [each.books for each in answers if each.number == 3] == [PartBooks("scn_1")]
+    assert sorted(each.name for each in (tmp_path / "records").iterdir()) == ["scn_1.0", "scn_1.1"]
+
+
+def test_the_ring_of_the_server_has_the_same_records_on_its_clock() -> None:
+    """More records than a segment can hold, and an offset that changes within a segment."""
+    ours, theirs, offset = Ring(), Ring(), -100.0
+    copy = RunRecords(ours, lambda _: None, lambda moment: moment + offset)
+    sender = RingSender(theirs, lambda body: copy.handle("RingRecords", body))
+    names = Names(0, SignalKind.POINT, "obj", "obj", ["x"], [""])
+    expected: list[list[bytes]] = []
+    for number in range(30):
+        if number % 10 == 0:
+            theirs.begin_segment()
+            offset = -100.0 - number
+            expected.append([])
+        for record in (names, ActionStarted(200.0 + number, number, "a" * 1000), ActionEnded(200.5 + number, number)):
+            assert theirs.append(encode(record))
+            if not isinstance(record, Names):
+                record = replace(record, stamp=record.stamp - 100.0 - number // 10 * 10)
+            expected[-1].append(encode(record))
+        if number % 3 == 0:
+            sender.flush()
+            offset += 0.001
+    sender.flush()
+    sender.flush()
+    assert [[bytes(each) for each in records(segment)] for segment in ours.segments()] == expected
