@@ -1,7 +1,7 @@
 #!/bin/sh
 # Install ARCOR2-HW from this folder as a service, without a network. To replace an installed version: arcor2-hw upgrade
 #
-#   ./install.sh [--public-key RW...] [--no-start]
+#   ./install.sh [--public-key RW...] [--no-start] [--no-server]
 set -eu
 umask 022
 bundle=$(cd "$(dirname "$0")" && pwd)

@@ -15,7 +15,7 @@ from packaging.version import Version
 from arcor2_hw.exceptions import Arcor2Error, Conflict, InvalidData, NotFound
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.deployment import minisign
-from arcor2_server.deployment.installation import NAME, CommandFailed, Installation, run
+from arcor2_server.deployment.installation import NAME, UNIT, CommandFailed, Installation, run
 from arcor2_server.deployment.upgrade import READY_WITHIN, Systemd, UpgradeFailed, checked, upgrade as upgrade_to
 
 PUBLIC: Final = 0o022
@@ -28,6 +28,7 @@ def install(
     *,
     public_key: str | None = None,
     start: bool = True,
+    server: bool = True,
     select_only: Annotated[bool, Parameter(negative="", show=False)] = False,
     root: Root = Path("/"),
 ) -> int:
@@ -39,6 +40,8 @@ def install(
         The minisign key of the releases (RW...). `upgrade` accepts only bundles that are signed with it.
     start
         With --no-start the service starts with the machine only.
+    server
+        With --no-server the service of the server is not enabled, on a computer that is only a node or shows a fleet.
     """
     here = Installation(root)
     os.umask(PUBLIC)
@@ -51,7 +54,8 @@ def install(
             here.public_key.write_text(f"{public_key}\n")
         if not select_only:
             here.add_user()
-            run(["systemctl", "enable", f"{NAME}.service"])
+        if server and not select_only:
+            run(["systemctl", "enable", UNIT])
             if start:
                 Systemd().start(READY_WITHIN)
     except (Arcor2Error, OSError) as error:

@@ -23,6 +23,7 @@ from arcor2_server.audit.command_line import note_command
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.cli.server_connection import printable, status_of
 from arcor2_server.cli.tables import console
+from arcor2_server.deployment.service_manager import ServiceManager
 from arcor2_server.log import setup as server_logging
 from arcor2_server.settings import ServerSettings, default_data_dir
 
@@ -135,11 +136,16 @@ async def _serve(name: str, credentials: "Callable[[], Credentials]") -> None:
         sys.stdout.write(f"ready {name}\n")
         sys.stdout.flush()
 
+    manager = ServiceManager.from_environment()  # first: hosts must not report to it
     serving = asyncio.create_task(NodeService(name, credentials, ready=ready).run())
     for number in (signal.SIGTERM, signal.SIGINT):
         asyncio.get_running_loop().add_signal_handler(number, serving.cancel)
-    with contextlib.suppress(asyncio.CancelledError):
-        await serving
+    manager.ready()  # also without a broker, to which the service connects again and again
+    try:
+        with contextlib.suppress(asyncio.CancelledError):
+            await serving
+    finally:
+        manager.stopping()
 
 
 # -------------------------------------------------------------------------------------------------------- server

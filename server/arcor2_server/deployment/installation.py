@@ -1,7 +1,8 @@
-"""The installed service: versions next to each other, a link to the present one, a user, a unit, and the data.
+"""The installed services: versions next to each other, a link to the present one, a user, units, and the data.
 
 A version is a virtual environment in `/opt/arcor2-hw/VERSION`. The link `/opt/arcor2-hw/current` selects the one that
-runs. The data is in `/var/lib/arcor2-hw` and belongs to the user of the service.
+runs. The data of the server is in `/var/lib/arcor2-hw`, that of nodes in `/var/lib/arcor2-hw-node` and that of the
+page of a fleet in `/var/lib/arcor2-hw-fleet`. All belongs to the user of the services.
 """
 
 import grp
@@ -23,6 +24,10 @@ from arcor2_server.deployment.bundle import REQUIREMENTS, WHEELS
 NAME: Final = "arcor2-hw"
 """Name of the user, the group and the service."""
 UNIT: Final = f"{NAME}.service"
+NODE: Final = f"{NAME}-node"
+FLEET: Final = f"{NAME}-fleet"
+UNITS: Final = (UNIT, f"{NODE}@.service", f"{FLEET}.service")
+"""The units. Only the first one is enabled by the installation."""
 COMMAND_TIMEOUT: Final = 60.0
 INSTALL_TIMEOUT: Final = 600.0
 _GROUPS: Final = "SupplementaryGroups="
@@ -103,9 +108,9 @@ class Installation(msgspec.Struct, frozen=True):
         return self.root / "etc" / NAME / "release.pub"
 
     @property
-    def unit(self) -> Path:
-        """The unit of the service."""
-        return self.root / "etc/systemd/system" / UNIT
+    def units(self) -> Path:
+        """The directory of the units."""
+        return self.root / "etc/systemd/system"
 
     @property
     def command(self) -> Path:
@@ -159,7 +164,7 @@ class Installation(msgspec.Struct, frozen=True):
             raise
 
     def select(self, version: Version) -> None:
-        """Let the service run a version from its next start on: write its unit, and set the links.
+        """Let the service run a version from its next start on: write the units, and set the links.
 
         Raises:
             NotFound: the version is not installed.
@@ -169,7 +174,8 @@ class Installation(msgspec.Struct, frozen=True):
         if not (target / "bin" / NAME).exists():
             raise NotFound("Version {version} is not installed in {path}.", version=version, path=self.programs)
         try:
-            _write(self.unit, _unit_text())
+            for unit in UNITS:
+                _write(self.units / unit, _text_of(unit))
             if not self.settings.exists():
                 _write(self.settings, _SETTINGS)
             _link(self.current, Path(str(version)))
@@ -178,27 +184,28 @@ class Installation(msgspec.Struct, frozen=True):
             raise StorageError("{path} cannot be written: {reason}.", path=error.filename, reason=error) from error
 
     def add_user(self) -> None:
-        """Create the user of the service and the data directory. Raises CommandFailed and StorageError."""
+        """Create the user of the services and the data directories. Raises CommandFailed and StorageError."""
         try:
             owner = pwd.getpwnam(NAME)
         except KeyError:
             run(["useradd", "--system", "--user-group", "--home-dir", self.data, "--shell", "/usr/sbin/nologin", NAME])
             owner = pwd.getpwnam(NAME)
-        try:
-            self.data.mkdir(mode=0o700, parents=True, exist_ok=True)
-            os.chown(self.data, owner.pw_uid, owner.pw_gid)
-        except OSError as error:
-            raise StorageError("{path} cannot be used: {reason}.", path=self.data, reason=error) from error
+        for path in (self.data, self.data.with_name(NODE), self.data.with_name(FLEET)):
+            try:
+                path.mkdir(mode=0o700, parents=True, exist_ok=True)
+                os.chown(path, owner.pw_uid, owner.pw_gid)
+            except OSError as error:
+                raise StorageError("{path} cannot be used: {reason}.", path=path, reason=error) from error
 
     def remove(self, version: Version) -> None:
         """Remove a version that does not run."""
         shutil.rmtree(self.path_of(version), ignore_errors=True)
 
 
-def _unit_text() -> str:
-    """Return the unit of this version, with those groups for devices that exist on this machine."""
+def _text_of(unit: str) -> str:
+    """Return a unit of this version, with those groups for devices that exist on this machine."""
     existing = {group.gr_name for group in grp.getgrall()}
-    lines = resources.files("arcor2_server.deployment").joinpath(UNIT).read_text().splitlines(keepends=True)
+    lines = resources.files("arcor2_server.deployment").joinpath(unit).read_text().splitlines(keepends=True)
     for number, line in enumerate(lines):
         if line.startswith(_GROUPS):
             groups = [name for name in line.removeprefix(_GROUPS).split() if name in existing]

@@ -1,4 +1,4 @@
-"""Upgrades of the installed service. If the new version does not start, the old one runs again with the old data."""
+"""Upgrades of the installed services. If the new version does not start, the old one runs again with the old data."""
 
 import sys
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from packaging.version import Version
 from arcor2_hw.exceptions import Arcor2Error, Conflict, NotFound
 from arcor2_server.deployment import bundle as bundles
 from arcor2_server.deployment.backup import BACKUPS
-from arcor2_server.deployment.installation import NAME, CommandFailed, Installation, run
+from arcor2_server.deployment.installation import NAME, UNIT, CommandFailed, Installation, run
 
 log = structlog.get_logger(__name__)
 
@@ -21,29 +21,38 @@ STOPPED_WITHIN: Final = 30.0
 BACKUP_WITHIN: Final = 600.0
 
 
-class Service(Protocol):
-    """The service as the service manager sees it."""
+class Services(Protocol):
+    """The services of this machine as the service manager sees them."""
 
     def start(self, within: float) -> None:
-        """Start the service, and wait until it is ready. Raises CommandFailed."""
+        """Start the services, and wait until they are ready. Raises CommandFailed."""
 
     def stop(self, within: float) -> None:
-        """Stop the service. Raises CommandFailed."""
+        """Stop the services. Raises CommandFailed."""
 
 
 class Systemd:
-    """The service of systemd."""
+    """The services of systemd: the server unless it is disabled, and the nodes and the page that ran."""
+
+    def __init__(self) -> None:
+        self._others: set[str] = set()
 
     def start(self, within: float) -> None:
-        """Start the service, and wait until it is ready. Raises CommandFailed."""
+        """Start the services, and wait until they are ready. Raises CommandFailed."""
         run(["systemctl", "daemon-reload"])
-        # An earlier start that failed several times must not prevent this one.
-        run(["systemctl", "reset-failed", f"{NAME}.service"])
-        run(["systemctl", "start", f"{NAME}.service"], within)
+        units = sorted(self._others)
+        if "disabled" not in run(["systemctl", "show", "--property", "UnitFileState", UNIT]):
+            units.insert(0, UNIT)
+        if units:
+            # An earlier start that failed several times must not prevent this one.
+            run(["systemctl", "reset-failed", *units])
+            run(["systemctl", "start", *units], within)
 
     def stop(self, within: float) -> None:
-        """Stop the service. Raises CommandFailed."""
-        run(["systemctl", "stop", f"{NAME}.service"], within)
+        """Stop the services. Raises CommandFailed."""
+        listed = run(["systemctl", "list-units", "--plain", "--no-legend", "--state=active,activating", f"{NAME}-*"])
+        self._others |= {line.split()[0] for line in listed.splitlines() if line.strip()}
+        run(["systemctl", "stop", UNIT, *sorted(self._others)], within)
 
 
 class UpgradeFailed(Arcor2Error):
@@ -54,7 +63,7 @@ def upgrade(
     installation: Installation,
     bundle: Path,
     version: Version,
-    service: Service,
+    services: Services,
     report: Callable[[str], None] = lambda _: None,
     user: str | None = NAME,
 ) -> None:
@@ -64,7 +73,7 @@ def upgrade(
         installation: what is installed.
         bundle: the checked bundle.
         version: its version.
-        service: the service.
+        services: the services.
         report: is told each step.
         user: the owner of the data; None: the present user.
 
@@ -87,7 +96,7 @@ def upgrade(
     copy = installation.data / BACKUPS / f"before-{version}.zip"
     stored = False
     try:
-        service.stop(STOPPED_WITHIN)
+        services.stop(STOPPED_WITHIN)
         report(f"copying the data to {copy}")
         run(["install", "-d", "-m", "700", copy.parent], user=user)
         data = ("--data-dir", installation.data)
@@ -95,11 +104,11 @@ def upgrade(
         stored = True
         report(f"starting version {version}")
         run([commands[version], "install", "--select-only", "--root", installation.root])
-        service.start(READY_WITHIN)
+        services.start(READY_WITHIN)
     except CommandFailed as error:
         report(f"{error}; going back to version {old}")
         log.error("upgrade failed", version=str(version), reason=str(error))
-        _go_back(installation, service, old, copy if stored else None, user)
+        _go_back(installation, services, old, copy if stored else None, user)
         installation.remove(version)
         raise UpgradeFailed(
             "Version {new} did not start ({reason}). Version {old} runs again with its data.",
@@ -112,16 +121,16 @@ def upgrade(
             installation.remove(other)
 
 
-def _go_back(installation: Installation, service: Service, old: Version, copy: Path | None, user: str | None) -> None:
+def _go_back(installation: Installation, services: Services, old: Version, copy: Path | None, user: str | None) -> None:
     try:
-        service.stop(STOPPED_WITHIN)
+        services.stop(STOPPED_WITHIN)
     except CommandFailed as error:
         log.warning("the service cannot be stopped", reason=str(error))
     installation.select(old)
     if copy is not None:
         command = installation.path_of(old) / "bin" / NAME
         run([command, "restore", copy, "--data-dir", installation.data], BACKUP_WITHIN, user)
-    service.start(READY_WITHIN)
+    services.start(READY_WITHIN)
 
 
 def checked(bundle: Path, key: Path, unsigned: bool) -> Version:

@@ -6,17 +6,23 @@ import os
 import shutil
 import socket
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from packaging.version import Version
 
 from arcor2_server import deployment
+from arcor2_server.deployment import installation, upgrade
 from arcor2_server.deployment.service_manager import ServiceManager
 from tests.server.core.serving import running
 
-UNIT = Path(deployment.__file__).with_name("arcor2-hw.service")
+FOLDER = Path(deployment.__file__).parent
+UNITS = [FOLDER / name for name in installation.UNITS]
+COMMAND = (sys.executable, "-P", "-m", "arcor2_server.cli.main")
+NO_BROKER = ("--broker", "nats://127.0.0.1:1")
 START_TIME = 3
 """Time that a start of the server takes, s, with a margin for a slow computer."""
 
@@ -51,6 +57,26 @@ async def test_a_server_reports_its_states(received: socket.socket, tmp_path: Pa
         assert await server.ended() == 0
 
 
+@pytest.mark.parametrize("command", ["node run press", "fleet serve --port 0"])
+async def test_a_node_and_the_page_of_a_fleet_report_their_states(
+    received: socket.socket, tmp_path: Path, command: str
+) -> None:
+    """They are ready without a broker, to which they connect when it is reached."""
+    environment = os.environ | {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "300000"}
+    arguments = (*command.split(), *NO_BROKER, "--data-dir", str(tmp_path / "data"))
+    process = await asyncio.create_subprocess_exec(*COMMAND, *arguments, env=environment, stdout=subprocess.DEVNULL)
+    try:
+        assert [await _next(received) for _ in range(3)] == ["READY=1", "WATCHDOG=1", "WATCHDOG=1"]
+        process.send_signal(15)
+        while (state := await _next(received)) != "STOPPING=1":
+            assert state == "WATCHDOG=1"
+        async with asyncio.timeout(30):
+            assert await process.wait() == 0
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            process.kill()
+
+
 async def test_an_event_loop_that_hangs_is_not_reported(received: socket.socket, tmp_path: Path) -> None:
     ServiceManager(str(tmp_path / "notify"), 0.03).ready()
     assert await _next(received) == "READY=1"
@@ -71,19 +97,68 @@ async def test_the_abstract_namespace_works() -> None:
         assert await _next(listener) == "STOPPING=1"
 
 
-def test_the_unit_restarts_a_server_that_hangs_within_10_s() -> None:
-    unit = dict(
-        line.split("=", 1) for line in UNIT.read_text().splitlines() if line.startswith(("Type", "Watch", "Restart"))
-    )
+def settings(unit: Path) -> dict[str, str]:
+    return dict(line.split("=", 1) for line in unit.read_text().splitlines() if "=" in line and line[0].isupper())
+
+
+@pytest.mark.parametrize("file", UNITS, ids=installation.UNITS)
+def test_the_units_restart_a_process_that_hangs_within_10_s(file: Path) -> None:
+    unit = settings(file)
     assert (unit["Type"], unit["Restart"]) == ("notify", "always")
     assert int(unit["WatchdogSec"]) + int(unit["RestartSec"]) + START_TIME <= 10
 
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd is not installed")
-def test_the_unit_is_hardened() -> None:
-    command = ["systemd-analyze", "security", "--offline=true", "--threshold=30", "--no-pager", str(UNIT)]
+@pytest.mark.parametrize("file", UNITS, ids=installation.UNITS)
+def test_the_units_are_hardened(file: Path) -> None:
+    command = ["systemd-analyze", "security", "--offline=true", "--threshold=30", "--no-pager", str(file)]
     checked = subprocess.run(command, capture_output=True, text=True, check=False)
     assert checked.returncode == 0, checked.stdout + checked.stderr
+
+
+def test_the_services_cannot_read_the_data_of_each_other() -> None:
+    for unit in UNITS:
+        found = settings(unit)
+        others = {f"-/var/lib/{each}" for each in (installation.NAME, installation.NODE, installation.FLEET)}
+        assert set(found["InaccessiblePaths"].split()) == others - {f"-/var/lib/{found['StateDirectory']}"}
+        assert found["WorkingDirectory"] == f"/var/lib/{found['StateDirectory']}"
+
+
+def test_an_installation_has_all_units(tmp_path: Path) -> None:
+    command = tmp_path / "opt/arcor2-hw/0.1.0/bin/arcor2-hw"
+    command.parent.mkdir(parents=True)
+    command.touch()
+    installation.Installation(tmp_path).select(Version("0.1.0"))
+    found = {path.name: path.read_text() for path in (tmp_path / "etc/systemd/system").iterdir()}
+    assert sorted(found) == sorted(installation.UNITS)
+    assert all("/opt/arcor2-hw/current/bin/arcor2-hw" in text for text in found.values())
+
+
+@pytest.mark.parametrize("server", ["enabled", "disabled"])
+def test_an_upgrade_restarts_the_services_that_ran(server: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A computer that is only a node has a disabled server, which must not start."""
+    active = {"arcor2-hw-node@press.service"} | ({"arcor2-hw.service"} if server == "enabled" else set())
+
+    def systemctl(command: list[str], *_: object) -> str:
+        match command[1:]:
+            case ["list-units", *_]:
+                lines = [f"{unit} loaded active running it runs" for unit in active if unit.startswith("arcor2-hw-")]
+                return "\n".join(lines)
+            case ["show", *_]:
+                return f"UnitFileState={server}\n"
+            case ["stop", *units]:
+                active.difference_update(units)
+            case ["start", *units]:
+                active.update(units)
+        return ""
+
+    monkeypatch.setattr(upgrade, "run", systemctl)
+    before, services = set(active), upgrade.Systemd()
+    services.stop(1.0)
+    assert active == set()
+    services.stop(1.0)  # of a new version that did not start
+    services.start(1.0)
+    assert active == before
 
 
 @pytest.mark.parametrize(("process", "reports"), [("", True), ("own", True), ("1", False)])
