@@ -1,7 +1,8 @@
 """Try the Debian package of `make dist` in a Debian with systemd: `make dist-try`, as root, with debootstrap.
 
-A container without a network installs the package. Its service is killed, frozen and backed up while it runs, upgraded,
-upgraded to a version that does not start, and removed. Each result is printed; the first wrong one ends the program.
+A container without a network installs the package. Its services are killed, frozen and backed up while they run,
+upgraded, upgraded to a version that does not start, and removed. Each result is printed; the first wrong one ends the
+program.
 """
 
 import contextlib
@@ -16,8 +17,22 @@ from pathlib import Path
 
 from release import BUNDLE, ROOT, build_debian, run, write_requirements, write_sums
 
-INCLUDED = "systemd,systemd-sysv,dbus,python3,python3-venv,libegl1,libgl1,libgomp1,libusb-1.0-0"
-"""Packages of the Debian system: systemd, and what ours depends on."""
+INCLUDED = "systemd,systemd-sysv,dbus,python3,python3-venv,libegl1,libgl1,libgomp1,libusb-1.0-0,nats-server"
+"""Packages of the Debian system: systemd, what ours depends on, and the broker."""
+OTHERS = {"arcor2-hw-node@press": "/var/lib/arcor2-hw-node", "arcor2-hw-fleet": "/var/lib/arcor2-hw-fleet"}
+"""The services that are not enabled by the installation, and their data directories."""
+OPEN = """
+import asyncio
+from arcor2_server.hosts.process import CellHost
+
+async def main():
+    host = await CellHost.start(node="press")
+    await asyncio.wait_for(asyncio.shield(host.ready), 30)
+    await host.close()
+
+asyncio.run(main())
+"""
+"""Starts a cell host on the node, with all that its unit does not permit."""
 RESTARTED_WITHIN = 10.0
 """Time until a service that hangs or was killed runs again, s."""
 DATA = "/var/lib/arcor2-hw"
@@ -54,15 +69,15 @@ class Machine:
             sys.exit(f"{command} failed with status {status}:\n{output}")
         return output
 
-    def server(self) -> str:
-        """Return the process id of the server; empty if the service is not active."""
-        shown = self.run("systemctl show --property ActiveState,MainPID arcor2-hw").splitlines()
+    def server(self, unit: str = "arcor2-hw") -> str:
+        """Return the process id of the server, or of another service; empty if it is not active."""
+        shown = self.run(f"systemctl show --property ActiveState,MainPID {unit}").splitlines()
         state = dict(line.split("=", 1) for line in shown)
         return state["MainPID"] if state["ActiveState"] == "active" else ""
 
-    def restarted(self, former: str) -> float:
+    def restarted(self, former: str, unit: str = "arcor2-hw") -> float:
         """Wait until the service has another process, and return how long it took, s."""
-        return wait(lambda: self.server() not in ("", former), RESTARTED_WITHIN, "restart of the service")
+        return wait(lambda: self.server(unit) not in ("", former), RESTARTED_WITHIN, f"restart of {unit}")
 
 
 @contextlib.contextmanager
@@ -136,8 +151,7 @@ def try_service(machine: Machine) -> None:
     expect("the server is not root", who == "arcor2-hw", who)
     modes = machine.run(f"stat -c %U:%a {DATA} {DATA}/*.sqlite").split()
     expect("data can be read by its user only", set(modes) == {"arcor2-hw:700", "arcor2-hw:600"}, " ".join(modes))
-    rating = machine.run("systemd-analyze security arcor2-hw").splitlines()[-1]
-    expect("the unit is hardened", float(rating.split(":")[1].split()[0]) <= 3.0, rating.strip("→ "))
+    expect_hardened(machine, "arcor2-hw")
     machine.run(f"kill -KILL {pid}")
     expect("a killed server is started again", True, f"{machine.restarted(pid):.1f} s")
     pid = machine.server()
@@ -145,6 +159,29 @@ def try_service(machine: Machine) -> None:
     expect("a frozen server is started again", True, f"{machine.restarted(pid):.1f} s")
     machine.run(f"runuser -u arcor2-hw -- arcor2-hw backup /tmp/copy.zip --data-dir {DATA}")
     expect("backup while it runs", machine.server())
+
+
+def expect_hardened(machine: Machine, unit: str) -> None:
+    """Check the rating of a unit."""
+    rating = machine.run(f"systemd-analyze security {unit}").splitlines()[-1]
+    expect(f"the unit {unit} is hardened", float(rating.split(":")[1].split()[0]) <= 3.0, rating.strip("→ "))
+
+
+def try_other_services(machine: Machine) -> None:
+    """Start a node and the page of a fleet, and freeze them."""
+    for unit, data in OTHERS.items():
+        machine.run(f"systemctl enable --now {unit}")
+        who = machine.run(f"stat -c %U:%a /proc/{machine.server(unit)} {data}").split()
+        expect(f"{unit} starts, and is not root", who == ["arcor2-hw:555", "arcor2-hw:700"], " ".join(who))
+        expect_hardened(machine, unit)
+    ready = "journalctl --output cat --unit arcor2-hw-node@press | grep -x 'ready press'"
+    took = wait(lambda: not machine.try_run(ready)[0], 10.0, "connection of the node to the broker")
+    expect("the node reaches the broker", True, f"{took:.1f} s")
+    machine.run(f"/opt/arcor2-hw/current/bin/python -c '{OPEN}'")
+    expect("a cell host starts on the node", True)
+    for unit in OTHERS:
+        machine.run(f"kill -STOP {(pid := machine.server(unit))}")
+        expect(f"a frozen {unit} is started again", True, f"{machine.restarted(pid, unit):.1f} s")
 
 
 def try_upgrades(machine: Machine) -> None:
@@ -155,10 +192,14 @@ def try_upgrades(machine: Machine) -> None:
     expect("a version that does not start is refused", status and last != output, last)
     expect("the old version runs again", machine.server() and "0.1.0" in machine.run("arcor2-hw --version"), before)
     machine.run("apt-get install --yes /release/second.deb")
-    expect("upgrade", machine.server() and "0.1.2" in machine.run("arcor2-hw --version"))
+    running = all(machine.server(unit) for unit in ("arcor2-hw", *OTHERS))
+    expect("upgrade of all services", running and "0.1.2" in machine.run("arcor2-hw --version"))
     machine.run("apt-get remove --yes arcor2-hw")
-    left = machine.run(f"ls -d {DATA}/*.sqlite; test ! -e /opt/arcor2-hw && systemctl is-active arcor2-hw || true")
-    expect("after removal, the data is left", DATA in left and "inactive" in left, left.splitlines()[0])
+    left = machine.run(f"ls -d {DATA}/*.sqlite; test ! -e /opt/arcor2-hw")
+    expect("after removal, the data is left", DATA in left, left.splitlines()[0])
+    units = machine.run("ls /etc/systemd/system /etc/systemd/system/multi-user.target.wants")
+    running = any(machine.server(unit) for unit in ("arcor2-hw", *OTHERS))
+    expect("after removal, no service is left", "arcor2-hw" not in units and not running)
 
 
 def main() -> None:
@@ -178,6 +219,7 @@ def main() -> None:
         shutil.rmtree(tree)
         with booted(system) as machine:
             try_service(machine)
+            try_other_services(machine)
             try_upgrades(machine)
 
 

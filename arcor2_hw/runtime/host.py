@@ -31,7 +31,6 @@ from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.calls import Calls, error_data
 from arcor2_hw.runtime.cell import Cell
-from arcor2_hw.runtime.checkpoints import CheckpointFile
 from arcor2_hw.runtime.checkpoints_at_server import CheckpointsAtServer
 from arcor2_hw.runtime.clock import Clock
 from arcor2_hw.runtime.device import Device
@@ -188,7 +187,7 @@ class Host:
             cell_file=message.cell,
             secrets=message.secrets,
             held=self._held if message.hold_on_error else None,
-            record=self._record(message),
+            record=RunRecord.of(message, self.link.post, self._at_server),
             interlock_states=self._interlocks_changed,
             values=message.values,
         )
@@ -235,22 +234,6 @@ class Host:
                 not failed and problem is None,
                 None if why is None else _described(why, program.source_of(why)),
             )
-        )
-
-    def _record(self, message: m.RunPackage) -> RunRecord | None:
-        if not (message.records or message.records_at_server):
-            return None
-        return RunRecord(
-            lambda scene: (
-                self._at_server if message.records_at_server else CheckpointFile(Path(message.records), scene)
-            ),
-            message.run,
-            message.package_id,
-            lambda books: self.link.post(m.PartsChanged(books)),
-            lambda *concerned: self.link.post(m.PartStep(*concerned)),
-            each_action=message.checkpoints,
-            continues=message.continues,
-            continue_at=message.continue_at,
         )
 
     # -------------------------------------------------------------------------------- channel of the program

@@ -16,9 +16,10 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.parts import ConfirmedPart, DoneAction, PartBooks, RunCheckpoint, RunningAction
 from arcor2_hw.data.project import START, Project
 from arcor2_hw.exceptions import Arcor2Error, Conflict, PartUnconfirmed, StorageError
+from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.branches import Action, Branch
 from arcor2_hw.runtime.cell import Cell
-from arcor2_hw.runtime.checkpoints import Checkpoints
+from arcor2_hw.runtime.checkpoints import CheckpointFile, Checkpoints
 from arcor2_hw.runtime.continuing import Continuation, kind_of
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.part_tracking import PartTracking, Step
@@ -86,6 +87,28 @@ class RunRecord:
         """Whether the program continues where it was interrupted."""
         self.continuation: Continuation | None = None
         """What the interrupted cycle has done already; None if the program starts from its beginning."""
+
+    @classmethod
+    def of(cls, run: m.RunPackage, post: Callable[[m.ToServer], None], at_server: Checkpoints) -> "RunRecord | None":
+        """Return the record of a run, None if nothing is stored.
+
+        Args:
+            run: the request to run a package.
+            post: sends a message to the server.
+            at_server: the checkpoints if the server stores them.
+        """
+        if not (run.records or run.records_at_server):
+            return None
+        return cls(
+            lambda scene: at_server if run.records_at_server else CheckpointFile(Path(run.records), scene),
+            run.run,
+            run.package_id,
+            lambda books: post(m.PartsChanged(books)),
+            lambda *concerned: post(m.PartStep(*concerned)),
+            each_action=run.checkpoints,
+            continues=run.continues,
+            continue_at=run.continue_at,
+        )
 
     def open(self, project: Project, cell: Cell, package: Path) -> None:
         """Read the books of the scene, and store that the run has started. All devices are connected.
