@@ -38,6 +38,8 @@ OPEN_WITHIN: Final = 3.0
 """Time limit for a node to answer the request to open a session, s."""
 ENDED_WITHIN: Final = 2.5
 """Time limit for the host on the node to end after the server closed the connection, s."""
+STORED_WITHIN: Final = 1.0
+"""Time limit for the last checkpoint to be stored before the end is reported, s."""
 NICENESS: Final = -5
 """Niceness of this process: stops and beats pass through it."""
 
@@ -75,10 +77,12 @@ class Relay:
             reason = await self._over
         except Arcor2Error as error:
             reason = error.message
+        if self._records is not None:  # first, because the server reads the checkpoint after the end
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(STORED_WITHIN):
+                    await self._records.close()
         self._stream.send(msgspec.msgpack.encode(m.HostLost(reason)))
         self._stream.close()
-        if self._records is not None:
-            await self._records.close()
         if self._end is not None:
             await self._end.close()
         await broker.close(connections)
