@@ -11,7 +11,6 @@ from arcor2_hw.runtime import messages as m
 
 ANSWER_WITHIN: Final = 5.0
 """Time limit for the server to store a checkpoint, s; its disk may be busy."""
-_FAILED: Final = "The state of the run cannot be stored: {reason}"
 
 
 class CheckpointsAtServer:
@@ -48,12 +47,12 @@ class CheckpointsAtServer:
             try:
                 answer = self._answers.get(timeout=max(0.0, limit - time.monotonic()))
             except Empty:
-                raise StorageError(_FAILED, reason="the server does not answer") from None
+                raise StorageError("The state of the run cannot be stored: the server does not answer.") from None
             if answer is not None and answer.number == self._number:  # others are answers that were late
                 if answer.problem is not None:
                     raise StorageError(answer.problem)
                 return answer
-        raise StorageError(_FAILED, reason="the connection to the server was lost")
+        raise StorageError("The state of the run cannot be stored: the connection to the server was lost.")
 
     # -------------------------------------------------------------------------------- thread that receives messages
     def answered(self, answer: m.CheckpointAnswer) -> None:
