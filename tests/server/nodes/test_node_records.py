@@ -10,6 +10,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import httpx
 import msgspec
 import pytest
 from msgspec import UNSET
@@ -34,6 +35,7 @@ from tests.runtime.test_host_recording import check, running
 from tests.server.cell.conftest import running_server
 from tests.server.cell.test_execution_history import subscribe
 from tests.server.cell.test_part_books import CONFIRMED, CONTINUE
+from tests.server.core.serving import ServerProcess, running as running_process, talking
 from tests.server.nodes.conftest import NODE, PATIENCE, Broker, Listener, Node
 from tests.server.nodes.test_node_hosts import AN_HOUR_AHEAD
 from tests.waiting import wait_for
@@ -144,9 +146,7 @@ async def test_clients_inspect_and_continue_a_run_of_a_killed_node(
             subscribe(server, "PartsChanged")
             package = server.services.settings.packages_dir / "pkg_1"
             write_package(package, tmp_path, ONE)
-            scene = msgspec.json.decode((package / "data" / "scene.json").read_bytes())
-            scene["objects"][0]["node"] = "lathe"
-            (package / "data" / "scene.json").write_bytes(msgspec.json.encode(scene))
+            on_node(package)
             await server.ask("RunPackage", {"id": "pkg_1", "on_error": "hold"})
             await until((tmp_path / "notes").exists, "the arm picks the part")
             (books,) = await server.ask("GetParts")
@@ -267,6 +267,62 @@ async def test_the_relay_stores_the_recording_of_a_run_that_the_end_of_the_serve
     [saved] = RecordingFiles(tmp_path / "recordings").saved_rings()
     assert saved.run == 3
     check(converted(saved.segments, saved.monotonic, saved.monotonic - 60.0, saved.monotonic)[0])
+
+
+def on_node(package: Path) -> None:
+    """Let the devices of a package run on the node "lathe"."""
+    file = package / "data" / "scene.json"
+    scene = msgspec.json.decode(file.read_bytes())
+    scene["objects"][0]["node"] = "lathe"
+    file.write_bytes(msgspec.json.encode(scene))
+
+
+async def recordings(server: ServerProcess) -> list[dict[str, Any]]:
+    """Wait for recordings, and return them with their content."""
+    async with httpx.AsyncClient(base_url=server.url.replace("ws", "http", 1)) as http:
+        async with asyncio.timeout(PATIENCE):
+            while not (listed := (await http.get("/api/recordings")).json()):
+                await asyncio.sleep(0.1)
+        return [(await http.get(f"/api/recordings/{each['number']}")).json() for each in listed]
+
+
+@pytest.mark.matrix
+async def test_a_run_on_a_node_survives_killed_servers_and_nodes(broker: Broker, tmp_path: Path) -> None:
+    """Both are real processes. After each kill there is one more recording, and the program continues."""
+    data, hang = tmp_path / "data", tmp_path / "hang"
+    hang.touch()
+    write_package(data / "packages" / "pkg_1", tmp_path, ONE)
+    on_node(data / "packages" / "pkg_1")
+    node = Node(broker.url, tmp_path, name="lathe")
+    try:
+        server = ServerProcess(data, ARCOR2_HW_NATS_URL=broker.url)
+        await server.start()
+        async with talking(server.url, "ann") as client:
+            await client.granted("RunPackage", {"id": "pkg_1", "on_error": "hold"})
+            await until((tmp_path / "notes").exists, "the arm picks the part")
+            server.process.kill()
+        await server.ended()
+
+        async with running_process(data, ARCOR2_HW_NATS_URL=broker.url) as server, talking(server.url, "ann") as client:
+            (recording,) = await recordings(server)
+            assert [each["name"] for each in recording["actions"]] == ["scan", "pick"]
+            assert "Confirm where these parts are" in await client.refused("RunPackage", CONTINUE)
+            await client.granted("ConfirmParts", CONFIRMED | {"parts": [{"number": 1, "place": "obj_feeder"}]})
+            await client.granted("RunPackage", CONTINUE)
+            async with asyncio.timeout(PATIENCE):
+                while not (held := (await client.granted("GetHeld")).get("held")):
+                    await asyncio.sleep(0.05)
+            await client.granted("DecideHeld", {"number": held["number"], "choice": "retry", "confirmed": True})
+            await until(lambda: (tmp_path / "notes").read_text().split() == ["pick", "pick"], "it picks again")
+            node.process.kill()
+            async with asyncio.timeout(PATIENCE):
+                while not any(each["run"] == 2 and each.get("run_failed") for each in await recordings(server)):
+                    await asyncio.sleep(0.1)
+            (books,) = await client.granted("GetParts")
+            assert [each["action_name"] for each in books["run"]["actions"]] == ["pick"]
+            assert (books["counts"]["fed"], len(books["parts"])) == (1, 1)
+    finally:
+        node.end()
 
 
 # ------------------------------------------------------------------------------------------------ without a broker
