@@ -1,4 +1,4 @@
-"""Shows on a tower light what a server does. `python tower_light_client.py --help`; docs/how-to/follow-a-server.md."""
+"""Show the state of a server on a tower light. See docs/how-to/follow-a-server.md; options: --help."""
 
 import asyncio
 import logging
@@ -11,13 +11,13 @@ from arcor2_hw.client import Client, EventsMissed
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.objects.machine import MachineStateName
 
-# An error, a program running, one paused; without a program: a scene online, none online, no server.
+# Program: failed, running, paused. Without a program: scene online, scene offline, no connection to the server.
 LAMPS = "aborted=red blinking; execute=green; held=amber; idle=green blinking; stopped=off; suspended=amber blinking"
 PROGRAM = {"pausing": "held", "paused": "held", "stopped": "", "undefined": ""}  # every other state: execute
 
 
 def show(light: TowerLight, state: str) -> None:
-    """Show a state; control of the lamps is taken first, also again after the block was away."""
+    """Take control of the lamps if necessary, also after a connection loss, and show a state."""
     light.take_control()
     light.show_state(MachineStateName(state))
 
@@ -34,16 +34,16 @@ async def follow(client: Client, light: TowerLight) -> None:
                 program = PROGRAM.get(event.data.state, "execute")
             elif event.event == "SceneState":
                 scene = "idle" if event.data.state == "started" else "stopped"
-        except EventsMissed:  # what is so now is told next, as at first
+        except EventsMissed:  # the server sends the current state next, as after connecting
             program, scene = "", "stopped"
-        except TimeoutError:  # nothing happened; but the server, or the light, may be gone
+        except TimeoutError:  # no event; the server or the light may still have disconnected
             pass
         state = (program or scene) if client.connected else "suspended"
         try:
             if state != shown or light.control_owner() != "us":
                 await asyncio.to_thread(show, light, state)
                 shown = state
-        except Arcor2Error as error:  # tried again in half a second
+        except Arcor2Error as error:  # the next iteration tries again, after at most 0.5 s
             logging.warning("%s", error)
 
 
