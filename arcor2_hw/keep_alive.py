@@ -57,7 +57,7 @@ class KeepAlive:
             stdin=subprocess.PIPE,
             stdout=fd,
             stderr=subprocess.PIPE,
-            start_new_session=True,  # with its own share of a busy computer
+            start_new_session=True,  # with its own share of processor time
         )
         assert self._process.stdin is not None
         assert self._process.stderr is not None
@@ -83,7 +83,7 @@ class KeepAlive:
             os.write(self._process.stdin.fileno(), pulse())
 
     def close(self) -> None:
-        """End the child process. It does nothing the second time."""
+        """End the child process. Further calls do nothing."""
         if self._process.stdin is not None and not self._process.stdin.closed:
             self._process.kill()
             self._process.stdin.close()
@@ -133,7 +133,7 @@ def acquire_within(lock: threading.Lock, timeout: float) -> bool:
 
 
 def once_within(holds: Callable[[], Any], timeout: float, pause: float) -> bool:
-    """Return whether `holds` becomes true within `timeout` s of running time; it is called every `pause` s."""
+    """Return whether `holds` returns true within `timeout` s of running time; it is called every `pause` s."""
     clock = RunningTime()
     while not holds():
         if clock() >= timeout:

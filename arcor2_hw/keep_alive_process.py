@@ -70,8 +70,8 @@ def main(message: bytes, period: float, quiet: float) -> None:
             try:
                 os.write(1, message)
             except BlockingIOError:
-                pass  # the line is full: other traffic feeds the watchdog as well
-            except OSError:  # the line is gone; the parent notices by itself
+                pass  # the line is full: other messages trigger the watchdog, too
+            except OSError:  # the line is closed; the parent detects that itself
                 return
             sent = time.monotonic()
 

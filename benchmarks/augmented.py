@@ -25,7 +25,7 @@ LENS_WITHIN: Final = 60.0
 
 
 SELECTED: Final = 10
-"""Number of items selected in each way."""
+"""Number of items selected with each method."""
 _IN_VIEW: Final = """(n) => {
     const { left, top, width, height } = document.querySelector(".view canvas").getBoundingClientRect();
     const free = ({ x, y }) => document.elementFromPoint(left + x, top + y)?.matches(".view canvas");
@@ -38,7 +38,7 @@ _IN_VIEW: Final = """(n) => {
 
 
 def size(report: Report) -> None:
-    """Measure the size of the files that each way of AR loads when it starts, compressed with gzip."""
+    """Measure the size of the files that each AR mode loads when it starts, compressed with gzip."""
     manifest = json.loads((FILES / ".vite" / "manifest.json").read_text())
     sizes = {way: ar_size(FILES, manifest, way) for way in AR_WAYS}
     note = "most that a device loads; " + ", ".join(f"{way} {total / 1e3:.1f} kB" for way, total in sizes.items())

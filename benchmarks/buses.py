@@ -70,7 +70,7 @@ def dynamixel_reads(port: str, n: int = 1000) -> Metric:
         nonlocal unanswered
         try:
             bus.again(lambda: bus.sync_read(SERVOS, register))
-        except DeviceTimeout:  # the fake did not get a core twice; counted with the time it took
+        except DeviceTimeout:  # the fake was delayed twice; counted with its duration
             unanswered += 1
 
     bus.open()

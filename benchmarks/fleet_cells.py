@@ -31,7 +31,7 @@ def name_of(number: int) -> str:
 
 
 def situation(number: int) -> dict[str, Any]:
-    """Return what a cell does: most run; some wait, are disturbed, or need somebody."""
+    """Return the situation of a cell: most run; some wait, are disturbed, or need attention."""
     program = PROGRAMS[number % len(PROGRAMS)]
     since = (datetime.now(UTC) - timedelta(minutes=number + 1)).isoformat()
     running = {"state": CellStateName.EXECUTE, "program_state": PackageStateEnum.RUNNING, "program": program}

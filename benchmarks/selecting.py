@@ -16,7 +16,7 @@ from tests.editor.screen import Screen
 MOST_CANDIDATES: Final = 8
 """Largest number of candidates at the crosshair."""
 SELECTED: Final = 12
-"""Number of items selected in each way."""
+"""Number of items selected with each method."""
 _AIM: Final = """(id) => {
     const { x, y, z } = __engine.item(id).pose.position;
     __engine.view.set([x - 0.4, y - 0.4, z + 0.4], [x, y, z]);

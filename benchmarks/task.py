@@ -54,7 +54,7 @@ _HIDDEN: Final = """(control) => {
 
 
 class Worker(Counting):
-    """A user who scrolls a panel before a tap on what it does not show; scrolls are counted on their own."""
+    """A user who scrolls a panel before tapping a control outside its visible part; scrolls are counted separately."""
 
     scrolls = 0
 

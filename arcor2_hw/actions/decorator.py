@@ -14,13 +14,13 @@ DEFAULT_DEADLINE: Final = 120.0
 """Time limit of an action, s; longer than any single motion of the demo cell."""
 
 OLDER_DEADLINE: Final = 3600.0
-"""Time limit of an action marked in the older way, s, which has no time limit of its own."""
+"""Time limit of an action that is declared in the older form, without a time limit, s."""
 
 NOTHING_RENAMED: Final[Mapping[str, str]] = MappingProxyType({})
 
 
 class PartFlow(NamedTuple):
-    """What an action does with a part.
+    """The effect of an action on a part.
 
     takes_from, puts_to: names of the parameters with the places. serial, order: names of the parameters with the serial
     number of the part and the id of its order. Empty: none.
@@ -133,7 +133,7 @@ def action(
             if takes_from and puts_to:
                 raise TypeError("an action cannot declare both takes_from and puts_to")
             if (takes_from or puts_to) not in inspect.signature(function).parameters:
-                raise TypeError(f"the action has no parameter {takes_from or puts_to!r}, which is to name a place")
+                raise TypeError(f"the action has no parameter {takes_from or puts_to!r}to name a place")
         for parameter in filter(None, (serial, order)):
             if parameter not in inspect.signature(function).parameters:
                 raise TypeError(f"the action has no parameter {parameter!r}")
@@ -172,7 +172,7 @@ def metadata_of(method: object) -> ActionMetadata | None:
 
 
 def part_flow_of(method: object) -> PartFlow:
-    """Return what an action does with a part."""
+    """Return the effect of an action on a part."""
     found = getattr(method, "__part_flow__", None)
     return found if isinstance(found, PartFlow) else PartFlow()
 

@@ -204,7 +204,7 @@ class Library:
         return list(done.values())
 
     def _imported(self, module: Module, found: Import) -> list[Module]:
-        """Return the modules that an import statement runs, as far as they are read."""
+        """Return those of the modules loaded by an import statement that are part of the library."""
         if not found.guarded and (lacking := not_offered(found.module, found.name)) is not None:
             raise module.problem(lacking, found.line)
         try:

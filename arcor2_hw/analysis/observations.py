@@ -17,7 +17,7 @@ from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.object_type import ObservationMeta
 
 _ERRORS: Final = re.compile(r"\s+Raises? .*")
-"""What a docstring says about errors, which is not for users."""
+"""The sentences of a docstring about errors, which are not shown to users."""
 _TYPES: Final = ("boolean", "integer", "double", "string", "string_enum", "integer_enum")
 """Parameter types of values that can be compared."""
 

@@ -15,7 +15,7 @@ from arcor2_hw.data.base import Data
 
 _LIBRARY: Final = Path(__file__).resolve().parents[1]
 _CODE: Final = ("analysis", "data", "actions")
-"""Packages of ours on which a result depends in addition to the sources."""
+"""Packages of the library on which a result depends in addition to the sources."""
 
 
 class StoredSource(Data, frozen=True, array_like=True):

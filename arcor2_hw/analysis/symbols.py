@@ -104,7 +104,7 @@ class Resolver:
         return External(f"builtins.{name}") if hasattr(builtins, name) else None
 
     def _own(self, name: str, module: Module, depth: int) -> Symbol | None:
-        """Return what a module itself binds, or imports with `from x import *`."""
+        """Return the names that a module binds, or imports with `from x import *`."""
         if depth <= 0:
             return None
         if name in module.bindings:

@@ -20,7 +20,7 @@ from arcor2_hw.messages import Message
 HUGE: Final = 64 * 1024
 """Number of characters above which a source is analysed in a separate process; a shorter one is parsed in about 20 ms.
 """
-WITHIN: Final = 30.0
+TIME_LIMIT: Final = 30.0
 """Time limit of the analysis of all sources, s."""
 _encode = msgspec.msgpack.Encoder().encode
 
@@ -48,7 +48,7 @@ async def analyse(library: Library) -> bytes:
     """Analyse all types of a library in another process, and return the results encoded for `snapshot.restore`.
 
     Raises:
-        InvalidData: The process failed, or exceeded `WITHIN` and was ended.
+        InvalidData: The process failed, or exceeded `TIME_LIMIT` and was ended.
     """
     sources = [StoredSource.of(library.file(name)) for name in library.names() if name not in BUILT_IN]
     process = await asyncio.create_subprocess_exec(
@@ -58,10 +58,10 @@ async def analyse(library: Library) -> bytes:
         stderr=asyncio.subprocess.PIPE,
     )
     try:
-        async with asyncio.timeout(WITHIN):
+        async with asyncio.timeout(TIME_LIMIT):
             encoded, errors = await process.communicate(_encode(sources))
     except TimeoutError:
-        raise InvalidData("The sources were not analysed within {within:g} s.", within=WITHIN) from None
+        raise InvalidData("The sources were not analysed within {within:g} s.", within=TIME_LIMIT) from None
     finally:
         if process.returncode is None:
             process.kill()

@@ -59,7 +59,7 @@ def find_camera_pose(
     try:
         found = find(lens, detection.seen, hints, options)
     except CalibrationRefused as error:
-        if error.reason == Reason.IMPLAUSIBLE:  # some markers are taken for others in a mirror image
+        if error.reason == Reason.IMPLAUSIBLE:  # in a mirror image, some markers are mistaken for others
             check_not_mirrored(grey_of(pictures[0]), wanted_markers(layout))
         raise
     checked = check_of_lens(lens, found, hints, options)

@@ -154,8 +154,8 @@ def _check_turns(hands: list[Array], options: HandEyeOptions) -> None:
     spread = float(np.arccos(np.clip(np.abs(axes @ axes.T), 0.0, 1.0).min()))
     if spread < options.smallest_spread:
         raise CalibrationRefused(
-            "The flange was turned about one axis only, which leaves the position of the camera along this "
-            "axis open. Turn it about another axis, too.",
+            "The flange was turned about one axis only, so the position of the camera along this axis is "
+            "undetermined. Turn it about another axis, too.",
             f"axes within {math.degrees(spread):.1f}°, at least {math.degrees(options.smallest_spread):.1f}°",
             Reason.DEGENERATE,
         )
@@ -227,8 +227,8 @@ def _result(
     residual = _root_mean_square(np.concatenate(best.errors))
     if residual > options.largest_residual:
         raise CalibrationRefused(
-            "The flange's poses do not belong to the pictures: the corners are off by {residual:.1f} px. Are they "
-            "in the same order, of the flange, in the base frame, and is the mounting the right one?",
+            "The flange poses do not match the pictures: the corners are off by {residual:.1f} px. Check that the "
+            "poses are in the same order, of the flange and in the base frame, and that the mounting is correct.",
             f"at most {options.largest_residual} px",
             Reason.IMPLAUSIBLE,
             residual=residual,
@@ -244,7 +244,7 @@ def _result(
     orientation = float(np.sqrt(np.linalg.eigvalsh(covariance[3:, 3:])[-1]))
     if checked.contradicted and not position <= options.largest_deviation:
         raise CalibrationRefused(
-            "The camera's place would be off by {position:.0f} mm. {verdict}",
+            "The position of the camera would be off by {position:.0f} mm. {verdict}",
             f"at most {options.largest_deviation * 1000:.1f} mm",
             Reason.IMPLAUSIBLE,
             position=position * 1000,
@@ -252,8 +252,8 @@ def _result(
         )
     if not position <= options.largest_deviation:
         raise CalibrationRefused(
-            "The camera's place would be known to {position:.0f} mm only: more pictures are needed, with the "
-            "flange turned more, to all sides.",
+            "The position of the camera would be uncertain by {position:.0f} mm. Take more pictures, and turn the "
+            "flange further, in all directions.",
             f"standard deviation {position * 1000:.1f} mm, at most {options.largest_deviation * 1000:.1f} mm",
             Reason.UNOBSERVABLE,
             position=position * 1000,

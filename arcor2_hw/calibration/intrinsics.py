@@ -134,8 +134,8 @@ def _check_enough(
     covered = coverage_of([view.pixels for view in views], size)
     if covered < options.smallest_coverage:
         raise CalibrationRefused(
-            "The board was in {covered:.0%} of the picture only; {smallest_coverage:.0%} are the least. "
-            "Hold it into the corners, too.",
+            "The board covered only {covered:.0%} of the picture; at least {smallest_coverage:.0%} is needed. Hold "
+            "it in the corners, too.",
             reason=Reason.TOO_FEW_POINTS,
             covered=covered,
             smallest_coverage=options.smallest_coverage,
@@ -210,8 +210,8 @@ def _result(
     tilt = _tilt_between(solved.normals)
     if tilt < options.smallest_tilt:
         raise CalibrationRefused(
-            "The board is seen from one direction only, within {tilt:.0f}°: the focal length and the "
-            "distance cannot be told apart. Tilt it, by 30° and more, to all sides.",
+            "The board is seen from one direction only, within {tilt:.0f}°, so the focal length and the distance "
+            "cannot be distinguished. Tilt it by 30° or more in all directions.",
             f"at least {math.degrees(options.smallest_tilt):.0f}°",
             Reason.DEGENERATE,
             tilt=math.degrees(tilt),
@@ -219,8 +219,8 @@ def _result(
     residual = _root_mean_square(np.concatenate(solved.errors))
     if residual > options.largest_residual:
         raise CalibrationRefused(
-            "The corners are off by {residual:.1f} px: is it another board, is it bent, or does the lens need a model "
-            "with more coefficients?",
+            "The corners are off by {residual:.1f} px. Check that it is the configured board and that it is flat, "
+            "or use a lens model with more coefficients.",
             f"residual {residual:.2f} px, at most {options.largest_residual}",
             Reason.IMPLAUSIBLE,
             residual=residual,
@@ -229,8 +229,8 @@ def _result(
     width, height = size
     if not (0.25 < cx / width < 0.75 and 0.25 < cy / height < 0.75 and fx > 0 and 0.5 < fx / fy < 2.0):
         raise CalibrationRefused(
-            "The lens that fits the pictures is implausible: its axis is far from their middle. Take more "
-            "pictures, tilted to all sides.",
+            "The lens that fits the pictures is implausible: its axis is far from the center of the picture. Take "
+            "more pictures with the board tilted in all directions.",
             f"fx {fx:.1f}, fy {fy:.1f}, cx {cx:.1f}, cy {cy:.1f}",
             Reason.IMPLAUSIBLE,
         )

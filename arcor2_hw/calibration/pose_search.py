@@ -128,9 +128,9 @@ def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
         distance, angle = apart(inverted(best.pose), inverted(other.pose))
         if other.cost - best.cost < _TELL_APART and distance > 2 * options.largest_deviation:
             raise CalibrationRefused(
-                "The picture fits two places of the camera, {distance:.0f} mm and {angle:.0f}° apart, because it "
-                "was taken from nearly straight ahead of {names}. What helps: a second marker, a view from the "
-                "side or from nearer, the direction of gravity, or where the camera roughly is.",
+                "Two poses of the camera, {distance:.0f} mm and {angle:.0f}° apart, explain the picture, because it "
+                "was taken from nearly straight ahead of {names}. Add a second marker, take the picture from the "
+                "side or from closer, or state the direction of gravity or the approximate pose of the camera.",
                 f"costs {best.cost:.1f} and {other.cost:.1f}",
                 Reason.AMBIGUOUS,
                 distance=distance * 1000,

@@ -185,8 +185,8 @@ def _refuse_unsettled(surface: RobotSurface, best: Fit, start: Floats, limits: R
     moved, turned = float(np.linalg.norm(off[:3, 3])), angle_of(off[:3, :3])
     if moved > 1.5 * limits.within or turned > 1.5 * limits.angle_within:
         raise CalibrationRefused(
-            "{name} was found {moved:.0f} mm and {turned:.1f}° from where it was taken to"
-            " stand, farther than was searched: put it nearer in the scene, and calibrate again.",
+            "{name} was found {moved:.0f} mm and {turned:.1f}° from its pose in the scene, outside of the search "
+            "range. Correct its pose in the scene, then calibrate again.",
             f"searched: {limits.within * 1e3:.0f} mm and {math.degrees(limits.angle_within):.1f}°",
             Reason.NOT_CONVERGED,
             name=surface.name,

@@ -165,7 +165,7 @@ class Search:
 
     def _unlike(self, detail: str) -> CalibrationRefused:
         return CalibrationRefused(
-            "What the camera sees near the expected place of {name} does not look like it.",
+            "The shape that the camera sees at the expected place of {name} does not match its model.",
             detail,
             Reason.NO_OVERLAP,
             name=self._surface.name,

@@ -146,14 +146,14 @@ def tip_by_touches(flange: Sequence[Pose]) -> TouchedTip:
     least = singular / math.sqrt(count)
     if least[4] < ORIENTATION_SPREAD:
         raise CalibrationRefused(
-            "The orientations of the tool are too much alike. Turn it by 30° or more between touches.",
+            "The orientations of the tool are too similar. Turn it by 30° or more between touches.",
             f"singular values {np.round(least, 3).tolist()}",
             Reason.DEGENERATE,
         )
     if least[5] < ORIENTATION_SPREAD:
         raise CalibrationRefused(
-            "The tool was turned about one axis only, which leaves the position of the tip along this axis "
-            "open. Tilt it to another side, too.",
+            "The tool was turned about one axis only, so the position of the tip along this axis is undetermined. "
+            "Tilt it in another direction, too.",
             f"singular values {np.round(least, 3).tolist()}",
             Reason.DEGENERATE,
         )
@@ -163,8 +163,8 @@ def tip_by_touches(flange: Sequence[Pose]) -> TouchedTip:
     residual, worst = _rms(residuals), int(np.argmax(residuals))
     if residual > TIP_MISFIT:
         raise CalibrationRefused(
-            "The touches agree on no point: {residual:.1f} mm on the average, touch {worst} is worst. Was"
-            " the tip on the same point every time?",
+            "The touches do not agree on one point: they are off by {residual:.1f} mm on average; touch {worst} is "
+            "worst. Check that the tip was on the same point every time.",
             f"residuals {np.round(residuals * 1e3, 2).tolist()} mm",
             Reason.NOT_CONVERGED,
             residual=residual * 1000.0,
@@ -221,8 +221,8 @@ def orientation_by_alignment(flange: Sequence[Orientation], reference: Orientati
     residual, worst = _rms(residuals), int(np.argmax(residuals))
     if residuals[worst] > TURN_MISFIT:
         raise CalibrationRefused(
-            "The alignments differ by {residual:.1f}°; number {worst} is worst."
-            " Was the tool put along the same axes every time?",
+            "The alignments differ by {residual:.1f}°; number {worst} is worst. Check that the tool was aligned "
+            "with the same axes every time.",
             f"residuals {np.round(np.degrees(residuals), 2).tolist()} °",
             Reason.NOT_CONVERGED,
             residual=math.degrees(residuals[worst]),
@@ -322,7 +322,7 @@ def _too_near(what: Literal["points", "x", "plane"] = "points") -> CalibrationRe
 
 def _on_one_line() -> CalibrationRefused:
     return CalibrationRefused(
-        "The points are on one line, so that the frame can rotate about it. Take one that is farther aside.",
+        "The points are on one line, so the rotation about it is undetermined. Touch a point farther from the line.",
         reason=Reason.DEGENERATE,
     )
 
@@ -331,8 +331,8 @@ def _refuse_misfit(residuals: Floats, points: Floats, what: Message) -> None:
     spread = float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
     if _rms(residuals) > MISFIT * spread:
         raise CalibrationRefused(
-            "{what}: {residual:.1f} mm on the average, point {worst} is worst."
-            " Was every point touched, and in this order?",
+            "{what}: off by {residual:.1f} mm on average; point {worst} is worst. Check that every point was "
+            "touched, in this order.",
             f"residuals {np.round(residuals * 1e3, 2).tolist()} mm",
             Reason.NOT_CONVERGED,
             what=what,

@@ -17,7 +17,7 @@ from arcor2_hw.messages import Message
 END_STEP: Final = -1
 """The target of an edge that leads to END."""
 OUTSIDE: Final = -1
-"""What stands for the call around a step of the program."""
+"""Placeholder for the call around a step of the program itself."""
 
 
 class Edge(Data, frozen=True):

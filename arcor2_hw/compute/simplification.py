@@ -8,16 +8,16 @@ from numpy.typing import NDArray
 from arcor2_hw.kinematics.meshes import Surface, linear_of
 from arcor2_hw.kinematics.shapes import Array, Triangles
 
-MOST: Final = 40_000
+MAX_TRIANGLES: Final = 40_000
 """Maximum number of triangles of a mesh of 0.5 m or more; smaller meshes get proportionally fewer."""
-FEWEST: Final = 4_000
+MIN_TRIANGLES: Final = 4_000
 """Number of triangles that a mesh of any size may have."""
 _FULL_SIZE: Final = 0.5
-"""Diagonal of the bounding box of a mesh that gets MOST triangles, m."""
+"""Diagonal of the bounding box of a mesh that gets MAX_TRIANGLES triangles, m."""
 CREASE: Final = np.cos(np.radians(40.0))
 """Cosine of the angle between triangles below which they are shaded as one smooth surface."""
 _CAREFUL: Final = 3.0
-_HASTY: Final = 7.0
+_FAST: Final = 7.0
 """Aggressiveness of the simplification: the first keeps shapes better, the second always reaches the target."""
 _MANY: Final = 48
 """Number of triangles around one vertex above which it is shaded flat, as the tip of a cone or the centre of a disc."""
@@ -42,7 +42,7 @@ class DisplayMesh(NamedTuple):
 def budget(vertices: Array) -> int:
     """Return the maximum number of triangles of a mesh of this size."""
     size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    return max(FEWEST, min(MOST, round(MOST * size / _FULL_SIZE)))
+    return max(MIN_TRIANGLES, min(MAX_TRIANGLES, round(MAX_TRIANGLES * size / _FULL_SIZE)))
 
 
 def simplified(surface: Surface, most: int) -> Surface:
@@ -81,9 +81,9 @@ def _simplified(surface: Surface, most: int) -> Surface:
     middle, size = surface.vertices.mean(axis=0), float(np.ptp(surface.vertices, axis=0).max())
     points = np.ascontiguousarray((surface.vertices - middle) / size)
     faces = np.ascontiguousarray(surface.triangles, dtype=np.int32)
-    for haste in (_CAREFUL, _HASTY):
+    for aggressiveness in (_CAREFUL, _FAST):
         vertices, triangles, collapses = fast_simplification.simplify(
-            points, faces, target_count=most, return_collapses=True, agg=haste
+            points, faces, target_count=most, return_collapses=True, agg=aggressiveness
         )
         if len(triangles) <= most:
             break

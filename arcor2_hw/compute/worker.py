@@ -23,7 +23,7 @@ from arcor2_hw.messages import Message
 
 NICENESS: Final = 5
 """Scheduling priority below that of devices and the server."""
-LATE: Final = 1.0
+KILL_DELAY: Final = 1.0
 """Time after the limit of a computation at which the kernel ends the process, s."""
 MAX_ANSWER: Final = 128 * 1024 * 1024
 """Maximum size of an answer, bytes."""
@@ -67,7 +67,7 @@ def serve(sock: socket.socket) -> None:
 
 def _answer(work: m.Work, state: WorkerState) -> m.Done | m.Failed:
     # The default action of the signal ends the process even inside a library call that never returns.
-    signal.setitimer(signal.ITIMER_REAL, work.within + LATE)
+    signal.setitimer(signal.ITIMER_REAL, work.within + KILL_DELAY)
     try:
         value = m.encode_value(function_of(work.task)(work.task, state))
         if len(value) > MAX_ANSWER:

@@ -18,7 +18,7 @@ MODELS: Final = 16
 
 
 class WorkerState:
-    """What a worker keeps from one task to the next.
+    """State that a worker keeps between tasks.
 
     Attributes:
         progress: Function (share, message) that reports the progress of the present task.

@@ -42,7 +42,7 @@ class AuditEntry(Data, frozen=True):
         time: time of the end of the request.
         outcome: what became of the request.
         request: name of the request, or method and path of a REST operation.
-        target: id or name of what it concerned; empty if unknown.
+        target: id or name of the affected item; empty if unknown.
         user: name of the user or of the token; empty if unknown.
         role: role of the sender, `none` if it has none.
         address: address of the sender; empty for the server itself.

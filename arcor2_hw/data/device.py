@@ -146,7 +146,7 @@ class LossReaction(Data, frozen=True):
 
     @classmethod
     def holds(cls) -> "LossReaction":
-        """Declare that it keeps its last outputs and starts nothing new."""
+        """Declare that the device keeps its last outputs and starts nothing new."""
         return cls(LossKind.HOLDS)
 
     @classmethod

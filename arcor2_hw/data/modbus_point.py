@@ -107,7 +107,7 @@ class Point(Data, frozen=True, forbid_unknown_fields=True):
             if not holds:
                 raise ValueError(reason)
 
-    # -------------------------------------------------------------------------------- what it is
+    # -------------------------------------------------------------------------------- kinds
     @property
     def size(self) -> int:
         """Return the number of registers; 1 for a coil or a discrete input."""

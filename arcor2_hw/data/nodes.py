@@ -51,7 +51,7 @@ class NodeStatus(Data, frozen=True):
         version: Version of its installation; empty if it has never announced itself.
         computer: Name of the computer.
         since: When its service started. Omitted, as all that follows, if it has never announced itself.
-        seen: When it was last heard, for a silent node.
+        seen: Time of its last announcement, for a silent node.
         load: Average load of the last minute, per processor core: 1 for as many running tasks as cores.
         free: Free space of its disk, bytes.
         sessions: What runs on it.

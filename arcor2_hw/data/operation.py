@@ -57,7 +57,7 @@ class CarriedPart(Data, frozen=True):
 
 
 class ObjectValuesData(Data, frozen=True):
-    """Data of the event ObjectValues: what one can see of a device, for displays. Missing values are unknown.
+    """Data of the event ObjectValues: visible state of a device, such as an open door. Missing values are unknown.
 
     values: by name, in SI units, such as the width of a gripper; 1 for on. parts: carried by a robot.
     """

@@ -29,7 +29,7 @@ class PlaceKind(enum.StrEnum):
 
 
 class Place(Data, frozen=True):
-    """A place: id and name of the object, or of an action point at no object that is a place.
+    """A place of parts: id and name of its object, or of an action point that belongs to no object with a place.
 
     capacity: how many parts fit; 0: any number. parts: serial numbers of the newest parts in a box. sensed: whether the
     sensor detects a part; omitted if there is no sensor, or if it was not read.
@@ -183,7 +183,7 @@ class RunCheckpoint(Data, frozen=True):
         )
 
     def published(self) -> "RunCheckpoint":
-        """Return the run as clients see it: with what a person can decide, without what the program has done."""
+        """Return the run as it is sent to clients: with the possible decisions, without the completed actions."""
         _, repeated = self.split_done()
         branches = {each.branch for each in repeated}
         at = [action.action_name for action in self.actions if action.branch not in branches]

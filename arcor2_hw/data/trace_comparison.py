@@ -1,4 +1,4 @@
-"""What the trace of a run says about its time: cycle time, bottleneck and waits; and the comparison of two runs."""
+"""The cycle time, bottleneck and waits of a run, computed from its trace, and the comparison of two runs."""
 
 import itertools
 import statistics

@@ -64,13 +64,13 @@ class ThreeParallel:
         self._sign3, self._sign4 = (1.0 if axes[1] @ axes[i] > 0.0 else -1.0 for i in (2, 3))
         plane, last = _frame(h2, h5), _frame(h6, h5)
         links = np.diff(points[:5], axis=0) @ plane
-        # What remains when joint 1 is rotated back is linear in the target, its cosine and its sine: the columns of the
-        # rotation and the position in the plane, and their heights above it.
+        # Rotated back by joint 1, the target is linear in itself and in the cosine and sine of joint 1. The rows are
+        # the columns of its rotation and its position in the plane, and their heights above the plane.
         along = np.outer(h1, h1)
         before = np.zeros((3, 3, 4))
         before[:, :, :3] = plane.T @ (np.eye(3) - along), plane.T @ np.cross(h1, np.eye(3)), plane.T @ along
         before[:, :, 3] = -before[:, :, :3] @ points[0]
-        # The position remains relative to joint 2. Its height must be that of joint 5, which no other joint changes.
+        # The position is relative to joint 2. Its height must equal that of joint 5, which no other joint changes.
         before[2, :, 3] -= *links[0, :2], links[:, 2].sum()
         after = np.eye(4)
         after[:3, :3] = tip[:3, :3].T @ last

@@ -175,7 +175,7 @@ class InverseKinematics:
             yield q
         yield from late
         if some and not given:
-            # At the edge of the workspace, and where axes meet, the closed form may be too inexact to be refined.
+            # At the edge of the workspace and at singularities, the closed form may be too inexact to be refined.
             yield from self._searched(target, seed, everything, _FEW)
 
     def _is_exact(self, target: Array, q: Array) -> bool:

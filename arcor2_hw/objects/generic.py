@@ -131,7 +131,7 @@ class Generic(abc.ABC):
 
     @property
     def shown_values(self) -> dict[str, float]:
-        """Return what the device last reported of what one can see, by name, for displays. It does no I/O.
+        """Return the last reported visible state, such as an open door, by name, for displays. It does no I/O.
 
         Names that the editor draws: `width` of a gripper, m; `gripped`, 1 for a closed gripper; `velocity` of a belt,
         m/s; `door`, 1 when open, 0 when closed, 0.5 in between; `red`, `amber`, `green`, `blue` and `white`, 1 for a

@@ -108,7 +108,7 @@ class Line:
 
     @contextlib.contextmanager
     def held_if_free(self) -> Iterator[bool]:
-        """Lock the line unless another thread holds the lock. The value tells whether it was locked."""
+        """Lock the line unless another thread holds the lock. The value is whether it was locked."""
         free = self._one_user.acquire(blocking=False)
         try:
             yield free
@@ -193,7 +193,7 @@ class Line:
         return error
 
     def loss_again(self) -> DeviceError | None:
-        """Return a new error like the one that broke the line."""
+        """Return a new error equal to the one that broke the line."""
         loss = self.loss
         if isinstance(loss, DeviceFault):
             return type(loss)(loss.message, loss.detail, loss.fault_code)

@@ -291,7 +291,7 @@ class MappedDevice(ModbusDevice[dict[str, Any]]):
         return holds
 
     def _try(self, write: Callable[[], None]) -> None:
-        """Write after a command, if we still have control. An error of the command matters more than one of this."""
+        """Write after a command, if we still have control. An error of the command takes precedence."""
         with contextlib.suppress(DeviceError):
             self.send("ending a command", write)
 

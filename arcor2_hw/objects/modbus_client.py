@@ -41,7 +41,7 @@ class _HoldingRegisters(ReadHoldingRegistersResponse):
         """Decode the answer after its function code. Raises ModbusIOException."""
         count, odd = divmod(data[0], 2)
         if odd or len(data) < 1 + data[0]:
-            raise ModbusIOException(f"{len(data) - 1} bytes came where {data[0]} were announced")
+            raise ModbusIOException(f"{len(data) - 1} bytes received instead of {data[0]}")
         self.registers = struct.unpack_from(f">{count}H", data, 1)
 
     def __str__(self) -> str:

@@ -50,7 +50,7 @@ class PathMonitor:
     """Context manager for a motion: checks the rest of the path whenever the surroundings change.
 
     An obstacle in the rest of the path stops the robot at once, at any distance. Only changes since planning count. The
-    exit raises PathBlocked, whose message names the obstacle and tells whether the robot stopped before it.
+    exit raises PathBlocked, whose message names the obstacle and states whether the robot stopped before it.
     """
 
     def __init__(self, robot: Robot, path: PlannedPath, take_snapshot: Callable[[Others], ObstacleSnapshot]) -> None:

@@ -19,13 +19,13 @@ from arcor2_hw.kinematics.errors import GoalInCollision, NoPath, OnlyInCollision
 from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.shapes import Array
 
-WITHIN: Final = 2.0
+TIME_LIMIT: Final = 2.0
 """Maximum time of planning, s."""
 COARSE: Final = 8.0
 """Factor between the resolution of the search and the resolution of the final check."""
 STEP: Final = 1.5
 """Maximum step of a tree, in joint values times their levers, m."""
-BESIDE: Final = np.pi
+SEARCH_RANGE: Final = np.pi
 """Range of joint values beyond start and goals that is searched first, rad; longer detours are rarely useful."""
 MOST_GOALS: Final = 8
 SHORTCUTS: Final = 60
@@ -54,7 +54,7 @@ class Planner:
         self._scale = np.maximum(sweep.levers, 1e-3)
 
     def to_pose(
-        self, start: Array, target: Array, *, within: float = WITHIN, seed: int = 0, stopped: Stopped | None = None
+        self, start: Array, target: Array, *, within: float = TIME_LIMIT, seed: int = 0, stopped: Stopped | None = None
     ) -> list[Array]:
         """Plan a path to a pose, to whichever joint values give a short one.
 
@@ -89,7 +89,7 @@ class Planner:
         return self.to_any(start, goals, within=within, seed=seed, stopped=stopped)
 
     def to_joints(
-        self, start: Array, goal: Array, *, within: float = WITHIN, seed: int = 0, stopped: Stopped | None = None
+        self, start: Array, goal: Array, *, within: float = TIME_LIMIT, seed: int = 0, stopped: Stopped | None = None
     ) -> list[Array]:
         """Plan a path to joint values.
 
@@ -120,7 +120,7 @@ class Planner:
         start: Array,
         goals: Sequence[Array],
         *,
-        within: float = WITHIN,
+        within: float = TIME_LIMIT,
         seed: int = 0,
         stopped: Stopped | None = None,
     ) -> list[Array]:
@@ -230,7 +230,7 @@ class _Search:
         arm, ends = planner.arm, np.array([start, *goals])
         slides = np.array(arm.prismatic)
         # A prismatic joint, or a revolute one with a range below two turns, is searched in its whole range.
-        far = np.where(slides, np.inf, BESIDE)
+        far = np.where(slides, np.inf, SEARCH_RANGE)
         lower = np.maximum(arm.lower, ends.min(axis=0) - far)
         upper = np.minimum(arm.upper, ends.max(axis=0) + far)
         self._box = np.minimum(lower, ends.min(axis=0)) * self._scale, np.maximum(upper, ends.max(axis=0)) * self._scale

@@ -1,1 +1,1 @@
-"""What the processes that show the cell to plant systems have in common: the data of the cell, and their connection."""
+"""Shared parts of the processes for plant systems: the data of the cell, and their connection to the server."""

@@ -1,4 +1,4 @@
-"""The side of the process: its start, and its connection to the server."""
+"""The start of a process for plant systems, and its connection to the server."""
 
 import argparse
 import asyncio

@@ -1,4 +1,4 @@
-"""The branches of a program: the program itself, calls that run at once, and threads that a script starts."""
+"""The branches of a program: the program itself, calls that run in parallel, and threads that a script starts."""
 
 import threading
 from typing import TYPE_CHECKING

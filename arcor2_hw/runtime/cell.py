@@ -293,7 +293,7 @@ class Cell:
         if former is not None and former.failure is None:
             former.fail(NotConnected("{name} is being connected again", name=former.name))
         if former is not None and former.closed_by is not None:
-            former.closed_by.wait(CLOSE_DEADLINE)  # both instances would use the same port
+            former.closed_by.wait(CLOSE_DEADLINE)  # two instances would use the same port
         device = self._make(how)
         self._absent.pop(object_id, None)
         job, deadline = device.open(lambda _: None)

@@ -1,4 +1,4 @@
-"""Continues an interrupted program: what its present cycle has done already is not done again."""
+"""Continues an interrupted program without repeating the completed actions of its present cycle."""
 
 import ast
 import threading

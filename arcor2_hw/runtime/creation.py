@@ -152,7 +152,7 @@ def settings_type(cls: type[Generic]) -> type[Settings] | None:
             ) from error
         if hint is None:
             if any(p.kind is p.VAR_KEYWORD for p in inspect.signature(constructor).parameters.values()):
-                continue  # passes its arguments to the next base class
+                continue  # this constructor passes its arguments to the next base class
             return None
         for candidate in (hint, *typing.get_args(hint)):
             if isinstance(candidate, type) and issubclass(candidate, Settings) and candidate is not Settings:

@@ -228,7 +228,7 @@ def _require_forcible(force: _Force, instance: Generic) -> LivePoint:
     if not isinstance(point.force, Unset):
         return point
     if point.use is not PointUse.OUTPUT:
-        raise Refused("{device}: {point} is no output. Only outputs can be forced.", **names)
+        raise Refused("{device}: {point} is not an output. Only outputs can be forced.", **names)
     raise Refused(
         "{device}: {point} cannot be forced, because the device would keep the value if this computer failed", **names
     )

@@ -1,4 +1,4 @@
-"""Motions that interlocks have admitted, and why others were not."""
+"""Motions that interlocks have admitted, and the reasons for refused ones."""
 
 from collections.abc import Callable
 from typing import NamedTuple

@@ -107,13 +107,13 @@ class Holds:
                     hold.release_ids.append(message.id)
                     return hold
                 if hold.ending:
-                    raise hold.error or Refused("{name}: this hold is ending", name=device.name)
+                    raise hold.error or Refused("{name}: this hold-to-run motion is ending", name=device.name)
             elif message.until == 0.0:
                 return None
             elif hold is not None:
                 raise Refused("another client is already moving {name}", name=device.name)
             elif message.hold <= self._ended.get(message.object_id, 0):
-                raise Refused("{name}: this hold has ended", name=device.name)
+                raise Refused("{name}: this hold-to-run motion has ended", name=device.name)
             if message.until <= time.monotonic():
                 raise Refused("{name}: the lease had expired when it arrived", name=device.name)
             if hold is None:

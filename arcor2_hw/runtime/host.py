@@ -1,7 +1,7 @@
 """The cell host: the only process that owns the device instances of a scene or of a program run.
 
 The server starts it with one end of a socket pair (`--fd N`). The main thread runs the script, so that a signal can
-interrupt whatever the script waits for. One thread reads messages, one writes them, and one runs timers. Each device
+interrupt a waiting script. One thread reads messages, one writes them, and one runs timers. Each device
 has its lanes.
 """
 
@@ -282,7 +282,7 @@ class Host:
     def _handle(self, message: m.HostBound) -> None:
         match message:
             case m.OpenScene() | m.RunPackage():
-                for body in message.bodies:  # at once, because later messages may change them
+                for body in message.bodies:  # at once, because later messages may change these values
                     self._updates.put(body)
                 for object_id, calibration in message.calibrations.items():
                     self._updates.calibrate(object_id, calibration)

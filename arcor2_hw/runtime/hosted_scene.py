@@ -140,7 +140,7 @@ class HostedScene:
 
 
 def recognise(cell: Cell, identities: Mapping[str, Identity], link: Link) -> None:
-    """Let the devices that will be connected be compared with the confirmed identities, and report what they are."""
+    """Compare the devices that will be connected with the confirmed identities, and report their identities."""
 
     def identified(device: Device, reported: Reported) -> None:
         cls = device.recipe.cls

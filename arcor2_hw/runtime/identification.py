@@ -30,7 +30,7 @@ _REMEDY: Final = "Call a technician, who confirms the device."
 
 
 class Reported(NamedTuple):
-    """What was read: the identity, or why it cannot be read; and the counters of the device, None if it has none."""
+    """The read identity, or the reason why it cannot be read; and the counters of the device, None without counters."""
 
     identity: Identity | None
     problem: Message | None = None
@@ -90,13 +90,13 @@ class Identification:
             if self._known is None:
                 return
             raise Refused(
-                "{name}: the identity cannot be read, so that it may be another device: {reason}",
+                "{name}: the identity cannot be read, so it may be another device: {reason}",
                 error.detail if isinstance(error, Arcor2Error) else "",
                 name=self._name,
                 reason=message,
             ) from error
         if losses != self._losses:
-            return  # it may be that of the device before the loss; the command fails, or the next one reads again
+            return  # it may be that of the device before the connection loss; the next command reads it again
         self._found = found
         self._compare()
         self._report(Reported(found, counters=_counters(instance)))

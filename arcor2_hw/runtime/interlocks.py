@@ -41,7 +41,7 @@ JOG: Final = "jog"
 """Name of jogging in messages."""
 
 Wait = Callable[[float], float]
-"""Waits for a time, s, and returns how long the program was paused meanwhile. It raises if the action is stopped."""
+"""Waits for a time, s, and returns how long the program was paused. It raises if the action is stopped."""
 
 
 class Interlocks:
@@ -133,7 +133,7 @@ class Interlocks:
                 if device.id not in self._guards and not any(device.id in ids for ids in self._waiting.values()):
                     self._tokens.release(device.id, keep=inside)
                     if inside and self._tokens.take(device.id, inside):
-                        self._tokens.release(device.id, keep=inside)  # it stands there, and does not wait
+                        self._tokens.release(device.id, keep=inside)  # it is stopped there, and does not wait
             return
         entered = set(inside)
         if guard.leaving is not None:
@@ -348,7 +348,7 @@ class Interlocks:
             return guard
 
     def steer(self, guard: Guard, lease: Lease) -> tuple[Lease, float]:
-        """Return the lease of a hold as the robot may move, and the scale of its velocity.
+        """Return the lease limited to the permitted motion, and the scale of its velocity.
 
         Raises:
             Interlocked: the robot may only leave zones, and the velocity leads elsewhere.

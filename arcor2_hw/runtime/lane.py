@@ -14,7 +14,7 @@ _on_lane = threading.local()
 
 
 def on_any_lane() -> bool:
-    """Return whether this is the thread of a lane, so that what it calls is part of another call."""
+    """Return whether this is the thread of a lane, whose calls are part of the running call."""
     return getattr(_on_lane, "here", False)
 
 

@@ -155,7 +155,7 @@ class Ledger:
                 return
 
     def require_arrived(self, number: int, target: str) -> None:
-        """Check that nobody has confirmed a part elsewhere than at the target of its movement. Raises WrongPart."""
+        """Check that no person has confirmed a part elsewhere than at the target of its movement. Raises WrongPart."""
         part = self._parts.get(number)
         if part is not None and isinstance(part.moving_to, Unset) and part.place != target:
             raise WrongPart(

@@ -139,7 +139,7 @@ class ProgramHeld(ToServer, frozen=True):
 
 
 class HeldChanged(ToServer, frozen=True):
-    """Other choices are possible in the present hold."""
+    """The choices of the present hold have changed."""
 
     held: HeldData
 

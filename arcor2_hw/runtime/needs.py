@@ -40,7 +40,7 @@ class Verdict(NamedTuple):
 
 
 def key_of(need: Need) -> Key:
-    """Return what a need observes."""
+    """Return the object and the observation of a need."""
     return need.object_id, need.observation, need.point
 
 

@@ -83,7 +83,7 @@ class Gate:
         with self._changed:
             self._step = mode
             longest = next(iter(self._waiting), None)
-            # The branch may be on its way to the gate.
+            # The branch may be about to enter the gate.
             self._stepping = next((one for one in self._parallel if one.id == branch), longest)
             self._continue(_Mode.STEP)
 
@@ -241,7 +241,7 @@ class Gate:
             self._changed.notify_all()
 
     def ended(self, branch: Branch) -> None:
-        """Record the end of a branch of parallel work. Its step ends there, unless all branches have ended."""
+        """Record the end of a branch of parallel work, and end its single step unless all branches have ended."""
         with self._changed:
             self._parallel.discard(branch)
             if self._mode is _Mode.STEP and self._stepping is branch:

@@ -1,4 +1,4 @@
-"""Parallel work of a script: several calls run at once, each on a thread of its own, and the script waits for all."""
+"""Parallel work of a script: several calls run concurrently, each on its own thread, and the script waits for all."""
 
 import logging
 import threading

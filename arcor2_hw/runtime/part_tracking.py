@@ -38,7 +38,7 @@ class Step(NamedTuple):
 
 
 class PartTracking:
-    """Keeps the books of parts while a program runs, in scenes with a feeder or a box. Calls must not overlap.
+    """Tracks the places of parts while a program runs, in scenes with a feeder or a box. Calls must not overlap.
 
     Args:
         former: The books so far.
@@ -112,7 +112,7 @@ class PartTracking:
     def begin(
         self, step: Step, device: Device, bound: Any, arguments: Sequence[Any], keywords: Mapping[str, Any]
     ) -> Step:
-        """Return the step with what it does to a part; `RunRecord.begin` states the arguments and errors."""
+        """Return the step with its effect on a part; `RunRecord.begin` states the arguments and errors."""
         if not self._active:
             return step
         flow, found = part_flow_of(bound), metadata_of(bound)
@@ -198,7 +198,7 @@ class PartTracking:
         return self._points.get(point, "")
 
     def _compare(self, source: str, target: str) -> None:
-        """Compare what the books expect with what sensors detect. Raises PlaceEmpty, PlaceOccupied."""
+        """Compare the expected parts with those that sensors detect. Raises PlaceEmpty, PlaceOccupied."""
         if self._sensed(source) is False:
             raise PlaceEmpty(
                 "The sensor detects no part at {place}. Check the place, then confirm where the parts are.",

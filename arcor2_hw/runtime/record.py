@@ -36,7 +36,7 @@ log = logging.getLogger(__name__)
 
 
 class RunRecord:
-    """Keeps the books of parts and stores checkpoints. The threads of the script and the reader thread call it.
+    """Tracks the places of parts and stores checkpoints. The threads of the script and the reader thread call it.
 
     Args:
         checkpoints: returns the checkpoints of a scene.
@@ -136,7 +136,7 @@ class RunRecord:
         self._parts.publish()
 
     def _continue(self, former: RunCheckpoint | Unset) -> None:
-        """Use what an interrupted run has done in its last cycle. Raises Conflict."""
+        """Use the completed actions of the last cycle of an interrupted run. Raises Conflict."""
         if self._continue_at is not None and not isinstance(former, Unset):
             former = former.until(self._continue_at)
         if isinstance(former, Unset) or former.ended or not former.published().continues:
@@ -198,7 +198,7 @@ class RunRecord:
         return outer.number != former
 
     def outcome(self, branch: Branch, action_id: str, name: str) -> DoneAction | None:
-        """Return what the interrupted program has done as the next action of a branch, None if it has to be executed.
+        """Return the stored outcome of the next action of a branch, None if the action has to be executed.
 
         Raises:
             Conflict: the interrupted program has done another action here.

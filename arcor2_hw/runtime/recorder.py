@@ -1,4 +1,4 @@
-"""The recorder of a cell host: writes the points, joints and actions that the host sees anyway to the ring."""
+"""The recorder of a cell host: writes the points, joints and actions that the host receives to the ring."""
 
 import threading
 import time
@@ -114,7 +114,7 @@ class Recorder:
             )
 
     def device_changed(self, report: DeviceChanged) -> None:
-        """Record connection and shown values of a device. What its observations contain is not recorded twice."""
+        """Record connection and shown values of a device, except those that its observations contain."""
         if self._ring is None:
             return
         stamp, device = time.monotonic(), self._device(report.object_id)

@@ -120,7 +120,7 @@ class Recovery:
 
     # -------------------------------------------------------------------------------- failures
     def holds(self, call: ActionCall, error: BaseException) -> bool:
-        """Return whether the program is held because of an error: it has no error exit for it."""
+        """Return whether an error holds the program, because no error exit handles it."""
         if not self.active or not isinstance(error, Exception):
             return False
         if isinstance(error, ENDS_PROGRAM):
@@ -268,7 +268,7 @@ class Recovery:
         self._gate.release()
 
     def _forced(self, hold: _Hold, exit_id: str) -> Arcor2Error:
-        """Return the error of a hold as one that the exit catches. It keeps its code."""
+        """Return the error of a hold, with its code, as an error that the exit catches."""
         exits = hold.data.exits or []
         found = next((one for one in exits if exit_id in ("", one.id)), None)
         if found is None:

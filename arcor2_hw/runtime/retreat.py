@@ -1,4 +1,4 @@
-"""How a robot leaves a zone: along the retract path of the zone, otherwise on the shortest way out.
+"""How a robot leaves a zone: along the retract path of the zone, otherwise by the shortest path.
 
 None of this is a safety function.
 """
@@ -31,7 +31,7 @@ REACHED: Final = 0.005
 
 
 class Retreat:
-    """The way out of one zone.
+    """The path out of one zone.
 
     Args:
         body: the zone, a primitive shape.
@@ -45,14 +45,14 @@ class Retreat:
         self.tips = tips
 
     def remaining(self, tips: Sequence[Position]) -> float:
-        """Return how far end effectors, in the world, are from the end of their way, m; their sum.
+        """Return the sum of the distances of end effectors (poses in the world) from the ends of their paths, m.
 
         Without a path, it is negative outside of the zone.
         """
         return math.fsum(self._length(self._local(tips[index])) for index in self.tips)
 
     def direction(self, tip: Position) -> Position | None:
-        """Return the unit vector in the world along which an end effector leaves; None at the end of the way."""
+        """Return the unit vector in the world along which an end effector leaves; None at the end of the path."""
         point = self._local(tip)
         if self._path:
             target = self._path[self._next(point)] - point
@@ -75,7 +75,7 @@ class Retreat:
         return point.distance_to(following[0]) + math.fsum(a.distance_to(b) for a, b in pairwise(following))
 
     def _next(self, point: Position) -> int:
-        """Return the index of the point of the path to which the way leads: the end of the nearest section."""
+        """Return the index of the next point of the path: the end of the nearest section."""
         sections = list(pairwise(self._path))
         if not sections:
             return 0

@@ -49,6 +49,6 @@ class Retrying:
                     ATTEMPT.reset(token)
                     RETRIES.reset(retries)
                 self._program.pause_before_retry(self._pause)
-            raise AssertionError("the last attempt returns or raises")
+            raise AssertionError("unreachable: the last attempt returns or raises")
 
         return call

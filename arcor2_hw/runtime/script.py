@@ -36,7 +36,7 @@ def execute(directory: Path, program: Program) -> None:
         project = read_document(directory / "data" / "project.json", Project)
         if program.values and project.has_logic:  # other scripts read values by `res.parameter`
             set_values(source, project, program.values)
-        if program.record is not None and continues:  # what the interrupted program has assigned since
+        if program.record is not None and continues:  # values that the interrupted program assigned
             set_variables(source, program.record.former_variables(project.scene_id))
     code = compile(source, str(script), "exec")
     try:

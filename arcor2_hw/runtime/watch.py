@@ -1,4 +1,4 @@
-"""Observation of devices: reports changes of connection, health, alarms, control owner, and of what one can see."""
+"""Observation of devices: reports changes of connection, health, alarms, control owner and visible state."""
 
 import threading
 import time

@@ -16,7 +16,7 @@ class Frames(Protocol):
         ...
 
     def acting(self, frame: bytes) -> str:
-        """Return what a frame does to the device, empty when it only reads."""
+        """Return the effect of a frame on the device, empty when it only reads."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""A clock for time limits that stands still while this process or its children wait for a processor.
+"""A clock for time limits that stops while this process or its children wait for a processor.
 
 A test that a call returns within 1 s would otherwise fail next to processes that take the processor away, from the
 driver or from its fake. On an idle machine it is the ordinary clock; on the busiest it runs at a tenth of the speed.

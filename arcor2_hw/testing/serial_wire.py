@@ -25,7 +25,7 @@ class SerialWire(Wire):
         self._path = path
         self._device = -1
         self._ends: tuple[int, int] | None = (
-            None  # our end and that of the driver, which stays open so that a driver may reopen it
+            None  # our end, and that of the driver, which stays open so that a driver can reopen it
         )
         self._mode: list[object] = []
         self._thread: threading.Thread | None = None

@@ -66,7 +66,7 @@ def seen_again(bench: Bench, device: Generic) -> None:
 
 
 def goes_on(bench: Bench) -> None:
-    """Fail when the action of a process that was killed does not go on until it is done or was watched long enough."""
+    """Fail unless the action continues after its process was killed, until it is done or was watched long enough."""
     killed = changed = own_time()
     done = bench.progress()
     while (now := own_time()) - killed < max(bench.loss_watched, bench.progress_within + SLACK) and done < 1.0:

@@ -41,7 +41,7 @@ def within(limit: float, call: Callable[[], Any], what: str) -> Any:
     """Call on another thread, and return the result or raise the error of the call.
 
     Args:
-        limit: Time limit, s, of the suite's clock, which stands still while this process waits for a processor.
+        limit: Time limit, s, of the suite's clock, which stops while this process waits for a processor.
         call: The call.
         what: Name of the call in the error.
 

@@ -29,7 +29,7 @@ class Do(NamedTuple):
 
 
 class Cell:
-    """The processes of the cell, and what is true in its world."""
+    """The processes of the cell, and the true state of its world."""
 
     def __init__(self, folder: Path, boards: int, seed: int) -> None:
         self.folder, self._boards, self._seed = folder, boards, seed
@@ -57,7 +57,7 @@ class Cell:
     async def start(self) -> None:
         """Start everything, and build the package."""
         wanted = fakes(self._boards, self._seed, fast=True)
-        options = {"robot": ("--time-scale", "0.1")}  # its times for unlocking
+        options = {"robot": ("--time-scale", "0.1")}  # shorter delays before a protective stop may be unlocked
         children = [self._child(fake.name, [*fake.command(), *options.get(fake.name, ())]) for fake in wanted]
         async with asyncio.TaskGroup() as starts:
             found = [starts.create_task(child.start_json()) for child in children]

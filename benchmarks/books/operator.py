@@ -59,7 +59,7 @@ class Operator:
         await self.confirm(client)
         shown = (await client.call("GetHeld")).held
         if not isinstance(shown, Unset) and shown.since == held.since:
-            held = shown  # without what the books exclude now
+            held = shown  # with fewer choices after the confirmation
         choice, results = await self._choose(client, held, tries)
         await self._checks.still(still, f"while held at {held.action_name}")
         deadline = time.monotonic() + DECIDED_WITHIN
@@ -70,7 +70,7 @@ class Operator:
                 await client.call("DecideHeld", args)
             except RequestFailed as error:
                 if "not held at this action" in str(error):
-                    return  # the next event says why
+                    return  # the next event states the reason
                 if time.monotonic() > deadline:
                     self._checks.found(
                         self._checks.result.unresolved, f"{held.action_name}: {choice} is refused: {error}"
@@ -92,7 +92,7 @@ class Operator:
                 await client.call("AcknowledgeStop", rpc.AcknowledgeStopArgs(held.device, code), timeout=40.0)
 
     async def _choose(self, client: Client, held: HeldData, tries: int) -> tuple[HoldChoice, list[str]]:
-        """Decide by what a person sees in the cell."""
+        """Decide by the visible state of the cell."""
         name, choices = held.action_name, held.choices
         boards = await self._cell.boards()
         by_place = {board["place"]: board for board in boards}
@@ -102,7 +102,7 @@ class Operator:
         if held.before:
             return retry, []
         if name in PICKS:
-            if held.kind == "place_occupied" and "gripper" in by_place:  # by the board of an earlier program
+            if held.kind == "place_occupied" and "gripper" in by_place:  # occupied by the board of an earlier program
                 await self._take_out(client, by_place["gripper"]["code"])
             elif "gripper" in by_place:
                 return await self._done(client, held, "gripper")
@@ -140,12 +140,12 @@ class Operator:
         """Return that the movement counts as done if the books agree, otherwise end the program."""
         (books,) = await client.get_parts()
         there = {books.name_of(part.place) for part in books.parts}
-        # A part that was moved into a box has left the books.
+        # A part that was moved into a box is no longer tracked.
         arrived = NAMES["gripper"] not in there if target in ("good", "bad") else NAMES[target] in there
         return (HoldChoice.SKIP if arrived and HoldChoice.SKIP in held.choices else HoldChoice.END), []
 
     async def _take_out(self, client: Client, code: str) -> None:
-        """Take a board out of the cell, and tell the books."""
+        """Take a board out of the cell, and confirm that in the books."""
         await self._remove(code)
         self._gone.add(code)
         for books in await client.get_parts():

@@ -1,4 +1,4 @@
-/** Repeats what fails while the server is disconnected, such as loading a part of the page. */
+/** Repeats operations that fail while the server is disconnected, such as loading a part of the page. */
 
 /** Delays before each further attempt, s; the last one is repeated. */
 const PAUSES = [0.5, 1, 2, 4];

@@ -55,14 +55,14 @@ def parse_address(address: str) -> tuple[str, int]:
 def one_of(name: str, value: T, allowed: Collection[T]) -> T:
     """Return an argument of a command. Raise `ValueError` unless it is one of the allowed values."""
     if value not in allowed:
-        raise ValueError(f"{name} is one of {', '.join(map(str, allowed))}")
+        raise ValueError(f"{name} must be one of {', '.join(map(str, allowed))}")
     return value
 
 
 def within(name: str, value: N, least: float, most: float) -> N:
     """Return a number given to a command. Raise `ValueError` unless it is in a range."""
     if not least <= value <= most:
-        raise ValueError(f"{name} is {least} to {most}")
+        raise ValueError(f"{name} must be {least} to {most}")
     return value
 
 
@@ -201,7 +201,7 @@ class _Session:
         if to not in self._sources:
             raise ValueError(f"source {to!r} does not exist; available: {', '.join(sorted(self._sources))}")
         if not 0.0 <= rate <= MAX_RATE:
-            raise ValueError(f"rate is 0 to {MAX_RATE:g} Hz")
+            raise ValueError(f"rate must be 0 to {MAX_RATE:g} Hz")
         self._unsubscribe(to)
         if rate > 0.0:
             self._every(to, 1.0 / rate, asyncio.get_running_loop().time())

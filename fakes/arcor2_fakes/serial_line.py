@@ -90,7 +90,7 @@ class PtyLine:
 
     def _write(self, data: bytes) -> None:
         if self._ends is not None:
-            # A full buffer means that no host reads. On a real line the bytes are lost, too.
+            # A full buffer means that no host reads. A real line loses the bytes, too.
             with contextlib.suppress(BlockingIOError):
                 os.write(self._ends[0], data)
 

@@ -65,7 +65,7 @@ class Faults:
             self.wrong_checksum = True
         elif fault == "slow":
             if not 0.0 <= seconds <= 600.0:
-                raise ValueError("seconds is 0 to 600")
+                raise ValueError("seconds must be 0 to 600")
             self.delay = seconds
         elif fault == "heal":
             self.silent = self.half_next = self.garbage = self.wrong_checksum = False

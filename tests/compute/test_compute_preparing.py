@@ -120,7 +120,7 @@ def test_units_and_up_axis_of_the_file_are_applied(tmp_path: Path) -> None:
     made, _ = prepare(tmp_path, box, "box.dae")
     glb = Glb(made.content)
     assert np.allclose(np.ptp(glb.meshes["mesh"]["POSITION"], axis=0), (0.1, 0.3, 0.2))
-    # Other programs have y up, and turn by the root node.
+    # Other programs use y up, and rotate the model at the root node.
     assert np.allclose(glb.json["nodes"][0]["rotation"], (-np.sqrt(0.5), 0, 0, np.sqrt(0.5)))
 
 
@@ -217,7 +217,7 @@ def test_a_robot_has_a_description_and_one_mesh_per_visual_file(tmp_path: Path) 
         "meshes/base.stl": "boxy/meshes/base.stl",
     }
     assert set(glb.meshes) == {"boxy/meshes/base.stl", "boxy/meshes/arm.dae"}
-    # As descriptions of robots have it: the scale is theirs, and axes are as in the file.
+    # As in robot descriptions: the URDF states the scale, and the axes are those of the file.
     assert np.allclose(np.ptp(glb.meshes["boxy/meshes/arm.dae"]["POSITION"], axis=0), (0.1, 0.2, 0.3))
     assert set(glb.extras["problems"]) == {"meshes/broken.stl", "meshes/gone.stl"}
     assert "broken.stl" in glb.extras["problems"]["meshes/broken.stl"]

@@ -110,7 +110,7 @@ async def test_a_frozen_worker_is_replaced(compute: Compute, monkeypatch: pytest
 ENDLESS = """
 import sys
 from arcor2_hw.compute import worker
-worker.LATE = 0.1
+worker.KILL_DELAY = 0.1
 worker.function_of = lambda task: lambda *_: 7 ** 10**9  # in C, with the interpreter lock held
 worker.main(sys.argv[1:])
 """

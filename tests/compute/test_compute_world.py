@@ -242,7 +242,7 @@ async def test_a_gripped_part_moves_with_the_robot(compute: Compute) -> None:
 
     async def met(joints: list[Joint]) -> str | None:
         where = (await forward(compute, joints)) * in_link
-        away = Position(0, 0.04, 0)  # aside of the arm itself
+        away = Position(0, 0.04, 0)  # next to the arm itself
         check = t.CheckLines([t.Line(where.position + away, where.position)], ignore=["arm"])
         (hit,) = await compute.run(check, world=world(robot(joints=joints), held))
         return None if hit is None else hit.id
@@ -300,7 +300,7 @@ async def test_only_differences_of_a_large_world_are_sent(compute: Compute, monk
 async def test_a_mesh_of_two_gigabytes_is_refused_without_reading(compute: Compute, tmp_path: Path) -> None:
     huge = tmp_path / "content"
     with huge.open("wb") as file:
-        file.truncate(2 * 1024**3)  # sparse: it takes no room
+        file.truncate(2 * 1024**3)  # sparse: it uses no disk space
     with pytest.raises(InvalidData, match=r"huge\.stl") as raised:
         await compute.run(t.ReadMesh(StoredFile(str(huge), "huge.stl")))
     assert raised.value.code == "bad_mesh"

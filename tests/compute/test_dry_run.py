@@ -113,7 +113,7 @@ def test_a_target_out_of_reach_has_no_planned_time() -> None:
     assert found.durations[1].source is DurationSource.ACTION
 
 
-def test_other_actions_take_what_they_took_before_or_count_as_unknown() -> None:
+def test_other_actions_have_their_earlier_duration_or_none() -> None:
     known = {"belt_on": KnownDuration(1.25, ActionDuration("belt_on", DurationSource.METHOD, 4))}
     task = replace(program({}, "belt_on", "belt_off", durations=known), robots={})
     found = predict(task)
@@ -122,7 +122,7 @@ def test_other_actions_take_what_they_took_before_or_count_as_unknown() -> None:
     assert found.summary.devices[0].name == "Belt"
 
 
-def test_what_real_motions_took_longer_is_added() -> None:
+def test_the_measured_extra_time_of_motions_is_added() -> None:
     moves = {"a": line(0.4, 0.2), "b": line(0.4, -0.2), "c": line(0.4, 0.2)}
     planned = trapezoid_time(0.4, 0.5, 2.5)
     measured = {"a": 0.2, "b": planned + 0.2, "c": planned + 0.2}

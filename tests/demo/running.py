@@ -54,7 +54,7 @@ async def arcor2_hw(*words: str) -> tuple[int, str]:
 
 @asynccontextmanager
 async def demo(data_dir: Path, *arguments: str) -> AsyncIterator[Run]:
-    """A demo that hurries, ended at the end."""
+    """A demo that runs at full speed, ended after the test."""
     command = [sys.executable, "-m", "arcor2_server.cli.main", "demo", "--fast", "--port", "0"]
     process = await asyncio.create_subprocess_exec(
         *command,

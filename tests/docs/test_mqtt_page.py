@@ -28,7 +28,7 @@ def test_the_page_states_the_limits() -> None:
         r"after (\d+) ends in a row": process.ALARM_AFTER,
     }
     for pattern, number in numbers.items():
-        (found,) = re.findall(pattern, PAGE)
+        (found,) = re.findall(pattern.replace(" ", r"\s+"), PAGE)
         assert float(found) == number, pattern
     assert re.findall(r"later after up to (\d+) s", PAGE) == [f"{link.LONGEST_PAUSE:.0f}"] * 2
     named = re.findall(r"characters `([^`]*)`", PAGE)[0].split()

@@ -174,7 +174,7 @@ async def test_hidden_cameras_and_robots_are_refused(world: World) -> None:
             before = await world.placed(name)
             records = (await world.http.get("/api/calibrations")).json()
             world.show(**hidden)
-            await asyncio.sleep(0.5)  # a picture taken earlier may still be on its way
+            await asyncio.sleep(0.5)  # a picture taken earlier may still arrive
             try:
                 state, message = await world.calibrated(name)
             finally:

@@ -22,7 +22,7 @@ from tests.e2e.harness import Cell, running_cell, scene_state, until
 
 ZONE = "inside"
 DOWN = 0.15
-"""Way of the arm from its start into the zone, m; the zone begins 0.05 m above its end."""
+"""Distance of the arm from its start into the zone, m; the zone begins 0.05 m above its end."""
 
 
 CYCLES = 4
@@ -30,7 +30,7 @@ CYCLES = 4
 
 
 class JointLog:
-    """What the fakes do: the state of the door, and whether the arm is in the zone."""
+    """Records of the fakes: the state of the door, and whether the arm is in the zone."""
 
     def __init__(self, cell: Cell) -> None:
         self.cell = cell

@@ -92,7 +92,7 @@ def chromium() -> str:
 
 @asynccontextmanager
 async def running_browser(*more: str, behind: bool = False) -> AsyncIterator[Browser]:
-    """Run Chromium, with more arguments.
+    """Run Chromium with additional arguments.
 
     Args:
         more: additional arguments.

@@ -80,7 +80,9 @@ async def test_an_output_is_forced_and_an_operator_ends_it(cell: Cell, browser: 
         await expect(row).to_contain_text("on")
         await page.get_by_placeholder("Search device or point").fill("digital_out[0]")
         await expect(tester).to_have_count(0)
-        await page.get_by_role("button", name="Force robot: digital_out[0]").click(force=True)  # it says why not
+        await page.get_by_role("button", name="Force robot: digital_out[0]").click(
+            force=True
+        )  # the message states the reason
         await screen.sees("The device would keep a forced value")
 
         await page.get_by_placeholder("Search device or point").fill("lamp")

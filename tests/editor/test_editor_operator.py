@@ -74,7 +74,7 @@ async def built(cell: Cell, colleague: Client, message: str = "", method: str = 
 
 
 async def reads_who_commands(screen: Screen, technician: Client, sizes: Iterable[str]) -> None:
-    """Open the dialog from the note on the screen. An operator may only read it; it follows what a technician does."""
+    """Open the dialog from the note on the screen. An operator can only read it; it shows changes by a technician."""
     start = screen.page.get_by_role("button", name=re.compile("^Start"))
     await technician.call("SetCellAuthority", rpc.SetCellAuthorityArgs(CellAuthority.NOBODY))
     await expect(start).to_have_attribute("aria-disabled", "true")

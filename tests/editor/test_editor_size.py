@@ -39,7 +39,7 @@ def needed(manifest: dict[str, Any], *names: str) -> set[str]:
 
 
 def ar_size(files: Path, manifest: dict[str, Any], way: str) -> int:
-    """Return the size of what a way of AR loads when it starts, without what other parts of the editor load, bytes."""
+    """Return the size of the files that only an AR mode loads at its start, bytes."""
     modules, worker = AR_WAYS[way]
     of_ar = _START.union(_ON_DEMAND, *(each for each, _ in AR_WAYS.values()))
     others = {name for name, chunk in manifest.items() if chunk.get("isEntry") or chunk.get("isDynamicEntry")} - of_ar

@@ -268,7 +268,7 @@ def test_a_bad_mesh_is_refused_by_name(content: bytes, name: str, words: str) ->
 def test_an_oversized_mesh_is_refused_before_reading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "arm.urdf").write_bytes(with_shape('<mesh filename="arm.stl"/>'))
     with (tmp_path / "arm.stl").open("wb") as file:
-        file.truncate(2 * 1024**3)  # 2 GB that take no room on the disk
+        file.truncate(2 * 1024**3)  # 2 GB, sparse: they use no disk space
     with pytest.raises(UnsafeDescription, match=r"arm\.stl is larger than"):
         RobotModel.load(tmp_path)
     monkeypatch.setattr(meshes, "MAX_TRIANGLES", 11)

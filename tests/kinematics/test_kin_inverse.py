@@ -111,7 +111,7 @@ def test_poses_at_and_near_singularities_are_reached() -> None:
 
 
 def test_poses_slightly_out_of_reach_are_reached_within_the_tolerance() -> None:
-    """Near a singularity, a pose error changes a joint by its square root, and so what the others can reach."""
+    """Near a singularity, a joint changes by the square root of a pose error, and with it the reach of the others."""
     arm = ur().arm("tcp")
     inverse, chance = InverseKinematics(arm), np.random.default_rng(1)
     for _ in range(200):
@@ -253,7 +253,7 @@ def test_dobot_joints_match_its_driver(q: tuple[float, float, float, float]) -> 
     except dobot_kinematics.Unreachable:
         assume(False)
     out = math.hypot(tool.x, tool.y)
-    assume(out > 0.08)  # above its foot the arm may also face backwards
+    assume(out > 0.08)  # above its base the arm may also face backwards
     found = InverseKinematics(arm).solutions(target, np.array(q))
     assert np.allclose(found[0], q, atol=1e-4)
     # Nearly stretched, the elbow may point down as well; the driver's is above.

@@ -168,7 +168,7 @@ def test_each_end_effector_has_its_own_chain() -> None:
         right.forward(np.array((0.1, 0.5)))[:3, 3], (0.3 * math.cos(0.5), -0.2, 0.1 - 0.3 * math.sin(0.5))
     )
     assert np.allclose(right.forward(np.array((0.1, 0.5)))[:3, 0], (math.cos(1.0), 0.0, -math.sin(1.0)))
-    # Both joints moved by the mimicked one count: the hand turns twice as fast as it.
+    # Both the mimicked joint and the one that mimics it move the hand, which turns twice as fast.
     assert right.jacobian(np.array((0.1, 0.5)))[4, 1] == pytest.approx(2.0)
 
 

@@ -62,7 +62,7 @@ def test_an_impossible_line_is_refused_with_the_point_where_it_fails() -> None:
     here = arm.pose(READY)
     with pytest.raises(OutOfReach):
         straight_line(arm, READY, moved(here, 1.5, 0.0, 0.0).matrix())
-    # Past the axis of the foot, where a tool that points down has no space.
+    # Past the axis of the base, where a tool that points down has no space.
     near = Pose(Position(-0.45, 0.12, here.position.z), here.orientation)
     with pytest.raises(NoStraightLine, match=r"arm cannot go straight: after 0\.\d+ m"):
         straight_line(arm, READY, near.matrix(), "arm")

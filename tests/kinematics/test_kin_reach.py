@@ -75,11 +75,11 @@ def test_only_changed_poses_are_computed_again(world: CollisionWorld, reach: Rea
     assert (reach.computed, reach.checked) == (60, 60)
     assert reach.judge(poses) == first
     assert (reach.computed, reach.checked) == (60, 60)
-    # Far away: nothing is computed again.
+    # An obstacle far away: nothing is computed again.
     world.put("far", Box(0.5, 0.5, 0.5), down_at(5.0, 0.0, 0.0))
     assert reach.judge(poses) == first
     assert (reach.computed, reach.checked) == (60, 60)
-    # In the way of some points: these are checked again, without a new search for joint values.
+    # An obstacle at some points: these are checked again, without a new search for joint values.
     world.put("near", Box(0.05, 0.05, 0.05), poses[0])
     again = reach.judge(poses)
     assert again[0].reach is Reach.IN_COLLISION
@@ -89,7 +89,7 @@ def test_only_changed_poses_are_computed_again(world: CollisionWorld, reach: Rea
     world.delete("near")
     assert [each.reach for each in reach.judge(poses)] == [each.reach for each in first]
     assert reach.checked > checked
-    # One pose more costs one.
+    # One more pose needs one more computation.
     computed = reach.computed
     reach.judge([*poses, down_at(0.4, 0.0, 0.33)])
     assert reach.computed == computed + 1

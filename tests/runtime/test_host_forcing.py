@@ -96,7 +96,7 @@ def test_a_force_ends_unless_it_is_renewed(host: HostProcess, block: FakeProcess
 
 
 def test_what_cannot_be_forced(host: HostProcess, block: FakeProcess) -> None:
-    refused(host, "part is no output", "part", True, 1)
+    refused(host, "part is not an output", "part", True, 1)
     refused(host, "clamp cannot be forced, because the device would keep the value", "clamp", True, 2)
     refused(host, "has no point 'missing'", "missing", True, 3)
     refused(host, "valve is digital", "valve", 1.0, 4)

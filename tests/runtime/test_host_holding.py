@@ -198,7 +198,7 @@ def test_a_lease_that_arrives_after_a_freeze_does_not_resume_an_expired_hold(hol
             renewal = holder.lease()
         error = holder.host.answer(renewal)
         assert isinstance(error, m.ErrorData)
-        assert re.search("not renewed in time|this hold has ended", error.message.text)
+        assert re.search("not renewed in time|motion has ended", error.message.text)
         holder.ended()
     assert len(holder.calls("jog")) == 4
 

@@ -161,5 +161,5 @@ def test_streams_at_different_rates(host: HostProcess) -> None:
     assert all("time_ms" not in one for one in streamed(host, "RobotJoints", 0.0))
     host.seen.clear()
     fast, eef, _ = wait_for(all_streams, lambda streams: len(streams[2]) >= 4)
-    assert fast[1:] == []  # one may have been on its way
+    assert fast[1:] == []  # one value may have been sent before
     assert eef[1:] == []

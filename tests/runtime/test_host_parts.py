@@ -1,4 +1,4 @@
-"""The cell host keeps the books of parts, and stores checkpoints before and after each action."""
+"""The cell host tracks the places of parts, and stores checkpoints before and after each action."""
 
 import os
 import signal

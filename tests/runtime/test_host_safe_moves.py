@@ -329,7 +329,7 @@ def test_another_arm_is_an_obstacle_at_its_current_joints(host: HostProcess) -> 
     assert go(host, READY) is None
     assert host.call("obj_arm", "waypoints") > 2
     collision(go(host, MEETING), "arm/", "other/")
-    # The other way round: neither robot moves into the other.
+    # In the opposite direction, too: neither robot moves into the other.
     assert go(host, MEETING, safe=False) is None
     home = joints(READY)
     assert host.call("obj_other", "move_to_joints", target_joints=home, speed=0.5, safe=False) is None

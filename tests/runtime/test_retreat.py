@@ -1,4 +1,4 @@
-"""The way of a robot out of a zone: along its retract path, or the shortest one."""
+"""The path of a robot out of a zone: its retract path, or the shortest one."""
 
 import math
 from typing import Final

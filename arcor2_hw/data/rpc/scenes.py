@@ -110,7 +110,7 @@ class FoundDevice(Data, frozen=True):
 
 
 class ListScenesData(Data, frozen=True):
-    """Answer to ListScenes. `problem_messages`: the problems with what is needed to translate them, if requested."""
+    """Answer to ListScenes. `problem_messages`: the problems with keys and values for translation, if requested."""
 
     id: str
     name: str

@@ -1,4 +1,4 @@
-"""Places of parts for programs that keep books of parts: feeders, holders and boxes.
+"""Places of parts: feeders, holders and boxes. Scenes with them record where each part is.
 
 An action that takes a part from an action point, or puts it there, uses the place that is the parent of the point.
 """
@@ -15,7 +15,7 @@ from arcor2_hw.objects.small import HasPoints
 
 
 class Outcome(StrEnum):
-    """As what the parts in a box are counted."""
+    """How the parts in a box are counted."""
 
     GOOD = "good"
     BAD = "bad"
@@ -76,7 +76,7 @@ class PartHolder(GenericWithPose):
 
 
 class PartFeeder(PartHolder):
-    """Where parts come into the cell, such as the stop of a conveyor."""
+    """A place where parts enter the cell, such as the stop of a conveyor."""
 
     _ABSTRACT = False
     display_name = "Part feeder"

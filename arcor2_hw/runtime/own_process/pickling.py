@@ -1,6 +1,6 @@
 """Pickling of values, errors and object references between the cell host and the process of a device.
 
-Pickle is used because drivers return whatever they like: structs, dataclasses, enumerations, images, NumPy arrays. It
+Pickle is used because drivers return values of any type: structs, dataclasses, enumerations, images, NumPy arrays. It
 is safe here: both ends are processes of this program with the same rights, connected by an unnamed socket pair that no
 other process can open, and they load the same object type anyway.
 """

@@ -40,7 +40,7 @@ STANDSTILL: Final = frozenset(
 )
 """States of a machine in which nothing moves."""
 FREE_WITHIN: Final = 10.0
-"""Time in which a device gives up an owner that is lost, s."""
+"""Time in which a device ends the control of a lost owner, s."""
 LAG: Final = 0.15
 """Age of the state that a second connection may show, s: a device that moves is observed twice."""
 PULLED_WITHIN: Final = 120.0
@@ -196,7 +196,7 @@ class RealBench(CellBench):
         return motion.sentence + (f" ({values})" if values else "")
 
     def running(self) -> bool:
-        """Return whether the device moves: by a connection of its own, or by the person where there is none."""
+        """Return whether the device moves, read over a separate connection; without one, ask the person."""
         self._go_on()
         device = self._watcher()
         if device is None:
@@ -292,7 +292,7 @@ class RealBench(CellBench):
         return [Check(name, value, value if agrees else "another value, says the person") for name, _, value in values]
 
     def beyond_limits(self, device: Generic) -> Mapping[str, Callable[[], object]]:
-        """Return calls that move nothing even if they are not refused: from the present joints to themselves."""
+        """Return calls that move nothing even if they are not refused: moves to the present joints."""
         assert isinstance(device, Robot)
         joints = device.robot_joints()
         return {
@@ -308,7 +308,7 @@ class RealBench(CellBench):
     def why_not(self, hook: str) -> str | None:
         """Return why the bench has no such hook."""
         if getattr(type(self), hook) not in (getattr(RealBench, hook), getattr(CellBench, hook)):
-            return None  # a bench of one's own
+            return None  # a custom bench
         day = self.day
         if hook in OF_A_REACTION and self.object_type.loss_reaction.kind is not OF_A_REACTION[hook]:
             return None

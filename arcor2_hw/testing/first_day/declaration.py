@@ -1,4 +1,4 @@
-"""first_day.yaml: what a person has to know before a real device is used for the first time, next to its driver."""
+"""first_day.yaml next to a driver: instructions for a person who uses a real device for the first time."""
 
 import math
 from pathlib import Path

@@ -83,7 +83,7 @@ def summary(name: str) -> str:
 
 
 def acts(name: str, kind: type[Generic], ask: str | Unset) -> list[str]:
-    """Return what a case executes: `small` and `full` for the declared motions, or a hook of the bench.
+    """Return the motions that a case executes: `small`, `full`, or a hook of the bench.
 
     Args:
         name: Name of the case.

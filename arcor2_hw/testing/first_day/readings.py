@@ -1,4 +1,4 @@
-"""What a connected device reports, as the person compares it with the display of the device."""
+"""The readings of a connected device, which the person compares with the display of the device."""
 
 import math
 from typing import Any

@@ -247,7 +247,7 @@ class ArmLine:
         raise CommandRefused(template, status, **values)
 
     def stop(self) -> bool:
-        """Stop the arm, whatever else is in progress; return whether the server confirmed standstill in time."""
+        """Stop the arm, also during another request; return whether the server confirmed standstill in time."""
         watch = self._watch
         if watch is None or self.ended is not None:
             return False

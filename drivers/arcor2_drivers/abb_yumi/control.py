@@ -129,7 +129,7 @@ class Control:
                 limited.enter_context(rws.all_until(time.monotonic() + RELEASE_WITHIN))
             self.release()
             if rws is not None and online:
-                rws.logout(RELEASE_WITHIN)  # the controller releases whatever the session has mastership of
+                rws.logout(RELEASE_WITHIN)  # the controller releases all mastership of the session
         if rws is not None:
             rws.close()
         self._rws, self._mastership = None, False

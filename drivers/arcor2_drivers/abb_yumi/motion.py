@@ -291,7 +291,7 @@ class Motion:
                 )
 
     def _cause(self, session: ControlSession, guards: dict[str, StopGuard], error: DeviceError) -> DeviceError:
-        """Stop what still moves, and return the error that says what happened."""
+        """Stop the arms that still move, and return the error that describes the cause."""
         stopped = [self._control.stopped_at[arm] for arm, guard in guards.items() if guard.stopped()]
         for arm in guards:
             if session.ended is None:

@@ -198,7 +198,7 @@ class Observer(StateObserver[Sample]):
 
     @property
     def known_panel(self) -> Panel | None:
-        """Return the latest panel, whatever its age."""
+        """Return the latest panel, even if it is outdated."""
         return self._panel
 
     def note(self, panel: Panel) -> None:

@@ -64,7 +64,9 @@ class YumiSettings(Settings):
     host: str
     rws_port: Annotated[int, Range(1, 65535)] = 80
     user: str = "Default User"
-    password: str = dataclasses.field(default="robotics", repr=False, metadata={"secret": True})  # what ABB delivers
+    password: str = dataclasses.field(
+        default="robotics", repr=False, metadata={"secret": True}
+    )  # the names of the modules that ABB ships
     left_port: Annotated[int, Range(1, 65534)] = 6101
     right_port: Annotated[int, Range(1, 65534)] = 6111
     left_mass: float = dataclasses.field(default=-1.0, metadata={"for_control": True})

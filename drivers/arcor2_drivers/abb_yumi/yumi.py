@@ -181,7 +181,7 @@ class YuMi(Hands, Connected, MultiArmRobot):
     ) -> None:
         """Move the TCP of an arm to a pose in the world, in a line or with all axes together.
 
-        The arm keeps clear of the other one, whatever `safe` is. This driver avoids no other obstacles.
+        The arm keeps clear of the other one, with and without `safe`. This driver avoids no other obstacles.
 
         Raises:
             KinematicsException: The pose cannot be reached.

@@ -146,7 +146,7 @@ class BarcodeReader(LineDevice, Reader):
 
     # -------------------------------------------------------------------------------- commands
     def _reset(self) -> None:
-        """Reset the reader; what it sends before its answer does not belong to a later trigger."""
+        """Reset the reader. Codes that it sends before its answer do not belong to a later trigger."""
         self._ask(lines.RESET, lambda line: line == lines.RESET_DONE)
 
     def _ask(self, command: str, answers: Callable[[str], bool], timeout: float = 0.0) -> str:

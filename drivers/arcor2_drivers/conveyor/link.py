@@ -138,7 +138,7 @@ class CanLink:
             host, port, name = settings.server
             if settings.interface is CanInterface.SOCKETCAND:
                 return SocketcandBus(name, host, port, timeout)
-            # Check that the port is open, because pyserial waits five seconds for it, whatever its timeout.
+            # Check that the port is open, because pyserial waits five seconds for it, independent of its timeout.
             socket.create_connection((host, port), timeout).close()
         if settings.interface is CanInterface.SLCAN:
             return SlcanBus(settings.channel, bitrate=settings.bitrate, sleep_after_open=0.0, timeout=RECEIVE_TIMEOUT)

@@ -199,7 +199,7 @@ class Motion:
             go_on,
         )
 
-    # -------------------------------------------------------------------------------- stands
+    # -------------------------------------------------------------------------------- stopping
     def halt(self) -> None:
         """Stop the belt and wait for standstill. The set-point is discarded, also by the drive."""
         s = self._settings

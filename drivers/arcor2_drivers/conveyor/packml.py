@@ -81,7 +81,7 @@ class Unit:
             self._one_act.release()
 
     def command(self, command: MachineCommand, now: State, go_on: GoOn) -> None:
-        """Do what the command means to a belt; return when that is done. Raises Refused, naming command and state."""
+        """Execute a PackML command on the belt and return when it is done. Raises Refused with command and state."""
         name, state = command.name.lower(), self.state(now)
         values: dict[str, Any] = {"device": self._who, "name": name, "state": state.name.capitalize()}
         acts: dict[MachineCommand, tuple[MachineState, Callable[[], None]]] = {

@@ -13,7 +13,7 @@ from .link import CanLink
 INVALID: Final = 1 << 31
 """Bit of the COB-ID: the PDO does not exist. A mapping may be changed only then."""
 BY_EVENT: Final = 255
-"""Transmission type: when the profile says so, and by the event timer."""
+"""Transmission type: on events of the profile, and by the event timer."""
 
 
 class Tpdo(NamedTuple):

@@ -51,9 +51,9 @@ class SocketcandBus(can.BusABC):
     def _expect(self, wanted: str, deadline: float) -> None:
         while (text := self._next()) is None:
             if not self._receive(deadline - time.monotonic()):
-                raise can.CanTimeoutError(f"{self.channel_info} does not say <{wanted}>")
+                raise can.CanTimeoutError(f"{self.channel_info} did not send <{wanted}>")
         if text.split()[1:-1] != [wanted]:
-            raise can.CanInitializationError(f"{self.channel_info} says {text!r} instead of <{wanted}>")
+            raise can.CanInitializationError(f"{self.channel_info} sent {text!r} instead of <{wanted}>")
 
     def _receive(self, timeout: float) -> bool:
         """Receive bytes within `timeout` s; return whether any came."""
@@ -96,7 +96,7 @@ class SocketcandBus(can.BusABC):
         try:
             self._socket.sendall(convert_can_message_to_ascii_message(msg).encode())
         except TimeoutError as error:
-            raise can.CanTimeoutError(f"{self.channel_info} takes no frame") from error
+            raise can.CanTimeoutError(f"{self.channel_info} accepts no frames") from error
 
     def flush(self) -> None:
         """Discard invalid bytes."""

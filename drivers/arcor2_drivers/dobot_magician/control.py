@@ -80,7 +80,7 @@ class Control:
         self.ours = False
 
     def leave(self) -> None:
-        """Stop arm and belt because we disconnect: nothing in the arm would stop them."""
+        """Stop arm and belt before disconnecting, because the arm itself would not stop them."""
         if self._active:
             self.stops.request()
             with contextlib.suppress(DeviceError):  # it cannot be reached

@@ -55,7 +55,7 @@ class Sender:
         self._thread.start()
 
     def stop(self) -> None:
-        """Tell the thread to end. It ends when its present request has."""
+        """Request the end of the thread, which ends after its present request."""
         self._ending = True
         self._service.close()
         self._wake.set()
@@ -145,7 +145,7 @@ class Sender:
             self._has_retry_after = answer.retry_after > 0.0
             self._service_pause.grow(answer.retry_after)
         elif 400 <= answer.status < 500:
-            log.warning("%s; it is not sent again before the user asks for it", text)
+            log.warning("%s; it is not sent again until the user requests it", text)
             self._outbox.mark_refused(message, answer.text)
             self._service_pause = Pause(self._longest)
         else:

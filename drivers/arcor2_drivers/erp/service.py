@@ -40,7 +40,7 @@ class Answer(NamedTuple):
 
     @property
     def done(self) -> bool:
-        """Return whether the service has done what was requested."""
+        """Return whether the service has executed the request."""
         return self.status in (200, 201)
 
     @property
@@ -123,7 +123,7 @@ class Service:
         self._ended = False
 
     def request(self, method: str, path: str, key: str = "", body: bytes = b"", timeout: float = 0.0) -> Answer:
-        """Send a request and return the answer, whatever its status.
+        """Send a request and return the answer, also one with an error status.
 
         Raises:
             NotConnected: The service cannot be reached.
@@ -212,7 +212,7 @@ class Service:
         return self.read(answer, Status, "GET /status")
 
     def check(self, answer: Answer, what: str) -> None:
-        """Raise Refused or DeviceFault with the text of the service, unless it has done what was requested."""
+        """Raise Refused or DeviceFault with the text of the service, unless it has executed the request."""
         if answer.done:
             return
         if answer.status in UNAUTHORIZED:

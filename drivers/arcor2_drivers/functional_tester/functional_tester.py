@@ -58,7 +58,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         return Health.NORMAL if inputs.mode is UnitMode.PRODUCE else Health.CHECK_FUNCTION
 
     def alarms(self) -> list[Alarm]:
-        """Return the present fault."""
+        """Return the present fault as an alarm, if there is one."""
         inputs = self.current()
         if not inputs.fault_code:
             return []

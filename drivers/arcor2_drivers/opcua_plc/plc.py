@@ -226,7 +226,7 @@ class Plc(PolledControl[Handshake]):
     def require_handshake(self) -> None:
         """Raise Refused for a PLC without a handshake."""
         if not self.handshake_nodes:
-            raise Refused("{device}: the setting handshake is empty, so that control cannot be taken", device=self.who)
+            raise Refused("{device}: the setting handshake is empty, so control cannot be taken", device=self.who)
 
     # -------------------------------------------------------------------------------- jobs
     def is_busy(self, state: Handshake) -> bool:

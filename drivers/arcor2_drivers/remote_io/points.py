@@ -31,7 +31,7 @@ class Point(Data, frozen=True):
         return raw * self.io.scale
 
     def raw(self, value: float) -> int:
-        """Return the raw value of a physical one. Raises ValueError with the range when there is none."""
+        """Return the raw value of a physical value. Raises ValueError with the range if it is outside of it."""
         limit = RAW_MAX * abs(self.io.scale)
         if not (math.isfinite(value) and abs(value) <= limit):
             raise ValueError(f"must be {-limit:g} to {limit:g}")

@@ -78,7 +78,7 @@ class TowerLight(Block, Generic):
             self._forced |= {name}
 
     def release_point(self, name: str, value: bool | float) -> None:
-        """End a force. A lamp shows again what it should, otherwise it gets the state from before."""
+        """End a force. A lamp returns to the shown pattern; without one, to its state from before."""
         with self._showing:
             self._forced -= {name}
             self.switch(name, self._lit.get(name, bool(value)))

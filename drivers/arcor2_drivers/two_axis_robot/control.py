@@ -90,7 +90,7 @@ class Control:
             setup = setups[joint]
             has = {reg.HOMING_OFFSET: setup.homing_offset, reg.CURRENT_LIMIT: setup.current_limit}
             for register, value in reg.wanted_setup(self._settings, joint).items():
-                if has[register] != value:  # the memory wears
+                if has[register] != value:  # each write wears the memory
                     bus.write(number, register, value)
             setups[joint] = reg.decode_setup(bus.again(partial(bus.read, number, reg.EEPROM)))
             self._observer.setups = tuple(setups)

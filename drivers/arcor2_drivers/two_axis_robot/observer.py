@@ -128,7 +128,7 @@ class Observer(StateObserver[State]):
             future.set_exception(e)  # the connection is not affected
         except DeviceError as e:
             future.set_exception(e)
-            raise  # a late answer could be taken for another one
+            raise  # a late answer could be mistaken for another one
         except Exception as e:
             log.exception("%s: a command failed", self.who)
             future.set_exception(e)

@@ -46,7 +46,7 @@ class ControlClient:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            start_new_session=True,  # its own share of a busy computer
+            start_new_session=True,  # its own share of processor time
         )
         self.pid, self.kill = self._process.pid, self._process.kill
         self._listening = threading.Thread(target=self._listen, name=f"control answers {who}", daemon=True)

@@ -3,7 +3,7 @@
 `session.py` runs this script in a separate process for two reasons. First, a busy cell host must not stop the arm:
 watchdog signals and the deadline of a jog must not depend on the host's interpreter. Second, a process can be killed.
 When the connection of ur_rtde 1.6.5 breaks, it reconnects and sends its program again without the watchdog, which stops
-whatever plays on the controller by then. It sometimes crashes, and its constructors and destructors hold the
+any program that the controller runs by then. It sometimes crashes, and its constructors and destructors hold the
 interpreter.
 
 Standard input has one request per line, `{"n": 1, "do": "moveL", "args": [...]}`, and the host's pulses. Standard

@@ -109,7 +109,7 @@ class Observer:
         self.observing = Observing(device_at(name, self.address), self._open, self._watch, self._close)
 
     def newest(self) -> Sample | None:
-        """Return the latest sample, whatever its age; None before the first."""
+        """Return the latest sample, even if it is outdated; None before the first."""
         return self._newest
 
     def sample(self, max_age: float = FRESH) -> Sample:

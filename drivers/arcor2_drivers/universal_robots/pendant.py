@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 
 class Pendant:
-    """What an operator sets at the teach pendant, and the commands that otherwise are given there."""
+    """Settings of the operator at the teach pendant, and commands that replace its buttons."""
 
     def __init__(self, name: str, host: str) -> None:
         self.name = name
@@ -82,7 +82,7 @@ class Pendant:
         return Identity("Universal Robots", model, serial, software or firmware)
 
     def do(self, command: str, expected: str) -> None:
-        """Give a command. Raise Refused without a dashboard server, NotInControl in local control."""
+        """Send a command. Raise Refused without a dashboard server, NotInControl in local control."""
         if not self.available:
             raise Refused(
                 "{name} has no dashboard server. Use the pendant for {command!r}.", name=self.name, command=command

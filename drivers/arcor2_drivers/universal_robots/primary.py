@@ -43,7 +43,7 @@ def parts(buffer: bytes) -> tuple[list[tuple[int, bytes]], bytes]:
     while len(buffer) - at >= _HEADER.size:
         size, kind = _HEADER.unpack_from(buffer, at)
         if not _HEADER.size <= size <= MAX_MESSAGE:
-            raise ValueError(f"a message of {size} bytes")
+            raise ValueError(f"invalid message length: {size} bytes")
         if len(buffer) - at < size:
             break
         found.append((kind, buffer[at + _HEADER.size : at + size]))
@@ -57,11 +57,11 @@ def calibration_in(message: bytes) -> KinematicCalibration | None:
     for kind, content in packages:
         if kind == _KINEMATICS:
             if len(content) < _LAYOUT.size:
-                raise ValueError(f"kinematics of {len(content)} bytes")
+                raise ValueError(f"invalid length of the kinematics: {len(content)} bytes")
             numbers = _LAYOUT.unpack_from(content)
             theta, a, d, alpha = (numbers[at : at + 6] for at in (6, 12, 18, 24))
             if not all(math.isfinite(value) and abs(value) < _LONGEST for value in numbers[6:30]):
-                raise ValueError("kinematics with impossible numbers")
+                raise ValueError("the kinematics contain impossible numbers")
             joints = [DhParameters(*row) for row in zip(theta, d, a, alpha, strict=True)]
             return KinematicCalibration(joints, "-".join(f"{checksum:08x}" for checksum in numbers[:6]))
     return None

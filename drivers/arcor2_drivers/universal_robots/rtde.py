@@ -46,7 +46,7 @@ def frames(buffer: bytes) -> tuple[list[tuple[int, bytes]], bytes]:
     while end - at >= _HEADER.size:
         size, kind = _HEADER.unpack_from(buffer, at)
         if not _HEADER.size <= size <= MAX_FRAME:
-            raise ValueError(f"a frame of {size} bytes")
+            raise ValueError(f"invalid frame length: {size} bytes")
         if end - at < size:
             break
         found.append((kind, buffer[at + _HEADER.size : at + size]))
@@ -65,13 +65,13 @@ def recipe(names: list[str], payload: bytes) -> tuple[int, struct.Struct]:
         ValueError: The answer is garbage.
     """
     if not payload:
-        raise ValueError("an empty recipe")
+        raise ValueError("the recipe is empty")
     types = payload[1:].decode("ascii", "replace").rstrip(",").split(",")
     missing = [name for name, kind in zip(names, types, strict=False) if kind == "NOT_FOUND"]
     if missing:
         raise DeviceFault("The controller does not have {missing}.", ", ".join(types), missing=", ".join(missing))
     if len(types) != len(names) or not set(types) <= _FORMATS.keys():
-        raise ValueError(f"a recipe of {', '.join(types)}")
+        raise ValueError(f"unexpected types in the recipe: {', '.join(types)}")
     return payload[0], struct.Struct(">" + "".join(_FORMATS[kind] for kind in types))
 
 
@@ -152,7 +152,7 @@ class RtdeStream:
                     self._buffer = b"".join(later) + rest
                     return answer
                 if received not in (_TEXT, _DATA):
-                    raise ValueError(f"a frame of type {received} instead of {kind}")
+                    raise ValueError(f"received a frame of type {received} instead of {kind}")
             self._socket.settimeout(max(deadline - time.monotonic(), 0.001))
             data = self._socket.recv(MAX_FRAME)
             if not data:

@@ -373,7 +373,7 @@ class ControlSession:
         self._last_stop()
 
     def program_gone(self) -> DeviceError:
-        """Return why our program is not playing, after the control process had time to report a reason of its own."""
+        """Return why our program is not playing. Wait first for a reason that the control process may report."""
         assert self._process is not None
         response = self._process.request("was_late", ())
         if not once_within(self._ending.is_set, timing.PROCESS_ENDS, timing.GUARD_PERIOD) and not response.done():

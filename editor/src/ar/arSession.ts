@@ -59,7 +59,7 @@ export interface CameraOptions {
   /** The known focal length of a camera by its name; null if it is not known. */
   stored: (camera: string) => FocalLength | null;
   store: (camera: string, focal: FocalLength | null) => void;
-  /** What was placed by hand with a camera. */
+  /** Return the placement made by hand with a camera. */
   placement: (camera: string) => Placement;
   storePlacement: (camera: string, placement: Placement) => void;
   report: (state: Partial<Ar>) => void;

@@ -196,7 +196,7 @@ export class Headset {
     }
   }
 
-  /** Continue what is pressed: move an item, or collect positions of the tip. */
+  /** Continue the pressed operations: move an item, or collect positions of the tip. */
   private hold(): void {
     const { press } = this;
     if (!press) return;
@@ -228,7 +228,7 @@ export class Headset {
     this.press = null;
   }
 
-  /** A controller or hand is no longer tracked: end what it does, and every motion. */
+  /** Handle a controller or hand that is no longer tracked: end its operations, and every motion. */
   private lose(source: XRInputSource): void {
     const ray = this.rays.get(source);
     ray?.removeFromParent();

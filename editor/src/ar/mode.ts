@@ -1,4 +1,4 @@
-/** What the user interface needs of a running AR view, whichever way it knows where the camera is. */
+/** Interface of a running AR view for the user interface, independent of how the camera is located. */
 
 import type { Ar } from "../store/ui";
 import type { Point } from "./geometry";
@@ -7,7 +7,7 @@ import type { Direction } from "./placing";
 import type { Lens, View } from "./pose";
 import type { Found } from "./tracker";
 
-/** What is shown: for the outlines of the markers, and for tests. */
+/** The shown state, for the outlines of the markers and for tests. */
 export interface Shown {
   found: Found;
   view: View | null;
@@ -23,7 +23,7 @@ export interface ArMode {
   readonly mode: Ar["mode"];
   /** The configured markers. */
   readonly places: Layout["places"];
-  /** What is shown; null before the first picture. */
+  /** The shown state; null before the first picture. */
   readonly shown: Shown | null;
   /** Called after each picture. */
   onPicture: () => void;

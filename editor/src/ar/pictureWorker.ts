@@ -1,4 +1,4 @@
-/** What the workers of AR have in common: they read pictures and report what they show. */
+/** Common part of the AR workers, which analyse pictures and report the markers in them. */
 
 import type { Pixels } from "./cameraPixels";
 import type { Lens } from "./pose";

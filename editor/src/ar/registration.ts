@@ -47,7 +47,7 @@ export const FAIR = 0.012;
 /** Jump after which the overlay was visibly wrong, m. */
 export const JUMP = 0.01;
 
-/** What is known before a picture. */
+/** The known state before a picture is analysed. */
 export interface Knowledge {
   /** Standard deviation of the focal length, relative, and whether the focal length counts as known. */
   deviation: number;

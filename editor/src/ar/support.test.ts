@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { codesOf } from "./codes";
 import { layoutOf } from "./places";
-import { abilitiesOf, obstacleOf, obstacleOfError, waysOf } from "./support";
+import { abilitiesOf, methodsOf, obstacleOf, obstacleOfError } from "./support";
 
 const ABLE = { secure: true, camera: true, workers: true };
 const pose = { position: { x: 1, y: 2, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } };
@@ -46,9 +46,9 @@ test("WebXR is used where the device has it, and the picture of the camera other
       createImageBitmap: () => {},
     }) as unknown as typeof globalThis;
   const supports = { isSessionSupported: async (mode: string) => mode === "immersive-ar" };
-  expect(await waysOf(scope())).toEqual(["camera"]);
-  expect(await waysOf(scope(supports))).toEqual(["xr", "camera"]);
-  expect(await waysOf(scope(supports, false))).toEqual(["xr"]);
-  expect(await waysOf(scope({ isSessionSupported: () => Promise.reject(new Error()) }))).toEqual(["camera"]);
-  expect(await waysOf({ ...scope(supports), isSecureContext: false })).toEqual([]);
+  expect(await methodsOf(scope())).toEqual(["camera"]);
+  expect(await methodsOf(scope(supports))).toEqual(["xr", "camera"]);
+  expect(await methodsOf(scope(supports, false))).toEqual(["xr"]);
+  expect(await methodsOf(scope({ isSessionSupported: () => Promise.reject(new Error()) }))).toEqual(["camera"]);
+  expect(await methodsOf({ ...scope(supports), isSecureContext: false })).toEqual([]);
 });

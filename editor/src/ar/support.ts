@@ -43,13 +43,13 @@ export function abilitiesOf(scope: typeof globalThis): Abilities {
 }
 
 /**
- * The ways in which AR can know where the device is. `xr`: the device tracks itself (WebXR on Android and headsets);
+ * The methods by which AR locates the device. `xr`: the device tracks itself (WebXR on Android and headsets);
  * `camera`: markers in pictures of the camera.
  */
-export type Way = "xr" | "camera";
+export type ArMethod = "xr" | "camera";
 
-/** Return the ways of this device, the better one first; none if AR cannot start. */
-export async function waysOf(scope: typeof globalThis): Promise<Way[]> {
+/** Return the methods of this device, the better one first; none if AR cannot start. */
+export async function methodsOf(scope: typeof globalThis): Promise<ArMethod[]> {
   const able = abilitiesOf(scope);
   if (!able.secure) return [];
   const xr = await scope.navigator?.xr?.isSessionSupported("immersive-ar").catch(() => false);

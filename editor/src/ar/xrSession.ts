@@ -230,7 +230,7 @@ export class XrArSession implements ArMode {
     this.options.report({ ...found, checked: true, seenAt: Date.now() });
   }
 
-  /** Another view covers the session: the user can reach nothing of it. */
+  /** Handle that another view covers the session, so that the user cannot operate it. */
   private hide(): void {
     this.options.release();
     this.headset?.hide();

@@ -74,7 +74,7 @@ export interface Eye {
 /** Draws into the framebuffer of an XR session. */
 export class XrOutput {
   private target: WebGLRenderTarget | null = null;
-  /** Dims what was drawn before. */
+  /** Dims the picture behind it. */
   private readonly veil = new Mesh(
     new PlaneGeometry(2, 2),
     new MeshBasicMaterial({

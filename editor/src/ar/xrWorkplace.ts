@@ -1,4 +1,4 @@
-/** Where the workplace is in an XR session: as it was registered, held by an anchor meanwhile. */
+/** The pose of the workplace in an XR session: as registered, kept by an anchor between registrations. */
 
 import { Matrix4, Quaternion, Vector3 } from "three";
 import type { Vec3 } from "./geometry";
@@ -111,7 +111,7 @@ export class XrWorkplace {
     else this.wantsAnchor = true;
   }
 
-  /** Let the device hold the place of the workplace where it can. */
+  /** Create an anchor, with which the device tracks the workplace, if it supports anchors. */
   private createAnchor(frame: XRFrame, space: XRReferenceSpace): void {
     this.wantsAnchor = false;
     const { pose } = this;

@@ -40,8 +40,8 @@ vi.mock("../ar/xrSession", () => ({
 }));
 const { leaveAr, programEnded, startAr, startHere } = await import("./ar");
 
-async function started(way: "camera" | "xr" = "camera"): Promise<Options> {
-  await startAr({ places: new Map() } as never, way, () => {});
+async function started(method: "camera" | "xr" = "camera"): Promise<Options> {
+  await startAr({ places: new Map() } as never, method, () => {});
   endHolds.mockClear();
   return sessions.at(-1) as Options;
 }

@@ -5,7 +5,7 @@ import type { Grab } from "../ar/headset";
 import type { ArMode } from "../ar/mode";
 import { askForMotion } from "../ar/motionSensor";
 import { type Layout, layoutOf, type MarkerTable } from "../ar/places";
-import { ArProblem, type Obstacle, obstacleOfError, type Way } from "../ar/support";
+import { type ArMethod, ArProblem, type Obstacle, obstacleOfError } from "../ar/support";
 import type { XrArSession } from "../ar/xrSession";
 import type { Engine } from "../engine/engine";
 import { theEngine } from "../session/engine";
@@ -44,7 +44,7 @@ export async function loadMarkers(): Promise<Layout> {
  *
  * @param onEnd called with the obstacle if AR ends later without our doing.
  */
-export async function startAr(layout: Layout, way: Way, onEnd: (obstacle: Obstacle) => void): Promise<void> {
+export async function startAr(layout: Layout, method: ArMethod, onEnd: (obstacle: Obstacle) => void): Promise<void> {
   leaveAr();
   const engine = theEngine();
   const ended = () => {
@@ -52,31 +52,31 @@ export async function startAr(layout: Layout, way: Way, onEnd: (obstacle: Obstac
     leaveAr();
     onEnd("ended");
   };
-  const mode = way === "xr" ? await xrMode(layout, engine, ended) : await cameraMode(layout, engine, ended);
+  const mode = method === "xr" ? await xrMode(layout, engine, ended) : await cameraMode(layout, engine, ended);
   if (!mode) return;
   use(mode);
   setUi({ ar: initialAr(mode.mode, layout.places.size) });
   await mode.start().catch(() => {
     leaveAr();
-    throw new ArProblem(way === "xr" ? "session" : "busy");
+    throw new ArProblem(method === "xr" ? "session" : "busy");
   });
 }
 
 async function cameraMode(layout: Layout, engine: Engine | null, ended: () => void): Promise<ArMode | null> {
   await askForMotion();
-  const { openCameraAr } = await loadWay("camera");
+  const { openCameraAr } = await loadMethod("camera");
   return openCameraAr({ layout, report, ended }, engine);
 }
 
 const LOADS = { xr: () => import("../ar/xrSession"), camera: () => import("./cameraAr") };
 
-/** Load what a way of AR needs; before the tap that starts it, since browsers ask for the camera only then. */
-export const loadWay = <W extends Way>(way: W): ReturnType<(typeof LOADS)[W]> =>
-  LOADS[way]() as ReturnType<(typeof LOADS)[W]>;
+/** Load the code of an AR mode before the tap that starts it, because browsers ask for the camera only during a tap. */
+export const loadMethod = <M extends ArMethod>(method: M): ReturnType<(typeof LOADS)[M]> =>
+  LOADS[method]() as ReturnType<(typeof LOADS)[M]>;
 
 async function xrMode(layout: Layout, engine: Engine | null, ended: () => void): Promise<ArMode | null> {
   if (!engine) return null;
-  const { hasOverlay, requestXr, XrArSession } = await loadWay("xr");
+  const { hasOverlay, requestXr, XrArSession } = await loadMethod("xr");
   const session = await requestXr().catch((error: unknown) => {
     throw new ArProblem(obstacleOfError(error) === "refused" ? "refused" : "session");
   });
@@ -107,7 +107,7 @@ function stopOutOfReach(): void {
   void stopMotion();
 }
 
-/** Start or continue the program from a headset; it runs only while a button stops it. */
+/** Start or continue the program from a headset; it runs only while a controller with a stop button is connected. */
 export async function startHere(start: () => Promise<unknown>): Promise<void> {
   const { runtime } = now();
   const program = { lost: false };

@@ -10,7 +10,7 @@ import type { State } from "../store/state";
 import { now, store } from "../store/store";
 import { ask, sentence } from "./requests";
 
-/** What a run or dry run says about time. */
+/** The cycle time, bottleneck and waits of a run or dry run. */
 export interface Timing {
   /** `dry` and a number, or `run` and a number. */
   key: string;

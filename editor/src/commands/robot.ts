@@ -94,7 +94,7 @@ export interface Step {
   pose?: Pose | undefined;
 }
 
-/** Return why it was refused, or an empty string. */
+/** Return the reason if the step was refused, else an empty string. */
 export function stepEffector(
   { robotId, armId, effector }: Chosen,
   { pose, ...step }: Step,

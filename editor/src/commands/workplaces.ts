@@ -4,7 +4,7 @@ import { theSession } from "../session/session";
 import { now } from "../store/store";
 import { ask } from "./requests";
 
-/** Give up what this device controls here, and show the page with all cells. */
+/** Release the locks and motions of this device, and show the page with all cells. */
 export async function showWorkplaces(address: string): Promise<void> {
   if (now().connection.shared) await ask("LogOff");
   await theSession().giveUp();

@@ -18,9 +18,9 @@ const DIRECTIONS: Record<Side, [Vector3, Vector3]> = {
 };
 /** Distance of the camera, m: so far away that the picture has hardly any perspective. */
 const AWAY = 20;
-/** What is nearer to the camera or farther from it than this relative to the middle is not drawn, m. */
+/** Depth around the middle of the view that is drawn, in both directions, m. */
 const DEPTH = 5;
-/** What is shown around an item, m, and relative to its size. */
+/** Margin around an item, m, and relative to its size. */
 const AROUND = 0.12;
 const PART = 0.75;
 

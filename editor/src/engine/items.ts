@@ -29,7 +29,7 @@ export interface ObjectItem extends Base {
   pose: Pose;
   shape: Shape;
   fault: boolean;
-  /** What the device reports of what one can see, by name; undefined while it is unknown. */
+  /** Visible state that the device reports, such as an open door, by name; undefined while it is unknown. */
   values?: Readonly<Record<string, number>> | undefined;
   /** Places on it at which sensors detect parts, in its frame. */
   parts?: readonly DetectedPart[] | undefined;
@@ -77,7 +77,7 @@ export interface PointItem extends Base {
   breakpoint: boolean;
 }
 
-/** Empty: unknown, or nothing has to be reached. */
+/** Reachability of a point; empty if it is unknown or not needed. */
 export type ReachShown = "" | "reachable" | "near_limit" | "in_collision" | "out_of_reach" | "unknown";
 
 export interface OrientationItem extends Base {

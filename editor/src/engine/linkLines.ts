@@ -1,4 +1,4 @@
-/** The lines of all connections, drawn in one call by what is loaded with the first line. */
+/** The lines of all connections, drawn in one call. Loaded with the first line. */
 
 import type { Color, Scene } from "three";
 import { persistently } from "../persistently";

@@ -1,4 +1,4 @@
-/** The page with all cells: who needs somebody first. A tap opens the operator's screen of a cell on its own server. */
+/** The page with all cells; those that need attention come first. A tap opens the operator's screen of a cell. */
 
 import { i18n } from "@lingui/core";
 import { plural, t } from "@lingui/core/macro";

@@ -36,7 +36,7 @@ function card(name: string, state: Partial<FleetState> = {}, more: Partial<Fleet
   return { id: `${name}:a`, name, alive: true, conflict: false, seen, state: { ...STATE, ...state }, ...more };
 }
 
-describe("who needs somebody", () => {
+describe("cells that need attention", () => {
   it.each([
     ["running", card("a")],
     ["running", card("a", { low: 3 })],

@@ -1,4 +1,4 @@
-/** Which cells need somebody, and why. */
+/** Which cells need attention, and why. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
@@ -9,12 +9,12 @@ import type { FleetCard, FleetState } from "../protocol/types";
 import { STATES } from "../ui/cell/words";
 import type { IconName } from "../ui/kit/icons";
 
-/** How urgently a cell needs somebody, most urgently first. */
+/** How urgently a cell needs attention, most urgently first. */
 export const LEVELS = ["need", "watch", "running", "ready", "gone"] as const;
 export type Level = (typeof LEVELS)[number];
 
 export const TITLES: Record<Level, MessageDescriptor> = {
-  need: msg`Needs somebody`,
+  need: msg`Needs attention`,
   watch: msg`To check`,
   running: msg`Running`,
   ready: msg`Ready`,
@@ -50,7 +50,7 @@ export function stateText({ alive, conflict, seen, state }: FleetCard): string {
   return i18n._(STATES[state.state]);
 }
 
-/** Return why a cell needs somebody; an empty string if it does not. */
+/** Return why a cell needs attention; an empty string if it does not. */
 export function reasonOf({ alive, conflict, seen, state }: FleetCard): string {
   if (conflict && !alive) return t`No signal since ${clock(seen)}`;
   if (conflict) return t`Its state may be that of another cell. Give each cell a name of its own.`;

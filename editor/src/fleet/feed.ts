@@ -4,7 +4,7 @@ import type { FleetCard, FleetUpdate } from "../protocol/types";
 
 /** Close code of the server for a missing or invalid token. */
 const NOT_ADMITTED = 4401;
-/** Time without a message after which nothing that is shown is up to date, ms. The server sends one each second. */
+/** Time without a message after which the shown cells are outdated, ms. The server sends a message each second. */
 const SILENCE = 1900;
 /** Pause before the next attempt to connect, ms. */
 const RETRY = 1000;

@@ -1,10 +1,10 @@
-/** The ways that a program can take, for a dry run. */
+/** The branches that a program can take, for a dry run. */
 
 import { expect, test } from "vitest";
 import { branchings, existing } from "./branchings";
 import { program, TYPES } from "./testing";
 
-test("branching actions state their ways; a removed way is not chosen any more", () => {
+test("branching actions state their branches; a removed branch is not chosen any more", () => {
   const doc = program({ a: "ask", b: "act", c: "act" }, [
     ["START", "a"],
     ["a", "b", "true"],
@@ -16,7 +16,7 @@ test("branching actions state their ways; a removed way is not chosen any more",
     {
       id: "a",
       name: "a",
-      ways: [
+      branches: [
         { to: "b", when: "yes" },
         { to: "END", when: "no" },
       ],

@@ -1,4 +1,4 @@
-/** Actions at which a program can take one of several ways, and the words for each way. Pure functions. */
+/** Actions at which a program branches, and the texts for each branch. Pure functions. */
 
 import { inScope } from "../store/scope";
 import type { OpenDocument, State } from "../store/state";
@@ -9,7 +9,7 @@ export interface Branching {
   id: string;
   name: string;
   /** The next action or END, and the condition in words. */
-  ways: { to: string; when: string }[];
+  branches: { to: string; when: string }[];
 }
 
 /** Return the actions of the program and its called functions that have several next actions. */
@@ -20,21 +20,24 @@ export function branchings(doc: OpenDocument, types: State["types"]): Branching[
     .filter(({ path: [id] }) => id === undefined || called.has(id))
     .flatMap((body) =>
       Object.values(body.actions).map(({ id, name }) => {
-        const ways = nextSteps(body, id).map((step) => ({
+        const branches = nextSteps(body, id).map((step) => ({
           to: placeOf(step.end),
           when: conditionWords(body, types, step),
         }));
-        return { id, name, ways: ways.filter(({ to }, n) => ways.findIndex((each) => each.to === to) === n) };
+        const first = (to: string) => branches.findIndex((each) => each.to === to);
+        return { id, name, branches: branches.filter(({ to }, n) => first(to) === n) };
       }),
     )
-    .filter(({ ways }) => ways.length > 1);
+    .filter(({ branches }) => branches.length > 1);
 }
 
-/** Return the chosen ways that still exist. */
+/** Return the chosen branches that still exist. */
 export function existing(
   found: readonly Branching[],
   chosen: Readonly<Record<string, string>>,
 ): Record<string, string> {
-  const ways = found.flatMap(({ id, ways }) => ways.filter(({ to }) => chosen[id] === to).map(({ to }) => [id, to]));
-  return Object.fromEntries(ways);
+  const kept = found.flatMap(({ id, branches }) =>
+    branches.filter(({ to }) => chosen[id] === to).map(({ to }) => [id, to]),
+  );
+  return Object.fromEntries(kept);
 }

@@ -1696,7 +1696,7 @@ export interface ListRunsData {
   runs: Run[];
 }
 
-/** Answer to ListScenes. `problem_messages`: the problems with what is needed to translate them, if requested. */
+/** Answer to ListScenes. `problem_messages`: the problems with keys and values for translation, if requested. */
 export interface ListScenesData {
   id: string;
   name: string;
@@ -2065,7 +2065,7 @@ export type NodeState = "connected" | "silent" | "other_version";
  *     version: Version of its installation; empty if it has never announced itself.
  *     computer: Name of the computer.
  *     since: When its service started. Omitted, as all that follows, if it has never announced itself.
- *     seen: When it was last heard, for a silent node.
+ *     seen: Time of its last announcement, for a silent node.
  *     load: Average load of the last minute, per processor core: 1 for as many running tasks as cores.
  *     free: Free space of its disk, bytes.
  *     sessions: What runs on it.
@@ -2249,7 +2249,7 @@ export interface ObjectTypeMeta {
 }
 
 /**
- * Data of the event ObjectValues: what one can see of a device, for displays. Missing values are unknown.
+ * Data of the event ObjectValues: visible state of a device, such as an open door, for displays. Missing values are unknown.
  *
  * values: by name, in SI units, such as the width of a gripper; 1 for on. parts: carried by a robot.
  */

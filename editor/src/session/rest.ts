@@ -5,7 +5,7 @@ import { type ServerMessage, translate } from "../i18n/serverMessages";
 import { now } from "../store/store";
 import { remembered } from "./localStorage";
 
-/** Time limits, s: of requests, and of files, which have to be prepared and transferred. */
+/** Time limit of a request, and of one that transfers a file, s. */
 const DEADLINE = 30;
 export const FILE_DEADLINE = 600;
 

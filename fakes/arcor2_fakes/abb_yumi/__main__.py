@@ -36,7 +36,7 @@ def register_commands(fake: Fake, controller: Controller, http: HttpPort) -> Non
 
     def part(arm: str, on: bool = True, width: float = PART_WIDTH) -> None:
         if not 0.0 < width <= HAND_STROKE:
-            raise ValueError(f"width is up to {HAND_STROKE:g} m")
+            raise ValueError(f"width must be up to {HAND_STROKE:g} m")
         controller.arms[arm_of(arm)].hand.part = width if on else 0.0
 
     def speed_ratio(percent: int) -> None:

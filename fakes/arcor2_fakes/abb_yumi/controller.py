@@ -131,9 +131,9 @@ class Controller:
 
     # -------------------------------------------------------------------------------- commands of tests
     def set_control_state(self, state: str) -> None:
-        """Set the control state, such as that of an emergency stop and its release."""
+        """Set the control state, such as emergency stop or emergency stop reset."""
         if state not in CONTROL_STATES:
-            raise ValueError(f"state is one of {', '.join(CONTROL_STATES)}")
+            raise ValueError(f"state must be one of {', '.join(CONTROL_STATES)}")
         if state == "motoron":
             self.control_state = state
             return
@@ -143,7 +143,7 @@ class Controller:
     def set_operation_mode(self, mode: str) -> None:
         """Turn the key; RAPID stops and the motors switch off, as with a real key."""
         if mode not in OPERATION_MODES:
-            raise ValueError(f"mode is one of {', '.join(OPERATION_MODES)}")
+            raise ValueError(f"mode must be one of {', '.join(OPERATION_MODES)}")
         if mode != self.operation_mode:
             self.operation_mode = mode
             if self.control_state == "motoron":

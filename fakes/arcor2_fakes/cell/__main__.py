@@ -63,7 +63,7 @@ class Cell:
         async def renew(boards: int, seed: int) -> None:
             """Replace all boards, and end the simulated faults of sensors."""
             if not 0 <= boards <= MAX_BOARDS:
-                raise ValueError(f"boards is 0 to {MAX_BOARDS}")
+                raise ValueError(f"boards must be 0 to {MAX_BOARDS}")
             drawn = draw_boards(boards, seed)
             async with self._lock:
                 if (refused := await self.world.clear_tester()) is not None:

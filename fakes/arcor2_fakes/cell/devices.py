@@ -153,7 +153,7 @@ class RobotFeed:
 
 
 class _Truth(msgspec.Struct):
-    """The state of a fake, as far as the world uses it; each fake sends some of the fields."""
+    """The fields of the state of a fake that the world uses; each fake sends some of them."""
 
     belt: float = 0.0
     angles: dict[str, float] = {}

@@ -46,7 +46,7 @@ def register_commands(fake: Fake, arm: Arm, commands: Commands) -> None:
 
     def pace(factor: float) -> None:
         if not 0.0 < factor <= 100.0:
-            raise ValueError("factor is above 0, to 100")
+            raise ValueError("factor must be above 0 and at most 100")
         arm.pace = float(factor)
 
     fake.commands(

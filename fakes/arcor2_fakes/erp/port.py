@@ -74,7 +74,7 @@ class Port:
     def fail(self, status: int, count: int = 1, retry_after: float = 0.0, path: str = "", done: bool = False) -> None:
         """Answer the next `count` requests (-1: all) of a path (empty: all) with a status; `done`: execute them."""
         if status not in REASONS:
-            raise ValueError(f"status is one of {', '.join(map(str, REASONS))}")
+            raise ValueError(f"status must be one of {', '.join(map(str, REASONS))}")
         self._failing, self._failures = (int(status), float(retry_after), path, bool(done)), int(count)
 
     def heal(self) -> None:
@@ -85,7 +85,7 @@ class Port:
     def power_cycle(self, seconds: float = 1.0) -> None:
         """Switch off for `seconds`: connections are reset and the port is closed; stored data survive."""
         if not 0.0 <= seconds <= LONGEST_OFF:
-            raise ValueError(f"seconds is 0 to {LONGEST_OFF:g}")
+            raise ValueError(f"seconds must be 0 to {LONGEST_OFF:g}")
         self.wire.refuse()
         self.wire.reset()
         self.heal()

@@ -170,7 +170,7 @@ class Camera:
                 color, depth = await asyncio.to_thread(self._render, self.scene, variant, bright, self.covered)
                 self._send(last, color, b"" if self.depth_off else depth)
             except ValueError as e:  # an invalid mesh or marker
-                log.error("the scene cannot be seen: %s", e)
+                log.error("the scene cannot be rendered: %s", e)
                 await asyncio.sleep(0.5)
             if time.monotonic() - self._told_status > STATUS_PERIOD:
                 self.send_status()

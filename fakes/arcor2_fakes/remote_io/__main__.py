@@ -40,13 +40,13 @@ def register_commands(fake: Fake, block: Block) -> None:
         """Switch several inputs at the same time, as {"3": true}."""
         wanted = {int(number): bool(on) for number, on in inputs.items()}
         if not wanted.keys() <= set(range(DIGITAL)):
-            raise ValueError(f"numbers are 0 to {DIGITAL - 1}")
+            raise ValueError(f"the numbers must be 0 to {DIGITAL - 1}")
         for number, on in wanted.items():
             block.inputs[number] = on
 
     def set_analog(number: int, raw: int) -> None:
         if number not in range(ANALOG_IN) or not -32768 <= raw <= 32767:
-            raise ValueError(f"number is 0 to {ANALOG_IN - 1}, raw is a signed 16-bit number")
+            raise ValueError(f"number must be 0 to {ANALOG_IN - 1}, raw must be a signed 16-bit number")
         block.analog_inputs[number] = raw
 
     def diagnosis(supply_missing: bool = False, overload: bool = False) -> None:

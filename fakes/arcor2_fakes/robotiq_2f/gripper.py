@@ -56,7 +56,7 @@ class Pace:
     def set(self, factor: float) -> None:
         """Set the speed; 1 is real time. Raise `ValueError`."""
         if not 0.01 <= factor <= 1000.0:
-            raise ValueError("factor is 0.01 to 1000")
+            raise ValueError("factor must be 0.01 to 1000")
         self._now, self._since, self._factor = self(), self._clock(), factor
 
 
@@ -110,7 +110,9 @@ class Gripper:
         """Put a part between the fingers. Raise `ValueError` if it does not fit."""
         self.advance()
         if not 0.0 < width <= self.mechanics.width(self._position) + 1e-9:
-            raise ValueError(f"width is above 0 and up to {self.mechanics.width(self._position):.4f} m, the opening")
+            raise ValueError(
+                f"width must be above 0 and up to {self.mechanics.width(self._position):.4f} m, the opening"
+            )
         self._part = width
 
     def remove_part(self) -> None:
@@ -131,7 +133,7 @@ class Gripper:
         """Raise a fault; 0 clears a minor one. Faults from 10 on are cleared only by a reset (ACT 0)."""
         self.advance()
         if code not in FAULTS:
-            raise ValueError(f"code is one of {', '.join(map(str, sorted(FAULTS)))}")
+            raise ValueError(f"code must be one of {', '.join(map(str, sorted(FAULTS)))}")
         self._fault = code
         if code >= FIRST_MAJOR:
             self._legs = []

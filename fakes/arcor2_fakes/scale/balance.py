@@ -244,7 +244,7 @@ class Balance:
     def _measured(self, word: str, argument: str = "") -> str:
         stable, gross = self.stable, self.shown()
         if word in _WHEN_STABLE and not stable:
-            return f"{'S' if word == 'SR' else word} I"  # not stable in time
+            return f"{'S' if word == 'SR' else word} I"  # did not become stable in time
         mark = "S" if stable else "D"
         if word in _WEIGHINGS:
             net = gross - self.zero - self.tare
@@ -330,7 +330,7 @@ class Balance:
     def press(self, key: str) -> None:
         """Press a key. Raises ValueError."""
         if key not in KEYS:
-            raise ValueError(f"key is one of {', '.join(KEYS)}")
+            raise ValueError(f"key must be one of {', '.join(KEYS)}")
         code = KEYS[key]
         if self.keys == KEYS_REPORT:
             self._answer(f"K C {code}")

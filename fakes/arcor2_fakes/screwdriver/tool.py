@@ -129,7 +129,7 @@ class Tool:
     def plan(self, torque: float, angle: int) -> None:
         """Set torque (N m) and angle (degrees) of a later tightening, in order."""
         if not (0.0 <= torque <= _HIGHEST_TORQUE and 0 <= angle <= _HIGHEST_ANGLE):
-            raise ValueError(f"torque is 0 to {_HIGHEST_TORQUE}, angle 0 to {_HIGHEST_ANGLE}")
+            raise ValueError(f"torque must be 0 to {_HIGHEST_TORQUE}, angle 0 to {_HIGHEST_ANGLE}")
         self.planned.append((torque, angle))
 
     def raise_alarm(self, alarm: Alarm) -> None:

@@ -91,7 +91,7 @@ async def main(
         firmware: Version of the firmware of the servos.
     """
     if len(set(ids)) != len(ids) or not all(0 <= number <= 252 for number in ids):
-        raise ValueError("ids are 0 to 252, each once")
+        raise ValueError("ids must be 0 to 252, each once")
 
     own = OwnTime()
 

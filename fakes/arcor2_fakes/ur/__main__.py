@@ -61,7 +61,7 @@ class _Cycles:
     def tick(self, periods: int) -> None:
         """Run the cycles of the periods that have passed."""
         if periods > _MOST_AT_ONCE:
-            log.warning("held up for %.2f s", periods * self._controller.period)
+            log.warning("stalled for %.2f s", periods * self._controller.period)
         busy, self._owed = self._owed > 0, min(self._owed + periods, _MOST_AT_ONCE)
         if not busy:
             self._catch_up()

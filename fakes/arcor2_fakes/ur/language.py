@@ -90,7 +90,7 @@ def _conditional(kind: str, condition: str, lines: Iterator[str]) -> Statement:
     if kind != "while" and end.startswith("elif"):
         further = _BLOCK.fullmatch(end)
         if further is None:
-            raise ValueError(f"not understood: {end}")
+            raise ValueError(f"cannot parse: {end}")
         made.other = [_conditional("elif", further[4], lines)]
     elif kind != "while" and end.startswith("else"):
         made.other = _closed(*_block(lines))
@@ -115,7 +115,7 @@ def _expression(text: str) -> ast.expr:
     try:
         return ast.parse(text.strip(), mode="eval").body
     except SyntaxError:
-        raise ValueError(f"not understood: {text.strip()}") from None
+        raise ValueError(f"cannot parse: {text.strip()}") from None
 
 
 class _AtOnce(Interpreter):
@@ -261,7 +261,7 @@ class WrittenProgram(Program):
                 return _OPERATORS[type(op)](self.value(node.left), self.value(right))
             case ast.Call(func=ast.Name(id=name)) if name in self._functions:
                 return self._functions[name](*map(self.value, node.args))
-        raise ValueError(f"not understood: {ast.unparse(node) if node is not None else 'nothing'}")
+        raise ValueError(f"cannot parse: {ast.unparse(node) if node is not None else 'nothing'}")
 
     def _table(self) -> dict[str, Callable[..., Any]]:
         c = self._c

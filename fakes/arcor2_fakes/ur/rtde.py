@@ -120,7 +120,7 @@ class Deframer:
             while len(self._buffer) - start >= HEADER.size:
                 size, kind = HEADER.unpack_from(self._buffer, start)
                 if size < HEADER.size:
-                    raise FramingError(f"a frame of {size} bytes")
+                    raise FramingError(f"invalid frame length: {size} bytes")
                 if len(self._buffer) - start < size:
                     break
                 payload = bytes(self._buffer[start + HEADER.size : start + size])

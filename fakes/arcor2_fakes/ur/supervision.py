@@ -101,13 +101,13 @@ def register(control: ControlServer, c: Controller, rtde: RtdeServer, script: Sc
 
     def set_input(bit: int, on: bool = True) -> None:
         if not 0 <= bit < 18:
-            raise ValueError("bit is 0 to 17: 8 standard, 8 configurable, 2 tool inputs")
+            raise ValueError("bit must be 0 to 17: 8 standard, 8 configurable, 2 tool inputs")
         c.digital_inputs = c.digital_inputs & ~(1 << bit) | int(on) << bit
         c.changed()
 
     def joints(q: Sequence[float]) -> tuple[float, ...]:
         if len(q) != 6 or not all(math.isfinite(v) and abs(v) <= JOINT_RANGE for v in q):
-            raise ValueError("q has six joint positions within +-2 pi")
+            raise ValueError("q must have six joint positions within +-2 pi")
         return tuple(map(float, q))
 
     def place(q: Sequence[float]) -> None:
@@ -127,7 +127,7 @@ def register(control: ControlServer, c: Controller, rtde: RtdeServer, script: Sc
 
     def slider(fraction: float) -> None:
         if not 0.0 <= fraction <= 1.0:
-            raise ValueError("fraction is 0 to 1")
+            raise ValueError("fraction must be 0 to 1")
         c.arm.slider = float(fraction)
 
     def safeguard_stop(on: bool = True, reports_paused: bool = False) -> None:

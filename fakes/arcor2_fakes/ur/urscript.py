@@ -84,7 +84,7 @@ def calls(text: str) -> list[Call]:
             continue
         call = parse_call(bare)
         if call is None:
-            log.info("not understood: %s", bare)
+            log.info("line not understood: %s", bare)
         else:
             found.append(call)
     return found

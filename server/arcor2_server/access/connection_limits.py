@@ -15,7 +15,7 @@ CONNECTION: Final = "arcor2_hw.connection"
 """Key of the Connection in the extensions of an ASGI scope."""
 OWN_FILES: Final = 256
 """Number of file descriptors reserved for databases, cell hosts, packages and uploads."""
-MOST: Final = 4000
+MAX_CONNECTIONS: Final = 4000
 """Maximum number of connections, even if the system allows more files."""
 FEWEST: Final = 64
 """Minimum number of connections, even if the system allows fewer files."""
@@ -73,8 +73,8 @@ class ConnectionLimits:
     def of(cls, settings: ServerSettings) -> "ConnectionLimits":
         """Return the limits for these settings and the number of files that this process may open."""
         allowed, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-        files = MOST + OWN_FILES if allowed == resource.RLIM_INFINITY else allowed
-        total = settings.connections or max(FEWEST, min(MOST, files - OWN_FILES))
+        files = MAX_CONNECTIONS + OWN_FILES if allowed == resource.RLIM_INFINITY else allowed
+        total = settings.connections or max(FEWEST, min(MAX_CONNECTIONS, files - OWN_FILES))
         return cls(total, settings.connections_per_address, settings.trusted_proxies)
 
     def __len__(self) -> int:

@@ -58,7 +58,7 @@ class Occurrence(Struct, frozen=True):
 
 
 class _Entry:
-    """A record with what is needed while it is open."""
+    """An open record with its temporary data."""
 
     def __init__(self, record: AlarmRecord, occurrence: Occurrence | None) -> None:
         self.record = record

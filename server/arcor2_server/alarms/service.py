@@ -70,7 +70,7 @@ class Alarms:
             self._end_shelving_later(record)
 
     async def close(self) -> None:
-        """Store what is not stored yet."""
+        """Store the remaining changes."""
         for handle in self._shelved.values():
             handle.cancel()
         await self.flush()
@@ -89,7 +89,7 @@ class Alarms:
         board.on_clear.append(lambda objects: self._gone(what, objects))
 
     def _session(self) -> str:
-        """Return what alarms with the same cause have in common: the run, or the online scene."""
+        """Return the run or online scene to which alarms with the same cause belong."""
         return f"run {run}" if (run := self._run()) else "scene"
 
     def _reported(self, board: DeviceBoard, what: str, report: DeviceChanged) -> None:
@@ -206,7 +206,7 @@ class Alarms:
 
     # -------------------------------------------------------------------------------- requests
     async def find(self, args: ListAlarmsArgs) -> list[AlarmRecord]:
-        """Return the selected records, newest first. What is returned is stored."""
+        """Return the selected records, newest first, as they are stored."""
         await self.flush()
         found: list[AlarmRecord] = []
         for record in self._book.records(args.show):

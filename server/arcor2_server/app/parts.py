@@ -300,7 +300,7 @@ class Server:
         self.opcua = closed(OpcUa(settings, feed, PlantRequests(access, persons, plc, alarms, audit), cell, alarms))
         self.mqtt: Mqtt | None = None
         if settings.mqtt is not None:
-            from arcor2_server.mqtt import service  # takes time, and few servers need it
+            from arcor2_server.mqtt import service  # imported only if needed, because it takes time
 
             self.mqtt = closed(service.Mqtt(settings, feed, alarms))
         outboxes = [each for each in (unit_outbox, alarm_store.outbox) if each is not None]
@@ -370,7 +370,7 @@ def board_of_nodes(settings: ServerSettings, hub: Hub, session: Session) -> Node
 def connect_alarms(
     alarms: Alarms, scene_host: HostSession, program_host: HostSession, execution: Execution, damage: DataDamage
 ) -> None:
-    """Let the alarm service record what the hosts, the program and the storage report."""
+    """Connect the alarm service to the reports of the hosts, the program and the storage."""
     for host, what in ((scene_host, "scene"), (program_host, "program")):
         alarms.watch(host.board, what)
         host.on_death.append(lambda reason: alarms.system("host_died", None, reason, with_devices=True))
@@ -412,7 +412,7 @@ def to_both(scene_host: HostSession, program_host: HostSession) -> Callable[[ToH
 def connect_devices(
     devices: Devices, scene_host: HostSession, program_host: HostSession, online: OnlineScene, execution: Execution
 ) -> None:
-    """Let the device cards follow what the hosts report, and count the actions of devices."""
+    """Connect the device cards to the reports of the hosts, and count the actions of devices."""
     for host, what in ((scene_host, "scene"), (program_host, "program")):
         devices.watch(host.board, what)
     online.on_device_action.append(devices.acted)

@@ -36,7 +36,7 @@ _BUSY_TIMEOUT: Final = 5.0
 _NO_DIGEST: Final = bytes(32)
 """Digest before the first entry."""
 _UNREADABLE: Final = b"unreadable"
-"""Stands for the digest of a damaged head."""
+"""Placeholder for the digest of a damaged head."""
 _FIELDS: Final = tuple(field.name for field in msgspec.structs.fields(AuditEntry))
 _COLUMNS: Final = ", ".join(_FIELDS)
 _SCHEMA: Final = """

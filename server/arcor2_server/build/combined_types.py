@@ -60,7 +60,7 @@ class CombinedTypes:
         return self.analysis(name).enumerations
 
     def facts(self, scene: Scene) -> dict[str, TypeFacts]:
-        """Return what a script needs to know about the types of a scene, by type."""
+        """Return the facts about the types of a scene that a script needs, by type."""
         facts: dict[str, TypeFacts] = {}
         for name in {obj.type for obj in scene.objects}:
             found = self.analysis(name)

@@ -77,7 +77,7 @@ class ActionCall(NamedTuple):
 
 
 PARALLEL_CALL: Final = ActionCall("functions", "functions", "parallel", ObjectAction("parallel"))
-"""What an action calls that runs several calls at once."""
+"""The method that parallel work calls."""
 
 
 class ParameterUse(NamedTuple):
@@ -290,7 +290,7 @@ class Frame:
 
 
 class References:
-    """Expressions for what the parameters of an action refer to (`ScriptNames` of the parameter types)."""
+    """Expressions for the references in parameters of an action (`ScriptNames` of the parameter types)."""
 
     def __init__(
         self, frame: Frame, object_id: str, enumerations: Mapping[tuple[str, str], Enumeration], method: str

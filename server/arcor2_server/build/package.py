@@ -41,7 +41,7 @@ def to_zip(files: Files) -> bytes:
                 entry = zipfile.ZipInfo(_checked(path), _EPOCH)
                 entry.compress_type = zipfile.ZIP_DEFLATED
                 entry.external_attr = _MODE
-                entry.create_system = 3  # Unix, whatever this system is
+                entry.create_system = 3  # Unix, also on other systems
                 archive.writestr(entry, files[path])
         return buffer.getvalue()
 

@@ -106,7 +106,7 @@ _State = dict[str, frozenset[_Stay]]
 
 
 class _Walk:
-    """Follows all paths of a project, and finds the zones that its robots need and keep."""
+    """Follows all paths of a project, and finds the zones that its robots need and stay in."""
 
     def __init__(self, scene: Scene, project: Project, zones: Mapping[str, Obstacle], robots: frozenset[str]) -> None:
         self._index, self._zones, self._robots = ProjectIndex(scene, project), zones, robots

@@ -1,7 +1,7 @@
 """`arcor2-hw device check --real`: the terminal of a person who uses a real device for the first time.
 
-The session runs in a process of its own, which loads the driver. Ctrl-C reaches only this process, which asks that one
-to stop the device; the end of this process does the same.
+The session runs in a separate process, which loads the driver. Ctrl-C reaches only this process, which asks the other
+one to stop the device; the end of this process does the same.
 """
 
 import contextlib

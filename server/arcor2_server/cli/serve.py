@@ -20,7 +20,7 @@ import msgspec
 import uvloop
 from cyclopts import Parameter, validators
 
-import arcor2_server.log  # before all that imports structlog
+import arcor2_server.log  # before any import of structlog
 from arcor2_hw.calibration.configuration import (
     CalibrationConfiguration,
     configuration_of,
@@ -182,7 +182,7 @@ def serve(
             classic_ports=ports_from_environment() if classic_ports else None,
         )
         if broker := os.environ.get(BROKER_URL):
-            from arcor2_server.nodes.credentials import require_tls  # takes time, and few servers need it
+            from arcor2_server.nodes.credentials import require_tls  # imported only if needed, because it takes time
 
             require_tls(broker)
         if settings.in_fleet:
@@ -302,7 +302,7 @@ def _mqtt(
     """Return the settings of MQTT, None without a broker. Raise InvalidData if an option is invalid."""
     if not any((address, sparkplug, primary_host, prefix, os.environ.get(MQTT_URL))):
         return None
-    from arcor2_server.cli.mqtt_options import mqtt_settings  # takes time, and few servers need it
+    from arcor2_server.cli.mqtt_options import mqtt_settings  # imported only if needed, because it takes time
 
     return mqtt_settings(address, sparkplug, primary_host, prefix, unencrypted=unencrypted)
 

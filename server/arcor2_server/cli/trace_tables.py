@@ -23,7 +23,7 @@ def _safe(text: str) -> str:
 
 
 def show_trace(trace: RunTrace) -> None:
-    """Print the actions of a trace, and what it says about cycle time, bottleneck and waits."""
+    """Print the actions of a trace, its cycle time, bottleneck and waits."""
     times = summarize(trace)
     names = {device.id: device.name for device in trace.devices}
     out = console()

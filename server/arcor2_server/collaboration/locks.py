@@ -126,7 +126,7 @@ class Locks(LockTable):
         await self._retry(lambda root_ids: self._add_writes(user, root_ids), ids)
 
     def release(self, user: str, *ids: str) -> None:
-        """Free the locks that `acquire` took. Ids that were removed meanwhile are ignored."""
+        """Release the locks that `acquire` took. Ids that were removed meanwhile are ignored."""
         for item in ids:
             if self._is_writer(user, item):
                 self._remove_write(user, item)

@@ -216,7 +216,7 @@ class LogOns:
             self._detach(client, reason)
 
     def _detach(self, client: Connection, reason: Message | None = None) -> None:
-        """Take the rights of the person from a connection, end its hold-to-run motions and release its locks."""
+        """Revoke the rights of the person on a connection, end its hold-to-run motions and release its locks."""
         reason = reason or Message.of("The same person continues at another window.")
         client.person = None
         for notify in self.on_end:

@@ -29,7 +29,7 @@ LONGEST_LOCK_OUT: Final = 3600.0
 FORGOTTEN_AFTER: Final = 86_400.0
 """Time after a lock-out, or after a wrong PIN, at which wrong PINs no longer count, s."""
 _CARDS: Final = ""
-"""Stands for the person in the lock-out of wrong cards."""
+"""Placeholder for the person in the lock-out after unknown cards."""
 
 
 class LogOnRefused(RequestRefused):
@@ -63,7 +63,7 @@ class Persons:
         return any(person.name.casefold() == name.casefold() for person in await self._store.all())
 
     async def has_administrator(self) -> bool:
-        """Return whether somebody may manage persons."""
+        """Return whether a person with the role programmer exists."""
         return any(person.role is Role.PROGRAMMER for person in await self._store.all())
 
     async def lock_outs(self, person: StoredPerson, names: dict[str, str]) -> list[LockOut]:

@@ -47,7 +47,7 @@ class Object(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Place(Struct, frozen=True, forbid_unknown_fields=True):
-    """Where the editor draws a device whose type has no pose."""
+    """The place at which the editor draws a device whose type has no pose."""
 
     object: str
     position: Vector3
@@ -406,7 +406,7 @@ async def confirm_emptied(client: Client) -> None:
 
 @dataclass(slots=True)
 class _Places:
-    """The ids of what was created, by name."""
+    """The ids of the created items, by name."""
 
     points: dict[str, str]
     orientations: dict[str, str]

@@ -46,7 +46,7 @@ _LOG_HEADER: Final = 32
 JOURNAL: Final = "journal.sqlite"
 """The SQLite file that a server locks for itself alone."""
 _DERIVED: Final = frozenset({"analysis.msgpack", "problems.msgpack", "prepared"})
-"""What the server computes again."""
+"""Files that the server can compute again."""
 _READ_FIRST: Final = (".position", ".head")
 """Endings of files that name the newest entry of an SQLite file. They may be older than it, but not newer."""
 _UNPACKING: Final = ".restore-unpacking"

@@ -164,7 +164,7 @@ class Installation(msgspec.Struct, frozen=True):
             raise
 
     def select(self, version: Version) -> None:
-        """Let the service run a version from its next start on: write the units, and set the links.
+        """Select the version that the services run from their next start on: write the units, and set the links.
 
         Raises:
             NotFound: the version is not installed.

@@ -16,7 +16,7 @@ PROCESS: Final = "WATCHDOG_PID"
 
 
 class ServiceManager:
-    """Tells systemd the state of this process. Without systemd it does nothing.
+    """Reports the state of this process to systemd. Without systemd it does nothing.
 
     Args:
         address: the datagram socket of the service manager; empty: none.

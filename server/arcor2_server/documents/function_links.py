@@ -69,7 +69,7 @@ class Names:
 
 
 def with_links(action: Action, changed: Callable[[tuple[str, str, int]], str | None]) -> Action:
-    """Return an action with other links, as far as `changed` returns one for the parts of its link."""
+    """Return an action whose links are replaced where `changed` returns a replacement."""
 
     def parameter(one: ActionParameter) -> ActionParameter:
         if one.type != ActionParameterType.LINK:
@@ -84,7 +84,7 @@ def with_links(action: Action, changed: Callable[[tuple[str, str, int]], str | N
 
 
 def with_condition(item: LogicItem, changed: Callable[[tuple[str, str, int]], str | None]) -> LogicItem:
-    """Return a logic item with a condition on other results, as far as `changed` returns one."""
+    """Return a logic item whose condition refers to other results where `changed` returns a replacement."""
 
     def link(what: str) -> str:
         try:

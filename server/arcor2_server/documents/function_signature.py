@@ -112,7 +112,9 @@ def remove_parameter(document: Document, function_id: str, name: str) -> list[Ch
     function = document.function(function_id)
     index = _index(function, name)
     for action, _ in uses_of_parameter(function, name):
-        raise RequestRefused("{action} uses the parameter {name}. Change that first.", action=action.name, name=name)
+        raise RequestRefused(
+            "{action} uses the parameter {name}. Change {action} first.", action=action.name, name=name
+        )
     declared = [*function.parameters[:index], *function.parameters[index + 1 :]]
     changes = [_updated(document, replace(function, parameters=declared))]
     for call in document.calls_of(function_id):
@@ -189,7 +191,7 @@ def remove_result(document: Document, function_id: str, index: int) -> list[Chan
         for user in document.users_of(call.id):
             if (call.id, FlowTypes.DEFAULT, index) in used_by(user):
                 raise RequestRefused(
-                    "Result number {index} of {call} is used by {user}. Change that first.",
+                    "Result number {index} of {call} is used by {user}. Change {user} first.",
                     index=index,
                     call=call.name,
                     user=getattr(user, "name", "a condition"),

@@ -154,7 +154,7 @@ class _Selection:
 
 
 class _Parameters:
-    """The parameters of a new function: what its actions use from outside."""
+    """The parameters of a new function: the values that its actions use from outside."""
 
     def __init__(self, document: Document, types: Types, selection: _Selection) -> None:
         self.declared: list[ActionParameter] = []

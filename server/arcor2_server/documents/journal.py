@@ -51,7 +51,7 @@ class Journal:
         self.loss: Loss | None = None
 
     async def open(self) -> Recovered | None:
-        """Start the thread, and return what an earlier server left open. `loss` describes what is lost to damage.
+        """Start the thread, and return the document that an earlier server left open. `loss` describes damage.
 
         Raises:
             StorageError: The file cannot be read or written.

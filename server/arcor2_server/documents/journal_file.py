@@ -92,7 +92,7 @@ class JournalFile:
         self.position = Position()
 
     def open(self) -> tuple[Recovered | None, Loss | None]:
-        """Open or create the files. Return what an earlier server left open, and what of it is lost.
+        """Open or create the files. Return the document that an earlier server left open, and its lost changes.
 
         A damaged file is renamed, and its intact content is written into a new one.
         """

@@ -156,7 +156,7 @@ class JournalDamaged(Arcor2Error):
 
 
 class JournalContent(msgspec.Struct):
-    """The content of a journal file: what is intact, and what is damaged.
+    """The intact content of a journal file, and a description of the damage.
 
     Attributes:
         serial: See `Position`.
@@ -222,7 +222,7 @@ def _shown(document: str) -> Message:
 
 
 def read_content(connection: sqlite3.Connection) -> JournalContent:
-    """Read what is intact.
+    """Read the intact records.
 
     Raises:
         JournalDamaged: The document itself is damaged.

@@ -69,7 +69,7 @@ def require_unused(document: Document, action: Action, without: Collection[str] 
             )
         using = title_of(user)
         raise RequestRefused(
-            "A result of {name} is used by {user}. Change that first.",
+            "A result of {name} is used by {user}. Change {user} first.",
             name=action.name,
             user=using[0].lower() + using[1:],
         )

@@ -30,7 +30,7 @@ class UnknownTarget(Exception):
 
 
 def maxima_of(settings: Mapping[str, Any]) -> RobotMaxima:
-    """Return the maxima that the settings of a robot state."""
+    """Return the maximum velocities and accelerations in the settings of a robot."""
 
     def stated(name: str) -> float:
         value = settings.get(name)

@@ -78,7 +78,7 @@ class ProgramHold:
         self._hub.broadcast(make_event(HELD, self.present))
 
     def change(self, held: HeldData) -> None:
-        """Handle that other choices are possible in the present hold."""
+        """Handle changed choices of the present hold."""
         if self.present is not None and self.present.number == held.number:
             self.present = replace(held, run=self.present.run)
             self._hub.broadcast(make_event(HELD, self.present))
@@ -120,7 +120,7 @@ class ProgramHold:
             held = self._require(args.number)
             if host is None or args.choice not in held.choices:
                 choices = Message.listed([_name(choice) for choice in held.choices])
-                raise RequestRefused("This is not possible here. Choices: {choices}.", choices=choices)
+                raise RequestRefused("This decision is not possible here. Choices: {choices}.", choices=choices)
             if args.choice is HoldChoice.RETRY and held.again is Again.ASK and not args.confirmed:
                 raise RequestRefused(
                     "{action} may have been executed partly. Confirm that it is to be repeated.",

@@ -173,7 +173,7 @@ class AllPartBooks:
         async with self._using_files:
             books = await asyncio.to_thread(self._read, args.scene_id)
             if books is None:
-                raise RequestRefused("There are no books of parts of the scene {scene}.", scene=args.scene_id)
+                raise RequestRefused("No parts are recorded for the scene {scene}.", scene=args.scene_id)
             ledger = Ledger(books)
             ledger.confirm(args.parts)
             corrected = ledger.books

@@ -73,7 +73,7 @@ class ProgramRun:
             for difference in await asyncio.to_thread(check_versions, directory):
                 log.warning("package was built with another version", package=self.package_id, difference=difference)
         except Arcor2Error as error:
-            log.warning("run not described", package=self.package_id, reason=str(error))
+            log.warning("package of the run cannot be read", package=self.package_id, reason=str(error))
 
     def collect_statistics(self, info: PackageInfoData, verdicts: Set[str]) -> None:
         """Start to collect statistics, and name the devices of the trace.

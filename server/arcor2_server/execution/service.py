@@ -220,7 +220,7 @@ class Execution(PackageLibrary, RunObservers):
         self._background.spawn(program.describe(self.packages), "description of the run")
 
     def reserve(self) -> None:
-        """Refuse other runs, since a document is closed only for the time of a run, or a project is about to run."""
+        """Refuse other runs while a document is closed for a run, or a project is about to run."""
         self._reserved = True
 
     def release(self) -> None:

@@ -36,7 +36,7 @@ TOKEN_NEEDED: Final = translatable("A token is needed.")
 
 
 class NoPersons:
-    """In place of the persons who log on at a cell: nobody does at the fleet."""
+    """Replacement for the persons of a cell: nobody logs on at the fleet."""
 
     @staticmethod
     def person_of(_session: str, _device: str, *, active: bool) -> None:

@@ -43,7 +43,7 @@ class RecordedPoint:
 
 
 Waiting = tuple[RecordedPoint, int, float | None, str | None, int]
-"""A value that waits until it is stored: point, time in ms since 1970, number, text, number of the quality."""
+"""A value that waits until it is stored: point, time in ms since 1970, number, text, code of the quality."""
 
 
 class PointRecorder:

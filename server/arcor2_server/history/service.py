@@ -213,7 +213,7 @@ class History:
                 self._failed(StorageError("The history cannot be moved to files: {reason}", reason=error))
 
     async def maintain(self) -> None:
-        """Move closed hours to files, merge the files of closed days, and delete what is too old or too much.
+        """Move closed hours to files, merge the files of closed days, and delete data beyond the limits.
 
         Raises:
             Arcor2Error: the files cannot be written. Nothing was lost.
@@ -250,7 +250,7 @@ class History:
             log.info("history moved", file=name, rows=written.file.rows, size=written.file.size, merged=len(names))
 
     async def _retain(self) -> None:
-        """Delete what is older than the setting, and the oldest files while all need too much space."""
+        """Delete data older than the limit, and the oldest files while the total size exceeds the limit."""
         before = self._now() - self._settings.point_history_days * DAY
         hot, size, *_ = await self._in_thread(self._file.sizes)
         limit = self._settings.point_history_megabytes * 1_000_000
@@ -351,7 +351,7 @@ def _mergeable(files: Sequence[ColdFile], today: int) -> list[list[ColdFile]]:
 
 
 def past_run(run: Run) -> PastRun:
-    """Return what the history stores of a run."""
+    """Return the stored data of a past run."""
     recipe, statistics = run.recipe, run.statistics
     numbers = {}
     if not isinstance(statistics, Unset):

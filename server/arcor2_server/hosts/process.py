@@ -361,7 +361,7 @@ class CellHost:
         lost = asyncio.create_task(self._lost.wait())
         try:
             await asyncio.wait({waiting, lost}, return_when=asyncio.FIRST_COMPLETED)
-            # Wait for the other sign too: the last messages may arrive after the exit of the process, and the exit
+            # Wait for the other event, too: the last messages may arrive after the exit of the process, and the exit
             # status after the end of the connection. Repeat while data arrives, which takes time on a busy server.
             received = -1
             while not (lost.done() and waiting.done()) and received != self._connection.chunks:

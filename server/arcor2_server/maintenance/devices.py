@@ -73,7 +73,7 @@ class Devices:
         self._background.spawn(self._repeat(), "hours of devices")
 
     async def close(self) -> None:
-        """Store what is not stored yet."""
+        """Store the remaining changes."""
         async with self._writing:  # a write is not interrupted
             await self._background.cancel()
         self._count_hours()
@@ -177,7 +177,7 @@ class Devices:
             )
         before, at = card.identity, now()
         if set(card.differing) - {"firmware"}:
-            self._count_hours()  # of the previous device
+            self._count_hours()  # those of the previous device
             card = replace(card, hours=0.0, cycles=0, counters={}, counted_since=at)
         card = replace(card, identity=identity, found=UNSET, differing=[], confirmed_at=at, confirmed_by=by)
         await self._store.put([card])

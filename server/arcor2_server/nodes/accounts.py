@@ -201,7 +201,7 @@ class Accounts:
 
     # -------------------------------------------------------------------------------- file
     def _account_claim(self, state: _State) -> str:
-        """Return the claim of the account, newer than all earlier ones whatever the clock shows."""
+        """Return the claim of the account, newer than all earlier ones even if the clock was set back."""
         state.issued = max(int(time.time()), state.issued + 1)
         key = SigningKey.from_seed(state.account).public
         operator = SigningKey.from_seed(state.operator)

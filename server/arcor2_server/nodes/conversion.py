@@ -1,4 +1,4 @@
-"""What a node or relay has to know of the messages between server and cell host: their lane, their age, their times."""
+"""Properties of the messages between server and cell host that nodes and relays need: lane, age and times."""
 
 from collections.abc import Callable
 from typing import Any, Final

@@ -1,4 +1,4 @@
-"""What a computer needs to connect to the broker, and the file in which it is stored."""
+"""Credentials of a computer at the broker, and the file in which they are stored."""
 
 import base64
 import re

@@ -31,7 +31,7 @@ class Lane(StrEnum):
 
 
 class Header(NamedTuple):
-    """What is known of a message without decoding it.
+    """Properties of a message that are known without decoding it.
 
     number: counts the messages of the sender over all lanes. part: counts the parts of the lane. sent: when it was
     sent, on the sender's monotonic clock, s. flags: MORE, END.

@@ -102,7 +102,7 @@ class Relay:
             raise Arcor2Error("The node {node} is not connected.", str(error), node=self._node) from error
         except (NatsError, OSError) as error:
             raise Arcor2Error(
-                "The node {node} cannot be asked: the broker failed.", str(error), node=self._node
+                "The node {node} cannot be reached: the broker failed.", str(error), node=self._node
             ) from error
         opened = msgspec.json.decode(answer.data, type=Opened)
         if opened.refusal is not None:

@@ -277,7 +277,7 @@ class _Run(msgspec.Struct, frozen=True):
 
 
 def _runs(kind: str, body: bytes) -> tuple[str, str]:
-    """Return kind and name of what a message starts."""
+    """Return the kind and name of the scene or program that a message starts."""
     run = msgspec.msgpack.decode(body, type=_Run)
     return ("scene", run.scene.name) if kind == "OpenScene" else ("program", run.package_id)
 

@@ -135,7 +135,7 @@ class SessionEnd:
         self._handler.ended(reason, by_peer)
 
     def send_end(self, reason: Message) -> None:
-        """Tell the peer to end the session."""
+        """Ask the peer to end the session."""
         self.send(Lane.CALLS, msgspec.msgpack.encode(reason), END)
 
     async def finish(self, reason: Message) -> None:

@@ -54,7 +54,7 @@ class InstallationWatch:
                 read = last
                 try:
                     await self._rescan()
-                except Exception:  # a broken installation must not end the checks
+                except Exception:  # a broken installation must not stop the checks
                     log.exception("installed object types cannot be read")
 
     async def _rescan(self) -> None:

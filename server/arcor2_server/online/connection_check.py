@@ -52,7 +52,7 @@ class _Outcome:
 
 @dataclass(frozen=True, slots=True)
 class ConnectionCheck:
-    """Connects a device, reads what it reports, and disconnects it. Nothing is switched or moved."""
+    """Connects a device, reads its state, and disconnects it. Nothing is switched or moved."""
 
     _pool: CellHosts
     _opening: SceneOpening

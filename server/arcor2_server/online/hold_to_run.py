@@ -214,7 +214,7 @@ class HoldToRun:
                 raise RequestRefused("{name} is still stopping. Try again when it has stopped.", name=name)
             self._require_unspent(client, args.hold)
         if (former := self._held.get(robot_id)) is not None:
-            raise RequestRefused("{name} is held by {user}.", name=name, user=former.user)
+            raise RequestRefused("{name} is being moved by {user}.", name=name, user=former.user)
         self._require_lock(user, robot_id)
         press = self._held[robot_id] = _Press(client, user, kind, args, next(self._numbers))
         try:
@@ -292,7 +292,9 @@ class HoldToRun:
 
     def _publish(self, press: _Press, held: bool, reason: Message | None = None) -> None:
         hub, why = self._hub, str(reason or "")
-        log.info("held robot", robot=press.robot_id, kind=press.kind.value, user=press.user, held=held, reason=why)
+        log.info(
+            "hold-to-run motion", robot=press.robot_id, kind=press.kind.value, user=press.user, held=held, reason=why
+        )
         hub.broadcast(make_event("RobotHold", press.state(held, reason)))
         if press.kind is HoldKind.HAND_TEACHING:
             data = HandTeachingModeData(press.robot_id, held, press.arm_id)

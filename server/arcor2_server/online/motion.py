@@ -79,7 +79,7 @@ class RobotMotion:
         name = cell.robot(robot_id).name
         cell.board.require_not_failed(robot_id)
         if not held and (holder := cell.held.holder(robot_id)) is not None:
-            raise RequestRefused("{name} is held by {holder}.", name=name, holder=holder)
+            raise RequestRefused("{name} is being moved by {holder}.", name=name, holder=holder)
         if robot_id in cell.moving:
             raise RequestRefused("{name} is moving.", name=name)
         if cell.running_action is not None and cell.running_action.object_id == robot_id:

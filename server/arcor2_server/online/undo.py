@@ -136,7 +136,7 @@ class Undo:
                     if item.value.name == name
                 }
                 if (found | opened) - {None, change.id}:
-                    raise RequestRefused("There is now a scene or project called {name}.", name=name)
+                    raise RequestRefused("A scene or project called {name} exists now.", name=name)
             if (
                 change.kind is Kind.OBJECT
                 and change.after is None

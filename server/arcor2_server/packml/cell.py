@@ -259,7 +259,7 @@ class PackmlCell:
 
     @contextlib.contextmanager
     def starting(self, job: int) -> Iterator[None]:
-        """Mark the program that is started meanwhile as a job of the PLC; none if the start fails."""
+        """Mark the program that is started in this context as a job of the PLC, unless the start fails."""
         self.job = job
         try:
             yield

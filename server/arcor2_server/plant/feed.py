@@ -1,4 +1,4 @@
-"""Collects what plant systems are shown: only what has changed, and of each stream only the newest event."""
+"""Collects the data for plant systems: only changes, and of each stream only the newest event."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ _START: Final = "1970-01-01T00:00:00+00:00"
 
 
 class FeedReader:
-    """What one process for plant systems has not received yet. Created by `CellFeed.reader`."""
+    """The changes that one process for plant systems has not received yet. Created by `CellFeed.reader`."""
 
     def __init__(self, feed: "CellFeed", *, with_streams: bool) -> None:
         self._feed = feed
@@ -61,7 +61,7 @@ class FeedReader:
         return replace(update, devices=self._devices, states=dict(self._states), unit=self._unit, alarms=alarms)
 
     async def changes(self) -> Update:
-        """Return what has changed since the last call."""
+        """Return the changes since the last call."""
         feed = self._feed
         await feed.refresh()
         unit = feed.unit()
@@ -180,7 +180,7 @@ class CellFeed:
         return list(reversed(alarms))
 
     async def refresh(self) -> None:
-        """Collect what has changed."""
+        """Collect the changes."""
         if self._devices_changed:
             self._devices_changed = False
             self._collect_devices()

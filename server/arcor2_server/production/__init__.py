@@ -1,1 +1,1 @@
-"""Recipes and their release, records of produced units, and what the cell does when."""
+"""Recipes and their release, records of produced units, and the activity of the cell over time."""

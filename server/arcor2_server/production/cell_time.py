@@ -1,4 +1,4 @@
-"""What the cell does when, and its effectiveness."""
+"""The activity of the cell over time, and its effectiveness."""
 
 import asyncio
 import time
@@ -20,8 +20,8 @@ log = structlog.get_logger(__name__)
 
 PERIOD: Final = 30.0
 """Time between two stores of the present time, s. After the end of the server, at most this time is missing."""
-KEPT: Final = 400 * 86_400.0
-"""Time for which times are stored, s."""
+RETENTION: Final = 400 * 86_400.0
+"""Time for which activities are stored, s."""
 DEFAULT_PERIOD: Final = 8 * 3600.0
 """Period of a query that states no start, s: one shift."""
 
@@ -38,12 +38,12 @@ _ACTIVITIES: Final = {
 
 
 def activity_of(execution: Execution) -> CellActivity:
-    """Return what the cell does."""
+    """Return the present activity of the cell."""
     return CellActivity.HELD if execution.hold.present is not None else _ACTIVITIES[execution.state.value]
 
 
 class CellTime:
-    """Stores what the cell does when. Queries may raise StorageError.
+    """Records the activity of the cell over time. Queries may raise StorageError.
 
     Args:
         store: stores the times, and the units that were produced.
@@ -97,7 +97,7 @@ class CellTime:
                         await self._store.put_time(start, end, activity)
                     if self._unwritten.get(start) == (end, activity):
                         del self._unwritten[start]
-                await self._store.delete_times(self._clock() - KEPT)
+                await self._store.delete_times(self._clock() - RETENTION)
             except StorageError as error:
                 log.warning("times of the cell not stored", reason=str(error))
 

@@ -174,7 +174,7 @@ class Recipes:
             for path in sorted({*digests[0], *digests[1]})
             if digests[0].get(path) != digests[1].get(path)
         ]
-        import difflib  # no start needs it
+        import difflib  # not needed at the start of the server
 
         lines = difflib.unified_diff(former, present, "script.py", "script.py")
         return files, "".join(islice(lines, _MAX_DIFF))

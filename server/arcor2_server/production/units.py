@@ -87,7 +87,7 @@ class Units:
             self.follow(books)
 
     async def close(self) -> None:
-        """Store what is not stored yet."""
+        """Store the remaining changes."""
         async with self._describing:  # a query is not interrupted
             await self._background.cancel()
         if self._unwritten or self._deleted:
@@ -126,7 +126,7 @@ class Units:
             async with self._describing:
                 latest = await self._calibrations.latest()
         except Arcor2Error as error:
-            log.warning("units not described", run=number, reason=str(error))
+            log.warning("package of the units cannot be read", run=number, reason=str(error))
             return
         if number != self._run_number:
             return

@@ -48,7 +48,9 @@ class HistoryOperations:
     @operation("GET", "/api/history/values/export", SERVER, Role.OPERATOR, media_type="text/csv")
     async def export_values(self, query: HistoryQuery) -> Binary:
         """Return the recorded values of a point in a period as CSV, oldest first."""
-        from arcor2_server.history.export import values_as_csv  # with a module that no start needs
+        from arcor2_server.history.export import (
+            values_as_csv,
+        )  # with a module that is not needed at the start of the server
 
         found = await self._history.values(query)
         return Binary(await asyncio.to_thread(values_as_csv, found), "text/csv", f"point-{query.point}.csv")
@@ -61,7 +63,9 @@ class HistoryOperations:
     @operation("GET", "/api/history/runs/export", SERVER, Role.OPERATOR, media_type="text/csv")
     async def export_past_runs(self, query: HistoryRunQuery) -> Binary:
         """Return runs that ended in a period as CSV, newest first."""
-        from arcor2_server.history.export import runs_as_csv  # with a module that no start needs
+        from arcor2_server.history.export import (
+            runs_as_csv,
+        )  # with a module that is not needed at the start of the server
 
         found = await self._history.runs(query)
         return Binary(await asyncio.to_thread(runs_as_csv, found), "text/csv", "runs.csv")

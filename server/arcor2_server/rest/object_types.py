@@ -67,7 +67,7 @@ class ObjectTypeOperations:
     @operation("GET", "/api/translations/{language}", SERVER, Role.OPERATOR, plain=True, open=True)
     async def translations(self, language: str) -> dict[str, str]:
         """Return the translations of messages and of texts of installed types into a language, by English text."""
-        from arcor2_server.object_types import translations  # a start has no use for it
+        from arcor2_server.object_types import translations  # not needed at the start of the server
 
         return await asyncio.to_thread(translations.into, language, self._types.installed_folders())
 

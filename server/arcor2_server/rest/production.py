@@ -34,7 +34,9 @@ class ProductionOperations:
     @operation("GET", "/api/units/export", SERVER, Role.OPERATOR, media_type="text/csv")
     async def export_units(self, query: ListUnitsArgs) -> Binary:
         """Return produced units as CSV, newest first."""
-        from arcor2_server.production.export import units_as_csv  # with a module that no start needs
+        from arcor2_server.production.export import (
+            units_as_csv,
+        )  # with a module that is not needed at the start of the server
 
         return Binary(units_as_csv(await self._units.find(query)), "text/csv", "units.csv")
 

@@ -30,7 +30,9 @@ class RecordingOperations:
     @operation("GET", "/api/recordings/{number}/export", SERVER, Role.OPERATOR, media_type="text/csv")
     async def export_recording(self, number: str) -> Binary:
         """Return a recording as CSV: one row for each time at which something changed."""
-        from arcor2_server.recordings.export import as_csv  # with a module that no start needs
+        from arcor2_server.recordings.export import (
+            as_csv,
+        )  # with a module that is not needed at the start of the server
 
         recording = await self._recordings.get(_number(number))
         content = await asyncio.to_thread(as_csv, recording)

@@ -117,7 +117,7 @@ class ObjectTypeRequests:
         """Raise RequestRefused if the name, the base or the collision model of a new object type is not allowed."""
         types = self._types
         if types.known(new.type):
-            raise RequestRefused("There is an object type called {type} already: choose another name.", type=new.type)
+            raise RequestRefused("An object type called {type} already exists. Choose another name.", type=new.type)
         if not is_valid_name(new.type):
             raise RequestRefused(
                 "{type!r} is not a valid name. Use letters, digits and _, and no keyword or built-in name of Python.",

@@ -128,7 +128,7 @@ class SceneObjectRequests:
     async def _add_shape(self, context: Context, args: AddVirtualCollisionObjectToSceneArgs) -> None:
         self._online.require_offline()
         if self._types.known(args.name):
-            raise RequestRefused("There is an object type called {name} already: choose another name.", name=args.name)
+            raise RequestRefused("An object type called {name} already exists. Choose another name.", name=args.name)
         self._editing.require_name_free(Kind.OBJECT, args.name, "an object")
         check_name(args.name, "object")
         if _model_of(args.model).id != args.name:

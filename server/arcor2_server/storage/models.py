@@ -247,7 +247,7 @@ class UnitRunRow(Base):
 
 
 class CellTimeRow(Base):
-    """A time in which the cell did one thing; s since the epoch."""
+    """A period in which the cell had one activity; s since the epoch."""
 
     __tablename__ = "cell_time"
 

@@ -1,4 +1,4 @@
-"""What has to be sent to the fleet: units that have left the cell, until the broker has stored them."""
+"""Outbox for the fleet: units that have left the cell, until the broker has stored them."""
 
 import enum
 import time

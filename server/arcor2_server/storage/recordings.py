@@ -23,7 +23,7 @@ from arcor2_server.files import DIRECTORY_MODE, replace_file
 
 log = structlog.get_logger(__name__)
 
-MOST: Final = 100
+MAX_RECORDINGS: Final = 100
 """Maximum number of recordings."""
 MOST_BYTES: Final = 200_000_000
 """Maximum size of all recordings, bytes."""
@@ -127,7 +127,7 @@ class RecordingFiles:
             raise StorageError("The recording cannot be stored: {reason}", reason=error) from error
         return msgspec.structs.replace(info, size=len(content))
 
-    def delete_oldest(self, most: int = MOST, most_bytes: int = MOST_BYTES) -> list[int]:
+    def delete_oldest(self, most: int = MAX_RECORDINGS, most_bytes: int = MOST_BYTES) -> list[int]:
         """Delete the oldest files until the limits are met; return their numbers."""
         deleted, total = [], 0
         for count, number in enumerate(reversed(self._numbers()), 1):

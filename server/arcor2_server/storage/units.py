@@ -1,4 +1,4 @@
-"""Stores the records of units, and what the cell did when."""
+"""Stores the records of units, and the activity of the cell over time."""
 
 import asyncio
 import zlib
@@ -130,7 +130,7 @@ class UnitStore:
 
     # ------------------------------------------------------------------------------------------------ times
     async def put_time(self, start: float, end: float, activity: CellActivity) -> None:
-        """Store what the cell did in a time, s since the epoch; the same start replaces it."""
+        """Store the activity of the cell in a period, s since the epoch. A period with the same start is replaced."""
         async with self._storage.writing(documents=False) as session:
             await self._storage.upsert(session, CellTimeRow(start=start, end=end, activity=activity.value))
 

@@ -22,7 +22,7 @@ class FeederSettings(Settings):
 
 
 class FeederException(Arcor2Exception):
-    """The feeder says no."""
+    """The feeder refuses the request."""
 
 
 class OldFeeder(GenericWithPose):

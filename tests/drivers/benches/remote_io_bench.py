@@ -211,7 +211,7 @@ class TowerLightBench(RemoteIOBench):
             assert self.fake.truth()["outputs"][0] is True
 
         def released() -> None:
-            device.release_point("green", True)  # the lamps are off since then
+            device.release_point("green", True)  # the lamps have been off since
             assert self.fake.truth()["outputs"][0] is False
 
         return {"force_point": forced, "release_point": released}

@@ -10,7 +10,7 @@ from arcor2_hw.testing.bench import Check
 from tests.drivers.fake_bench import FakeBench
 
 ACTING = ("T", "Z", "@", "TI", "ZI", "TA ", "M21")
-"""Prefixes of commands that change something in the scale; TA alone only reads."""
+"""Prefixes of commands that change something in the scale; TA without a value only reads."""
 
 
 class MtSicsScaleBench(FakeBench):

@@ -106,7 +106,7 @@ def test_unreachable_and_missing_parts_are_refused(picture: Photographer, make: 
         crate.next_part(picture(part("wrong", wrong, (0.06, 0.04, 0.03))))
     with pytest.raises(NoDepth, match=r"^crate is not visible"):
         crate.next_part(picture(camera=Pose(Position(0.6, 0.5, 0.7), Orientation(1, 0, 0, 0))))
-    # Two touch, a third lies free: the third is found.
+    # Two parts touch each other, the third is separate: the third is found.
     free = at(-0.11, 0.0, FLAT, turned(z=90))
     pose, _ = crate.next_part(picture(part("one", one), part("other", other), part("free", free)))
     assert errors(pose, free)[0] < CLOSE

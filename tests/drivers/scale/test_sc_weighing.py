@@ -41,7 +41,7 @@ def test_connecting_only_reads_and_a_cycle_weighs(
     fake.control.do("put", kg=0.25)
     began = time.monotonic()
     reading = scale.weigh()
-    assert reading.value == 0.25  # and not an intermediate value
+    assert reading.value == 0.25  # the stable value, not an intermediate one
     assert reading.monotonic >= began
     scale.tare()
     assert fake.truth()["tare"] == pytest.approx(0.25)

@@ -38,7 +38,7 @@ def test_the_calibration_is_read_and_used_by_the_model(arm: UR5e, fake: FakeUr) 
     assert nominal.joints[4].alpha == -math.pi / 2.0
     assert len(nominal.checksum.split("-")) == 6
     deltas = np.random.default_rng(3).uniform(-1e-3, 1e-3, (4, 6)).tolist()
-    deltas[2][1] += 12.0  # of two nearly parallel axes, one offset leads away and the next one back
+    deltas[2][1] += 12.0  # of two nearly parallel axes, the offsets are opposite
     deltas[2][2] -= 12.0
     fake.do("calibration", deltas=deltas)
     read = arm.kinematic_calibration()

@@ -585,7 +585,7 @@ def test_pick_and_place_use_the_part_sensor(fake: FakeUr) -> None:
         placing.result()
         assert robot.parts == {}
 
-        # A part that slips out on the last way is not at the place, although the gripper would open there.
+        # A part that slips out during the last motion is not at the place, although the gripper would open there.
         picking = BackgroundCall(robot.pick, target, approach=0.05, slow_speed=0.5)
         fake.control.wait_until(lambda t: t["digital_outputs"] & 1)
         fake.do("set_input", bit=1, on=True)

@@ -254,7 +254,7 @@ async def test_jaws_need_time() -> None:
     await cell.at(*FEEDER)
     cell.bits = 1
     await cell.wait(0.06)
-    await cell.at(*NOWHERE)  # it leaves before they closed
+    await cell.at(*NOWHERE)  # the board leaves before the jaws have closed
     assert cell.places == "feeder feeder feeder"
     assert cell.world.truth()["gripper"]["closed"]
 

@@ -25,7 +25,7 @@ class Bench:
             self.host.life += alive
             found.append(self.program.scan(self.host, self.time))
             if found[-1]:
-                self.host.owner = 0  # as the PLC does in its variable
+                self.host.owner = 0  # the PLC clears the owner in its variable
         return found
 
 

@@ -176,7 +176,7 @@ def test_an_unreadable_code_is_refused(reader: Any) -> None:
         with pytest.raises(ControlError):
             reader.control.do("present", code=code)
     assert reader.truth()["code"] is None
-    with pytest.raises(ControlError, match="health is one of"):
+    with pytest.raises(ControlError, match="health must be one of"):
         reader.control.do("health", value="TIRED")
 
 

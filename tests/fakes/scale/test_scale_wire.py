@@ -169,7 +169,7 @@ def test_sir_repeats_until_another_weighing(fake: FakeProcess, line: Line) -> No
     while (answer := line.read()) != "S S     200.00 g":
         raise AssertionError(answer)
     line.serial.timeout = 0.3
-    assert line.serial.read_until(b"\r\n", 100).strip() in (b"", b"S S     200.00 g")  # one could be on its way
+    assert line.serial.read_until(b"\r\n", 100).strip() in (b"", b"S S     200.00 g")  # one may have been sent before
     assert line.serial.read(1) == b""
     line.serial.timeout = 30.0
     line.send("SIR")

@@ -85,7 +85,7 @@ async def test_subscription_at_a_rate_and_on_change(server):
         for by in (1, 2):
             await client.do("add", by=by)
             server.publish("truth")
-        await client.do("truth")  # answers come in order, so both pushes are here
+        await client.do("truth")  # answers arrive in order, so both earlier events have arrived
         assert seen == [1, 3]
 
 

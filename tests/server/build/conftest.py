@@ -12,7 +12,7 @@ STOCK = Path(arcor2_hw.objects.__file__).parent / "stock"
 
 
 def make_code(directory: Path) -> list[PackageType]:
-    """Write the driver below a directory and give all types."""
+    """Write the driver below a directory and return all types."""
     folder = directory / "vendor" / "acme_devices" / "acme_reader"
     for name, content in workplace.DRIVER.items():
         file = folder / name

@@ -1,4 +1,4 @@
-"""As much of a server as Build and import work with: real storage, assets and registry; nothing is open."""
+"""The parts of a server that Build and import need: real storage, assets and registry; nothing is open."""
 
 import contextlib
 import types
@@ -27,7 +27,7 @@ async def opened(
     monkeypatch: pytest.MonkeyPatch,
     models: Mapping[str, ObjectModel] | None = None,
 ) -> AsyncIterator[Any]:
-    """Give services on an empty storage but for the uploaded types among `code`; the others are installed."""
+    """Return services on an empty storage but for the uploaded types among `code`; the others are installed."""
     settings = ServerSettings(data_dir=directory)
     settings.data_dir.mkdir(parents=True)
     storage = await Storage.open(settings)
@@ -48,14 +48,14 @@ async def opened(
         assets = await AssetStore.open(directory / "assets")
         object_types = ObjectTypes(KnownTypes(), storage, assets)
         await object_types.load()
-        told: list[Any] = []
+        events: list[Any] = []
         services: Any = types.SimpleNamespace(
             settings=settings,
             storage=storage,
             assets=assets,
             types=object_types,
             session=types.SimpleNamespace(scene=None, project=None),
-            hub=types.SimpleNamespace(broadcast=told.append, told=told),
+            hub=types.SimpleNamespace(broadcast=events.append, events=events),
         )
         services.build = BuildService(settings, storage, object_types)
         services.type_notifications = TypeNotifications(object_types, services.hub)

@@ -75,8 +75,8 @@ INVERSES = {
     Operator.EQUAL: Operator.DIFFERENT,
     Operator.DIFFERENT: Operator.EQUAL,
 }
-Way = tuple[str, str, bool | int | str] | None
-"""Condition: the action asked, its output's name, the value."""
+EdgeCondition = tuple[str, str, bool | int | str] | None
+"""Condition of an edge: the tested action, the name of its output, the value."""
 SORTS = ("low", "middle", "high")
 
 DECLARED = {
@@ -96,29 +96,29 @@ SCENE = Scene("scene", objects=[SceneObject("thing", "Thing", id=OBJECT)], id="s
 
 @dataclass
 class Draft:
-    """A project in the making: actions by name with the names of their results, and ways between them."""
+    """A project under construction: actions by name with the names of their results, and the edges between them."""
 
     actions: dict[str, list[str]] = field(default_factory=dict)
-    ways: list[tuple[str, str, Way]] = field(default_factory=list)
+    edges: list[tuple[str, str, EdgeCondition]] = field(default_factory=list)
     links: dict[str, tuple[str, int]] = field(default_factory=dict)
     methods: dict[str, str] = field(default_factory=dict)
     exits: list[tuple[str, str, list[str]]] = field(default_factory=list)
     errors: dict[str, str] = field(default_factory=dict)
-    told: dict[str, tuple[str, int]] = field(default_factory=dict)
+    error_parts: dict[str, tuple[str, int]] = field(default_factory=dict)
     retries: dict[str, Retry] = field(default_factory=dict)
     variables: set[str] = field(default_factory=set)
     """The names of the project parameters that actions change."""
     reading: dict[str, str] = field(default_factory=dict)
     """The id of the project parameter that an action uses, by its name."""
     whens: dict[int, LogicWhen] = field(default_factory=dict)
-    """Comparisons instead of the condition of a way, by its number."""
+    """Comparisons instead of the condition of an edge, by its number."""
 
     def action(self, name: str, *results: str) -> "Draft":
         self.actions[name] = list(results)
         return self
 
-    def way(self, start: str, end: str, condition: Way = None) -> "Draft":
-        self.ways.append((start, end, condition))
+    def edge(self, start: str, end: str, condition: EdgeCondition = None) -> "Draft":
+        self.edges.append((start, end, condition))
         return self
 
     def chain(self, *names: str) -> "Draft":
@@ -126,13 +126,13 @@ class Draft:
             if name not in (START, END):
                 self.actions.setdefault(name, [])
         for start, end in itertools.pairwise(names):
-            self.way(start, end)
+            self.edge(start, end)
         return self
 
     def branch(self, name: str, yes: str, no: str) -> "Draft":
         self.actions[name] = self.actions.get(name) or [f"r_{name}"]
         result = self.actions[name][0]
-        return self.way(name, yes, (name, result, True)).way(name, no, (name, result, False))
+        return self.edge(name, yes, (name, result, True)).edge(name, no, (name, result, False))
 
     def exit(self, start: str, end: str, *kinds: str) -> "Draft":
         self.exits.append((start, end, list(kinds)))
@@ -151,8 +151,8 @@ class Draft:
             method = "use"
             constant = ActionParameter("flag", "project_parameter", json.dumps(self.reading[name]))
             parameters = [constant, ActionParameter("x", "double", "0.5")]
-        if name in self.told:
-            source, part = self.told[name]
+        if name in self.error_parts:
+            source, part = self.error_parts[name]
             method, parameters = "tell", [ActionParameter("text", "link", json.dumps(f"id_{source}/error/{part}"))]
         flows = [Flow(outputs=results)]
         error, retry = self.errors.get(name, UNSET), self.retries.get(name, UNSET)
@@ -160,7 +160,7 @@ class Draft:
 
     def project(self) -> Project:
         logic = []
-        for number, (start, end, condition) in enumerate(self.ways):
+        for number, (start, end, condition) in enumerate(self.edges):
             when: Any = UNSET
             if condition is not None:
                 asked, result, value = condition
@@ -187,7 +187,7 @@ class Draft:
 
 
 class Enough(Exception):
-    """The run has shown what it was to show."""
+    """The run has covered the requested number of actions."""
 
 
 Exits = dict[str, list[list[str]]]
@@ -204,7 +204,7 @@ def exits_of(project: Project) -> Exits:
 
 
 def failure(exits: Exits, name: str, number: int, drawn: tuple[bool, ...]) -> Arcor2Error | None:
-    """Give the error of the n-th action that runs, for what an oracle draws."""
+    """Return the error of the n-th executed action, chosen by the values of an oracle."""
     rng = random.Random(f"{name} {number} {drawn}")
     kinds = sorted(kind for exit_ in exits.get(name, ()) for kind in exit_)
     if not kinds or rng.random() < 0.5:
@@ -213,11 +213,11 @@ def failure(exits: Exits, name: str, number: int, drawn: tuple[bool, ...]) -> Ar
 
 
 Oracle = Callable[[str, int], tuple[bool, ...]]
-"""Gives the results of the n-th action that runs."""
+"""Return the results of the n-th action that runs."""
 
 
 def given(method: str, drawn: tuple[bool, ...]) -> tuple[Any, ...]:
-    """Give the results of a method for what an oracle draws."""
+    """Return the results of a method, chosen by the values of an oracle."""
     match method:
         case "count":
             return (sum(drawn),)
@@ -246,7 +246,7 @@ def _met(one: LogicComparison, value: Any, *others: Any) -> bool:
 
 
 def walk(project: Project, oracle: Oracle, count: int) -> list[tuple[str, tuple[Any, ...]]]:
-    """Follow the logic item by item, without any notion of blocks; gives what runs with which linked values."""
+    """Follow the logic item by item, without blocks; yield the executed actions with their linked values."""
     actions = {action.id: action for point in project.action_points for action in point.actions}
     exits = exits_of(project)
     done: list[tuple[str, tuple[Any, ...]]] = []
@@ -284,17 +284,17 @@ def walk(project: Project, oracle: Oracle, count: int) -> list[tuple[str, tuple[
             for output, value in zip(action.outputs(), results[at, "default"], strict=False):
                 if output in stored:
                     variables[stored[output]] = value
-            ways = [item for item in project.logic if item.start == at and not item.error_kinds]
-            # The one without a condition is for when none holds, wherever it stands.
-            ways.sort(key=lambda way: not way.has_condition)
-            while len(ways) > 1 and ways[-2].end == ways[-1].end:
-                ways.pop(-2)
-            for item in ways:
-                if isinstance(item.condition, ProjectLogicIf) and item is not ways[-1]:
+            edges = [item for item in project.logic if item.start == at and not item.error_kinds]
+            # The step without a condition is taken if no condition holds, whatever its position.
+            edges.sort(key=lambda edge: not edge.has_condition)
+            while len(edges) > 1 and edges[-2].end == edges[-1].end:
+                edges.pop(-2)
+            for item in edges:
+                if isinstance(item.condition, ProjectLogicIf) and item is not edges[-1]:
                     source, _, output = parse_link(item.condition.what)
                     if results[source, "default"][output] != json.loads(item.condition.value):
                         continue
-                if isinstance(item.when, LogicWhen) and item is not ways[-1]:
+                if isinstance(item.when, LogicWhen) and item is not edges[-1]:
                     comparisons = item.when.comparisons
                     met = [_met(o, *(_compared(w, results, variables) for w in o.compared())) for o in comparisons]
                     if not (all(met) if item.when.match == "all" else any(met)):
@@ -374,16 +374,16 @@ def same_runs(draft: Draft, oracle: Oracle, count: int) -> None:
     assert run(source, oracle, count, exits_of(project)) == walk(project, oracle, count), source
 
 
-def random_draft(rng: random.Random, size: int, joining: float, ending: float, window: int) -> Draft:
-    """Draw a graph without loops: each action goes on to one, two or three others, near ones rather than far ones."""
+def random_draft(rng: random.Random, size: int, merging: float, end_rate: float, window: int) -> Draft:
+    """Create a random graph without loops: each action leads to one, two or three others, mostly near ones."""
     draft = Draft()
     names = [f"a{n}" for n in range(size)]
-    # Which actions always run before another one: the sets are what the program may rely on.
+    # For each action, the actions that always run before it: the program may use their results.
     always: dict[int, set[int]] = {0: {0}}
     results: dict[int, int] = {n: rng.choice((0, 1, 1, 1, 2)) for n in range(size)}
     for n in range(size):
         draft.action(names[n], *[f"r{k}_{n}" for k in range(results[n])])
-    draft.way(START, names[0])
+    draft.edge(START, names[0])
     fresh = 1
     for n in range(size):
         if n not in always:
@@ -391,10 +391,10 @@ def random_draft(rng: random.Random, size: int, joining: float, ending: float, w
 
         def target(n: int = n) -> int:
             nonlocal fresh
-            if rng.random() < ending or n == size - 1:
+            if rng.random() < end_rate or n == size - 1:
                 return size
             known = [t for t in always if t > n]
-            if known and rng.random() < joining:
+            if known and rng.random() < merging:
                 return rng.choice(sorted(known)[:window])
             fresh = max(fresh, n + 1)
             if fresh >= size:
@@ -415,8 +415,8 @@ def random_draft(rng: random.Random, size: int, joining: float, ending: float, w
             conditions = []
         for condition in conditions or [None]:
             end = target()
-            way = None if condition is None else (names[condition[0]], f"r{condition[1]}_{condition[0]}", condition[2])
-            draft.way(names[n], names[end] if end < size else END, way)
+            edge = None if condition is None else (names[condition[0]], f"r{condition[1]}_{condition[0]}", condition[2])
+            draft.edge(names[n], names[end] if end < size else END, edge)
             if end < size:
                 always[end] = (always[end] & always[n] if end in always else always[n]) | {end}
     for n in sorted(always):
@@ -428,43 +428,43 @@ def random_draft(rng: random.Random, size: int, joining: float, ending: float, w
 
 
 def without_doubles(draft: Draft) -> Draft:
-    """Make one way of all the ways from one action to the same one, which no editor makes."""
+    """Merge all edges between the same two actions, because no editor creates several."""
     ends: dict[str, set[str]] = {}
-    for start, end, _ in draft.ways:
+    for start, end, _ in draft.edges:
         ends.setdefault(start, set()).add(end)
-    ways: list[tuple[str, str, Way]] = []
-    for start, end, condition in draft.ways:
+    edges: list[tuple[str, str, EdgeCondition]] = []
+    for start, end, condition in draft.edges:
         if len(ends[start]) > 1:
-            ways.append((start, end, condition))
-        elif (start, end, None) not in ways:
-            ways.append((start, end, None))
-    draft.ways = ways
+            edges.append((start, end, condition))
+        elif (start, end, None) not in edges:
+            edges.append((start, end, None))
+    draft.edges = edges
     return draft
 
 
 def with_choices(draft: Draft, rng: random.Random) -> Draft:
-    """Turn branchings on truth values into branchings on numbers and texts with an else, wherever that can be."""
+    """Replace branches on booleans by branches on numbers and texts with an else, where possible."""
     linked = {source for source, _ in draft.links.values()}
     choices = {name for name, results in draft.actions.items() if len(results) == 1} - linked
     groups: dict[str, list[int]] = {}
-    for number, (start, _, condition) in enumerate(draft.ways):
+    for number, (start, _, condition) in enumerate(draft.edges):
         if condition is not None:
             groups.setdefault(start, []).append(number)
-    asked = {start: {draft.ways[n][2][0] for n in numbers} for start, numbers in groups.items()}  # type: ignore[index]
+    asked = {start: {draft.edges[n][2][0] for n in numbers} for start, numbers in groups.items()}  # type: ignore[index]
     while lost := {name for names in asked.values() if not names <= choices for name in names & choices}:
         choices -= lost
     values = {name: rng.choice((("count", 0, 1), ("count", 2, 1), ("sort", *SORTS[:2]))) for name in sorted(choices)}
     draft.methods |= {name: kind for name, (kind, *_) in values.items()}
     for numbers in groups.values():
         for number in numbers:
-            start, end, condition = draft.ways[number]
+            start, end, condition = draft.edges[number]
             assert condition is not None
             if condition[0] in choices:
                 value = values[condition[0]][1 + bool(condition[2])]
-                draft.ways[number] = (start, end, None if number == numbers[-1] else (*condition[:2], value))
+                draft.edges[number] = (start, end, None if number == numbers[-1] else (*condition[:2], value))
     if rng.random() < 0.5:
-        # Where the way without a condition stands among the others makes no difference.
-        draft.ways.sort(key=lambda way: way[2] is not None)
+        # The position of the step without a condition among the others must not matter.
+        draft.edges.sort(key=lambda edge: edge[2] is not None)
     return draft
 
 
@@ -510,7 +510,7 @@ def _proven(whens: list[LogicWhen], kinds: dict[str, str], *, otherwise: bool) -
 
 
 def with_comparisons(draft: Draft, rng: random.Random) -> Draft:
-    """Turn branchings on truth values into branchings on comparisons of several results and project parameters."""
+    """Replace branches on booleans by branches on comparisons of several results and project parameters."""
     linked = {source for source, _ in draft.links.values()}
     draft.methods |= {
         name: rng.choice(list(METHODS))
@@ -518,13 +518,13 @@ def with_comparisons(draft: Draft, rng: random.Random) -> Draft:
         if len(results) == 1 and name not in linked
     }
     groups: dict[str, list[int]] = {}
-    for number, (start, _, condition) in enumerate(draft.ways):
+    for number, (start, _, condition) in enumerate(draft.edges):
         if condition is not None:
             groups.setdefault(start, []).append(number)
     for numbers in groups.values():
         kinds = {one.id: one.type for one in PARAMETERS}
         for number in numbers:
-            asked, result, _ = draft.ways[number][2]  # type: ignore[misc]
+            asked, result, _ = draft.edges[number][2]  # type: ignore[misc]
             link = f"id_{asked}/default/{draft.actions[asked].index(result)}"
             kinds[link] = METHODS.get(draft.methods.get(asked, ""), "boolean")
         for attempt in range(12):
@@ -548,7 +548,7 @@ def with_comparisons(draft: Draft, rng: random.Random) -> Draft:
             whens = [LogicWhen([LogicComparison("pco_n", Operator.EQUAL, str(n))]) for n, _ in enumerate(numbers[1:])]
         rng.shuffle(numbers)
         for number in numbers:
-            draft.ways[number] = (*draft.ways[number][:2], None)
+            draft.edges[number] = (*draft.edges[number][:2], None)
         for number, when in zip(sorted(numbers[: len(whens)]), whens, strict=True):
             draft.whens[number] = when
     return draft
@@ -557,7 +557,7 @@ def with_comparisons(draft: Draft, rng: random.Random) -> Draft:
 def with_variables(draft: Draft, rng: random.Random) -> Draft:
     """Store results that nothing else uses in variables, and use these as parameters."""
     used = {source for source, _ in draft.links.values()}
-    used |= {condition[0] for _, _, condition in draft.ways if condition is not None}
+    used |= {condition[0] for _, _, condition in draft.edges if condition is not None}
     for when in draft.whens.values():
         compared = {what for one in when.comparisons for what in one.compared() if "/" in what}
         used |= {parse_link(what)[0].removeprefix("id_") for what in compared}
@@ -601,10 +601,10 @@ def with_exits(draft: Draft, rng: random.Random) -> Draft:
             if rng.random() < 0.6:
                 handler = f"h{number}_{name}"
                 added.action(handler)
-                added.exit(name, handler, *chosen).way(handler, end)
+                added.exit(name, handler, *chosen).edge(handler, end)
                 if rng.random() < 0.7:
                     added.errors[name] = f"e_{name}"
-                    added.told[handler] = (name, rng.randrange(3))
+                    added.error_parts[handler] = (name, rng.randrange(3))
             else:
                 added.exit(name, end, *chosen)
             exits = [(start, target) for start, target, _ in added.exits]

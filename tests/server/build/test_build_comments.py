@@ -70,16 +70,16 @@ def reformatted(source: str, rng: random.Random) -> str:
 
 
 def program(
-    seed: int, size: int, joining: float, ending: float, conditions: str, functions: int, parallel: bool
+    seed: int, size: int, merging: float, end_rate: float, conditions: str, functions: int, parallel: bool
 ) -> tuple[Scene, Project]:
     rng = random.Random(seed)
-    draft = without_doubles(random_draft(rng, size, joining, ending, 3))
+    draft = without_doubles(random_draft(rng, size, merging, end_rate, 3))
     if conditions:
         draft = with_choices(draft, rng) if conditions == "choices" else with_comparisons(draft, rng)
     draft = with_exits(with_retries(with_variables(draft, rng), rng), rng)
     project = draft.project()
     steps = [(item.start, item.end, item.is_error_exit) for item in project.logic]
-    assume(len(steps) == len(set(steps)))  # no editor makes two steps from one action to the same one
+    assume(len(steps) == len(set(steps)))  # no editor creates two steps between the same two actions
     if functions:
         project = with_functions(project, rng, functions)
     return with_parallel_work(project, rng) if parallel else (SCENE, project)

@@ -1,4 +1,4 @@
-"""Conditions of which one has to be true: the cases that the editor also decides, in completeness.test.ts."""
+"""Whether one of several conditions is always true, with the cases of the editor's completeness.test.ts."""
 
 import json
 from pathlib import Path

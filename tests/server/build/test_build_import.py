@@ -32,7 +32,7 @@ ALL = ImportOptions(True, True, True, True, True)
 
 
 def the_project() -> Project:
-    """Give the workplace's project without joints, which only a robot may have: its arm is none."""
+    """Return the workplace's project without joints, because only robots have joints and its arm is not one."""
     points = []
     for point in workplace.project().action_points:
         actions = []
@@ -47,7 +47,7 @@ def the_project() -> Project:
 
 @pytest.fixture(scope="module")
 def packed(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """Give the workplace's package as another hub publishes it."""
+    """Return the workplace's package as another hub publishes it."""
     directory = tmp_path_factory.mktemp("there")
 
     async def published() -> bytes:
@@ -62,7 +62,7 @@ def packed(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 @pytest.fixture
 async def here(code: list[PackageType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Any]:
-    """Give a hub that has the drivers installed and nothing saved."""
+    """Return a hub that has the drivers installed and nothing saved."""
     async with hub.opened(tmp_path / "here", [one for one in code if not one.source], monkeypatch) as services:
         yield services
 
@@ -73,7 +73,7 @@ def files_in(packed: bytes) -> dict[str, bytes]:
 
 
 def changed(packed: bytes, **contents: bytes | None) -> bytes:
-    """Give the package with other files; None leaves one out. `__` in a name stands for a slash."""
+    """Return the package with other files; None leaves one out. `__` in a name stands for a slash."""
     files: dict[str, bytes] = files_in(packed)
     for name, content in contents.items():
         path = name.replace("__", "/").replace("_py", ".py").replace("_json", ".json")
@@ -98,14 +98,14 @@ async def test_a_package_is_imported_completely(here: Any, packed: bytes) -> Non
     stored = {one.id: one for one in await here.storage.object_types()}
     assert {name: one.source for name, one in stored.items()} == {"Arm": workplace.ARM, "table": workplace.TABLE}
     assert stored["table"].model == MODELS["table"]
-    # What came back can be built again at once, into the same program.
+    # The imported project can be built at once, and results in the same program.
     again = files_in(await here.build.publish("pro_1"))
     assert again["script.py"] == files_in(packed)["script.py"]
     async with asyncio.timeout(30):
-        while not here.hub.told:
+        while not here.hub.events:
             await asyncio.sleep(0.05)
-    assert [event.event for event in here.hub.told] == ["ChangedObjectTypes"]
-    assert {meta.type for meta in here.hub.told[0].data} == {"Arm", "table"}
+    assert [event.event for event in here.hub.events] == ["ChangedObjectTypes"]
+    assert {meta.type for meta in here.hub.events[0].data} == {"Arm", "table"}
 
 
 async def test_a_helper_module_without_a_class_is_imported(here: Any, packed: bytes) -> None:
@@ -115,12 +115,12 @@ async def test_a_helper_module_without_a_class_is_imported(here: Any, packed: by
     await here.package_import.import_package(given, NOTHING)
     assert (await here.storage.object_type("sort_tools")).source == helper.decode()
     await here.types.refresh()
-    assert not here.types.known("sort_tools")  # no type that could be placed
+    assert not here.types.known("sort_tools")  # not a type whose objects can be added to a scene
     assert not here.types.meta("Arm").disabled
     built = files_in(await here.build.publish("pro_1"))
     assert built["object_types/sort_tools.py"] == helper
 
-    # It keeps the name that it has here.
+    # The module keeps the name of the object type on the server.
     await here.storage.delete_object_type("sort_tools")
     await here.storage.put_object_type(ObjectTypeSource("SortTools", helper.decode()))
     revision = here.storage.revision
@@ -201,7 +201,7 @@ async def test_an_edited_script_becomes_the_project(here: Any, packed: bytes) ->
     actions = {action.name: action for point in project.action_points for action in point.actions}
     assert {name for name in actions if name not in workplace_actions()} == {"lay down"}
     assert all(actions[name].id == key for name, key in workplace_actions().items())
-    # What a call leaves to its default is there when the project is opened.
+    # Arguments that a call omits have their default values in the project.
     assert {one.name: one.value for one in actions["pick"].parameters} == {
         "pose": '"ori_feeder"',
         "speed": "1.0",
@@ -317,7 +317,7 @@ async def test_a_type_of_the_package_shadows_an_installed_one(here: Any, packed:
     assert after["object_types/acme_reader.py"] == source.encode()
     assert before["object_types/acme_reader.py"] != source.encode()
 
-    # Base classes stay what they are.
+    # Base classes are unchanged.
     generic = b"from arcor2_hw.objects import Robot\n\n\nclass Generic(Robot):\n    pass\n"
     with pytest.raises(InvalidPackage, match="Generic is built in"):
         await here.package_import.import_package(changed(packed, object_types__generic_py=generic), ALL)
@@ -398,7 +398,7 @@ async def test_an_invalid_package_is_refused_completely(
         await here.package_import.import_package(changed(packed, **contents), ALL)
     assert text in str(caught.value)
     assert here.storage.revision == 0
-    assert here.hub.told == []
+    assert here.hub.events == []
 
 
 def _zip(*entries: tuple[str, bytes, int]) -> bytes:
@@ -441,11 +441,11 @@ async def test_a_zip_bomb_is_refused_during_reading(here: Any) -> None:
     assert len(bomb) < 100_000
     with pytest.raises(InvalidPackage, match="larger than"):
         await here.package_import.import_package(bomb, ALL)
-    # The size that the zip tells of itself is a lie: what counts is what comes out.
+    # The size stated in the archive is wrong: the size of the unpacked file counts.
     at = bomb.index(b"PK\x01\x02")
-    liar = bomb[: at + 24] + struct.pack("<I", 10) + bomb[at + 28 :]
+    understated = bomb[: at + 24] + struct.pack("<I", 10) + bomb[at + 28 :]
     with pytest.raises(InvalidPackage):
-        await here.package_import.import_package(liar, ALL)
+        await here.package_import.import_package(understated, ALL)
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
@@ -547,7 +547,7 @@ async def test_bases_mixins_and_modules_are_packed_and_imported(
         await other.package_import.import_package(published, NOTHING)
         assert {one.id: one.source for one in await other.storage.object_types()} == sources
         assert files_in(await other.build.publish("pro_t", "Tools"))["script.py"] == files["script.py"]
-        # An extra module that is nowhere is named.
+        # The error names an extra module that does not exist.
         await other.storage.put_project(replace(project, project_objects_ids=["Gone"]))
         with pytest.raises(NotFound, match="Gone"):
             await other.build.publish("pro_t")

@@ -1,4 +1,4 @@
-"""Programs do what their logic defines: random graphs are run both ways, and typical shapes compared as text."""
+"""Programs do what their logic defines: random graphs run directly and as programs, typical shapes as text."""
 
 import json
 import random
@@ -40,9 +40,9 @@ from tests.server.build.projects import (
     st.booleans(),
 )
 def test_a_program_does_what_its_logic_defines(
-    seed: int, size: int, joining: float, ending: float, window: int, choices: bool, exits: bool
+    seed: int, size: int, merging: float, end_rate: float, window: int, choices: bool, exits: bool
 ) -> None:
-    draft = random_draft(random.Random(seed), size, joining, ending, window)
+    draft = random_draft(random.Random(seed), size, merging, end_rate, window)
     if choices:
         draft = with_choices(draft, random.Random(seed))
     if exits:
@@ -62,14 +62,14 @@ def _oracle(seed: int) -> Any:
 def test_large_random_graphs() -> None:
     rng = random.Random(7)
     for size in (200, 400):
-        for joining, window in ((0.3, 5), (0.6, 50), (0.05, 3)):
-            draft = random_draft(rng, size, joining, 0.05, window)
+        for merging, window in ((0.3, 5), (0.6, 50), (0.05, 3)):
+            draft = random_draft(rng, size, merging, 0.05, window)
             same_runs(draft, _oracle(rng.randrange(1000)), 3 * size)
 
 
 # ------------------------------------------------------------------------------------------------ shapes
 def loop(source: str) -> str:
-    """Give the body of the loop without the objects' names, for comparison by eye."""
+    """Return the body of the loop without the objects' names, for comparison by eye."""
     lines = source.splitlines()
     start = lines.index("    while True:") + 1
     body = lines[start : lines.index('if __name__ == "__main__":')]
@@ -77,7 +77,7 @@ def loop(source: str) -> str:
 
 
 def test_a_diamond_joins_behind_the_branch() -> None:
-    draft = Draft().way(START, "a").branch("a", "b", "c").chain("b", "d").chain("c", "d").chain("d", END)
+    draft = Draft().edge(START, "a").branch("a", "b", "c").chain("b", "d").chain("c", "d").chain("d", END)
     assert (
         loop(draft.script())
         == """\
@@ -92,7 +92,7 @@ thing.do(an="d")"""
 
 
 def test_branches_that_both_end_become_if_and_else() -> None:
-    draft = Draft().way(START, "a").branch("a", "b", "c").chain("b", END).chain("c", END)
+    draft = Draft().edge(START, "a").branch("a", "b", "c").chain("b", END).chain("c", END)
     assert (
         loop(draft.script())
         == """\
@@ -105,7 +105,7 @@ else:
 
 
 def test_an_early_end_needs_no_else() -> None:
-    draft = Draft().way(START, "a").branch("a", "b", "c").chain("b", END).branch("c", "d", END).chain("d", END)
+    draft = Draft().edge(START, "a").branch("a", "b", "c").chain("b", END).branch("c", "d", END).chain("d", END)
     assert (
         loop(draft.script())
         == """\
@@ -121,7 +121,7 @@ if r_c == True:
 
 
 def test_an_empty_branch_is_omitted() -> None:
-    draft = Draft().way(START, "a").branch("a", "d", "c").chain("c", "d").chain("d", END)
+    draft = Draft().edge(START, "a").branch("a", "d", "c").chain("c", "d").chain("d", END)
     assert (
         loop(draft.script())
         == """\
@@ -135,7 +135,7 @@ thing.do(an="d")"""
 
 def test_more_than_two_branches_become_elif() -> None:
     draft = Draft().action("a", "x", "y").chain(START, "a").chain("b", "e").chain("c", "e").chain("d", "e", END)
-    draft.way("a", "b", ("a", "x", True)).way("a", "c", ("a", "y", True)).way("a", "d", ("a", "y", False))
+    draft.edge("a", "b", ("a", "x", True)).edge("a", "c", ("a", "y", True)).edge("a", "d", ("a", "y", False))
     assert (
         loop(draft.script())
         == """\
@@ -153,7 +153,7 @@ thing.do(an="e")"""
 
 def test_a_join_that_can_be_bypassed_is_written_once() -> None:
     draft = (
-        Draft().way(START, "a").branch("a", "b", "c").branch("b", "d", "e").chain("c", "e", "f", END).chain("d", "f")
+        Draft().edge(START, "a").branch("a", "b", "c").branch("b", "d", "e").chain("c", "e", "f", END).chain("d", "f")
     )
     source = draft.script()
     assert (
@@ -181,8 +181,8 @@ thing.do(an="f")"""
 
 
 def nested(depth: int) -> Draft:
-    """Make branches within branches that all join again, one level behind the other."""
-    draft = Draft().way(START, "a0")
+    """Return nested branches that all join again, one level after the other."""
+    draft = Draft().edge(START, "a0")
     for n in range(depth):
         draft.branch(f"a{n}", f"a{n + 1}" if n < depth - 1 else "deepest", f"b{n}")
         draft.chain(f"b{n}", f"j{n}").chain(f"j{n}", f"j{n - 1}" if n else END)
@@ -196,12 +196,12 @@ def test_deeply_nested_branches_become_functions(depth: int) -> None:
     assert deepest <= MAX_NESTING + 4
     for seed in range(3):
         same_runs(draft, _oracle(seed), 60)
-    # The way into the depths, which chance hardly ever takes.
+    # The path to the innermost branch, which random values hardly ever take.
     same_runs(draft, lambda *_: (True, True), 3 * depth)
 
 
 def diamonds(count: int) -> Draft:
-    draft = Draft().way(START, "a0")
+    draft = Draft().edge(START, "a0")
     for n in range(count):
         draft.branch(f"a{n}", f"y{n}", f"n{n}")
         after = f"a{n + 1}" if n < count - 1 else END
@@ -210,8 +210,8 @@ def diamonds(count: int) -> Draft:
 
 
 def exits(count: int) -> Draft:
-    """Make a long chain whose every action may go straight to the last one."""
-    draft = Draft().way(START, "a0")
+    """Return a long chain in which each action may also lead directly to the last one."""
+    draft = Draft().edge(START, "a0")
     for n in range(count - 1):
         draft.branch(f"a{n}", f"a{n + 1}", "last")
     return draft.chain(f"a{count - 1}", "last", END)
@@ -222,8 +222,8 @@ def chain(count: int) -> Draft:
 
 
 def ladder(count: int) -> Draft:
-    """Make two strands that change over everywhere: nothing of it is structured."""
-    draft = Draft().way(START, "l0")
+    """Return two parallel chains with crossings at every action: completely unstructured logic."""
+    draft = Draft().edge(START, "l0")
     for n in range(count):
         last = n == count - 1
         draft.branch(f"l{n}", END if last else f"l{n + 1}", f"r{n}")
@@ -245,7 +245,7 @@ def test_a_long_chain_is_built(make: Any, count: int) -> None:
 
 
 def _steps(draft: Draft) -> int:
-    """Count the lines of our code that a build runs through: a measure that no other load disturbs."""
+    """Count the lines of our code that a build executes: a measure that does not depend on other load."""
     project = draft.project()
     count = 0
 
@@ -286,17 +286,17 @@ def test_common_ancestors() -> None:
 
 # ------------------------------------------------------------------------------------------------ refusals
 def _no_condition() -> Draft:
-    return Draft().action("a", "x").chain(START, "a").chain("a", "b", END).way("a", END, ("a", "x", True))
+    return Draft().action("a", "x").chain(START, "a").chain("a", "b", END).edge("a", END, ("a", "x", True))
 
 
 def _never_taken() -> Draft:
     draft = Draft().action("a", "x", "y").chain(START, "a").chain("b", END).chain("c", END).chain("d", END)
-    return draft.way("a", "b", ("a", "x", True)).way("a", "c", ("a", "x", False)).way("a", "d", ("a", "y", True))
+    return draft.edge("a", "b", ("a", "x", True)).edge("a", "c", ("a", "x", False)).edge("a", "d", ("a", "y", True))
 
 
 def _linked_from_a_branch() -> Draft:
     draft = (
-        Draft().way(START, "a").branch("a", "b", "c").action("b", "x").chain("b", "d").chain("c", "d").chain("d", END)
+        Draft().edge(START, "a").branch("a", "b", "c").action("b", "x").chain("b", "d").chain("c", "d").chain("d", END)
     )
     draft.links["d"] = ("b", 0)
     return draft
@@ -313,10 +313,10 @@ def _linked_to_itself() -> Draft:
     [
         (Draft().chain("a", END), "START"),
         (Draft().chain(START, "a", END).chain(START, "b", END), "more than one first action"),
-        (Draft().way(START, END), "without an action"),
+        (Draft().edge(START, END), "without an action"),
         (Draft().chain(START, "first", "second"), "'second': no action follows"),
         (Draft().chain(START, "a", "b", "c", "b"), "'b': the logic forms a loop"),
-        (Draft().action("a", "x").chain(START, "a").way("a", "b", ("a", "x", True)).chain("b", END), "x is false"),
+        (Draft().action("a", "x").chain(START, "a").edge("a", "b", ("a", "x", True)).chain("b", END), "x is false"),
         (_no_condition(), "'a': one of its connections has no condition"),
         (_never_taken(), "'a': the connection to 'd' is never taken"),
         (_linked_from_a_branch(), "'d' uses a result of 'b', which does not run before it on all paths"),
@@ -337,11 +337,11 @@ def test_unreachable_actions_are_omitted() -> None:
 
 # ------------------------------------------------------------------------------------------------ numbers and texts
 def choosing(*values: int | str | None) -> Draft:
-    """Give a project whose first action leads to b0, b1 ... by the values of its result, all joining in z."""
+    """Return a project whose first action leads to b0, b1 ... by the values of its result, all merging in z."""
     method = "count" if isinstance(values[0], int) else "sort"
-    draft = Draft(methods={"a": method}).action("a", "r").way(START, "a")
+    draft = Draft(methods={"a": method}).action("a", "r").edge(START, "a")
     for number, value in enumerate(values):
-        draft.action(f"b{number}").way("a", f"b{number}", None if value is None else ("a", "r", value))
+        draft.action(f"b{number}").edge("a", f"b{number}", None if value is None else ("a", "r", value))
         draft.chain(f"b{number}", "z")
     return draft.chain("z", END)
 
@@ -371,15 +371,15 @@ def test_a_choice_between_texts() -> None:
 
 
 def test_a_default_branch_to_the_end() -> None:
-    draft = Draft(methods={"a": "count"}).action("a", "r").way(START, "a").action("b")
-    draft.way("a", "b", ("a", "r", 1)).way("a", END).way("b", END)
+    draft = Draft(methods={"a": "count"}).action("a", "r").edge(START, "a").action("b")
+    draft.edge("a", "b", ("a", "r", 1)).edge("a", END).edge("b", END)
     assert loop(draft.script()).splitlines()[1:] == ["if r == 1:", '    thing.do(an="b")']
     same_runs(draft, _oracle(3), 40)
 
 
 def test_a_default_branch_with_actions() -> None:
-    draft = Draft(methods={"a": "count"}).action("a", "r").way(START, "a").action("b").chain("b", "z", END)
-    draft.way("a", "z", ("a", "r", 1)).way("a", "b")
+    draft = Draft(methods={"a": "count"}).action("a", "r").edge(START, "a").action("b").chain("b", "z", END)
+    draft.edge("a", "z", ("a", "r", 1)).edge("a", "b")
     assert loop(draft.script()).splitlines()[1:3] == ["if r != 1:", '    thing.do(an="b")']
     same_runs(draft, _oracle(4), 40)
 
@@ -404,7 +404,7 @@ def test_invalid_choices_are_refused(draft: Draft, text: str) -> None:
 
 
 def test_a_boolean_has_no_default_branch() -> None:
-    draft = Draft().action("a", "r").way(START, "a").action("b").way("a", "b", ("a", "r", True)).way("a", END)
+    draft = Draft().action("a", "r").edge(START, "a").action("b").edge("a", "b", ("a", "r", True)).edge("a", END)
     with pytest.raises(InvalidProject, match="one of its connections has no condition"):
         draft.chain("b", END).script()
 
@@ -431,13 +431,13 @@ def compared(what: str, operator: str, value: object, upper: object = UNSET) -> 
 
 
 def comparing(*conditions: list[LogicComparison] | None, match: Match = Match.ALL) -> Draft:
-    """Give a project whose action a leads to b0, b1 ... by comparisons of the results of x, p and a, joining in z."""
+    """Return a project whose action a leads to b0, b1 ... by comparisons of the results of x, p and a, merging in z."""
     draft = Draft(methods={"a": "count", "x": "measure", "p": "ask"})
     draft.action("x", "x").action("p", "passed").action("a", "n").chain(START, "x", "p", "a")
     for number, comparisons in enumerate(conditions):
-        draft.action(f"b{number}").way("a", f"b{number}")
+        draft.action(f"b{number}").edge("a", f"b{number}")
         if comparisons is not None:
-            draft.whens[len(draft.ways) - 1] = LogicWhen(comparisons, match)
+            draft.whens[len(draft.edges) - 1] = LogicWhen(comparisons, match)
         draft.chain(f"b{number}", "z")
     return draft.chain("z", END)
 
@@ -476,7 +476,7 @@ def test_two_values_are_compared() -> None:
     ]
     same_runs(draft, _oracle(4), 60)
     comparing([pair(N, "<", LIMIT)], [pair(LIMIT, "<=", N)]).script()
-    # Two values can lie in any order between and outside of constants.
+    # Two values may be in any order, between constants or outside of them.
     high = [compared(N, ">", 5), compared(LIMIT, ">", 5)]
     for operator in ("<", "==", ">"):
         comparing([*high, pair(N, operator, LIMIT)], None).script()
@@ -497,7 +497,7 @@ def test_complete_comparisons_need_no_default_branch() -> None:
     comparing(passed, failed, [compared(LIMIT, "<", 1)]).script()
     # Overlapping conditions apply in their order, also when the first one leads to the next action of the program.
     overlapping = Draft(methods={"a": "count"}).action("a", "n").chain(START, "a").action("b").action("z")
-    overlapping.way("a", "z").way("a", "b").chain("b", "z", END)
+    overlapping.edge("a", "z").edge("a", "b").chain("b", "z", END)
     overlapping.whens = {1: LogicWhen([compared(N, "<", 2)]), 2: LogicWhen([compared(N, ">=", 1)])}
     assert "if not n < 2:" in overlapping.script()
     same_runs(overlapping, _oracle(3), 60)
@@ -540,8 +540,8 @@ def test_invalid_comparisons_are_refused(draft: Draft, text: str) -> None:
 
 def test_a_compared_result_is_set_on_all_paths() -> None:
     draft = Draft(methods={"c": "count"}).action("a", "r").chain(START, "a").branch("a", "c", "d")
-    draft.action("c", "n").chain("c", "d").action("d").way("d", "e").way("d", END).chain("e", END)
-    draft.whens = {len(draft.ways) - 3: LogicWhen([compared("id_c/default/0", "<", 3)])}
+    draft.action("c", "n").chain("c", "d").action("d").edge("d", "e").edge("d", END).chain("e", END)
+    draft.whens = {len(draft.edges) - 3: LogicWhen([compared("id_c/default/0", "<", 3)])}
     with pytest.raises(InvalidProject, match="'d' uses a result of 'c', which does not run before it on all paths"):
         draft.script()
 

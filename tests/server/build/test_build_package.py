@@ -263,7 +263,7 @@ def test_a_package_appears_atomically(tmp_path: Path, monkeypatch: pytest.Monkey
 async def service(
     code: list[PackageType], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> AsyncIterator[tuple[BuildService, Storage]]:
-    """Give a Build service on a real storage and registry."""
+    """Return a Build service on a real storage and registry."""
     async with hub.opened(tmp_path / "data", code, monkeypatch, MODELS) as services:
         await services.storage.put_scene(workplace.scene())
         yield services.build, services.storage
@@ -310,7 +310,7 @@ async def test_a_build_does_not_block_the_event_loop(service: tuple[BuildService
     await asyncio.wait_for(build.publish("pro_1"), 60)
     await publishing
     turning.cancel()
-    # A build on the loop would leave a handful of turns, around its other waits.
+    # If the build ran in the event loop, the loop would iterate only a few times meanwhile.
     assert turns > 100
 
 

@@ -63,9 +63,9 @@ def _oracle(seed: int) -> Any:
     st.booleans(),
 )
 def test_a_script_round_trips_to_the_same_project(
-    seed: int, size: int, joining: float, ending: float, window: int, conditions: str, variables: bool, exits: bool
+    seed: int, size: int, merging: float, end_rate: float, window: int, conditions: str, variables: bool, exits: bool
 ) -> None:
-    draft = random_draft(random.Random(seed), size, joining, ending, window)
+    draft = random_draft(random.Random(seed), size, merging, end_rate, window)
     if conditions:
         change = with_choices if conditions == "choices" else with_comparisons
         draft = change(draft, random.Random(seed))
@@ -79,7 +79,7 @@ def test_a_script_round_trips_to_the_same_project(
     steps = [(item.start, item.end, item.is_error_exit) for item in project.logic]
     if len(steps) == len(set(steps)):
         assert back == project, source
-    # Two steps from one action to the same one, which no editor makes, may become one.
+    # Two steps between the same two actions, which no editor creates, may be merged.
     assert back.action_points == project.action_points
     [point] = project.action_points
     fresh = from_script(source, SCENE, replace(project, action_points=[replace(point, actions=[])], logic=[]), TYPES)
@@ -100,17 +100,17 @@ def test_a_script_round_trips_to_the_same_project(
     st.booleans(),
 )
 def test_functions_round_trip_and_do_what_their_actions_did(
-    seed: int, size: int, joining: float, ending: float, count: int, conditions: str, variables: bool
+    seed: int, size: int, merging: float, end_rate: float, count: int, conditions: str, variables: bool
 ) -> None:
     rng = random.Random(seed)
-    draft = without_doubles(random_draft(rng, size, joining, ending, 3))
+    draft = without_doubles(random_draft(rng, size, merging, end_rate, 3))
     if conditions:
         draft = with_choices(draft, rng) if conditions == "choices" else with_comparisons(draft, rng)
     if variables:
         draft = with_retries(with_variables(draft, rng), rng)
     flat = with_exits(draft, rng).project()
     steps = [(item.start, item.end, item.is_error_exit) for item in flat.logic]
-    assume(len(steps) == len(set(steps)))  # no editor makes two steps from one action to the same one
+    assume(len(steps) == len(set(steps)))  # no editor creates two steps between the same two actions
     project = with_functions(flat, rng, count)
     source = from_logic(SCENE, project, TYPES)
     assert from_script(source, SCENE, project, TYPES) == project, source
@@ -150,10 +150,10 @@ def test_functions_round_trip_and_do_what_their_actions_did(
     st.booleans(),
 )
 def test_parallel_work_round_trips_and_does_what_its_calls_did(
-    seed: int, size: int, joining: float, comparisons: bool, variables: bool, exits: bool
+    seed: int, size: int, merging: float, comparisons: bool, variables: bool, exits: bool
 ) -> None:
     rng = random.Random(seed)
-    draft = without_doubles(random_draft(rng, size, joining, 0.05, 3))
+    draft = without_doubles(random_draft(rng, size, merging, 0.05, 3))
     if comparisons:
         draft = with_comparisons(draft, rng)
     if variables:
@@ -220,7 +220,7 @@ def values_of(project: Project, name: str) -> dict[str, tuple[str, str]]:
 
 
 def steps_of(project: Project) -> list[tuple[str, str, str]]:
-    """Give the logic by names, with the value of each condition."""
+    """Return the logic by names, with the value of each condition."""
     names = {action.id: name for name, action in actions_of(project).items()} | {START: START, END: END}
     return sorted(
         (names[item.start], names[item.end], "" if isinstance(item.condition, Unset) else item.condition.value)
@@ -230,7 +230,7 @@ def steps_of(project: Project) -> list[tuple[str, str, str]]:
 
 def test_an_untouched_script_changes_nothing() -> None:
     assert read() == workplace.project()
-    # Layout, comments and quotes are not what a project keeps.
+    # A project does not store layout, comments and quotation marks.
     spread = (PICK, "\n        # well\n        robot.pick(\n aps.feeder.poses.default,\n grip=Grip.FIRM, an='pick')\n")
     assert read(spread) == workplace.project()
 
@@ -270,7 +270,7 @@ def test_arguments_of_every_kind() -> None:
         "position": ("position", '"acp_feeder"'),
         "height": ("double", "-0.125"),
     }
-    # An action stays where it was; what it refers to may lie elsewhere.
+    # An action keeps its action point, even if its parameters refer to another one.
     assert point_of(project, "into good box") == "acp_good"
 
 
@@ -293,7 +293,9 @@ def test_a_new_action_is_placed_at_its_point() -> None:
         (BACK, BACK + '        again = reader.scan(1.0, an="once more")\n'),
     )
     assert point_of(project, "let go") == "acp_feeder"
-    assert point_of(project, "once more") == point_of(project, "back")  # it names no point: that of the one before
+    assert point_of(project, "once more") == point_of(
+        project, "back"
+    )  # it names no point, so it gets that of the action before
     new = actions_of(project)["once more"]
     assert (new.type, new.outputs()) == ("obj_reader/scan", ["again"])
     assert new.id.startswith("act_")
@@ -418,7 +420,7 @@ def test_numbers_and_texts_with_an_else() -> None:
     def steps(branches: str) -> list[tuple[str, str, str]]:
         source = edited((PICK, counted + branches))
         project = from_script(source, workplace.scene(), before, facts)
-        # Whatever was written, Build writes the same project again.
+        # Build writes the same project again, however the script was written.
         again = from_script(from_logic(workplace.scene(), project, facts), workplace.scene(), project, facts)
         assert again == project
         return [step for step in steps_of(project) if step[0] == "count"]
@@ -665,7 +667,7 @@ def test_unusual_scripts_are_read_or_refused() -> None:
         with pytest.raises(NotUnderstood, match=line):
             read(changes)
     deep = "".join(f"{'    ' * n}        if known == True:\n" for n in range(90)) + "    " * 90 + "        pass\n"
-    assert read((BACK, deep + BACK))  # the same thing asked again and again
+    assert read((BACK, deep + BACK))  # the same condition, nested 90 times
     branches = "".join(f"        elif n == {n}:\n            continue\n" for n in range(1, 400))
     source = edited(
         (BACK, f'        n = flow.count(an="count")\n        if n == 0:\n            pass\n{branches}' + BACK)

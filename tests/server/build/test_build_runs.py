@@ -33,13 +33,13 @@ COUNT = 1000
 
 
 def by_hand() -> Project:
-    """Give the workplace's project without logic and without actions, as one that is programmed by hand."""
+    """Return the workplace's project without logic and without actions, as one that is programmed by hand."""
     points = [replace(point, actions=[]) for point in workplace.project().action_points]
     return replace(workplace.project(), has_logic=False, logic=[], action_points=points)
 
 
 async def build(directory: Path, project: Project, source: str | None = None) -> dict[str, bytes]:
-    """Give the files of a package that a hub makes of a stored project."""
+    """Return the files of a package that a hub makes of a stored project."""
     with pytest.MonkeyPatch.context() as patch:
         async with hub.opened(directory / "hub", make_code(directory), patch) as services:
             await services.storage.put_scene(workplace.scene())
@@ -55,7 +55,7 @@ async def upload(server: Server, files: dict[str, bytes]) -> None:
 
 
 def long_project() -> Project:
-    """Give a chain of distinct actions, each on a point of its own; the last one ends the program."""
+    """Return a chain of distinct actions, each on a point of its own; the last one ends the program."""
     points, names = [], []
     for n in range(COUNT):
         key = f"ori_{n}"
@@ -98,13 +98,13 @@ async def test_a_thousand_distinct_actions_run(server: Server) -> None:
     assert not failures, (len(seen), seen[-3:])
     before = [event["data"] for event in seen if event["event"] == "ActionStateBefore"]
     assert [data["action_id"] for data in before] == [a.id for point in project.action_points for a in point.actions]
-    # Each had the parameters of its own point, none those of another one.
+    # Each action had the parameters of its own point.
     assert [data.get("action_point_ids") for data in before[:-1:2]] == [[f"acp_{n}"] for n in range(0, COUNT, 2)]
     assert before[1]["parameters"][1] == "0.2"
 
 
 def project_with_function() -> tuple[Project, dict[str, str]]:
-    """Give the workplace's project with a function that handles a board, and the ids of its actions by name."""
+    """Return the workplace's project with a function that handles a board, and the ids of its actions by name."""
     document = Document.of(workplace.scene(), workplace.project())
     ids = {action.name: action.id for action in workplace.project().all_actions()}
     names = ("above feeder", "pick", "known?", "into good box", "throw away", "back")
@@ -174,14 +174,14 @@ async def test_a_handwritten_script_runs_and_can_be_debugged(server: Server) -> 
     client = server.client
     await server.ask("RunPackage", {"id": "pkg_1", "start_paused": True, "breakpoints": ["acp_good"]})
     first = await client.event("ActionStateBefore")
-    assert first == {"parameters": ["2.5", "2"]}  # without actions in the project there is no id to tell
+    assert first == {"parameters": ["2.5", "2"]}  # a project without actions has no action ids
     await client.state("paused", "PackageState")
     await server.ask("StepAction")
     second = await client.event("ActionStateBefore")
     assert second["action_point_ids"] == ["acp_feeder"]
     await client.state("paused", "PackageState")
     await server.ask("ResumePackage")
-    # The pose that the script has lifted still belongs to its action point, where a breakpoint is.
+    # The pose that the script has raised still belongs to its action point, which has a breakpoint.
     placed = await client.event("ActionStateBefore", lambda data: data.get("action_point_ids") == ["acp_good"])
     await client.state("paused", "PackageState")
     assert '"z":0.18' in placed["parameters"][0]
@@ -197,9 +197,9 @@ async def test_handwritten_scripts_that_fail_or_are_stopped(server: Server) -> N
     body = BY_HAND.replace("    good = 0\n", "    robot.pick(aps.feeder.poses.default, grip=Grip.SOFT)\n    good = 0\n")
     await upload(server, await build(server.services.settings.data_dir, by_hand(), body))
     await server.ask("RunPackage", {"id": "pkg_1"})
-    told = await server.client.event("ProjectException")
-    assert told["type"] == "AssertionError"
-    assert "robot" in told["message"]
+    found = await server.client.event("ProjectException")
+    assert found["type"] == "AssertionError"
+    assert "robot" in found["message"]
     await ended(server)
 
     (server.services.settings.packages_dir / "pkg_1" / "script.py").write_text(
@@ -254,8 +254,8 @@ async def test_editors_and_type_checkers_understand_a_script(tmp_path: Path, pyt
         text=True,
         timeout=110,
     )
-    told = [line for line in done.stdout.splitlines() if ": error: " in line]
-    assert len(told) == len(wrong), done.stdout + done.stderr
-    for line, text in zip(told, wrong.values(), strict=True):
+    found = [line for line in done.stdout.splitlines() if ": error: " in line]
+    assert len(found) == len(wrong), done.stdout + done.stderr
+    for line, text in zip(found, wrong.values(), strict=True):
         assert line.startswith("wrong.py:")
         assert text in line

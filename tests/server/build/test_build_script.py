@@ -33,7 +33,7 @@ class _Resources:
 
 
 def read_points(project: Project) -> Any:
-    """Run action_points.py and give its ActionPoints."""
+    """Run action_points.py and return its ActionPoints."""
     names: dict[str, Any] = {}
     exec(compile(points.source(project), "action_points.py", "exec"), names)
     return names["ActionPoints"](_Resources())
@@ -198,7 +198,7 @@ def test_a_long_call_is_wrapped_at_arguments() -> None:
 
 # ------------------------------------------------------------------------------------------------ refusals
 def _with(name: str, *arguments: tuple[str, str, str], method: str = "", results: tuple[str, ...] = ()) -> Project:
-    """Give the workplace's project with another action of that name."""
+    """Return the workplace's project with another action of that name."""
     project = workplace.project()
     found = []
     for point in project.action_points:

@@ -1,4 +1,4 @@
-"""A workplace of the size that people have, to build a package from: every kind of argument, two branches, a join."""
+"""A workplace of realistic size for building packages: every kind of argument, two branches, a join."""
 
 from arcor2_hw.actions.decorator import StrEnum
 from arcor2_hw.analysis import Enumeration
@@ -50,7 +50,7 @@ def scene() -> Scene:
             SceneObject("robot", "Arm", Pose(Position(0.0, 0.0, 0.1)), id="obj_robot"),
             SceneObject("reader", "AcmeReader", parameters=[Parameter("port", "string", '"tcp"')], id="obj_reader"),
             SceneObject("flow", "FlowActions", id="obj_flow"),
-            # As AddVirtualCollisionObjectToScene makes them: one name for the type and its only object.
+            # AddVirtualCollisionObjectToScene uses one name for the type and its only object.
             SceneObject("table", "table", Pose(), id="obj_table"),
         ],
     )
@@ -241,7 +241,7 @@ class AcmeReader(Generic):
 
     @action
     def known(self, code: str, *, an: str | None = None) -> bool:
-        """Tell whether it is known."""
+        """Return whether it is known."""
         return code.startswith("1 ")
 ''',
     "codes.py": '''"""Codes."""

@@ -168,7 +168,7 @@ async def test_a_jog_runs_from_press_to_release(arm: Server) -> None:
         "robot_id": OBJ, "kind": "jog", "user": "alice", "held": True,
     }  # fmt: skip
     step = {"robot_id": OBJ, "end_effector_id": "tool", "axis": "x", "what": "position", "mode": "world", "step": 0.1}
-    with pytest.raises(RequestRefused, match="arm is held by alice"):
+    with pytest.raises(RequestRefused, match="arm is being moved by alice"):
         await arm.ask("StepRobotEef", step)
     with pytest.raises(RequestRefused, match="arm is"):
         await arm.ask("ExecuteAction", {"action_id": "act_wave"})
@@ -191,9 +191,9 @@ async def test_only_one_client_can_jog_a_robot(arm: Server) -> None:
     with pytest.raises(RequestRefused, match="arm is locked by alice"):
         await bob.jog(new=True)
     await alice.jog(new=True)
-    with pytest.raises(RequestRefused, match="arm is held by alice"):
+    with pytest.raises(RequestRefused, match="arm is being moved by alice"):
         await bob.jog(new=True)
-    with pytest.raises(RequestRefused, match="arm is held by alice"):
+    with pytest.raises(RequestRefused, match="arm is being moved by alice"):
         await bob.teach(new=True)
     await arm.services.locks.write_unlock("alice", OBJ)
     with pytest.raises(RequestRefused, match="Lock arm before"):
@@ -457,7 +457,7 @@ async def test_a_protective_stop_is_acknowledged_by_name(arm: Server) -> None:
     with pytest.raises(Arcor2Error, match="press it again"):
         await hand.jog()  # the button that is still pressed does not move the arm
     await hand.jog(new=True)
-    with pytest.raises(RequestRefused, match="arm is held by alice"):
+    with pytest.raises(RequestRefused, match="arm is being moved by alice"):
         await acknowledge(arm, operator)
     await hand.jog(0)
 

@@ -301,7 +301,7 @@ async def test_the_card_shows_what_the_confirmed_device_counts(tmp_path: Path) -
         place.device({"gain": 700}, serial="B2")
         await place.restart()
         card = await place.card()
-        assert card.counters == {"gain adjusted": 6}  # those of the other device are not taken for them
+        assert card.counters == {"gain adjusted": 6}  # those of the other device are not mistaken for them
         await place.ask("ConfirmDevice", object_id=card.object_id, identity=card.found)
         assert (await place.card()).counters == {}
         await place.restart()

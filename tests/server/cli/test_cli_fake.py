@@ -156,7 +156,7 @@ def test_without_a_fault_the_available_ones_are_listed(tester: Running) -> None:
     [
         (["toast"], 1, "refuses: toast: unknown command"),
         (["silence", "--wire", "toast"], 1, "wire 'toast' does not exist; available: modbus"),
-        (["slow", "--seconds", "1000"], 1, "seconds is 0 to 600"),
+        (["slow", "--seconds", "1000"], 1, "seconds must be 0 to 600"),
         (["put_board"], 1, "code"),
         (["put_board", "PCB-1"], 2, "'PCB-1' must be key=value"),
     ],

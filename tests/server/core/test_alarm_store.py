@@ -39,7 +39,7 @@ async def test_records_of_older_servers_are_taken_over_once(tmp_path: Path) -> N
     await put_in_database(storage, 1)
     await put_in_database(storage, 2)
     assert await numbers(path, storage) == [1, 2]
-    await put_in_database(storage, 7)  # a server that ended before it deleted the records of the database
+    await put_in_database(storage, 7)  # as if a server had ended before it deleted the records of the database
     store = AlarmStore(path, storage)
     assert await store.open() is None
     await store.put([record(3)], {1})

@@ -14,7 +14,7 @@ def draft() -> Draft:
     """Return a program that measures, stores whether the value suffices, and continues by the values of both."""
     made = Draft(methods={"measure": "measure"}, variables={"enabled"})
     made.action("measure", "length").action("ask", "enabled")
-    made.chain(START, "measure", "ask").way("ask", "sort").way("ask", "drop").way("ask", END)
+    made.chain(START, "measure", "ask").edge("ask", "sort").edge("ask", "drop").edge("ask", END)
     made.chain("sort", END).chain("drop", END)
     made.retries["measure"] = Retry(3, 0.5)
     length = LogicComparison("id_measure/default/0", Operator.RIGHT_OPEN, "1.5", "3")
@@ -54,4 +54,4 @@ def test_a_branch_by_comparisons_is_that_of_the_newest_run() -> None:
     assert names == ["measure", "ask", "drop"]
     assert assumptions == ["After ask, the branch leads to drop, as most often in run 7."]
     names, _ = planned(run("measure", "ask", "measure", "measure", "ask", "sort", "measure", "ask", "measure"))
-    assert names == ["measure", "ask"]  # twice to END, also before a repeated first action
+    assert names == ["measure", "ask"]  # two steps to END, also before a repeated first action

@@ -143,7 +143,7 @@ async def test_auto_waits_for_the_lock_then_gives_up(locks: Locks) -> None:
             pass
     assert loop.time() - start >= 0.14
     assert locks.locked_roots() == ["robot"], "nothing of a refused set stays locked"
-    # Also if the same user holds it.
+    # Refused also if the same user holds the lock.
     with pytest.raises(Locked):
         async with locks.auto("ann", "robot"):
             pass

@@ -1,4 +1,4 @@
-"""A running program goes on after its operator was logged off, and Stop works without a person."""
+"""A running program continues after its operator was logged off, and Stop works without a person."""
 
 from pathlib import Path
 

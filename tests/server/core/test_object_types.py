@@ -148,7 +148,7 @@ async def test_base_classes_cannot_be_replaced_or_deleted(types: ObjectTypes, st
         await types.add(source)
     with pytest.raises(InvalidData, match="Generic"):
         await types.remove("Generic")
-    # Nor by a source that is written straight to the storage.
+    # A source that is written directly to the storage does not change it either.
     before = types.meta("Generic")
     await storage.put_object_type(source)
     assert not await types.refresh()
@@ -182,7 +182,7 @@ async def test_an_upload_shadows_an_installed_type_until_it_is_deleted(types: Ob
     assert (types.meta("UR5e"), types.type_code("UR5e")) == (installed, code)
     assert not await types.refresh()
 
-    # Written straight to the storage it is an update for clients, and so is its removal.
+    # A source written directly to the storage is announced to clients as an update, and so is its removal.
     await storage.put_object_type(ObjectTypeSource("UR5e", source))
     changes = await types.refresh()
     assert ([meta.type for meta in changes.updated], changes.added, changes.removed) == (["UR5e"], [], [])
@@ -571,7 +571,7 @@ async def test_a_huge_source_that_takes_too_long_is_disabled(
     types = ObjectTypes(KnownTypes(), storage, assets, stored)
     await types.load()
     before = stored.read_bytes()
-    monkeypatch.setattr(worker, "WITHIN", 0.0)
+    monkeypatch.setattr(worker, "TIME_LIMIT", 0.0)
     meta = await types.add(ObjectTypeSource("Huge", HUGE))
     assert meta.disabled
     assert "not analysed within 0 s. Split the source" in str(meta.problem)

@@ -70,7 +70,7 @@ class Bench:
         return Recordings(hub, RecordingFiles(self.folder), lambda: self.ring)
 
     async def settled(self) -> None:
-        """Store the recording that continues; the server goes on."""
+        """Store the recording in progress; the server continues."""
         await self.recordings.close()
         self.recordings._closed = False
 

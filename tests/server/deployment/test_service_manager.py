@@ -1,4 +1,4 @@
-"""The service manager is told that the server is ready, that its event loop runs, and that it ends."""
+"""The service manager is notified that the server is ready, that its event loop runs, and that it ends."""
 
 import asyncio
 import contextlib

@@ -192,7 +192,7 @@ class Host:
         self.messages.append(message)
 
     def _check(self, message: Message) -> None:
-        """Check what the specification requires. Numbers of its requirements are in the comments."""
+        """Check the requirements of the specification, whose numbers are in the comments."""
         kind, metrics = message.kind, message.metrics
         assert not message.retain, "retained"
         assert message.time, "no timestamp"

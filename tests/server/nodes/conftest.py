@@ -153,7 +153,7 @@ async def followed(environment: Mapping[str, str]) -> AsyncIterator[Callable[...
 
 
 class Listener:
-    """Stores what a host reports."""
+    """Stores the reports of a host."""
 
     def __init__(self) -> None:
         self.messages: list[m.ServerBound] = []

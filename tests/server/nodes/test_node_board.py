@@ -33,7 +33,7 @@ class Board:
         self.published.append(event.data)
 
     def after(self, seconds: float, *announced: Announcement) -> list[NodesData]:
-        """Return what is published when time has passed and nodes have announced themselves."""
+        """Return the published events after some time, with announcements of nodes."""
         self.now += seconds
         for each in announced:
             self.board.take(each)

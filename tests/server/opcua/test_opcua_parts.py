@@ -290,7 +290,7 @@ async def test_the_feed_shows_devices_and_sends_only_changes() -> None:
 
 
 class Written:
-    """Stores what is written to variables."""
+    """Stores values written to variables."""
 
     def __init__(self) -> None:
         self.values: list[ua.DataValue] = []

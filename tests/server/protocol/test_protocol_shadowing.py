@@ -131,7 +131,7 @@ async def test_deleting_the_shadow_restores_the_installed_type(tmp_path: Path) -
 
 
 async def deleted(alice: Actor, *names: str) -> list[dict[str, str]]:
-    """Try to delete object types; return what was refused and why."""
+    """Try to delete object types; return the refused ones with the reasons."""
     answer = await alice.send({"id": 1, "request": "DeleteObjectTypes", "args": list(names)})
     found: list[dict[str, str]] = answer.get("data", [])
     return found

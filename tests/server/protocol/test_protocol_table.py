@@ -86,7 +86,7 @@ NEVER_REFUSED = {"GetObjectTypes", "GetRobotMeta", "ListPackages", "ListProjects
                  "SystemInfo"}  # fmt: skip
 """Requests without arguments that could be invalid, and which need nothing."""
 
-TOLD = {
+SENT = {
     "ActionCancelled": f"{ONLINE}::test_a_single_action_can_be_cancelled",
     "HandTeachingMode": f"{EDITING}::test_robots_with_several_arms_and_hand_teaching",
     "OverrideUpdated": f"{VALUES}::test_overrides_apply_online_and_in_the_package",
@@ -96,7 +96,7 @@ TOLD = {
 }
 """Tests of events that no recorded session contains."""
 
-NEVER_TOLD = {"Notification"}
+NEVER_SENT = {"Notification"}
 """Declared and never sent, not even by the original (protocol, 8)."""
 
 
@@ -133,7 +133,7 @@ def recorded() -> tuple[set[str], set[str], set[str]]:
 
 
 @pytest.mark.parametrize(
-    ("name", "test"), [*GRANTED.items(), *REFUSED.items(), *TOLD.items()], ids=lambda text: text.rpartition(":")[2]
+    ("name", "test"), [*GRANTED.items(), *REFUSED.items(), *SENT.items()], ids=lambda text: text.rpartition(":")[2]
 )
 def test_the_named_test_exists_and_mentions_the_request(name: str, test: str) -> None:
     file, _, function = test.partition("::")
@@ -164,4 +164,4 @@ def test_every_request_has_a_test_of_its_refusal() -> None:
 
 
 def test_every_event_has_a_test() -> None:
-    assert set(PROTOCOL["events"]) - recorded()[2] - TOLD.keys() == NEVER_TOLD
+    assert set(PROTOCOL["events"]) - recorded()[2] - SENT.keys() == NEVER_SENT

@@ -66,7 +66,7 @@ REFUSED = ("b3", "b3_copy")
 
 
 def without_refused(value: Any) -> Any:
-    """Remove what the action that we refuse added to a recorded message."""
+    """Remove the additions of the refused action from a recorded message."""
     match value:
         case {"event": _, "data": {"name": name}} if name in REFUSED:
             return {NOTHING: name}

@@ -1,4 +1,4 @@
-"""Edits while the database server is down: they go on, saving is refused with a reason, and nothing is lost."""
+"""Edits while the database server is down: they continue, saving is refused with a reason, and nothing is lost."""
 
 from pathlib import Path
 

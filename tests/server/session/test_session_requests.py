@@ -381,7 +381,7 @@ async def test_a_copy_refers_to_its_own_items(work: Work, alice: Person) -> None
     assert work.action("linked_copy").parameters[0].value == f'"{new_source.id}/default/0"'
     new_orientation = document.named("orientation", "o", work.point("below_copy"))
     assert work.action("move_copy").parameters[0].value == f'"{new_orientation}"'
-    # The copy uses nothing of the original, nor the other way round.
+    # The copy uses nothing of the original, and the original nothing of the copy.
     assert {getattr(user, "name", "") for user in document.users_of(orientation)} == {"move"}
     assert {getattr(user, "name", "") for user in document.users_of(new_source.id)} == {"linked_copy"}
 

@@ -25,7 +25,7 @@ async def test_undo_reverts_only_own_edits(server: SessionServer, alice: Person,
     assert {work.point("a"), work.point("b2")} == {a, b}
     await bob.ask("Undo")
     assert {work.point("a"), work.point("b")} == {a, b}
-    # Edits of others do not affect what a user can redo. An edit of their own ends it.
+    # Edits of other users do not affect what a user can redo. A new edit by this user does.
     await bob.ask("AddActionPoint", name="c", position=ORIGIN)
     await alice.ask("Redo")
     assert work.point("a2") == a

@@ -49,7 +49,7 @@ export class LinkThing extends Thing<LinkItem> {
   readonly root = new Group();
   item: LinkItem;
   private readonly color = new Color();
-  /** What is picked: its points. */
+  /** The points of the line, used for picking only. */
   private readonly line = new Mesh();
   private arrow: Arrow | null = null;
   private label: Sprite | null = null;

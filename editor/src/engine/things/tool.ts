@@ -69,7 +69,7 @@ export class ToolModel {
     this.tip.visible = true;
   }
 
-  /** Let the model begin at the flange and end at the tip. */
+  /** Stretch the model from the flange to the tip. */
   private stretch(): void {
     if (!this.model) return;
     const length = this.tip.position.length();

@@ -8,7 +8,7 @@ import { call, serves } from "../../session/connection";
 import { now, useEditor } from "../../store/store";
 
 /** Maximum number of alarms that a list loads. */
-const MOST = 200;
+const MAX_ALARMS = 200;
 
 export type Show = "retained" | "shelved" | "all";
 
@@ -36,7 +36,7 @@ export function useAlarms(show: Show): AlarmRecord[] | null {
     const listeners = runtime.takeAlarm;
     const take = (record: AlarmRecord) => setAlarms((known) => withChanged(known ?? [], translated(record), show));
     listeners.add(take);
-    call("ListAlarms", { show, limit: MOST }).then(
+    call("ListAlarms", { show, limit: MAX_ALARMS }).then(
       (answer) => current && setAlarms(answer.alarms.map(translated)),
       () => current && setAlarms((known) => known ?? []), // offline: loaded again after the reconnect
     );

@@ -3,8 +3,8 @@
 import { plural, t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import type { Layout } from "../../ar/places";
-import { ArProblem, abilitiesOf, obstacleOf, type Way, waysOf } from "../../ar/support";
-import { loadMarkers, loadWay, startAr } from "../../commands/ar";
+import { type ArMethod, ArProblem, abilitiesOf, methodsOf, obstacleOf } from "../../ar/support";
+import { loadMarkers, loadMethod, startAr } from "../../commands/ar";
 import { notify } from "../../store/store";
 import { Window } from "../kit/dialogs";
 import { Button, Waiting } from "../kit/kit";
@@ -15,14 +15,14 @@ export default function StartAr({ onClose }: { onClose: () => void }) {
   const [failure, setFailure] = useState("");
   const [obstacle, setObstacle] = useState(() => obstacleOf(abilitiesOf(globalThis), null));
   const [opening, setOpening] = useState(false);
-  const [ways, setWays] = useState<Way[]>(["camera"]);
+  const [methods, setMethods] = useState<ArMethod[]>(["camera"]);
   useEffect(() => {
     let over = false;
-    void waysOf(globalThis).then((found) => {
+    void methodsOf(globalThis).then((found) => {
       if (over) return;
-      for (const way of found) loadWay(way).catch(() => {}); // again by the start
+      for (const method of found) loadMethod(method).catch(() => {}); // again by the start
       if (found.includes("xr")) setObstacle((before) => (before === "browser" ? null : before));
-      if (found.length > 0) setWays(found);
+      if (found.length > 0) setMethods(found);
     });
     loadMarkers()
       .then((found) => {
@@ -35,10 +35,10 @@ export default function StartAr({ onClose }: { onClose: () => void }) {
       over = true;
     };
   }, []);
-  const start = (way: Way) => {
+  const start = (method: ArMethod) => {
     if (!layout) return;
     setOpening(true);
-    startAr(layout, way, (reason) => notify("error", reasonOf(reason, layout.dictionary)))
+    startAr(layout, method, (reason) => notify("error", reasonOf(reason, layout.dictionary)))
       .then(onClose)
       .catch((error: unknown) => {
         setOpening(false);
@@ -53,11 +53,11 @@ export default function StartAr({ onClose }: { onClose: () => void }) {
       {!permanent && (
         <>
           <p>
-            {t`The 3D view appears over the picture of the camera. Markers in the workplace tell where the camera is.`}
+            {t`The 3D view appears over the picture of the camera. Markers in the workplace show where the camera is.`}
           </p>
           <p className="quiet">
-            {ways[0] === "xr"
-              ? t`The device follows its own position. The browser asks for AR, and for the camera to find markers.`
+            {methods[0] === "xr"
+              ? t`The device tracks its own position. The browser asks for AR, and for the camera to find markers.`
               : t`The browser asks for the camera, and on an iPad also for the motion sensor.`}{" "}
             {t`Pictures stay on this device.`}
           </p>
@@ -79,7 +79,7 @@ export default function StartAr({ onClose }: { onClose: () => void }) {
         <Button onPress={onClose}>{permanent ? t`Close` : t`Cancel`}</Button>
         {!permanent && (
           <>
-            {ways.length > 1 && (
+            {methods.length > 1 && (
               <Button isDisabled={!layout || opening} onPress={() => start("camera")}>
                 {t`Camera only`}
               </Button>
@@ -88,7 +88,7 @@ export default function StartAr({ onClose }: { onClose: () => void }) {
               look="primary"
               icon="camera"
               isDisabled={!layout || opening}
-              onPress={() => start(ways[0] ?? "camera")}
+              onPress={() => start(methods[0] ?? "camera")}
               autoFocus
             >
               {t`Start AR`}

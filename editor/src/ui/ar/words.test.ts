@@ -65,13 +65,13 @@ test.each([
   [{ phase: "looking", mode: "headset" }, "Press Touch points, then touch three corners of markers."],
   [
     { phase: "looking", mode: "headset", configured: 0 },
-    "Look at a surface, and press Place. The device follows your steps from then on.",
+    "Look at a surface, and press Place. The device then tracks its own position.",
   ],
   [
     { phase: "looking", mode: "tablet", pictures: false },
     "The browser gives AR no pictures of markers. Press Place, or start again with the camera only.",
   ],
-  [{ phase: "hand", mode: "tablet" }, "The device follows your steps. Check the place from time to time."],
+  [{ phase: "hand", mode: "tablet" }, "The device tracks its own position. Check the overlay from time to time."],
   [{ phase: "lost", mode: "tablet" }, "The device has lost its position. Move it slowly, in good light."],
   [{ phase: "tracked", mode: "tablet", drifted: true }, "The position drifts as you move. Show a marker again."],
   [

@@ -43,12 +43,12 @@ export function gradeOf(ar: Ar): { word: string; shape: string; look: string } {
 /** Return what only concerns devices that track themselves. */
 function xrAdviceOf({ phase, mode, configured, touched, pictures, drifted, grade }: Ar): string {
   if (phase === "lost") return t`The device has lost its position. Move it slowly, in good light.`;
-  if (phase === "hand") return t`The device follows your steps. Check the place from time to time.`;
+  if (phase === "hand") return t`The device tracks its own position. Check the overlay from time to time.`;
   if (phase === "looking" && mode === "headset" && configured > 0) {
     return t`Press Touch points, then touch three corners of markers.`;
   }
   if (phase === "looking" && configured === 0) {
-    return t`Look at a surface, and press Place. The device follows your steps from then on.`;
+    return t`Look at a surface, and press Place. The device then tracks its own position.`;
   }
   if (phase === "looking" && !pictures) {
     return t`The browser gives AR no pictures of markers. Press Place, or start again with the camera only.`;

@@ -192,7 +192,7 @@ async function importScript(draft: ScriptDraft): Promise<string> {
 
 /** Whether an edited script can be imported. */
 function State({ checked, onShow }: { checked: CheckScriptData | null; onShow: (line: number) => void }) {
-  if (!checked) return <p className="code-note quiet">{t`Edited, not imported.`}</p>;
+  if (!checked) return <p className="code-note quiet">{t`The text was edited and is not imported yet.`}</p>;
   const [problem] = checked.problems;
   if (!problem) {
     const count = checked.changes.length;

@@ -6,7 +6,7 @@ import { showTooltip, type Tooltip } from "@codemirror/view";
 import { now } from "../../store/store";
 import { type Offer, offersAt, parameterWords, resultWords, type Signature, signatureAt } from "./offers";
 
-/** Priority of what has the type of the parameter. */
+/** Priority of completions whose type is that of the parameter. */
 const FITS = 50;
 
 const complete: CompletionSource = ({ state, pos, explicit }) => {

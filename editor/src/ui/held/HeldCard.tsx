@@ -68,7 +68,7 @@ export default function HeldCard({ held }: { held: HeldData }) {
           {offers("result") && (
             <Choice
               text={t`Enter the result`}
-              hint={t`You find out by yourself what ${device} would have reported.`}
+              hint={t`You enter what ${device} would have reported.`}
               why={why}
               act={() => setEntering(true)}
             />

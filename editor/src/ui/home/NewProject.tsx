@@ -41,10 +41,7 @@ export function NewProject({ initial = "", onClose }: { initial?: string; onClos
             <input type="checkbox" checked={logic} onChange={(event) => setLogic(event.target.checked)} />
             <span>
               {t`Connect the actions in the editor`}
-              <span className="quiet small">
-                {" "}
-                {t`– if off, the project only holds points for a script of your own`}
-              </span>
+              <span className="quiet small"> {t`– if off, the project only stores points for your own script`}</span>
             </span>
           </label>
         </>

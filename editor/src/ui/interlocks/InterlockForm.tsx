@@ -152,7 +152,7 @@ function RetractPath({ path, onChange }: RetractPathProps) {
       <p className="quiet small">
         {path.length > 0
           ? t`Points in the frame of the body, from inside to outside. A robot that may not stay leaves on this path.`
-          : t`A robot that may not stay in the zone leaves it on the shortest way.`}
+          : t`A robot that may not stay in the zone leaves it by the shortest path.`}
       </p>
       {path.map((point, n) => (
         <div key={n} className="need">

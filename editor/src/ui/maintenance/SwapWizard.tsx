@@ -122,10 +122,10 @@ export function SwapWizard({ card: given, reload, onClose, onLeave }: Props) {
           <>
             <p>
               {!other
-                ? t`It is the same device. Its calibrations hold; check them if the firmware changes its kinematics.`
+                ? t`Same device. Its calibrations are valid; check them if the firmware changes its kinematics.`
                 : measured?.length === 0
                   ? t`No calibration of the previous device is recorded.`
-                  : t`These calibrations of the previous device no longer hold. Measure them again.`}
+                  : t`These calibrations of the previous device are no longer valid. Measure them again.`}
             </p>
             {measured && measured.length > 0 && <Records id={card.object_id} />}
             {other && object && measured && measured.length > 0 && (

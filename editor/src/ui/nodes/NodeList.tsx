@@ -51,7 +51,7 @@ function Node({ node }: { node: NodeStatus }) {
       </div>
       {state === "silent" && (
         <p className="small">
-          {node.seen ? t`Last heard ${ago(node.seen)}.` : t`Not heard since the server was started.`}{" "}
+          {node.seen ? t`Last signal ${ago(node.seen)}.` : t`No signal since the server was started.`}{" "}
           {t`Switch the computer on, check its network cable, and start arcor2-hw node run ${name} on it.`}
         </p>
       )}

@@ -307,7 +307,7 @@ function useDynamic(state: State, actionId: string, wanted: ParameterMeta): { ch
     };
   }, [key, online, wanted.dynamic_value]);
   if (!wanted.dynamic_value) return {};
-  if (missing.length > 0) return { note: t`Choices depend on ${missing.join(", ")}, which is known at run time.` };
+  if (missing.length > 0) return { note: t`Choices depend on ${missing.join(", ")}, which is known only at run time.` };
   const fresh = asked?.key === key && online;
   const values = fresh ? asked.values : lastDynamicValues(objectId, wanted.name, parents as Known[]);
   if (!values) return { note: online ? t`Loading…` : t`Go online to load the choices.` };

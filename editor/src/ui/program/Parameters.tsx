@@ -148,7 +148,7 @@ function NewParameter() {
         onChange={setText}
         autoComplete="off"
       />
-      <OnOff isSelected={variable} onChange={setVariable}>{t`Actions change it`}</OnOff>
+      <OnOff isSelected={variable} onChange={setVariable}>{t`Set by actions`}</OnOff>
       {problem && (
         <p className="error" role="alert">
           {problem}

@@ -24,7 +24,7 @@ export function rowAt(tops: Float64Array, place: number): number {
 
 export interface Rows {
   tops: Float64Array;
-  /** Rendered rows: from the first one up to, without, the last one. */
+  /** Range of the rendered rows: first index, and the index after the last one. */
   first: number;
   last: number;
   /** Scroll a row into the view. */

@@ -102,7 +102,7 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
         onChange={(next) => setTurning(next === "turn")}
       />
       <Answer answer={answer?.problem ?? null} />
-      <WayWords answer={answer} />
+      <PathText answer={answer} />
       <div className="amounts">
         {AXES.map((axis) => (
           <Amount
@@ -161,7 +161,7 @@ export function GoTab({ chosen }: { chosen: Chosen }) {
 }
 
 /** Describe the straight path to the target. */
-function WayWords({ answer }: { answer: GoalAnswer | null }) {
+function PathText({ answer }: { answer: GoalAnswer | null }) {
   const { linear } = useMotionOptions();
   const name = useEditor((state) => (answer?.obstacle ? nameOf(state, answer.obstacle) : ""));
   if (!answer || answer.problem) return null;

@@ -87,14 +87,14 @@ function useBranches() {
   const fields = found.length > 0 && (
     <details>
       <summary>{t`Branches`}</summary>
-      {found.map(({ id, name, ways }) => (
+      {found.map(({ id, name, branches: options }) => (
         <Pick
           key={id}
           label={name}
           value={branches[id] ?? ""}
           choices={[
             ["", t`As in the last run`],
-            ...ways.map(({ to, when }): [string, string] => [to, `${when} → ${nameOf(state, to)}`]),
+            ...options.map(({ to, when }): [string, string] => [to, `${when} → ${nameOf(state, to)}`]),
           ]}
           onChange={(to) => setChosen((before) => ({ ...before, [id]: to }))}
         />

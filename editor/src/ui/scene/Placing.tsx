@@ -45,7 +45,7 @@ export function Placing({ id }: { id: string }) {
           </>
         )}
       </div>
-      <p className="quiet small">{t`The place is only for the view. Programs do not use it.`}</p>
+      <p className="quiet small">{t`Only the view uses this pose. Programs do not.`}</p>
     </>
   );
 }

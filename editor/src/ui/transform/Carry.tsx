@@ -15,7 +15,7 @@ import "../robot/robot.css";
 
 interface CarryProps {
   selection: Selection;
-  /** Whether it turns, or moves without turning. */
+  /** Whether the item is turned; otherwise it is moved without turning. */
   turns: boolean;
   why: string;
 }

@@ -13,7 +13,7 @@ from arcor2_server.build.reading.scope import Call, Scope, Use
 
 @dataclass(frozen=True, slots=True)
 class ScriptCalls:
-    """What the loop and the functions of a script share.
+    """State shared by the loop and the functions of a script.
 
     Args:
         functions: ids of the functions that are already read, by name.

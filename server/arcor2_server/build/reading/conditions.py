@@ -115,7 +115,7 @@ class ConditionReader:
         return Comparison(what, operator, value, upper)
 
     def _pair(self, test: ast.expr) -> Comparison | None:
-        """Read a comparison of two values, such as `count >= limit`; None if it is another one."""
+        """Read a comparison of two values, such as `count >= limit`; None for other expressions."""
         match test:
             case ast.Compare(ast.Name(variable), [symbol], [ast.Name(other)]) if type(symbol) in _OPERATORS:
                 operator = _OPERATORS[type(symbol)]

@@ -115,7 +115,7 @@ class _Reading:
     def _read_functions(
         self, frame: Frame, shared: ScriptCalls, variables: Variables
     ) -> dict[str, tuple[ProjectFunction, Part]]:
-        """Return the functions of the script by id, in its order, without their actions, and what it states of them."""
+        """Return the functions of the script by id, in its order, without their actions, and their declarations."""
         found: dict[str, tuple[ProjectFunction, Part]] = {}
         former = self._former_functions(frame)
         for node in self._script.functions:

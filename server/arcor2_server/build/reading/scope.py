@@ -36,7 +36,7 @@ class Call:
     arguments: dict[str, ast.expr]
     outputs: list[str]
     results: dict[str, tuple[int, str, int]] = field(default_factory=dict)
-    """What its arguments use of other calls, by parameter: number of the call, flow and number of the result."""
+    """Results of other calls that its arguments use, by parameter: number of the call, flow, number of the result."""
     passed: dict[str, str] = field(default_factory=dict)
     """The parameters of the function around the call that its arguments pass on, by parameter."""
     error: str = ""

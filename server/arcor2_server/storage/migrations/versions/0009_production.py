@@ -1,4 +1,4 @@
-"""Tables for recipes, changeovers, records of units, and what the cell did when."""
+"""Tables for recipes, changeovers, records of units, and the activity of the cell."""
 
 import sqlalchemy as sa
 from alembic import op
