@@ -6,7 +6,8 @@ import sys
 from pathlib import Path
 from typing import Annotated, Any
 
-from cyclopts import Parameter, validators
+from cyclopts import Parameter
+from cyclopts.types import PositiveFloat
 
 from arcor2_fakes.barcode_reader.reader import HEALTH, Framing, Health, Reader
 from arcor2_fakes.control import one_of, within
@@ -48,7 +49,7 @@ async def main(
     link: Path | None = None,
     crlf: Annotated[bool, Parameter(negative="--cr")] = False,
     stx: bool = False,
-    timeout: Annotated[float, Parameter(validator=validators.Number(gt=0))] = 1.0,
+    timeout: PositiveFloat = 1.0,
     seed: int = 0,
 ) -> None:
     """Start the fake; it prints one line `ready {json}` with its port and ends on SIGTERM.

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import App, Parameter, validators
+from cyclopts.types import NonNegativeFloat
 
 from arcor2_fakes.cell.boards import MAX_BOARDS, Board, draw_boards
 from arcor2_fakes.cell.devices import DeviceFeed, DeviceGone, Fake, FakeDevices, RobotFeed
@@ -143,7 +144,7 @@ def main(
     boards: Annotated[int, Parameter(validator=validators.Number(gte=0, lte=MAX_BOARDS))] = 5,
     seed: int = 0,
     control: str = "127.0.0.1:0",
-    patience: Annotated[float, Parameter(validator=validators.Number(gte=0))] = 30.0,
+    patience: NonNegativeFloat = 30.0,
 ) -> int:
     """Start the cell; it prints one line `ready {json}` with its address and ends on SIGTERM.
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import sys
 import time
 from collections import deque
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
-from cyclopts import Parameter, validators
+from cyclopts.types import PositiveFloat
 
 from arcor2_fakes.control import one_of
 from arcor2_fakes.functional_tester.board import Board
@@ -20,9 +20,6 @@ from arcor2_fakes.serving import Fake
 
 _STORED_FRAMES = 20
 _MODES = {"produce": 1, "maintenance": 2, "manual": 3}
-
-
-Positive = Annotated[float, Parameter(validator=validators.Number(gt=0))]
 Frames = deque[dict[str, object]]
 """The latest frames on the wire."""
 
@@ -101,8 +98,8 @@ async def main(
     host: str = "127.0.0.1",
     port: int = 0,
     seed: int = 0,
-    test_time: Positive = 1.5,
-    time_scale: Positive = 1.0,
+    test_time: PositiveFloat = 1.5,
+    time_scale: PositiveFloat = 1.0,
 ) -> None:
     """Start the fake; it prints one line `ready {json}` with its addresses and ends on SIGTERM.
 

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 import msgspec
 from cyclopts import Parameter, validators
+from cyclopts.types import PositiveFloat
 
 from arcor2_fakes.control import within
 from arcor2_fakes.label_printer.printer import FIRMWARE, SERIAL_NUMBER, LabelPrinter
@@ -61,7 +62,7 @@ async def main(
     *,
     tcp: str | None = None,
     link: Path | None = None,
-    duration: Annotated[float, Parameter(validator=validators.Number(gt=0))] = 0.3,
+    duration: PositiveFloat = 0.3,
     labels: Annotated[int, Parameter(validator=validators.Number(gte=0, lte=FULL_ROLL))] = FULL_ROLL,
     mute: bool = True,
     serial_number: str = SERIAL_NUMBER,

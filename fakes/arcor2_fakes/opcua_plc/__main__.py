@@ -7,12 +7,12 @@ import logging
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Any, cast
 
 from asyncua import Server, ua
 from asyncua.crypto.permission_rules import User, UserRole
 from asyncua.server.user_managers import UserManager
-from cyclopts import Parameter, validators
+from cyclopts.types import PositiveFloat
 
 from arcor2_fakes.control import parse_address, within
 from arcor2_fakes.opcua_plc.program import Host, Program, Step
@@ -165,8 +165,8 @@ async def main(
     fake: Fake,
     *,
     listen: str = "127.0.0.1:0",
-    time_scale: Annotated[float, Parameter(validator=validators.Number(gt=0))] = 1.0,
-    patience: Annotated[float, Parameter(validator=validators.Number(gt=0))] = 1.0,
+    time_scale: PositiveFloat = 1.0,
+    patience: PositiveFloat = 1.0,
     user: str = "",
     password: str = "",
     certificate: Path | None = None,

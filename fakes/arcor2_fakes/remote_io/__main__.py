@@ -6,14 +6,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from cyclopts import App
-
 from arcor2_fakes.modbus import serial_line, tcp_wire
+from arcor2_fakes.process import OwnTime
+from arcor2_fakes.program import program
 from arcor2_fakes.remote_io.block import ANALOG_IN, DIGITAL, Block
 from arcor2_fakes.remote_io.registers import RegisterMap
-from arcor2_fakes.serving import Fake, serve
-
-app = App(name="arcor2_fakes.remote_io", help="Fake remote I/O block on Modbus TCP or RTU.", version_flags=[])
+from arcor2_fakes.serving import Fake
 
 
 def outputs(block: Block) -> dict[str, Any]:
@@ -67,15 +65,10 @@ def register_commands(fake: Fake, block: Block) -> None:
     )
 
 
-@app.default
-def main(
-    *,
-    host: str = "127.0.0.1",
-    port: int = 0,
-    serial: bool = False,
-    link: Path | None = None,
-    control: str = "127.0.0.1:0",
-) -> int:
+@program("remote_io", "Fake remote I/O block on Modbus TCP or RTU.")
+async def main(
+    fake: Fake, *, host: str = "127.0.0.1", port: int = 0, serial: bool = False, link: Path | None = None
+) -> None:
     """Start the fake; it prints one line `ready {json}` with its addresses and ends on SIGTERM.
 
     Args:
@@ -83,21 +76,18 @@ def main(
         port: port to serve Modbus TCP on; 0 takes a free one.
         serial: serve Modbus RTU on a pty instead.
         link: Symbolic link to the pty; without it, one in a temporary directory.
-        control: HOST:PORT of the control channel; port 0 takes a free one.
     """
-
-    async def body(fake: Fake) -> None:
-        block = Block()
-        registers = RegisterMap(block)
-        modbus = serial_line(registers, link) if serial else tcp_wire(registers, host, port)
-        register_commands(fake, block)
-        fake.wires(("modbus",) if serial else (), modbus=modbus)
-        fake.truth(lambda: truth(block))
-        fake.channel.source("outputs", lambda: outputs(block))
-        await fake.run(modbus=modbus)
-
-    return serve("remote_io", control, body)
+    own_time = OwnTime()
+    block = Block(own_time)
+    registers = RegisterMap(block)
+    modbus = serial_line(registers, link) if serial else tcp_wire(registers, host, port)
+    register_commands(fake, block)
+    fake.wires(("modbus",) if serial else (), modbus=modbus)
+    fake.truth(lambda: truth(block))
+    fake.channel.source("outputs", lambda: outputs(block))
+    own_time.run()
+    await fake.run(modbus=modbus)
 
 
 if __name__ == "__main__":
-    sys.exit(app())
+    sys.exit(main())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -42,9 +41,9 @@ class Locked(ValueError):
 
 
 class Block:
-    """The block. Callers call `advance` before every access, which applies the changes that are due."""
+    """The block; `clock` returns seconds. Callers call `advance` before every access: it applies what is due."""
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
         self.as_delivered()
 

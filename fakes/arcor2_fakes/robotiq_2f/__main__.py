@@ -7,7 +7,8 @@ import sys
 from pathlib import Path
 from typing import Annotated, Any
 
-from cyclopts import Parameter, validators
+from cyclopts import Parameter
+from cyclopts.types import NonNegativeFloat, PositiveFloat
 
 from arcor2_fakes.control import parse_address
 from arcor2_fakes.modbus import serial_line
@@ -24,9 +25,9 @@ async def main(
     *,
     ascii_port: Annotated[str, Parameter(name="--ascii")] = "127.0.0.1:0",
     link: Path | None = None,
-    stroke: Annotated[float, Parameter(validator=validators.Number(gt=0))] = 0.085,
-    latency: Annotated[float, Parameter(validator=validators.Number(gte=0))] = 0.015,
-    time_scale: Annotated[float, Parameter(validator=validators.Number(gt=0))] = 1.0,
+    stroke: PositiveFloat = 0.085,
+    latency: NonNegativeFloat = 0.015,
+    time_scale: PositiveFloat = 1.0,
 ) -> None:
     """Start the fake; it prints one line `ready {json}` with its addresses, and exits on SIGTERM.
 

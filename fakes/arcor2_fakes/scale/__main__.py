@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from cyclopts import Parameter, validators
+from cyclopts.types import PositiveFloat
 
 from arcor2_fakes.control import one_of
 from arcor2_fakes.program import program
 from arcor2_fakes.scale.balance import UNITS, Balance
 from arcor2_fakes.serial_line import Line, line_at
 from arcor2_fakes.serving import Fake
-
-Positive = Annotated[float, Parameter(validator=validators.Number(gt=0))]
 
 
 def truth(balance: Balance, line: Line) -> dict[str, Any]:
@@ -58,9 +56,9 @@ async def main(
     *,
     tcp: str | None = None,
     link: Path | None = None,
-    capacity: Positive = 3.2,
-    settling: Positive = 0.4,
-    stability_timeout: Positive = 5.0,
+    capacity: PositiveFloat = 3.2,
+    settling: PositiveFloat = 0.4,
+    stability_timeout: PositiveFloat = 5.0,
 ) -> None:
     """Start the fake; it prints one line `ready {json}` with its port and ends on SIGTERM.
 

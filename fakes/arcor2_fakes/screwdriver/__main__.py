@@ -8,6 +8,7 @@ from functools import partial
 from typing import Annotated, Any
 
 from cyclopts import Parameter, validators
+from cyclopts.types import PositiveFloat
 
 from arcor2_fakes.control import within
 from arcor2_fakes.program import program
@@ -17,7 +18,6 @@ from arcor2_fakes.screwdriver.tool import Alarm, Tool
 from arcor2_fakes.serving import Fake
 from arcor2_fakes.wire import TcpWire
 
-Positive = Annotated[float, Parameter(validator=validators.Number(gt=0))]
 Count = Annotated[int, Parameter(validator=validators.Number(gte=1, lte=99))]
 Revision = Annotated[int, Parameter(validator=validators.Number(gte=0, lte=6))]
 
@@ -100,9 +100,9 @@ async def main(
     *,
     host: str = "127.0.0.1",
     port: int = 0,
-    duration: Positive = 1.0,
-    evaluation: Positive = 0.05,
-    time_scale: Positive = 1.0,
+    duration: PositiveFloat = 1.0,
+    evaluation: PositiveFloat = 0.05,
+    time_scale: PositiveFloat = 1.0,
     automatic: bool = False,
     programs: Count = 10,
     jobs: Count = 5,
@@ -113,8 +113,8 @@ async def main(
     job_revision: Revision = 2,
     binary: bool = False,
     lock_on_loss: bool = False,
-    response_timeout: Positive = 2.0,
-    keep_alive_timeout: Positive = 15.0,
+    response_timeout: PositiveFloat = 2.0,
+    keep_alive_timeout: PositiveFloat = 15.0,
     seed: int = 0,
 ) -> None:
     """Start the fake; it prints one line `ready {json}` with its addresses and ends on SIGTERM.

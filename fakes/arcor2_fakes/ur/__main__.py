@@ -10,7 +10,8 @@ import sys
 from collections.abc import Callable
 from typing import Annotated
 
-from cyclopts import Parameter, validators
+from cyclopts import Parameter
+from cyclopts.types import PositiveFloat
 
 from arcor2_fakes.program import program
 from arcor2_fakes.serving import Fake, Wire
@@ -31,9 +32,6 @@ log = logging.getLogger("main")
 _POLYSCOPE_X = 10  # has no dashboard server
 _MOST_AT_ONCE = 100  # control cycles to catch up after a delay; watchdog signals that waited count as one
 _CHUNK = 10  # cycles to catch up before the sockets are read again
-
-
-Positive = Annotated[float, Parameter(validator=validators.Number(gt=0))]
 
 
 def _check_version(_type: object, version: str) -> None:
@@ -90,8 +88,8 @@ async def main(
     secondary_port: int = 30002,
     model: Annotated[str, Parameter(validator=_check_model)] = "ur5e",
     controller_version: Annotated[str, Parameter(validator=_check_version)] = "5.25",
-    frequency: Positive = 500.0,
-    time_scale: Positive = 1.0,
+    frequency: PositiveFloat = 500.0,
+    time_scale: PositiveFloat = 1.0,
     powered_off: bool = False,
     serial_number: Annotated[str, Parameter(validator=_check_serial_number)] = SERIAL_NUMBER,
 ) -> None:

@@ -1,7 +1,10 @@
 """The fake block from the host's side: raw frames and pymodbus, as on the device page."""
 
 import logging
+import os
+import signal
 import socket
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -74,6 +77,23 @@ def test_watchdog_over_the_wire(fake: Any, host: Any, wait_for: Callable[..., An
     host.write_register(82, 1, device_id=1)
     assert not host.write_coil(0, True, device_id=1).isError()
     assert host.read_holding_registers(80, count=10, device_id=1).registers == [150, 0, 0, 3, 3, 2, 0, 0, 0, 0]
+
+
+def test_the_watchdog_does_not_count_the_time_in_which_the_fake_does_not_run(fake: Any) -> None:
+    """A busy machine may not run the fake for a while; a real block would have got the triggers of the host."""
+    name, port = fake.ready["modbus"].split(":")
+    trigger = bytes.fromhex("0001 0000 000b 01 10 0050 0002 04 00c8 1267")  # watchdog 1: 200 ms, host 4711
+    with socket.create_connection((name, int(port)), 30.0) as raw:
+        raw.sendall(trigger)
+        assert raw.recv(260)
+        os.kill(fake.process.pid, signal.SIGSTOP)
+        try:
+            time.sleep(0.4)
+            raw.sendall(trigger)
+        finally:
+            os.kill(fake.process.pid, signal.SIGCONT)
+        assert raw.recv(260)
+    assert fake.truth()["watchdogs"][1]["state"] == "running"
 
 
 def test_triggering_the_running_watchdog_is_not_a_write(fake: Any, host: Any) -> None:
