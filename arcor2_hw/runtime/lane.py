@@ -4,9 +4,12 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from queue import Empty, SimpleQueue
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from arcor2_hw.exceptions import Arcor2Error, Cancelled, DeviceTimeout
+from arcor2_hw.keep_alive import LONGEST_STEP, RunningTime
+
+T = TypeVar("T")
 
 _NO_ARGUMENTS: Final[Mapping[str, Any]] = {}
 
@@ -89,6 +92,14 @@ class Job:
             self._gate.release()
         return ended
 
+    def wait_running(self, timeout: float) -> bool:
+        """Wait as `wait`, but at most `timeout` s of running time; see RunningTime."""
+        clock = RunningTime()
+        while not self.wait(LONGEST_STEP / 2.0):
+            if clock() >= timeout:
+                return self.ended
+        return True
+
     def outcome(self) -> Any:
         """Return the result of a call that has ended, or raise its error."""
         if self.error is not None:
@@ -134,6 +145,18 @@ class Lane:
         elif not job.wait(deadline):
             self.expire(job, deadline)
         return job.outcome()
+
+    def read(self, method: str, function: Callable[[], T], timeout: float) -> T:
+        """Call a function that only observes, within `timeout` s of running time. Raises as `call`.
+
+        A busy computer delays the threads of the device as well, which then allow more time themselves.
+        """
+        job = Job(method, function)
+        self.submit(job)
+        if not job.wait_running(timeout):
+            self.expire(job, timeout)
+        value: T = job.outcome()
+        return value
 
     def submit(self, job: Job) -> None:
         """Queue a call. Raises DeviceTimeout if the lane hangs."""

@@ -14,7 +14,7 @@ from arcor2_hw.runtime.own_process.pickling import ByReference
 from arcor2_hw.runtime.world_updates import WorldUpdates
 
 JOINTS_TIMEOUT: Final = 0.5
-"""Time in which another robot has to return its joints, s. Older values are useless while it moves."""
+"""Running time in which another robot has to return its joints, s: longer than BUSY_FOR, which its driver may wait."""
 
 
 class SceneSurroundings(ByReference):
@@ -62,7 +62,7 @@ class SceneSurroundings(ByReference):
             try:
                 instance = device.require()
                 assert isinstance(instance, Robot)
-                joints = device.watch_lane.call("robot_joints", instance.robot_joints, deadline=JOINTS_TIMEOUT)
+                joints = device.watch_lane.read("robot_joints", instance.robot_joints, JOINTS_TIMEOUT)
             except Arcor2Error as error:
                 raise Refused("The position of {name} is unknown: {reason}", name=device.name, reason=error) from error
             found.append((instance, joints))

@@ -28,6 +28,7 @@ MEETING = (1.04, -1.57, 1.57, -1.57, -1.57, 0.0)
 ARM = """
 from arcor2_hw.objects.safe_moves import Way
 from arcor2_hw.objects.urdf_robot import UrdfRobot
+import ctypes
 
 class Arm(UrdfRobot):
     _ABSTRACT = False
@@ -38,10 +39,12 @@ class Arm(UrdfRobot):
         self.now = [Joint(f"{n}_joint", v) for n, v in START]
         self.count = 0
         self.silent = False
+        self.stall = 0
 
     def robot_joints(self, include_gripper: bool = False) -> list[Joint]:
         if self.silent:
             raise Stale(f"{self.name} has reported nothing")
+        ctypes.PyDLL(None).usleep(self.stall)  # holds the interpreter lock, like a machine that does not run the host
         return self.now
 
     def follow(self, way: Way) -> None:
@@ -55,6 +58,9 @@ class Arm(UrdfRobot):
 
     def fall_silent(self) -> None:
         self.silent = True
+
+    def stall_host(self) -> None:
+        self.stall = 600_000
 """.replace("START", repr(list(zip(NAMES, READY, strict=True))))
 SLOW_ARM = f"""
 {ARM}
@@ -164,6 +170,11 @@ def test_a_move_is_refused_if_the_joints_of_another_robot_are_unknown(scene: Hos
     assert error.code == "refused"
     assert "The position of other is unknown" in error.message.text
     assert go(scene, READY, safe=False) is None
+
+
+def test_a_stalled_host_does_not_make_the_joints_of_another_robot_unknown(scene: HostProcess) -> None:
+    scene.call("obj_other", "stall_host")  # longer than JOINTS_TIMEOUT
+    assert go(scene, ACROSS) is None
 
 
 # ---------------------------------------------------------------------------------------------------- added bodies
