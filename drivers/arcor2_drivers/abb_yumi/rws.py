@@ -25,7 +25,10 @@ _NO_TLS: Final = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
 
 
 class Rws:
-    """One session. Closing keeps the session at the controller, until `logout`."""
+    """One session. Closing keeps the session at the controller, until `logout`.
+
+    Any thread may close. A request has the connection to itself, and closes it at its end when `close` came meanwhile.
+    """
 
     def __init__(self, name: str, host: str, port: int, user: str, password: str) -> None:
         self.name = name
@@ -35,6 +38,8 @@ class Rws:
         self._cookies = httpx.Cookies()
         self._client: httpx.Client | None = None
         self._lock = threading.Lock()
+        self._storing = threading.Lock()
+        self._closes = 0
         self._until = math.inf
         self._fresh = True
 
@@ -49,14 +54,15 @@ class Rws:
 
     def close(self) -> None:
         """Close the connection, but not the session."""
-        client, self._client = self._client, None
+        with self._storing:
+            client, self._client = self._client, None
+            self._closes += 1
         if client is not None:
-            self._cookies = client.cookies
             client.close()
 
     def logout(self, timeout: float = 0.2) -> None:
         """End the session at the controller, if it can be reached; its mastership is released."""
-        if self._client is not None:
+        if not self._fresh:
             with contextlib.suppress(DeviceError):
                 self._ask("GET", "/logout", {}, None, timeout)
         self.close()
@@ -104,21 +110,35 @@ class Rws:
         finally:
             self._lock.release()
 
+    @contextlib.contextmanager
+    def _connection(self) -> Iterator[httpx.Client]:
+        """Take the connection for a request, and store it again, with the cookie of the session."""
+        with self._storing:
+            client, self._client, closes = self._client, None, self._closes
+        if client is None:
+            client = httpx.Client(
+                base_url=f"http://{self.address}",
+                auth=httpx.DigestAuth(self._user, self._password),
+                cookies=self._cookies,
+                trust_env=False,
+                verify=_NO_TLS,
+            )
+        try:
+            yield client
+        finally:
+            with self._storing:
+                closed = self._closes != closes
+                if not closed:
+                    self._client, self._cookies = client, client.cookies
+            if closed:
+                client.close()
+
     def _ask(self, method: str, path: str, query: Fields, body: Fields | None, timeout: float) -> httpx.Response:
         if self._fresh:  # digest authentication needs two requests
             timeout = max(timeout, FIRST_WITHIN)
         until = min(time.monotonic() + timeout, self._until)
         timeout = max(until - time.monotonic(), 0.01)
-        with self._turn(timeout):
-            client = self._client
-            if client is None:
-                client = self._client = httpx.Client(
-                    base_url=f"http://{self.address}",
-                    auth=httpx.DigestAuth(self._user, self._password),
-                    cookies=self._cookies,
-                    trust_env=False,
-                    verify=_NO_TLS,
-                )
+        with self._turn(timeout), self._connection() as client:
             try:
                 answer = client.request(
                     method, path, params={**query, "json": "1"}, data=body, timeout=max(until - time.monotonic(), 0.01)

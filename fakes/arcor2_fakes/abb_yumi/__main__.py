@@ -126,7 +126,7 @@ async def main(
     register_commands(fake, controller, http)
     fake.commands(stops=lambda: {name: list(server.stops_taken) for name, server in servers.items()})
     fake.wires(**wires)
-    fake.truth(lambda: controller.truth() | {"requests": http.requests})
+    fake.truth(lambda: controller.truth() | {"requests": http.requests, "sessions": http.sessions})
     fake.simulate(advance, _TICK)
     own_time.run()
     await fake.run(**wires, host=lambda: host)

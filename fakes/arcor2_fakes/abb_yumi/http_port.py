@@ -104,6 +104,11 @@ class HttpPort:
 
         connection.received = received
 
+    @property
+    def sessions(self) -> int:
+        """Return the number of sessions."""
+        return len(self._sessions)
+
     def expire(self) -> None:
         """End sessions without recent requests."""
         for session in list(self._sessions.values()):

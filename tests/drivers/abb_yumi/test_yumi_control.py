@@ -14,7 +14,7 @@ from arcor2_hw.data.robot import Control, Mode, Power, ProgramState, Safety
 from arcor2_hw.exceptions import DeviceError, InvalidData, NotConnected, NotFound, NotInControl, Refused, SafetyStop
 from tests.waiting import wait_for
 
-from .conftest import RWS_PORT, FakeYumi, make
+from .conftest import RWS_PORT, BackgroundCall, FakeYumi, make
 
 HOME = Position(-0.0096, 0.1826, 0.1986)
 """Position of the left flange in the calibration position according to RobotStudio, m (from general knowledge)."""
@@ -204,16 +204,31 @@ def test_power_on_only_switches_the_motors_on(fake: FakeYumi, robot: YuMi) -> No
 
 
 def test_sessions_do_not_accumulate(fake: FakeYumi) -> None:
-    """A controller allows 70 sessions; 36 connections with control would need two each."""
-    for _ in range(36):
-        robot = make(fake.host)
-        robot.connect(30.0)
-        robot.power_on()
-        robot.disconnect()
+    """A controller allows 70 sessions. Observing needs one, control another one."""
+    before = fake.truth()["sessions"]
     robot = make(fake.host)
     robot.connect(30.0)
-    assert robot.connection is Connection.ONLINE
+    robot.power_on()
+    assert fake.truth()["sessions"] == before + 2
     robot.disconnect()
+    assert fake.truth()["sessions"] == before
+
+
+def test_a_session_can_be_closed_during_a_request(fake: FakeYumi) -> None:
+    """The request ends as if it had come first. The next one opens a connection of the same session."""
+    rws = Rws("yumi", fake.host, RWS_PORT, "Default User", "robotics")
+    rws.get("/rw/system")
+    sessions = fake.truth()["sessions"]
+    fake.do("slow", wire="rws", seconds=0.2)
+    requests = fake.truth()["requests"]
+    doing = BackgroundCall(rws.value, "/rw/panel/opmode", "opmode", 10.0)
+    fake.control.wait_until(lambda t: t["requests"] > requests)
+    rws.close()
+    assert doing.result() == "AUTO"
+    fake.do("heal")
+    assert rws.value("/rw/panel/opmode", "opmode") == "AUTO"
+    assert fake.truth()["sessions"] == sessions
+    rws.logout()
 
 
 def test_a_refusal_contains_the_controllers_text(fake: FakeYumi) -> None:
