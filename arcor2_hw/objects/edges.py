@@ -101,6 +101,10 @@ class DigitalPoints(EdgeListeners):
         """Return the debounced value of a point; None before the first sample."""
         return self._debounced[name].value
 
+    def shown(self, names: Iterable[str]) -> dict[str, float]:
+        """Return 1 or 0 for each of some points whose value is known; see `Generic.shown_values`."""
+        return {name: float(value) for name in names if (value := self.value(name)) is not None}
+
     def take(self, name: str, raw: bool, at: float, sampled: Timestamp | None = None) -> None:
         """Process a sample of a point; see `Debounced.take`. Call `notify_edges` afterwards."""
         if (edge := self._debounced[name].take(raw, at, sampled)) is not None:

@@ -172,9 +172,7 @@ class MappedDevice(ModbusDevice[dict[str, Any]]):
         point = self.POINTS[self.HEARTBEAT]
         self._beats, self._beat_at = (self._beats + 1) % (2 if point.kind is bool else 256), now
         try:
-            self._write(point, [self._beats])
-        except DeviceTimeout:
-            self._write(point, [self._beats])
+            self.repeat_once(lambda: self._write(point, [self._beats]))
         except DeviceFault as error:
             self.drop_control(Phrase.of("{reason}", reason=error))
 

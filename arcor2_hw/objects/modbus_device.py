@@ -1,9 +1,11 @@
 """ModbusDevice: a device on Modbus TCP or RTU. A mixin of object types."""
 
 import time
+from collections.abc import Callable
 from typing import Final, TypeVar
 
 from arcor2_hw.data.device import Identity
+from arcor2_hw.exceptions import DeviceTimeout
 from arcor2_hw.objects.modbus_link import ModbusLink
 from arcor2_hw.objects.polled_control import PolledControl
 from arcor2_hw.objects.state_observer import Snapshot
@@ -36,6 +38,14 @@ class ModbusDevice(PolledControl[T]):
         """Read the identification of the device (function 43/14)."""
         self.observing.check()
         return self.link.identify()
+
+    @staticmethod
+    def repeat_once(write: Callable[[], None]) -> None:
+        """Write, and write again when no answer came. Use it only where a repetition does no harm."""
+        try:
+            write()
+        except DeviceTimeout:
+            write()
 
     def leave(self) -> None:
         """Release control during disconnecting."""

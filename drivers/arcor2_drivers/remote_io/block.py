@@ -4,10 +4,10 @@ import contextlib
 import random
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import ClassVar, Final
 
-from arcor2_hw.data.device import Alarm, LossReaction, Severity
+from arcor2_hw.data.device import Alarm, LossReaction, Reading, Severity
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, Refused
 from arcor2_hw.messages import Message, Phrase, translatable
 from arcor2_hw.objects.connected import AlarmText
@@ -80,7 +80,7 @@ class Block(ModbusDevice[Image]):
         """Notify listeners of edges, and trigger the watchdog."""
         self.digital_points.notify_edges()
         if self.in_control and time.monotonic() - self._triggered >= self._s.watchdog_ms / 5000.0:
-            self.retry_once(lambda: self.link.write_registers(self._watchdog + registers.TRIGGER, self._number))
+            self.repeat_once(lambda: self.link.write_registers(self._watchdog + registers.TRIGGER, self._number))
             self._triggered = time.monotonic()
 
     def alarms(self) -> list[Alarm]:
@@ -113,32 +113,28 @@ class Block(ModbusDevice[Image]):
 
     def owner_of(self, state: Image) -> str | None:
         """Return who triggers our watchdog, by the number stored in it; None when it is not running."""
-        running, number = state.watchdog(self._s.watchdog)
+        watchdog = self._s.watchdog
+        running, number = state.watchdog(watchdog)
         if running is not WatchdogState.RUNNING:
             return None
-        return (
-            US
-            if number == self._number
-            else Phrase.of(
-                "another host (number {number} on watchdog {watchdog})", number=number, watchdog=self._s.watchdog
-            )
-        )
+        if number == self._number:
+            return US
+        return Phrase.of("another host (number {number} on watchdog {watchdog})", number=number, watchdog=watchdog)
 
     def why_control_ended(self, state: Image) -> str:
         """Return why the watchdog does not run for us any more; empty while it does."""
-        running, _ = state.watchdog(self._s.watchdog)
         number = self._s.watchdog
+        running, _ = state.watchdog(number)
+        if running is WatchdogState.RUNNING:
+            return super().why_control_ended(state)
+        text = "watchdog {number} does not run ({register}): the block or another host switched it off"
+        if running is WatchdogState.EXPIRED:
+            self.set_alarm(WATCHDOG, True)
+            text = "watchdog {number} has expired ({register}); the outputs are safe until control is taken"
         register = Message.of(
             "input register {register} is {value}", register=registers.WATCHDOG_STATES + number, value=running
         )
-        if running is WatchdogState.EXPIRED:
-            self.set_alarm(WATCHDOG, True)
-            expired = "watchdog {number} has expired ({register}); the outputs are safe until control is taken"
-            return Phrase.of(expired, number=number, register=register)
-        if running is WatchdogState.OFF:
-            off = "watchdog {number} does not run ({register}): the block or another host switched it off"
-            return Phrase.of(off, number=number, register=register)
-        return super().why_control_ended(state)
+        return Phrase.of(text, number=number, register=register)
 
     # -------------------------------------------------------------------------------- outputs
     def digital(self, name: str) -> bool:
@@ -149,16 +145,14 @@ class Block(ModbusDevice[Image]):
             raise ConnectionLost("{device}: the value of {name} is not known yet", device=self.who, name=name)
         return value
 
+    def newest_digital(self, name: str) -> Reading[bool | float]:
+        """Return the newest value of a digital point, debounced. Raises Stale, NotConnected, ConnectionLost."""
+        _, asked, stamp = self._polled.current()
+        return Reading[bool | float](self.digital(name), stamp, asked)
+
     def switch(self, name: str, value: bool) -> None:
         """Switch a digital output."""
         self.send(f"writing {name}", lambda: self.link.write_coil(self.block_points[name].channel, value))
-
-    def retry_once(self, write: Callable[[], None]) -> None:
-        """Write, and write again when no answer came. Use it only where a repetition does no harm."""
-        try:
-            write()
-        except DeviceTimeout:
-            write()
 
     def pulse_output(self, name: str, duration: float) -> None:
         """Switch a digital output on for `duration` s, timed by the block, and wait until it is off again."""

@@ -26,10 +26,6 @@ class Point(Data, frozen=True):
         """Return the terminal, as DO4."""
         return f"{self.kind}{self.channel}"
 
-    def physical(self, raw: int) -> float:
-        """Return the value of a raw one."""
-        return raw * self.io.scale
-
     def raw(self, value: float) -> int:
         """Return the raw value of a physical value. Raises ValueError with the range if it is outside of it."""
         limit = RAW_MAX * abs(self.io.scale)

@@ -7,11 +7,12 @@ from arcor2_hw.data.device import Quality, Reading
 from arcor2_hw.exceptions import DeviceFault
 from arcor2_hw.objects import IOBlock
 from arcor2_hw.objects.point_actions import MARGIN, PointActions
-from arcor2_hw.objects.small import PointDirection, PointKind
+from arcor2_hw.objects.small import PointKind
+from arcor2_hw.objects.state_observer import Snapshot
 
 from .block import Block
 from .points import parse_points
-from .registers import BROKEN_WIRE, LONGEST_PULSE
+from .registers import BROKEN_WIRE, LONGEST_PULSE, Image
 from .settings import RemoteIOSettings
 
 
@@ -31,12 +32,7 @@ class RemoteIO(PointActions, Block, IOBlock):
     @property
     def shown_values(self) -> dict[str, float]:
         """Return for each digital input whether it is on."""
-        states = {
-            name: self.digital_points.value(name)
-            for name in self.digital_points.names
-            if self.io_points[name].direction is PointDirection.INPUT
-        }
-        return {name: float(on) for name, on in states.items() if on is not None}
+        return self.digital_points.shown(name for name, point in self.block_points.items() if point.kind == "DI")
 
     @observation
     def digital_point(self, name: str) -> bool:
@@ -49,11 +45,14 @@ class RemoteIO(PointActions, Block, IOBlock):
     def analog_point(self, name: str) -> Reading[float]:
         """Return the value of an analogue point. Raises OutOfRange, Refused, Stale, ConnectionLost."""
         self.require_point(name, PointKind.ANALOG)
-        image, asked, stamp = self._polled.current()
+        return self._analog(name, self._polled.current())
+
+    def _analog(self, name: str, snapshot: Snapshot[Image]) -> Reading[float]:
+        image, asked, stamp = snapshot
         point = self.block_points[name]
         raw = image.analog(point.kind, point.channel)
         quality = Quality.BAD if point.kind == "AI" and raw == BROKEN_WIRE else Quality.GOOD
-        return Reading(point.physical(raw), stamp, asked, quality)
+        return Reading(raw * point.io.scale, stamp, asked, quality)
 
     def point_label(self, name: str) -> str:
         """Return the terminal of a point."""
@@ -64,25 +63,15 @@ class RemoteIO(PointActions, Block, IOBlock):
 
         Raises OutOfRange for an unknown name, NotConnected, ConnectionLost, DeviceTimeout.
         """
-        io, point = self.require_point(name), self.block_points[name]
-        if io.debounce:
-            _, asked, stamp = self._polled.fresh()
-            return Reading(self.digital(name), stamp, asked)
-        self.observing.check()
-        image, asked, stamp = self.snapshot()
-        if io.kind is PointKind.DIGITAL:
-            return Reading(image.digital(point.kind, point.channel), stamp, asked)
-        raw = image.analog(point.kind, point.channel)
-        quality = Quality.BAD if point.kind == "AI" and raw == BROKEN_WIRE else Quality.GOOD
-        return Reading(point.physical(raw), stamp, asked, quality)
+        self.require_point(name)
+        self.fresh()
+        return self.newest_value(name)
 
     def newest_value(self, name: str) -> Reading[bool | float]:
         """Return the newest value of a point. Raises Stale, NotConnected, ConnectionLost."""
         if self.io_points[name].kind is PointKind.ANALOG:
-            reading = self.analog_point(name)
-            return Reading[bool | float](reading.value, reading.stamp, reading.monotonic, reading.quality)
-        _, asked, stamp = self._polled.current()
-        return Reading[bool | float](self.digital(name), stamp, asked)
+            return self._analog(name, self._polled.current())
+        return self.newest_digital(name)
 
     def bad_reading(self, name: str) -> DeviceFault:
         """Return the error for an input with a broken wire."""

@@ -8,7 +8,6 @@ from functools import partial
 from typing import ClassVar
 
 from arcor2_hw.actions import action
-from arcor2_hw.data.device import Reading
 from arcor2_hw.data.points import LivePoint
 from arcor2_hw.exceptions import NotInControl, OutOfRange, Refused
 from arcor2_hw.objects import Generic
@@ -57,17 +56,12 @@ class TowerLight(Block, Generic):
     @property
     def shown_values(self) -> dict[str, float]:
         """Return for each lamp whether it is lit."""
-        states = {color: self.digital_points.value(color) for color in self._lamps}
-        return {color: float(lit) for color, lit in states.items() if lit is not None}
+        return self.digital_points.shown(self._lamps)
 
     # -------------------------------------------------------------------------------- points
     def live_points(self) -> list[LivePoint]:
         """Return the lamps and the buzzer with their newest states."""
-        return [live_point(point.io, self._newest, can_force=True) for point in self.block_points.values()]
-
-    def _newest(self, name: str) -> Reading[bool | float]:
-        _, asked, stamp = self._polled.current()
-        return Reading[bool | float](self.digital(name), stamp, asked)
+        return [live_point(point.io, self.newest_digital, can_force=True) for point in self.block_points.values()]
 
     def force_point(self, name: str, value: bool | float) -> None:
         """Switch a lamp or the buzzer, and do not switch it otherwise until `release_point`."""
@@ -147,5 +141,5 @@ class TowerLight(Block, Generic):
         for color, on in sorted(wanted.items(), key=lambda lamp: lamp[1]):
             if self._lit.get(color) is not on:
                 if color not in self._forced:
-                    self.retry_once(partial(self.switch, color, on))
+                    self.repeat_once(partial(self.switch, color, on))
                 self._lit[color] = on

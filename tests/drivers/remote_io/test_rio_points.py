@@ -54,7 +54,6 @@ def test_the_point_list_is_parsed() -> None:
     assert (lamp.direction, lamp.on_loss, points["lamp"].address) == (PointDirection.OUTPUT, OnLoss.OFF, "DO4")
     assert (points["valve"].io.on_loss, points["lock"].io.on_loss) == (OnLoss.HOLD, OnLoss.ON)
     assert (speed.kind, speed.unit, speed.scale) == (PointKind.ANALOG, "m/s", 0.01)
-    assert points["level"].physical(1500) == pytest.approx(1.5)
     assert points["speed"].raw(1.5) == 150
 
 
