@@ -91,23 +91,21 @@ class Hands:
 
     def _move_fingers(self, arm: ArmId, code: Code, *values: float) -> float:
         """Execute a command of the fingers and return their width, m."""
-        setting = f"{arm.value}_gripper"
-        if not getattr(self._yumi, setting):
-            raise Refused(
-                "The {value} hand of {name} has no fingers: {setting} is not set.",
-                value=arm.value,
-                name=self.name,
-                setting=setting,
-            )
-        return self._control.current().lines[arm.value].ask(code, *values, within=HAND_WITHIN)[0] / 1e3
+        return self._ask(arm, "gripper", code, *values)[0] / 1e3
 
     def _switch_air(self, arm: ArmId, code: Code, on: bool) -> None:
-        setting = f"{arm.value}_suction"
+        self._ask(arm, "suction", code, float(on))
+
+    def _ask(self, arm: ArmId, tool: str, code: Code, *values: float) -> tuple[float, ...]:
+        """Send a command to a hand, and return its answer. Raise Refused unless the hand has the tool."""
+        setting = f"{arm.value}_{tool}"
         if not getattr(self._yumi, setting):
             raise Refused(
-                "The {value} hand of {name} has no suction cup: {setting} is not set.",
+                "The {value} hand of {name} has no fingers: {setting} is not set."
+                if tool == "gripper"
+                else "The {value} hand of {name} has no suction cup: {setting} is not set.",
                 value=arm.value,
                 name=self.name,
                 setting=setting,
             )
-        self._control.current().lines[arm.value].ask(code, float(on), within=HAND_WITHIN)
+        return self._control.current().lines[arm.value].ask(code, *values, within=HAND_WITHIN)

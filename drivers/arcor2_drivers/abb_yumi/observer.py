@@ -1,8 +1,9 @@
 """Observation of the controller: one thread polls Robot Web Services. It never writes."""
 
+import itertools
 import time
-from collections.abc import Callable
-from typing import Final, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Any, Final, NamedTuple
 
 from arcor2_hw.exceptions import ConnectionLost, NotConnected, Refused
 from arcor2_hw.objects.state_observer import Snapshot, StateObserver
@@ -74,42 +75,16 @@ class Sample(NamedTuple):
 
 def read_panel(rws: Rws) -> Panel:
     """Read the state that a person changes."""
-    panel = Panel(0.0, "", 0.0, "", {}, None, {})
-    for part in PARTS:
-        panel = part(rws, panel)
-    return panel._replace(monotonic=time.monotonic())
+    parts = {field: read(rws) for field, read in PARTS.items()}
+    return Panel(time.monotonic(), **parts)
 
 
-def _mode(rws: Rws, panel: Panel) -> Panel:
-    return panel._replace(operation_mode=rws.value("/rw/panel/opmode", "opmode"))
-
-
-def _speed(rws: Rws, panel: Panel) -> Panel:
+def _speed_ratio(rws: Rws) -> float:
     ratio = rws.value("/rw/panel/speedratio", "speedratio")
     try:
-        return panel._replace(speed_ratio=float(ratio) / 100.0)
+        return float(ratio) / 100.0
     except ValueError:
         raise ConnectionLost("{device} returned an invalid speed ratio.", ratio, device=rws.who) from None
-
-
-def _collision(rws: Rws, panel: Panel) -> Panel:
-    return panel._replace(collision=rws.value("/rw/panel/coldetstate", "coldetstate"))
-
-
-def _programs(rws: Rws, panel: Panel) -> Panel:
-    return panel._replace(programs={arm: _program(rws, task) for arm, task in TASKS.items()})
-
-
-def _holder(rws: Rws, panel: Panel) -> Panel:
-    return panel._replace(holder=holder(rws))
-
-
-def _lead_throughs(rws: Rws, panel: Panel) -> Panel:
-    return panel._replace(lead_through={arm: _lead_through(rws, unit) for arm, unit in UNITS.items()})
-
-
-PARTS: Final = (_mode, _speed, _collision, _programs, _holder, _lead_throughs)
-"""Parts of the panel; one is read after each sample, because reading all of them would delay the next one."""
 
 
 def holder(rws: Rws) -> Holder | None:
@@ -137,6 +112,17 @@ def _lead_through(rws: Rws, unit: str) -> bool | None:
         return rws.value(lead_through_path(unit), "status").lower() == "active"
     except Refused:
         return None
+
+
+PARTS: Final[Mapping[str, Callable[[Rws], Any]]] = {
+    "operation_mode": lambda rws: rws.value("/rw/panel/opmode", "opmode"),
+    "speed_ratio": _speed_ratio,
+    "collision": lambda rws: rws.value("/rw/panel/coldetstate", "coldetstate"),
+    "programs": lambda rws: {arm: _program(rws, task) for arm, task in TASKS.items()},
+    "holder": holder,
+    "lead_through": lambda rws: {arm: _lead_through(rws, unit) for arm, unit in UNITS.items()},
+}
+"""Fields of the panel; one is read after each sample, because reading all of them would delay the next one."""
 
 
 def read_running(rws: Rws) -> bool:
@@ -172,7 +158,7 @@ class Observer(StateObserver[Sample]):
         self.on_sample: Callable[[Sample], None] = lambda _: None
         self._panel: Panel | None = None
         self._before: Sample | None = None
-        self._part = 0
+        self._fields = itertools.cycle(PARTS)
 
     def leave(self) -> None:
         """Send no further requests; call `disconnect` afterwards."""
@@ -230,12 +216,11 @@ class Observer(StateObserver[Sample]):
         if (newest := self.newest()) is not None:
             self.on_sample(newest)
         self._check_not_leaving()
-        self._part = (self._part + 1) % len(PARTS)
         assert self._panel is not None
-        before = self._panel
-        found = PARTS[self._part](self.rws, before)
+        field, before = next(self._fields), self._panel
+        found = PARTS[field](self.rws)
         if self._panel is before:  # else it was read elsewhere meanwhile
-            self._panel = found._replace(monotonic=time.monotonic())
+            self._panel = before._replace(monotonic=time.monotonic(), **{field: found})
 
     def _check_not_leaving(self) -> None:
         if self.ending:

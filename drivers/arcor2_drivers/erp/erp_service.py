@@ -25,6 +25,7 @@ from arcor2_hw.messages import Message, device_at, translatable
 from arcor2_hw.objects import Generic
 from arcor2_hw.objects.connected import Connected
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
+from arcor2_hw.objects.settings import within
 
 from .outbox import Order, Outbox, OutboxState, RefusedMessage, file_of
 from .sender import Sender
@@ -205,7 +206,7 @@ class ErpService(Connected, Generic):
         """
         assert 0.0 <= wait <= 3600.0
 
-        self._check_wait("wait", wait)
+        within(f"{self.who}: wait", wait, 0.0, LONGEST_WAIT, "s")
         stops, deadline = self._stops, time.monotonic() + wait
         if not self._requesting_order.acquire(blocking=False):
             raise Refused("{device} is busy with another call of next_order", device=self.who)
@@ -275,7 +276,7 @@ class ErpService(Connected, Generic):
         """
         assert 0.0 <= timeout <= 3600.0
 
-        self._check_wait("timeout", timeout)
+        within(f"{self.who}: timeout", timeout, 0.0, LONGEST_WAIT, "s")
         stops, deadline = self._stops, time.monotonic() + timeout
         while (state := self.outbox().value).waiting:
             if stops != self._stops:
@@ -300,16 +301,6 @@ class ErpService(Connected, Generic):
         return count
 
     # -------------------------------------------------------------------------------- internals
-    def _check_wait(self, name: str, value: float) -> None:
-        if not 0.0 <= value <= LONGEST_WAIT:
-            raise OutOfRange(
-                "{device}: {name} must be 0 to {longest_wait:g} s, not {value!r}",
-                device=self.who,
-                name=name,
-                longest_wait=LONGEST_WAIT,
-                value=value,
-            )
-
     def _check_text(self, name: str, value: str, empty: bool = False) -> None:
         if not (value.strip() or empty) or len(value) > LONGEST_TEXT or not value.isprintable():
             raise OutOfRange(
