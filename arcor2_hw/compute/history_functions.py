@@ -5,7 +5,6 @@ each row is seen exactly once, also while rows are moved: what the list does not
 """
 # ruff: noqa: S608 - statements contain only names of ours, and file names in quotation marks
 
-import os
 import sqlite3
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
@@ -32,6 +31,7 @@ from arcor2_hw.data.editor import RunEnd
 from arcor2_hw.data.history import PastRun, PointSummary, PointValues
 from arcor2_hw.data.points import PointQuality
 from arcor2_hw.exceptions import StorageError
+from arcor2_hw.files import sync
 
 MEMORY: Final = "256MB"
 """Maximum memory of DuckDB. Larger sorts continue on the disk."""
@@ -87,9 +87,9 @@ def write_cold_file(task: WriteColdFile, _state: WorkerState) -> Written:
             found = engine.execute(summary).fetchone()
             assert found is not None
         temporary.chmod(0o600)
-        _flush(temporary)
+        sync(temporary)
         temporary.rename(target)
-        _flush(directory)
+        sync(directory)
         return Written(ColdFile(task.kind, task.name, found[1], found[2], found[0], target.stat().st_size), last_id)
     except (duckdb.Error, sqlite3.Error, OSError) as error:
         raise _unusable(directory, error) from error
@@ -103,14 +103,6 @@ def _load_names(engine: duckdb.DuckDBPyConnection, recent: sqlite3.Connection) -
     names = recent.execute("select number, object_id, object_name, name, unit from point").fetchall()
     if names:
         engine.executemany("insert into names values (?, ?, ?, ?, ?)", names)
-
-
-def _flush(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 # -------------------------------------------------------------------------------- reading

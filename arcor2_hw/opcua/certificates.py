@@ -1,7 +1,6 @@
 """The certificate of the OPC UA server, and the certificates of clients that it trusts, as files."""
 
 import ipaddress
-import os
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Final
@@ -10,6 +9,8 @@ from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+from arcor2_hw.files import replace_file
 
 CERTIFICATE: Final = "opcua-certificate.pem"
 KEY: Final = "opcua-key.pem"
@@ -83,17 +84,8 @@ def _create(certificate: Path, key_file: Path, machine: str, hosts: list[str]) -
     )  # fmt: skip
     pem = serialization.Encoding.PEM
     formats = serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
-    _write(key_file, key.private_bytes(pem, *formats), 0o600)
-    _write(certificate, built.public_bytes(pem), 0o644)
-
-
-def _write(file: Path, content: bytes, mode: int) -> None:
-    temporary = file.with_suffix(".new")
-    with os.fdopen(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode), "wb") as opened:
-        opened.write(content)
-        opened.flush()
-        os.fsync(opened.fileno())
-    temporary.replace(file)
+    replace_file(key_file, key.private_bytes(pem, *formats))
+    replace_file(certificate, built.public_bytes(pem), mode=0o644)
 
 
 class TrustedClients:

@@ -11,6 +11,7 @@ import msgspec
 
 from arcor2_hw.data.parts import PartBooks
 from arcor2_hw.exceptions import StorageError
+from arcor2_hw.files import sync
 
 _HEADER: Final = struct.Struct("<QII")
 """Sequence number, length and CRC-32 of the content."""
@@ -52,7 +53,7 @@ class CheckpointFile:
             if not self._files:
                 self._paths[0].parent.mkdir(parents=True, exist_ok=True)
                 self._files = [os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600) for path in self._paths]
-                _sync(self._paths[0].parent)
+                sync(self._paths[0].parent)
             self._sequence += 1
             body = _encode(books)
             file = self._files[self._sequence % 2]
@@ -75,15 +76,6 @@ class CheckpointFile:
 def stored_scenes(directory: Path) -> list[str]:
     """Return the ids of the scenes that have checkpoints."""
     return sorted({unquote(path.stem) for suffix in _SUFFIXES for path in directory.glob(f"*{suffix}")})
-
-
-def _sync(directory: Path) -> None:
-    """Write the entries of a directory to disk."""
-    descriptor = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _read(path: Path) -> tuple[int, PartBooks] | None:

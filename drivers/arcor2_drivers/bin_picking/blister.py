@@ -1,6 +1,8 @@
 """Blister: a blister, tray or magazine with places in a grid that counts its parts."""
 
+import contextlib
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import ClassVar
 
@@ -161,22 +163,22 @@ class Blister(Connected, GenericWithPose):
             raise OutOfRange("{name}: {reason}", name=self.name, reason=error) from None
 
     def _set(self, row: int, column: int, full: bool) -> None:
-        try:
+        with self._storing():
             self._places.set(row, column, full)
-        except OSError as error:
-            raise self._not_stored(error) from error
 
     def _set_all(self, full: bool) -> None:
-        try:
+        with self._storing():
             self._places.set_all(full)
-        except OSError as error:
-            raise self._not_stored(error) from error
         self._next_part = self._next_free = None
 
-    def _not_stored(self, error: OSError) -> NotConnected:
-        return NotConnected(
-            "{name}: the state file cannot be written; the state has not changed", str(error), name=self.name
-        )
+    @contextlib.contextmanager
+    def _storing(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise NotConnected(
+                "{name}: the state file cannot be written; the state has not changed", str(error), name=self.name
+            ) from error
 
     def _pose_of(self, row: int, column: int) -> Pose:
         given = self._config

@@ -1,11 +1,11 @@
 """Places: which places of a grid have a part, optionally stored in a file."""
 
-import os
-import tempfile
 from pathlib import Path
 from typing import Final
 
 import msgspec
+
+from arcor2_hw.files import replace_file
 
 VERSION: Final = 1
 
@@ -99,13 +99,4 @@ class Places:
         if self._file is None:
             return
         stored = _Stored(VERSION, self.rows, self.columns, "".join("1" if each else "0" for each in self._full))
-        descriptor, name = tempfile.mkstemp(dir=self._file.parent, prefix=f".{self._file.name}.")
-        try:
-            with os.fdopen(descriptor, "wb") as file:
-                file.write(msgspec.json.encode(stored))
-                file.flush()
-                os.fsync(file.fileno())
-            Path(name).replace(self._file)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise
+        replace_file(self._file, msgspec.json.encode(stored))

@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath
 from typing import Final
 
 from arcor2_hw.exceptions import InvalidPackage, StorageError
-from arcor2_server.files import sync_directory
+from arcor2_hw.files import sync
 from arcor2_server.storage.packages import MAX_FILES, inside
 
 Files = Mapping[str, bytes]
@@ -110,7 +110,7 @@ def write(files: Files, directory: Path) -> None:
                 os.fsync(stream.fileno())
         temporary.chmod(0o755)
         temporary.rename(directory)
-        sync_directory(directory.parent)
+        sync(directory.parent)
     except OSError as error:
         raise StorageError(
             "package {name} cannot be written: {reason}", str(directory), name=directory.name, reason=error.strerror

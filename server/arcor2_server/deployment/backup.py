@@ -21,7 +21,8 @@ import msgspec
 
 from arcor2_hw.data.base import Data, now
 from arcor2_hw.exceptions import InvalidData, StorageError
-from arcor2_server.files import DIRECTORY_MODE, FILE_MODE, sync_directory
+from arcor2_hw.files import sync
+from arcor2_server.files import DIRECTORY_MODE, FILE_MODE
 
 FORMAT: Final = 1
 """Version of the format of backups."""
@@ -120,7 +121,7 @@ def write_backup(data_dir: Path, target: Path, version: str) -> Manifest:
                 file.flush()
                 os.fsync(file.fileno())
             temporary.rename(target)
-            sync_directory(target.parent)
+            sync(target.parent)
             return manifest
         raise AssertionError("unreachable")
     except (OSError, sqlite3.Error, _Vanished) as error:
@@ -342,7 +343,7 @@ def restore_backup(source: Path, data_dir: Path) -> Manifest:
             if path.is_dir():
                 path.chmod(DIRECTORY_MODE)
         unpacked.rename(data_dir / _READY)
-        sync_directory(data_dir)
+        sync(data_dir)
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
         raise InvalidData("The backup {path} is damaged: {reason}.", path=source, reason=error) from error
     except OSError as error:
@@ -363,12 +364,12 @@ def finish_restoration(data_dir: Path) -> None:
             for entry in list(data_dir.iterdir()):
                 if not _stays(entry.name) and entry not in (ready, replaced):
                     entry.rename(replaced / entry.name)
-            sync_directory(data_dir)
+            sync(data_dir)
             ready.rename(moving)
         if moving.exists():
             for entry in list(moving.iterdir()):
                 entry.rename(data_dir / entry.name)
-            sync_directory(data_dir)
+            sync(data_dir)
             moving.rmdir()
         if replaced.exists():
             replaced.rename(_unused(data_dir))

@@ -19,8 +19,9 @@ from msgspec import UNSET
 
 from arcor2_hw.data.base import Data, Timestamp, Unset, new_id, now
 from arcor2_hw.exceptions import Conflict, InvalidData, NotFound, StorageError
+from arcor2_hw.files import sync
 from arcor2_hw.messages import translatable
-from arcor2_server.files import replace_file, sync_directory
+from arcor2_server.files import replace_file
 
 log = structlog.get_logger(__name__)
 
@@ -206,7 +207,7 @@ class AssetStore:
                 raise Conflict("The asset {key!r} belongs to an installed driver and cannot be deleted.", key=key)
             with self._storage_errors("write"):
                 await asyncio.to_thread(self._record(key).unlink, missing_ok=True)
-                await asyncio.to_thread(sync_directory, self._records)
+                await asyncio.to_thread(sync, self._records)
             del self._assets[key]
             self.revision += 1
             await self._drop_unused(asset.digest)
@@ -233,10 +234,10 @@ class AssetStore:
         place = self._path(asset.digest)
         place.parent.mkdir(exist_ok=True)
         received.replace(place)
-        sync_directory(place.parent)
-        sync_directory(self._content)
+        sync(place.parent)
+        sync(self._content)
         replace_file(self._record(asset.id), msgspec.json.encode(asset), temporary=self._incoming / "record")
-        sync_directory(self._records)
+        sync(self._records)
 
     def _store(self, content: bytes, digest: str) -> None:
         place = self._path(digest)
