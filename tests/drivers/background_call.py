@@ -9,7 +9,7 @@ from arcor2_hw.testing.own_time import own_time
 
 
 class BackgroundCall:
-    """A call in its own thread; `result` returns its result or raises its error."""
+    """A call in its own thread, which ended at `ended_at` (monotonic, s)."""
 
     def __init__(self, call: Callable[..., Any], *arguments: Any, **options: Any) -> None:
         self._value: Any = None
@@ -26,11 +26,20 @@ class BackgroundCall:
         self._thread = threading.Thread(target=run, daemon=True)
         self._thread.start()
 
-    def result(self, within: float = 30.0) -> Any:
+    @property
+    def over(self) -> bool:
+        return not self._thread.is_alive()
+
+    def outcome(self, within: float = 30.0) -> Any:
+        """Return the result of the call, or its error."""
         began = own_time()
-        while self._thread.is_alive():
+        while not self.over:
             self._thread.join(0.01)
             assert own_time() - began < within, f"still busy after {within} s"
+        return self._value if self._error is None else self._error
+
+    def result(self, within: float = 30.0) -> Any:
+        outcome = self.outcome(within)
         if self._error is not None:
             raise self._error
-        return self._value
+        return outcome

@@ -2,10 +2,12 @@
 
 import abc
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, ClassVar
 
 from arcor2_fakes.control import BlockingControlClient
-from arcor2_hw.objects import Generic
+from arcor2_hw.objects import Generic, Robot
 from arcor2_hw.testing.bench import Bench
 from arcor2_hw.testing.fake_bench import FakeFaults
 from arcor2_hw.testing.serial_wire import SerialWire
@@ -85,3 +87,48 @@ class WiredBench(_OnFake):
     def address(self) -> str:
         assert self.wire is not None
         return self.wire.address
+
+
+class ControllerBench(FakeFaults):
+    """An arm on its fake controller, which has an address of its own and injects connection faults."""
+
+    fake: Any
+    """The fake, with `host`, `do`, `end` and `reset`."""
+
+    def do(self, command: str, **arguments: Any) -> Any:
+        return self.fake.do(command, **arguments)
+
+    def end(self) -> None:
+        self.fake.end()
+
+    def reset(self) -> None:
+        self.fake.reset()
+
+    @property
+    def address(self) -> str:
+        return str(self.fake.host)
+
+    @abc.abstractmethod
+    def turn(self, device: Generic, by: float) -> object:
+        """Turn a joint, and return the result of the motion."""
+
+    def observe(self, device: Generic) -> object:
+        assert isinstance(device, Robot)
+        return device.robot_joints()
+
+    def ask(self, device: Generic) -> object:
+        return self.turn(device, 0.1)
+
+    def command(self, device: Generic) -> object:
+        return self.turn(device, 0.1)
+
+    def run_long(self, device: Generic) -> object:
+        return self.turn(device, 3.0)
+
+    @contextmanager
+    def foreign(self) -> Iterator[None]:
+        self.do("foreign_program", on=True)
+        try:
+            yield
+        finally:
+            self.do("foreign_program", on=False)

@@ -7,7 +7,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Self
 
 import msgspec
 import pytest
@@ -69,6 +69,14 @@ class FakeProcess:
         self.process.terminate()
         return self.process.wait(ENDS_WITHIN)
 
+    def __enter__(self) -> Self:
+        """Open the control channel, so that it stays open for all tests that share the fake."""
+        self.truth()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
     def end(self) -> None:
         if self._control is not None:
             self._control.close()
@@ -84,6 +92,13 @@ class FakeProcess:
             self.stderr.seek(0)
             self.errors = self.stderr.read()
             self.stderr.close()
+
+
+@contextlib.contextmanager
+def fakes_of(module: str, *common: str, **kinds: Sequence[str]) -> Iterator[dict[str, FakeProcess]]:
+    """Start a fake per kind with its own options and the common ones."""
+    with contextlib.ExitStack() as stack:
+        yield {kind: stack.enter_context(FakeProcess(module, *own, *common)) for kind, own in kinds.items()}
 
 
 @pytest.fixture

@@ -23,10 +23,8 @@ LONG = 300.0
 
 @pytest.fixture(scope="module")
 def one_block() -> Iterator[FakeProcess]:
-    fake = FakeProcess("remote_io")
-    fake.truth()  # opens the control channel
-    yield fake
-    fake.end()
+    with FakeProcess("remote_io") as fake:
+        yield fake
 
 
 @pytest.fixture

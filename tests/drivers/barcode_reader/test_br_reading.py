@@ -25,24 +25,10 @@ from arcor2_hw.exceptions import (
     Refused,
 )
 from arcor2_hw.objects import Code, NoRead
+from tests.drivers.background_call import BackgroundCall
 from tests.fakes.conftest import FakeProcess
 
 on_both = pytest.mark.parametrize("fake", ["pty", "tcp"], indirect=True)
-
-
-def in_background(call: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]:
-    """Run a call in a thread; the list gets its result or its exception."""
-    outcome: list[Any] = []
-
-    def run() -> None:
-        try:
-            outcome.append(call())
-        except Exception as error:
-            outcome.append(error)
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    return thread, outcome
 
 
 @on_both
@@ -100,11 +86,10 @@ def test_nothing_to_read_fails_with_the_name_within_the_timeout(fake: FakeProces
 
 
 def test_a_code_that_appears_late_is_read(fake: FakeProcess, reader: BarcodeReader) -> None:
-    thread, outcome = in_background(lambda: reader.scan(5.0))
+    doing = BackgroundCall(lambda: reader.scan(5.0))
     time.sleep(0.7)  # past the reader's own time-out
     fake.control.do("present", code="AT LAST")
-    thread.join(30.0)
-    assert outcome == ["AT LAST"]
+    assert doing.outcome() == "AT LAST"
 
 
 def test_a_code_decoded_too_late_is_not_matched_to_a_later_trigger(fake: FakeProcess, reader: BarcodeReader) -> None:
@@ -193,13 +178,12 @@ def test_timeouts_out_of_range_send_nothing(fake: FakeProcess, reader: BarcodeRe
 
 # ------------------------------------------------------------------------------------------------ stop
 def test_stop_ends_a_reading(fake: FakeProcess, reader: BarcodeReader, wait_for: Callable[..., Any]) -> None:
-    thread, outcome = in_background(lambda: reader.scan(30.0))
+    doing = BackgroundCall(lambda: reader.scan(30.0))
     wait_for(lambda: fake.truth()["reading"])
     with pytest.raises(Refused, match="is reading already"):
         reader.scan()
     reader.stop()
-    thread.join(30.0)
-    assert isinstance(outcome[0], Cancelled)
+    assert isinstance(doing.outcome(), Cancelled)
     assert fake.truth()["reading"] is False
     fake.control.do("present", code="NEXT")
     assert reader.scan() == "NEXT"
@@ -207,11 +191,10 @@ def test_stop_ends_a_reading(fake: FakeProcess, reader: BarcodeReader, wait_for:
 
 @on_both
 def test_disconnecting_ends_a_reading(fake: FakeProcess, reader: BarcodeReader, wait_for: Callable[..., Any]) -> None:
-    thread, outcome = in_background(lambda: reader.scan(30.0))
+    doing = BackgroundCall(lambda: reader.scan(30.0))
     wait_for(lambda: fake.truth()["reading"])
     reader.disconnect()
-    thread.join(30.0)
-    assert isinstance(outcome[0], Cancelled)
+    assert isinstance(doing.outcome(), Cancelled)
     assert fake.truth()["reading"] is False
     with pytest.raises(NotConnected, match=fake.ready["port"]):
         reader.scan()
@@ -241,12 +224,12 @@ def test_health_follows_the_reader(fake: FakeProcess, reader: BarcodeReader, wai
 # ------------------------------------------------------------------------------------------------ faults
 @on_both
 def test_unplugging_and_reconnecting(fake: FakeProcess, reader: BarcodeReader, wait_for: Callable[..., Any]) -> None:
-    thread, outcome = in_background(lambda: reader.scan(30.0))
+    doing = BackgroundCall(lambda: reader.scan(30.0))
     wait_for(lambda: fake.truth()["reading"])
     fake.control.do("unplug")
-    thread.join(30.0)
-    assert isinstance(outcome[0], ConnectionLost)
-    assert f"reader at {fake.ready['port']}: the connection was lost" in str(outcome[0])
+    outcome = doing.outcome()
+    assert isinstance(outcome, ConnectionLost)
+    assert f"reader at {fake.ready['port']}: the connection was lost" in str(outcome)
     wait_for(lambda: reader.connection, lambda state: state is Connection.LOST)
     assert reader.health is Health.FAILURE
     with pytest.raises(ConnectionLost, match=fake.ready["port"]):
@@ -289,11 +272,10 @@ def test_invalid_answers_of_the_reader_are_typed_errors(
 def test_a_reader_that_goes_silent_during_reading(
     fake: FakeProcess, reader: BarcodeReader, wait_for: Callable[..., Any]
 ) -> None:
-    thread, outcome = in_background(lambda: reader.scan(1.0))
+    doing = BackgroundCall(lambda: reader.scan(1.0))
     wait_for(lambda: fake.truth()["reading"])
     fake.control.do("silence")
-    thread.join(30.0)
-    assert isinstance(outcome[0], DeviceTimeout)
+    assert isinstance(doing.outcome(), DeviceTimeout)
 
 
 def test_a_silent_reader_is_detected_while_idle(

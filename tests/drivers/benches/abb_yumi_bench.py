@@ -2,8 +2,7 @@
 
 import math
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from arcor2_drivers.abb_yumi.settings import YumiSettings
@@ -12,8 +11,9 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.robot import Joint, Safety
 from arcor2_hw.exceptions import Stale
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench, Check
+from arcor2_hw.testing.bench import Check
 from tests.drivers.abb_yumi.conftest import RWS_PORT, FakeYumi, settings
+from tests.drivers.fake_bench import ControllerBench
 from tests.waiting import wait_for
 
 ORPHAN = """
@@ -31,7 +31,7 @@ robot.move_to_joints(joints, 0.5, arm_id="left")
 ABSENT = "127.99.77.2"
 
 
-class YuMiBench(Bench):
+class YuMiBench(ControllerBench):
     object_type = YuMi
     connect_timeout = 5.0  # about twenty requests, each of which a busy machine delays
     call_within = 3.0
@@ -39,16 +39,6 @@ class YuMiBench(Bench):
 
     def start(self) -> None:
         self.fake = FakeYumi()
-
-    def end(self) -> None:
-        self.fake.end()
-
-    def reset(self) -> None:
-        self.fake.reset()
-
-    @property
-    def address(self) -> str:
-        return self.fake.host
 
     def make(self) -> YuMi:
         return YuMi("robot_id", "both arms", Pose(), settings(self.fake.host, watchdog=0.5))
@@ -62,48 +52,15 @@ class YuMiBench(Bench):
         arms = {name: [arm[key] for key in kept] for name, arm in truth["arms"].items()}
         return truth["writes"], truth["mastership"], arms
 
-    def cut(self) -> None:
-        self.fake.do("silence")
-
-    def heal(self) -> None:
-        self.fake.do("heal")
-
-    def observe(self, device: Generic) -> object:
-        assert isinstance(device, YuMi)
-        return device.robot_joints()
-
-    def _turn(self, device: Generic, by: float) -> object:
+    def turn(self, device: Generic, by: float) -> object:
         assert isinstance(device, YuMi)
         joints = device.robot_joints(arm_id="left")
         joints[5].value += by if joints[5].value < 0.5 else -by
         device.move_to_joints(joints, 0.5, arm_id="left")
         return device.last_moves
 
-    def ask(self, device: Generic) -> object:
-        return self._turn(device, 0.1)
-
-    def command(self, device: Generic) -> object:
-        return self._turn(device, 0.1)
-
-    def run_long(self, device: Generic) -> object:
-        return self._turn(device, 3.0)
-
     def running(self) -> bool:
         return self.fake.moving()
-
-    @contextmanager
-    def foreign(self) -> Iterator[None]:
-        self.fake.do("foreign_program", on=True)
-        try:
-            yield
-        finally:
-            self.fake.do("foreign_program", on=False)
-
-    def reset_link(self) -> None:
-        self.fake.do("reset")
-
-    def half_frame(self) -> None:
-        self.fake.do("half_frame")
 
     def readings(self, device: Generic) -> Iterable[Check]:
         assert isinstance(device, YuMi)

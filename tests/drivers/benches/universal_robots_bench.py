@@ -1,8 +1,7 @@
 """The UR5e on its fake controller, on its own address."""
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from arcor2_drivers.universal_robots.settings import UrSettings
@@ -11,8 +10,9 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.robot import Joint, Safety
 from arcor2_hw.exceptions import Refused
 from arcor2_hw.objects import Generic
-from arcor2_hw.testing.bench import Bench, Check
+from arcor2_hw.testing.bench import Check
 from arcor2_hw.testing.life import wait_until
+from tests.drivers.fake_bench import ControllerBench
 from tests.drivers.universal_robots.conftest import FakeUr
 
 ORPHAN = """
@@ -31,7 +31,7 @@ ABSENT = "127.99.77.1"
 STANDSTILL = 1e-3  # rad/s: the encoder noise of a real arm at standstill
 
 
-class UR5eBench(Bench):
+class UR5eBench(ControllerBench):
     object_type = UR5e
     call_within = 4.0
     fake: FakeUr
@@ -39,18 +39,11 @@ class UR5eBench(Bench):
     def start(self) -> None:
         self.fake = FakeUr("--time-scale", "0.1")
 
-    def end(self) -> None:
-        self.fake.end()
-
     def reset(self) -> None:
         self.fake.reset()
         if self.fake.truth()["robot_mode"] != "RUNNING":
             self.fake.do("brake_release")
             self.fake.control.wait_until(lambda truth: truth["robot_mode"] == "RUNNING")
-
-    @property
-    def address(self) -> str:
-        return self.fake.host
 
     def _build(self, host: str) -> UR5e:
         return UR5e("robot_id", "arm", Pose(), UrSettings(host, payload_mass=1.0, tcp_z=0.1))
@@ -66,56 +59,23 @@ class UR5eBench(Bench):
         kept = ("scripts_taken", "programs_killed", "digital_outputs", "payload", "tcp_offset")
         return {key: truth[key] for key in kept}, self.fake.do("commands_taken")
 
-    def cut(self) -> None:
-        self.fake.do("silence")
-
-    def heal(self) -> None:
-        self.fake.do("heal")
-
-    def observe(self, device: Generic) -> object:
-        assert isinstance(device, UR5e)
-        return device.robot_joints()
-
-    def _turn(self, device: Generic, by: float) -> object:
+    def turn(self, device: Generic, by: float) -> object:
         assert isinstance(device, UR5e)
         joints = device.robot_joints()
         joints[0].value += by if joints[0].value < 1.0 else -by
         device.move_to_joints(joints, 0.5)
         return device.last_move
 
-    def ask(self, device: Generic) -> object:
-        return self._turn(device, 0.1)
-
-    def command(self, device: Generic) -> object:
-        return self._turn(device, 0.1)
-
-    def run_long(self, device: Generic) -> object:
-        return self._turn(device, 3.0)
-
     def running(self) -> bool:
         return bool(max(map(abs, self.fake.truth()["qd"])) > STANDSTILL)
-
-    @contextmanager
-    def foreign(self) -> Iterator[None]:
-        self.fake.do("foreign_program", on=True)
-        try:
-            yield
-        finally:
-            self.fake.do("foreign_program", on=False)
 
     def orphan(self) -> list[str]:
         return [sys.executable, "-c", ORPHAN, self.address]
 
-    def reset_link(self) -> None:
-        self.fake.do("reset")
-
-    def half_frame(self) -> None:
-        self.fake.do("half_frame")
-
     def readings(self, device: Generic) -> Iterable[Check]:
         assert isinstance(device, UR5e)
         device.take_control()  # sends the tool to the controller
-        self._turn(device, 0.4)
+        self.turn(device, 0.4)
         wait_until(lambda: not device.state().moving, 1.0, "the report of standstill")
         truth = self.fake.truth()
         for joint, own in zip(device.robot_joints(), truth["q"], strict=True):
@@ -132,7 +92,7 @@ class UR5eBench(Bench):
         for on, by in ((True, 0.1), (False, -0.2)):
             self.fake.do("set_input", bit=3, on=on)
             yield self.polled("get_digital_input", lambda: device.get_digital_input(3), on)
-            self._turn(device, by)
+            self.turn(device, by)
             real = self.fake.truth()["q"]
             yield self.polled("robot_joints", lambda: [joint.value for joint in device.robot_joints()], real, 1e-3)
 
@@ -223,7 +183,7 @@ class UR5eBench(Bench):
             assert self.fake.truth()["robot_mode"] == "RUNNING"
 
         return {
-            "move_to_joints": lambda: self._turn(device, 0.1),
+            "move_to_joints": lambda: self.turn(device, 0.1),
             "move_to_pose": lambda: device.move_to_pose("tcp", near(0.03), 0.5),
             "move_path": lambda: device.move_path([near(0.02), near(0.05)], 0.005),
             "move_until_contact": touched,

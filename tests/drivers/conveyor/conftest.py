@@ -7,6 +7,7 @@ import pytest
 
 from arcor2_drivers.conveyor.conveyor import Conveyor
 from arcor2_drivers.conveyor.settings import ConveyorSettings
+from tests.drivers.devices import disconnecting
 from tests.fakes.conftest import FakeProcess, wait_for
 
 __all__ = ["wait_for"]
@@ -14,10 +15,8 @@ __all__ = ["wait_for"]
 
 @pytest.fixture(scope="module")
 def one_fake() -> Iterator[FakeProcess]:
-    fake = FakeProcess("conveyor")
-    fake.control  # noqa: B018 - opened here, so that it stays open for the whole module
-    yield fake
-    fake.end()
+    with FakeProcess("conveyor") as fake:
+        yield fake
 
 
 @pytest.fixture
@@ -33,17 +32,13 @@ def fake(one_fake: FakeProcess) -> FakeProcess:
 @pytest.fixture
 def make() -> Iterator[Callable[..., Conveyor]]:
     """Return ``make("127.0.0.1:4000", homing_method=19)``: an unconnected driver; the fixture disconnects it."""
-    made: list[Conveyor] = []
 
     def build(address: str, **settings: Any) -> Conveyor:
         values = {"heartbeat_ms": 1000, "sdo_timeout": 0.4} | settings
-        conveyor = Conveyor("belt_id", "belt", ConveyorSettings(f"socket://{address}", **values))
-        made.append(conveyor)
-        return conveyor
+        return Conveyor("belt_id", "belt", ConveyorSettings(f"socket://{address}", **values))
 
-    yield build
-    for conveyor in made:
-        conveyor.disconnect()
+    with disconnecting(build) as make:
+        yield make
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """The conveyor's driver against the fake: connecting, homing, moving, running, stopping and faults."""
 
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -12,30 +11,21 @@ from arcor2_drivers.conveyor.conveyor import Conveyor
 from arcor2_drivers.conveyor.settings import ConveyorSettings
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, NotFound, NotInControl, OutOfRange, Refused
+from tests.drivers.background_call import BackgroundCall
 from tests.fakes.conftest import FakeProcess
 
 COUNTS = 10000
 
 
 @contextmanager
-def under_way(fake: FakeProcess, act: Callable[[], None]) -> Iterator[list[Any]]:
-    """Run `act` in a thread and wait until the belt moves at 0.3 m/s; the list gets its result or exception."""
-    outcome: list[Any] = []
-
-    def run() -> None:
-        try:
-            outcome.append(act())
-        except Exception as error:
-            outcome.append(error)
-
-    thread = threading.Thread(target=run)
-    thread.start()
+def under_way(fake: FakeProcess, act: Callable[[], None]) -> Iterator[BackgroundCall]:
+    """Run `act` in a thread and wait until the belt moves at 0.3 m/s."""
+    doing = BackgroundCall(act)
     try:
         fake.control.wait_until(lambda t: abs(t["velocity"]) > 2900)
-        yield outcome
+        yield doing
     finally:
-        thread.join(30.0)
-        assert not thread.is_alive()
+        doing.outcome()
 
 
 def test_connecting_observes_and_writes_nothing(fake: FakeProcess, observed: Conveyor) -> None:
@@ -109,11 +99,11 @@ def test_units_and_direction_are_scaled(fake: FakeProcess, make: Callable[..., C
 
 @pytest.mark.parametrize("how", ["stop", "quick_stop"])
 def test_stop_cancels_a_move_for_good(fake: FakeProcess, belt: Conveyor, how: str) -> None:
-    with under_way(fake, lambda: belt.move_by(5.0, 0.3)) as outcome:
+    with under_way(fake, lambda: belt.move_by(5.0, 0.3)) as doing:
         getattr(belt, how)()
         stood = fake.truth()
     assert stood["velocity"] == 0.0
-    assert isinstance(outcome[0], Cancelled), outcome
+    assert isinstance(doing.outcome(), Cancelled)
     assert stood["state"] == {"stop": "switched_on", "quick_stop": "switch_on_disabled"}[how]
     belt.move_by(0.01, 0.3)  # after enabling again only this move happens
     assert fake.truth()["belt"] == pytest.approx(stood["belt"] + 100, abs=2)
@@ -144,11 +134,11 @@ def test_a_fault_ends_the_move_with_its_text_and_is_reset(fake: FakeProcess, bel
 
 
 def test_an_emergency_message_ends_a_move(fake: FakeProcess, belt: Conveyor) -> None:
-    with under_way(fake, lambda: belt.move_by(5.0, 0.3)) as outcome:
+    with under_way(fake, lambda: belt.move_by(5.0, 0.3)) as doing:
         fake.control.do("emergency", code=0x2310)
-    assert isinstance(outcome[0], DeviceFault)
-    assert outcome[0].fault_code == "2310h"
-    assert "move_by 5 m ended: fault 2310h, continuous overcurrent" in str(outcome[0])
+    assert isinstance(doing.outcome(), DeviceFault)
+    assert doing.outcome().fault_code == "2310h"
+    assert "move_by 5 m ended: fault 2310h, continuous overcurrent" in str(doing.outcome())
 
 
 def test_failed_homing_is_reported(fake: FakeProcess, belt: Conveyor) -> None:

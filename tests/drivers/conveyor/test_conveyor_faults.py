@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import threading
 import time
 import tty
 from collections.abc import Callable
@@ -16,6 +15,7 @@ from arcor2_drivers.conveyor.settings import ConveyorSettings
 from arcor2_drivers.conveyor.slcan import SlcanBus
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, NotInControl
+from tests.drivers.background_call import BackgroundCall
 from tests.drivers.faults import refusing_address
 from tests.drivers.stall import BUSY, stall
 from tests.fakes.conftest import FakeProcess
@@ -66,21 +66,12 @@ def test_a_loss_during_a_run_stops_the_belt_and_only_observation_returns(
     belt.connect()
     belt.take_control()
     belt.home()
-    outcome: list[Any] = []
-
-    def move() -> None:
-        try:
-            belt.move_to(20.0, 0.4)
-        except Exception as error:
-            outcome.append(error)
-
-    thread = threading.Thread(target=move)
-    thread.start()
+    moving = BackgroundCall(belt.move_to, 20.0, 0.4)
     fake.control.wait_until(lambda t: t["velocity"] > 3900)  # its handshake is over, it waits for the end
     fake.control.do(fault)
-    thread.join(30.0)
-    assert isinstance(outcome[0], ConnectionLost), outcome
-    assert str(outcome[0]).startswith(f"belt at socket://{fake.ready['can']} node 5")
+    error = moving.outcome()
+    assert isinstance(error, ConnectionLost)
+    assert str(error).startswith(f"belt at socket://{fake.ready['can']} node 5")
     truth = fake.control.wait_until(lambda t: t["velocity"] == 0.0)
     assert truth["state"] == "switch_on_disabled"
     fake.control.do("heal")

@@ -90,12 +90,12 @@ def test_refused_commands_name_command_and_state(fake: FakeProcess, belt: Convey
     belt.reset()
     with pytest.raises(Refused, match="reset is refused in state Idle"):
         belt.reset()
-    with under_way(fake, lambda: belt.move_by(5.0, 0.3)) as outcome:
+    with under_way(fake, lambda: belt.move_by(5.0, 0.3)) as doing:
         assert belt.machine_state() is S.EXECUTE
         with pytest.raises(Refused, match="hold is refused in state Execute: a move cannot be held"):
             belt.hold()
         belt.command(MachineCommand.STOP)
-    assert isinstance(outcome[0], Cancelled)
+    assert isinstance(doing.outcome(), Cancelled)
 
 
 def test_an_aborted_belt_runs_only_after_clear(fake: FakeProcess, belt: Conveyor) -> None:

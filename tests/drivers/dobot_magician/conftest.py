@@ -8,6 +8,7 @@ import pytest
 from arcor2_drivers.dobot_magician.dobot_magician import DobotMagician
 from arcor2_drivers.dobot_magician.settings import DobotMagicianSettings
 from arcor2_hw.data.geometry import Pose, Position
+from tests.drivers.devices import disconnecting
 from tests.fakes.conftest import FakeProcess, start_fake, wait_for
 
 __all__ = ["start_fake", "wait_for"]
@@ -18,25 +19,21 @@ BASE = Pose(Position(0.4, -0.2, 0.138))
 @pytest.fixture
 def make() -> Iterator[Callable[..., DobotMagician]]:
     """Return ``make("/dev/pts/3", answer_timeout=0.2)``: an unconnected driver; the fixture disconnects it."""
-    made: list[DobotMagician] = []
 
     def build(port: str, **settings: Any) -> DobotMagician:
-        arm = DobotMagician("arm_id", "arm", BASE, DobotMagicianSettings(port, **{"answer_timeout": 1.0, **settings}))
-        made.append(arm)
-        return arm
+        return DobotMagician("arm_id", "arm", BASE, DobotMagicianSettings(port, **{"answer_timeout": 1.0, **settings}))
 
-    yield build
-    for arm in made:
-        arm.disconnect()
+    with disconnecting(build) as make:
+        yield make
 
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeProcess]:
     """Start one fake for all tests of a file, because starting one takes longer than most of them."""
-    fake = FakeProcess("dobot_magician", "--link", str(tmp_path_factory.mktemp("dev") / "ttyDOBOT"), "--pace", "12")
-    assert fake.control.do("commands")  # the channel is open before the first test
-    yield fake
-    fake.end()
+    with FakeProcess(
+        "dobot_magician", "--link", str(tmp_path_factory.mktemp("dev") / "ttyDOBOT"), "--pace", "12"
+    ) as fake:
+        yield fake
 
 
 @pytest.fixture

@@ -16,7 +16,8 @@ from arcor2_drivers.dobot_magician.dobot_magician import DobotMagician
 from arcor2_drivers.dobot_magician.frames import encode
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, NotInControl, Refused
-from tests.drivers.dobot_magician.test_dm_working import in_background, joints
+from tests.drivers.background_call import BackgroundCall
+from tests.drivers.dobot_magician.test_dm_working import joints
 from tests.drivers.stall import BUSY, stall
 from tests.fakes.conftest import FakeProcess
 
@@ -106,13 +107,13 @@ def test_late_answers_are_not_used(
 def test_unplugging_and_plugging_during_a_move(
     fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]
 ) -> None:
-    thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.06))
+    doing = BackgroundCall(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.06))
     fake.control.wait_until(lambda truth: truth["moving"])
     fake.control.do("unplug")
-    thread.join(30.0)
-    assert isinstance(outcome[0], ConnectionLost), outcome
-    assert "a joint move" in str(outcome[0])
-    assert "arm at" in str(outcome[0])
+    outcome = doing.outcome()
+    assert isinstance(outcome, ConnectionLost), outcome
+    assert "a joint move" in str(outcome)
+    assert "arm at" in str(outcome)
     with pytest.raises(ConnectionLost):
         arm.stop()  # the stop cannot be sent, and the driver logs it
     fake.control.do("plug")
@@ -129,11 +130,10 @@ def test_stop_after_a_reconnect_stops_a_motion_left_running(
     fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]
 ) -> None:
     arm.conveyor(0.05)
-    thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.02))
+    doing = BackgroundCall(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.02))
     fake.control.wait_until(lambda truth: truth["moving"])
     fake.control.do("reset")
-    thread.join(30.0)
-    assert isinstance(outcome[0], ConnectionLost), outcome
+    assert isinstance(doing.outcome(), ConnectionLost)
     wait_for(lambda: arm.connection, lambda state: state is Connection.BACK)
     assert fake.truth()["moving"] is True
     arm.stop()
@@ -178,11 +178,10 @@ def test_commands_left_in_a_stopped_queue_never_run(fake: FakeProcess, make: Cal
 
 
 def test_homing_after_a_power_cycle(fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]) -> None:
-    thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.06))
+    doing = BackgroundCall(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.06))
     fake.control.wait_until(lambda truth: truth["moving"])
     fake.control.do("power_cycle")
-    thread.join(30.0)
-    assert isinstance(outcome[0], DeviceError), outcome
+    assert isinstance(doing.outcome(), DeviceError)
     wait_for(lambda: arm.connection, lambda state: state is Connection.BACK)
     assert [alarm.code for alarm in arm.alarms()] == ["00h"]
     with pytest.raises(NotInControl):
@@ -245,11 +244,10 @@ def test_a_killed_owner_leaves_only_the_present_motion(fake: FakeProcess, tmp_pa
 
 
 def test_disconnecting_stops_the_arm(fake: FakeProcess, arm: DobotMagician) -> None:
-    thread, outcome = in_background(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.06))
+    doing = BackgroundCall(lambda: arm.move_to_joints(joints(60, 45, 45, 0), 0.06))
     fake.control.wait_until(lambda truth: truth["moving"])
     arm.disconnect()
-    thread.join(30.0)
-    assert isinstance(outcome[0], DeviceError)
+    assert isinstance(doing.outcome(), DeviceError)
     truth = fake.truth()
     assert truth["moving"] is False
     assert truth["joints"][0] < 60.0

@@ -1,7 +1,6 @@
 """The Magician: observing, moving, stopping, picking, and the conveyor belt."""
 
 import math
-import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -14,6 +13,7 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.project import ProjectRobotJoints
 from arcor2_hw.data.robot import Joint, MoveEnd, ProgramState
 from arcor2_hw.exceptions import Cancelled, DeviceFault, NotFound, NotInControl, OutOfRange, Refused
+from tests.drivers.background_call import BackgroundCall
 from tests.drivers.dobot_magician.conftest import BASE
 from tests.fakes.conftest import FakeProcess
 from tests.waiting import wait_for
@@ -30,21 +30,6 @@ def at(x: float, y: float, z: float, r: float = 0.0) -> Pose:
 
 def joints(*degrees: float) -> list[Joint]:
     return [Joint(f"joint_{i + 1}", math.radians(value)) for i, value in enumerate(degrees)]
-
-
-def in_background(call: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]:
-    """Run a call in a thread; the list gets its result or its exception."""
-    outcome: list[Any] = []
-
-    def run() -> None:
-        try:
-            outcome.append(call())
-        except Exception as error:
-            outcome.append(error)
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    return thread, outcome
 
 
 def test_connecting_only_reads(fake: FakeProcess, make: Callable[..., DobotMagician]) -> None:
@@ -128,16 +113,16 @@ def test_kinematics_agree_with_the_arm_and_name_unreachable_poses(fake: FakeProc
 def test_stop_overtakes_a_motion_and_drops_the_queue(
     fake: FakeProcess, arm: DobotMagician, wait_for: Callable[..., Any]
 ) -> None:
-    thread, outcome = in_background(lambda: arm.pick(at(0.2, 0.15, 0.0), speed=0.02))
+    doing = BackgroundCall(lambda: arm.pick(at(0.2, 0.15, 0.0), speed=0.02))
     fake.control.wait_until(lambda truth: truth["moving"])
     with pytest.raises(Refused, match="arm is moving already"):
         arm.move(at(0.2, 0.0, 0.0))
     assert arm.state().program in (ProgramState.PLAYING, ProgramState.STOPPED)
     arm.stop()
-    thread.join(30.0)
+    outcome = doing.outcome()
     truth = fake.truth()
-    assert isinstance(outcome[0], Cancelled)
-    assert "a move of arm at" in str(outcome[0])
+    assert isinstance(outcome, Cancelled)
+    assert "a move of arm at" in str(outcome)
     assert truth["moving"] is False
     assert (truth["queued"], truth["running"], truth["motions"]) == (0, False, 1)
     order = [command for command, control in truth["received"] if control & 1]
@@ -195,11 +180,10 @@ def test_the_belt_runs_and_stops_with_the_arm(
 
 
 def test_an_alarm_ends_a_motion_and_is_acknowledged(fake: FakeProcess, arm: DobotMagician) -> None:
-    thread, outcome = in_background(lambda: arm.move_to_joints(joints(80, 45, 45, 0), 0.03))
+    doing = BackgroundCall(lambda: arm.move_to_joints(joints(80, 45, 45, 0), 0.03))
     fake.control.wait_until(lambda truth: truth["moving"])
     fake.control.do("alarm", code=0x51)
-    thread.join(30.0)
-    fault = outcome[0]
+    fault = doing.outcome()
     assert isinstance(fault, DeviceFault)
     assert fault.fault_code == "51h"
     assert "joint 2 has lost steps" in str(fault)

@@ -1,6 +1,5 @@
 """A fake planning service in a separate process, and the drivers connected to it."""
 
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -9,41 +8,23 @@ import pytest
 
 from arcor2_drivers.erp.erp_service import ErpService
 from arcor2_drivers.erp.settings import ErpSettings
-from arcor2_hw.exceptions import Arcor2Error
 from tests import waiting
+from tests.drivers.background_call import BackgroundCall as BackgroundCall
+from tests.drivers.devices import disconnecting
 from tests.fakes.conftest import FakeProcess, start_fake, wait_for
 
 __all__ = ["start_fake", "wait_for"]
 
 
-class Waiting:
-    """A call in its own thread."""
+def outcome_after(call: BackgroundCall, stop: Callable[[], object]) -> object:
+    """Return the outcome of a call that is stopped until it ends: a stop from before it waits has no effect."""
 
-    def __init__(self, call: Callable[[], object]) -> None:
-        self.result: object = None
-        self._thread = threading.Thread(target=self._run, args=(call,), daemon=True)
-        self._thread.start()
+    def ended() -> bool:
+        stop()
+        return call.over
 
-    def _run(self, call: Callable[[], object]) -> None:
-        try:
-            self.result = call()
-        except Arcor2Error as error:
-            self.result = error
-
-    def outcome(self) -> object:
-        self._thread.join(waiting.WITHIN)
-        assert not self._thread.is_alive(), "it has not ended"
-        return self.result
-
-    def outcome_after(self, stop: Callable[[], object]) -> object:
-        """Request stops until the call ends: a stop from before it waits has no effect."""
-
-        def ended() -> bool:
-            stop()
-            return not self._thread.is_alive()
-
-        waiting.wait_for(ended)
-        return self.result
+    waiting.wait_for(ended)
+    return call.outcome()
 
 
 def serials(fake: FakeProcess, order: str = "A-1") -> list[str]:
@@ -53,10 +34,8 @@ def serials(fake: FakeProcess, order: str = "A-1") -> list[str]:
 
 @pytest.fixture(scope="module")
 def one_fake() -> Iterator[FakeProcess]:
-    fake = FakeProcess("erp")
-    fake.truth()  # opens the control channel
-    yield fake
-    fake.end()
+    with FakeProcess("erp") as fake:
+        yield fake
 
 
 @pytest.fixture
@@ -72,17 +51,13 @@ def fake(one_fake: FakeProcess) -> Iterator[FakeProcess]:
 @pytest.fixture
 def make(tmp_path: Path) -> Iterator[Callable[..., ErpService]]:
     """Return ``make("http://127.0.0.1:4000", poll=0.1)``: an unconnected driver; the fixture disconnects it."""
-    made: list[ErpService] = []
 
     def build(url: str, **settings: Any) -> ErpService:
         usual = {"outbox": str(tmp_path), "request_timeout": 0.5, "longest_pause": 0.5, "poll": 0.1}
-        erp = ErpService("erp_id", "planning", ErpSettings(url, **{**usual, **settings}))
-        made.append(erp)
-        return erp
+        return ErpService("erp_id", "planning", ErpSettings(url, **{**usual, **settings}))
 
-    yield build
-    for erp in made:
-        erp.disconnect()
+    with disconnecting(build) as make:
+        yield make
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import pytest
 from arcor2_drivers.erp.erp_service import ErpService
 from arcor2_hw.data.device import Health
 from arcor2_hw.exceptions import Cancelled, NotFound, Refused
-from tests.drivers.erp.conftest import Waiting, serials
+from tests.drivers.erp.conftest import BackgroundCall, outcome_after, serials
 from tests.fakes.conftest import FakeProcess
 from tests.waiting import wait_for
 
@@ -119,8 +119,8 @@ def test_disconnecting_from_a_silent_service_keeps_all_results(
 def test_stop_ends_waiting_for_the_outbox(fake: FakeProcess, erp: ErpService, order: str) -> None:
     fake.control.do("fail", status=503, count=-1, path="/results")
     erp.report_result(order, "S-1", True)
-    waiting = Waiting(lambda: erp.wait_until_sent(60.0))
-    assert isinstance(waiting.outcome_after(erp.stop), Cancelled)
+    waiting = BackgroundCall(lambda: erp.wait_until_sent(60.0))
+    assert isinstance(outcome_after(waiting, erp.stop), Cancelled)
     fake.control.do("work")
     erp.wait_until_sent(30.0)
     assert serials(fake) == ["S-1"]

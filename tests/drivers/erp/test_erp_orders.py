@@ -9,7 +9,7 @@ import pytest
 from arcor2_drivers.erp.erp_service import ErpService
 from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import Arcor2Error, Cancelled, ConnectionLost, DeviceError, NotConnected, OutOfRange, Refused
-from tests.drivers.erp.conftest import Waiting
+from tests.drivers.erp.conftest import BackgroundCall
 from tests.fakes.conftest import FakeProcess
 from tests.waiting import wait_for
 
@@ -84,7 +84,7 @@ def test_an_order_survives_a_lost_answer(fake: FakeProcess, erp: ErpService, mak
 def test_waiting_for_an_order_survives_a_connection_loss(fake: FakeProcess, erp: ErpService) -> None:
     assert erp.next_order(0.3) == NONE
     before = len(posts(fake))
-    waiting = Waiting(lambda: erp.next_order(60.0))
+    waiting = BackgroundCall(lambda: erp.next_order(60.0))
     wait_for(lambda: len(posts(fake)) > before)
     fake.control.do("power_cycle", seconds=0.5)
     time.sleep(0.2)
@@ -93,7 +93,7 @@ def test_waiting_for_an_order_survives_a_connection_loss(fake: FakeProcess, erp:
 
 
 def test_stop_ends_waiting_for_an_order(fake: FakeProcess, erp: ErpService) -> None:
-    waiting = Waiting(lambda: erp.next_order(60.0))
+    waiting = BackgroundCall(lambda: erp.next_order(60.0))
     wait_for(lambda: posts(fake))
     with pytest.raises(Refused, match="busy with another call of next_order"):
         erp.next_order()
@@ -106,7 +106,7 @@ def test_stop_ends_waiting_for_an_order(fake: FakeProcess, erp: ErpService) -> N
 
 
 def test_disconnecting_ends_waiting(fake: FakeProcess, erp: ErpService) -> None:
-    waiting = Waiting(lambda: erp.next_order(60.0))
+    waiting = BackgroundCall(lambda: erp.next_order(60.0))
     wait_for(lambda: posts(fake))
     erp.disconnect()
     assert isinstance(waiting.outcome(), DeviceError)

@@ -8,6 +8,7 @@ import pytest
 from arcor2_drivers.functional_tester.functional_tester import FunctionalTester
 from arcor2_drivers.functional_tester.settings import FunctionalTesterSettings
 from arcor2_hw.data.geometry import Pose
+from tests.drivers.devices import disconnecting
 from tests.drivers.faults import relay
 from tests.fakes.conftest import FakeProcess, start_fake, wait_for
 
@@ -16,10 +17,8 @@ __all__ = ["relay", "start_fake", "wait_for"]
 
 @pytest.fixture(scope="module")
 def one_fake() -> Iterator[FakeProcess]:
-    fake = FakeProcess("functional_tester", "--seed", "1", "--test-time", "6", "--time-scale", "20")
-    fake.truth()  # opens the control channel
-    yield fake
-    fake.end()
+    with FakeProcess("functional_tester", "--seed", "1", "--test-time", "6", "--time-scale", "20") as fake:
+        yield fake
 
 
 @pytest.fixture
@@ -31,10 +30,8 @@ def fake(one_fake: FakeProcess) -> FakeProcess:
 
 @pytest.fixture(scope="module")
 def one_slow_fake() -> Iterator[FakeProcess]:
-    fake = FakeProcess("functional_tester", "--seed", "1", "--test-time", "20", "--time-scale", "5")
-    fake.truth()
-    yield fake
-    fake.end()
+    with FakeProcess("functional_tester", "--seed", "1", "--test-time", "20", "--time-scale", "5") as fake:
+        yield fake
 
 
 @pytest.fixture
@@ -47,19 +44,15 @@ def slow_fake(one_slow_fake: FakeProcess) -> FakeProcess:
 @pytest.fixture
 def make() -> Iterator[Callable[..., FunctionalTester]]:
     """Return ``make("127.0.0.1:4000", watchdog_ms=500)``: an unconnected driver; the fixture disconnects it."""
-    made: list[FunctionalTester] = []
 
     def build(address: str, **settings: Any) -> FunctionalTester:
         host, _, port = address.rpartition(":")
-        tester = FunctionalTester(
+        return FunctionalTester(
             "tester_id", "tester", Pose(), None, settings=FunctionalTesterSettings(host, int(port), **settings)
         )
-        made.append(tester)
-        return tester
 
-    yield build
-    for tester in made:
-        tester.disconnect()
+    with disconnecting(build) as make:
+        yield make
 
 
 @pytest.fixture

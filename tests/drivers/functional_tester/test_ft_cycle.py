@@ -1,6 +1,5 @@
 """The functional tester's driver on a fake without faults: observing, commands and refusals."""
 
-import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -10,6 +9,7 @@ from arcor2_drivers.functional_tester.functional_tester import FunctionalTester
 from arcor2_hw.data.device import Connection, Health, Identity
 from arcor2_hw.exceptions import Cancelled, DeviceFault, DeviceTimeout, NotFound, NotInControl, Refused, SafetyStop
 from arcor2_hw.objects import MachineCommand, MachineState, UnitMode
+from tests.drivers.background_call import BackgroundCall
 from tests.fakes.conftest import FakeProcess
 
 READS = {2, 3, 4, 43}
@@ -19,21 +19,6 @@ READS = {2, 3, 4, 43}
 def functions(fake: FakeProcess) -> set[int]:
     """Return the function codes of the last requests on the wire."""
     return {int(frame["hex"][14:16], 16) for frame in fake.truth()["frames"] if not frame["to_host"]}
-
-
-def in_background(call: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]:
-    """Run a call in a thread; the list gets its result or its exception."""
-    outcome: list[Any] = []
-
-    def run() -> None:
-        try:
-            outcome.append(call())
-        except Exception as error:
-            outcome.append(error)
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    return thread, outcome
 
 
 def test_connecting_observes_and_writes_nothing(fake: FakeProcess, observed: FunctionalTester) -> None:
@@ -120,7 +105,7 @@ def test_refused_commands_name_command_and_state(tester: FunctionalTester) -> No
 
 
 def test_hold_and_door_during_a_test(fake: FakeProcess, loaded: FunctionalTester, wait_for: Callable[..., Any]) -> None:
-    thread, outcome = in_background(loaded.test)
+    doing = BackgroundCall(loaded.test)
     wait_for(lambda: fake.truth()["state"], lambda state: state == "Execute")
     loaded.command(MachineCommand.HOLD)
     loaded.wait_for(MachineState.HELD, 30.0)
@@ -133,8 +118,7 @@ def test_hold_and_door_during_a_test(fake: FakeProcess, loaded: FunctionalTester
     with pytest.raises(DeviceTimeout, match=r"reaching Idle took longer than 0\.1 s"):
         loaded.wait_for(MachineState.IDLE, 0.1)
     loaded.command(MachineCommand.UNHOLD)
-    thread.join(30.0)
-    assert outcome == [True]
+    assert doing.outcome() is True
     assert fake.truth()["door"] == "closed"
 
 
@@ -172,12 +156,11 @@ def test_control_is_refused_during_another_hosts_test(
 def test_stop_ends_a_test_without_result(
     fake: FakeProcess, loaded: FunctionalTester, wait_for: Callable[..., Any]
 ) -> None:
-    thread, outcome = in_background(loaded.test)
+    doing = BackgroundCall(loaded.test)
     wait_for(lambda: fake.truth()["state"], lambda state: state == "Execute")
     loaded.stop()
     assert fake.truth()["state"] == "Stopped"
-    thread.join(30.0)
-    assert isinstance(outcome[0], Cancelled)
+    assert isinstance(doing.outcome(), Cancelled)
     assert fake.truth()["tested"] == 0
     loaded.stop()  # has no effect when stopped
     assert loaded.test() is True
@@ -186,12 +169,12 @@ def test_stop_ends_a_test_without_result(
 def test_a_stop_at_the_station_cancels_the_test(
     fake: FakeProcess, loaded: FunctionalTester, wait_for: Callable[..., Any]
 ) -> None:
-    thread, outcome = in_background(loaded.test)
+    doing = BackgroundCall(loaded.test)
     wait_for(lambda: fake.truth()["state"], lambda state: state == "Execute")
     fake.control.do("command", name="stop")
-    thread.join(30.0)
-    assert isinstance(outcome[0], Cancelled)
-    assert "stopped at the station" in str(outcome[0])
+    outcome = doing.outcome()
+    assert isinstance(outcome, Cancelled)
+    assert "stopped at the station" in str(outcome)
 
 
 def test_a_test_that_takes_too_long_is_stopped(

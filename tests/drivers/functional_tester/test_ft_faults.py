@@ -1,7 +1,6 @@
 """Faults of the functional tester: a failing wire, late answers, a killed process."""
 
 import socket
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -23,6 +22,7 @@ from arcor2_hw.exceptions import (
     Stale,
 )
 from arcor2_hw.objects import MachineCommand, MachineState
+from tests.drivers.background_call import BackgroundCall
 from tests.drivers.faults import (
     connect_after_invalid_answers,
     disconnect_from_silence,
@@ -48,24 +48,14 @@ def quick(make: Callable[..., FunctionalTester], slow_fake: FakeProcess) -> Func
 
 
 @contextmanager
-def running_test(fake: FakeProcess, tester: FunctionalTester) -> Iterator[list[Any]]:
-    """Start a test in a thread and wait for Execute; the list gets its result or exception, and the time."""
-    outcome: list[Any] = []
-
-    def run() -> None:
-        try:
-            outcome.append(tester.test())
-        except Exception as error:
-            outcome.append(error)
-        outcome.append(time.monotonic())
-
-    thread = threading.Thread(target=run)
-    thread.start()
+def running_test(tester: FunctionalTester) -> Iterator[BackgroundCall]:
+    """Start a test in a thread and wait for Execute."""
+    doing = BackgroundCall(tester.test)
     tester.wait_for(MachineState.EXECUTE, 30.0)
     try:
-        yield outcome
+        yield doing
     finally:
-        thread.join(30.0)
+        doing.outcome()
 
 
 # ------------------------------------------------------------------------------------------------ connecting
@@ -105,14 +95,14 @@ def test_a_silent_peer_is_named(make: Callable[..., FunctionalTester]) -> None:
 def test_a_loss_during_a_test(
     slow_fake: FakeProcess, quick: FunctionalTester, wait_for: Callable[..., Any], fault: str, within: float | None
 ) -> None:
-    with running_test(slow_fake, quick) as outcome:
+    with running_test(quick) as doing:
         began = time.monotonic()
         slow_fake.control.do(fault)
         if fault == "refuse":  # only new connections are refused: the test continues until this connection breaks too
             slow_fake.control.do("reset")
-    assert isinstance(outcome[0], ConnectionLost)
-    assert f"tester at {slow_fake.ready['modbus']}" in str(outcome[0])
-    assert outcome[1] - began < (within or 0.3) + 0.3
+    assert isinstance(doing.outcome(), ConnectionLost)
+    assert f"tester at {slow_fake.ready['modbus']}" in str(doing.outcome())
+    assert doing.ended_at - began < (within or 0.3) + 0.3
     # The driver does not intervene until the tester has ended the test by itself, and nothing starts again.
     wait_for(slow_fake.truth, lambda truth: truth["fault"] == 105)
     slow_fake.control.do("heal")

@@ -7,39 +7,27 @@ import pytest
 
 from arcor2_drivers.label_printer.settings import ZplPrinterSettings
 from arcor2_drivers.label_printer.zpl_printer import ZplPrinter
-from tests.fakes.conftest import FakeProcess, start_fake, wait_for
+from tests.drivers.devices import disconnecting
+from tests.fakes.conftest import FakeProcess, fakes_of, start_fake, wait_for
 
 __all__ = ["start_fake", "wait_for"]
 
 
 @pytest.fixture
 def make() -> Iterator[Callable[..., ZplPrinter]]:
-    made: list[ZplPrinter] = []
-
     def build(port: str, **settings: Any) -> ZplPrinter:
-        printer = ZplPrinter("printer_id", "printer", settings=ZplPrinterSettings(port, **settings))
-        made.append(printer)
-        return printer
+        return ZplPrinter("printer_id", "printer", settings=ZplPrinterSettings(port, **settings))
 
-    yield build
-    for printer in made:
-        printer.disconnect()
+    with disconnecting(build) as make:
+        yield make
 
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, FakeProcess]]:
     """Start one fake per kind for all tests of a file, because starting one takes longer than most of them."""
-    kinds = {
-        "tcp": ("--tcp", "127.0.0.1:0"),
-        "pty": ("--link", str(tmp_path_factory.mktemp("dev") / "ttyPRINTER")),
-        "flags": ("--tcp", "127.0.0.1:0", "--no-mute"),
-    }
-    fakes = {kind: FakeProcess("label_printer", *options, "--duration", "0.15") for kind, options in kinds.items()}
-    for fake in fakes.values():
-        fake.truth()  # opens the control channel
-    yield fakes
-    for fake in fakes.values():
-        fake.end()
+    tcp, pty = ("--tcp", "127.0.0.1:0"), ("--link", str(tmp_path_factory.mktemp("dev") / "ttyPRINTER"))
+    with fakes_of("label_printer", "--duration", "0.15", tcp=tcp, pty=pty, flags=(*tcp, "--no-mute")) as fakes:
+        yield fakes
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ import pytest
 from arcor2_drivers.oak_d.oak_d import OakD
 from arcor2_drivers.oak_d.settings import OakDSettings
 from arcor2_hw.data.geometry import Orientation, Pose, Position
+from tests.drivers.devices import disconnecting
 from tests.fakes.conftest import FakeProcess
 
 ABOVE = {"position": [0.0, 0.0, 0.8], "orientation": [1.0, 0.0, 0.0, 0.0]}
@@ -18,10 +19,8 @@ PATIENCE = 40.0
 
 @pytest.fixture(scope="module")
 def running() -> Iterator[FakeProcess]:
-    fake = FakeProcess("oak_d", "--width", "640", "--height", "360", "--boot-time", "0.5")
-    assert fake.control.do("commands")
-    yield fake
-    fake.end()
+    with FakeProcess("oak_d", "--width", "640", "--height", "360", "--boot-time", "0.5") as fake:
+        yield fake
 
 
 @pytest.fixture
@@ -35,17 +34,12 @@ def fake(running: FakeProcess) -> FakeProcess:
 
 @pytest.fixture
 def make() -> Iterator[Callable[..., OakD]]:
-    made: list[OakD] = []
-
     def build(address: str, **settings: Any) -> OakD:
         pose = Pose(Position(0.0, 0.0, 0.8), Orientation(1.0, 0.0, 0.0, 0.0))
-        camera = OakD("camera_id", "camera", pose, None, OakDSettings(address, **settings))
-        made.append(camera)
-        return camera
+        return OakD("camera_id", "camera", pose, None, OakDSettings(address, **settings))
 
-    yield build
-    for camera in made:
-        camera.disconnect()
+    with disconnecting(build) as make:
+        yield make
 
 
 @pytest.fixture

@@ -1,6 +1,5 @@
 """A fake PLC in a separate process, and the drivers connected to it."""
 
-import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -8,8 +7,9 @@ import pytest
 
 from arcor2_drivers.opcua_plc.opcua_plc import OpcUaPlc
 from arcor2_drivers.opcua_plc.settings import OpcUaPlcSettings
-from arcor2_hw.exceptions import Arcor2Error
+from tests.drivers.background_call import BackgroundCall as BackgroundCall
 from tests.drivers.benches.opcua_plc_bench import HANDSHAKE
+from tests.drivers.devices import disconnecting
 from tests.fakes.conftest import FakeProcess, start_fake, wait_for
 
 __all__ = ["HANDSHAKE", "start_fake", "wait_for"]
@@ -22,32 +22,10 @@ POINTS = (
 )
 
 
-class BackgroundCall:
-    """A call in its own thread."""
-
-    def __init__(self, call: Callable[[], object]) -> None:
-        self.result: object = None
-        self._thread = threading.Thread(target=self._run, args=(call,), daemon=True)
-        self._thread.start()
-
-    def _run(self, call: Callable[[], object]) -> None:
-        try:
-            self.result = call()
-        except Arcor2Error as error:
-            self.result = error
-
-    def outcome(self, within: float = 20.0) -> object:
-        self._thread.join(within)
-        assert not self._thread.is_alive(), f"it has not ended within {within:g} s"
-        return self.result
-
-
 @pytest.fixture(scope="module")
 def one_fake() -> Iterator[FakeProcess]:
-    fake = FakeProcess("opcua_plc", "--time-scale", "5")
-    fake.truth()  # opens the control channel
-    yield fake
-    fake.end()
+    with FakeProcess("opcua_plc", "--time-scale", "5") as fake:
+        yield fake
 
 
 @pytest.fixture
@@ -61,17 +39,13 @@ def fake(one_fake: FakeProcess) -> FakeProcess:
 @pytest.fixture
 def make() -> Iterator[Callable[..., OpcUaPlc]]:
     """Return ``make("opc.tcp://127.0.0.1:4000", host_number=2)``: an unconnected driver."""
-    made: list[OpcUaPlc] = []
 
     def build(url: str, **settings: Any) -> OpcUaPlc:
         given = {"points": POINTS, "handshake": HANDSHAKE, **settings}
-        plc = OpcUaPlc("plc_id", "plc", OpcUaPlcSettings(url, **given))
-        made.append(plc)
-        return plc
+        return OpcUaPlc("plc_id", "plc", OpcUaPlcSettings(url, **given))
 
-    yield build
-    for plc in made:
-        plc.disconnect()
+    with disconnecting(build) as make:
+        yield make
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ import pytest
 
 from arcor2_drivers.remote_io.remote_io import RemoteIO
 from arcor2_drivers.remote_io.settings import RemoteIOSettings
+from tests.drivers.devices import disconnecting
 from tests.drivers.faults import relay
 from tests.fakes.conftest import FakeProcess, start_fake, wait_for
 
@@ -20,10 +21,8 @@ POINTS = (
 
 @pytest.fixture(scope="module")
 def one_fake() -> Iterator[FakeProcess]:
-    fake = FakeProcess("remote_io")
-    fake.truth()  # opens the control channel
-    yield fake
-    fake.end()
+    with FakeProcess("remote_io") as fake:
+        yield fake
 
 
 @pytest.fixture
@@ -36,18 +35,14 @@ def fake(one_fake: FakeProcess) -> FakeProcess:
 @pytest.fixture
 def make() -> Iterator[Callable[..., RemoteIO]]:
     """Return ``make("127.0.0.1:4000", watchdog_ms=500)``: an unconnected driver; the fixture disconnects it."""
-    made: list[RemoteIO] = []
 
     def build(address: str, **settings: Any) -> RemoteIO:
         host, _, port = address.rpartition(":")
         where: dict[str, Any] = {"host": host, "port": int(port)} if host else {"serial_port": address}
-        block = RemoteIO("block_id", "block", RemoteIOSettings(**{**where, "points": POINTS, **settings}))
-        made.append(block)
-        return block
+        return RemoteIO("block_id", "block", RemoteIOSettings(**{**where, "points": POINTS, **settings}))
 
-    yield build
-    for block in made:
-        block.disconnect()
+    with disconnecting(build) as make:
+        yield make
 
 
 @pytest.fixture

@@ -22,6 +22,7 @@ from arcor2_hw.exceptions import (
 )
 from arcor2_hw.objects import modbus_device
 from arcor2_hw.objects.modbus_link import ModbusLink
+from tests.drivers.background_call import BackgroundCall
 from tests.drivers.faults import (
     connect_after_invalid_answers,
     disconnect_from_silence,
@@ -31,7 +32,6 @@ from tests.drivers.faults import (
 )
 from tests.drivers.relay import Relay
 from tests.drivers.remote_io.conftest import POINTS
-from tests.drivers.remote_io.test_rio_points import in_thread
 from tests.fakes.conftest import FakeProcess
 
 READ_IMAGE, WRITE_COIL = 4, 5
@@ -104,15 +104,15 @@ def test_wrong_unit_is_refused_by_name(fake: FakeProcess, make: Callable[..., Re
 def test_a_loss_and_its_recovery(fake: FakeProcess, quick: RemoteIO, wait_for: Callable[..., Any], fault: str) -> None:
     edges: list[Any] = []
     quick.subscribe("part", edges.append)
-    thread, outcome = in_thread(lambda: quick.wait_for("part", True, 20.0))
+    doing = BackgroundCall(lambda: quick.wait_for("part", True, 20.0))
     began = time.monotonic()
     fake.control.do(fault)
     if fault == "reset":
         fake.control.do("refuse")  # the next test covers a connection that returns at once
-    thread.join(30.0)
-    assert isinstance(outcome[0], ConnectionLost)
-    assert fake.ready["modbus"] in str(outcome[0])
-    assert outcome[1] - began < 1.5
+    outcome = doing.outcome()
+    assert isinstance(outcome, ConnectionLost)
+    assert fake.ready["modbus"] in str(outcome)
+    assert doing.ended_at - began < 1.5
     with pytest.raises(ConnectionLost):
         quick.write_digital("lamp", False)
     # The block itself sets the outputs to their safe state, and nothing restores them.
@@ -198,11 +198,10 @@ def test_a_pulse_ends_during_a_connection_loss(
     block = make(fake.ready["modbus"], watchdog_ms=5000)  # the pulse ends long before the watchdog expires
     block.connect()
     block.take_control()
-    thread, outcome = in_thread(lambda: block.pulse("valve", 2.0))
+    doing = BackgroundCall(lambda: block.pulse("valve", 2.0))
     wait_for(lambda: fake.truth()["outputs"][5])
     fake.control.do("reset")
-    thread.join(30.0)
-    assert isinstance(outcome[0], ConnectionLost)
+    assert isinstance(doing.outcome(), ConnectionLost)
     history = wait_for(lambda: fake.truth()["history"], lambda history: len(history) == 2)
     assert history[1]["time"] - history[0]["time"] == pytest.approx(2.0, abs=0.001)
 

@@ -1,7 +1,6 @@
 """The remote I/O block on an intact wire: points, edges, pulses, control; TCP and RTU."""
 
 import termios
-import threading
 import time
 from collections.abc import Callable
 from typing import Any
@@ -26,24 +25,9 @@ from arcor2_hw.exceptions import (
 from arcor2_hw.objects.edges import Debounced, Edge
 from arcor2_hw.objects.modbus_settings import Parity
 from arcor2_hw.objects.small import OnLoss, PointDirection, PointKind
+from tests.drivers.background_call import BackgroundCall
 from tests.drivers.remote_io.conftest import POINTS
 from tests.fakes.conftest import FakeProcess
-
-
-def in_thread(call: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]:
-    """Start the call in a thread; the list gets its result or exception, and the time."""
-    outcome: list[Any] = []
-
-    def run() -> None:
-        try:
-            outcome.append(call())
-        except Arcor2Error as error:
-            outcome.append(error)
-        outcome.append(time.monotonic())
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    return thread, outcome
 
 
 # ------------------------------------------------------------------------------------------------ settings
@@ -178,17 +162,16 @@ def test_edges_are_debounced_and_reported_in_order(
 
 def test_wait_for_returns_at_the_condition(fake: FakeProcess, observed: RemoteIO) -> None:
     observed.wait_for("part", False, 0.0)
-    thread, outcome = in_thread(lambda: observed.wait_for("part", True, 60.0))
+    doing = BackgroundCall(lambda: observed.wait_for("part", True, 60.0))
     fake.control.do("set_input", number=0, on=True)
-    thread.join(30.0)
-    assert outcome[0] is None
+    assert doing.outcome() is None
     with pytest.raises(DeviceTimeout, match=r"part becoming off took longer than 0.05 s"):
         observed.wait_for("part", False, 0.05)
-    thread, outcome = in_thread(lambda: observed.wait_for("part", False, 60.0))
-    while thread.is_alive():  # a stop from before the wait has no effect
+    doing = BackgroundCall(lambda: observed.wait_for("part", False, 60.0))
+    while not doing.over:  # a stop from before the wait has no effect
         observed.stop()
         time.sleep(0.01)
-    assert isinstance(outcome[0], Cancelled)
+    assert isinstance(doing.outcome(), Cancelled)
 
 
 # ------------------------------------------------------------------------------------------------ outputs
@@ -220,14 +203,13 @@ def test_pulse_is_timed_by_the_block(fake: FakeProcess, block: RemoteIO) -> None
 
 def test_a_stopped_pulse_switches_off(fake: FakeProcess, block: RemoteIO, wait_for: Callable[..., Any]) -> None:
     block.write_digital("valve", True)
-    thread, outcome = in_thread(lambda: block.pulse("lamp", 20.0))
+    doing = BackgroundCall(lambda: block.pulse("lamp", 20.0))
     wait_for(lambda: fake.truth()["outputs"][4])
     with pytest.raises(Refused, match=r"pulsing lamp is refused while it is being pulsed$"):
         block.pulse("lamp", 0.05)
     block.stop()
     outputs = fake.truth()["outputs"]  # off when stop returns, at any progress of the other thread
-    thread.join(30.0)
-    assert isinstance(outcome[0], Cancelled)
+    assert isinstance(doing.outcome(), Cancelled)
     assert (outputs[4], outputs[5]) == (False, True)  # a stop switches nothing else
     block.pulse("lamp", 0.05)
 

@@ -7,6 +7,7 @@ import pytest
 
 from arcor2_drivers.robotiq_2f.robotiq_2f import Robotiq2F
 from arcor2_drivers.robotiq_2f.settings import Robotiq2FSettings
+from tests.drivers.devices import disconnecting
 from tests.fakes.conftest import FakeProcess, wait_for
 
 __all__ = ["wait_for"]
@@ -16,10 +17,8 @@ PACE = 6.0
 
 @pytest.fixture(scope="module")
 def running() -> Iterator[FakeProcess]:
-    fake = FakeProcess("robotiq_2f", "--time-scale", str(PACE))
-    fake.truth()  # opens the control channel
-    yield fake
-    fake.end()
+    with FakeProcess("robotiq_2f", "--time-scale", str(PACE)) as fake:
+        yield fake
 
 
 @pytest.fixture
@@ -36,17 +35,13 @@ def fake(running: FakeProcess) -> FakeProcess:
 @pytest.fixture
 def make() -> Iterator[Callable[..., Robotiq2F]]:
     """Return ``make("127.0.0.1:4000", request_timeout=0.2)``: an unconnected driver; the fixture disconnects it."""
-    made: list[Robotiq2F] = []
 
     def build(address: str, **settings: Any) -> Robotiq2F:
         host, _, port = address.rpartition(":")
-        gripper = Robotiq2F("gripper_id", "gripper", Robotiq2FSettings(host=host, port=int(port), **settings))
-        made.append(gripper)
-        return gripper
+        return Robotiq2F("gripper_id", "gripper", Robotiq2FSettings(host=host, port=int(port), **settings))
 
-    yield build
-    for gripper in made:
-        gripper.disconnect()
+    with disconnecting(build) as make:
+        yield make
 
 
 @pytest.fixture

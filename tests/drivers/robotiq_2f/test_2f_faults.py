@@ -10,8 +10,8 @@ from arcor2_drivers.robotiq_2f.robotiq_2f import Robotiq2F
 from arcor2_hw.data.device import Connection, Health
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, NotInControl
 from arcor2_hw.objects.small import GripperState
+from tests.drivers.background_call import BackgroundCall
 from tests.drivers.robotiq_2f.conftest import make_ready
-from tests.drivers.robotiq_2f.test_2f_gripping import in_background
 from tests.fakes.conftest import FakeProcess
 
 
@@ -44,12 +44,12 @@ def test_a_wire_fault_during_a_grip_is_a_loss_and_recovers(
     gripper.connect()
     make_ready(fake, gripper)
     fake.control.do("put_part", width=0.03)
-    thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.02))
+    doing = BackgroundCall(lambda: gripper.grip(0.0, speed=0.02))
     wait_for(gripper.state, lambda state: state is GripperState.MOVING)
     fake.control.do(fault, seconds=0.4)
-    thread.join(30.0)
-    assert isinstance(outcome[0], ConnectionLost)
-    assert "gripper at 127.0.0.1" in str(outcome[0])
+    outcome = doing.outcome()
+    assert isinstance(outcome, ConnectionLost)
+    assert "gripper at 127.0.0.1" in str(outcome)
     if fault != "reset":
         wait_for(lambda: gripper.connection is Connection.LOST)
         assert gripper.health is Health.FAILURE
@@ -84,19 +84,18 @@ def test_invalid_answers_are_typed_errors(make: Callable[..., Robotiq2F]) -> Non
                     client.sendall(answer)
                     client.recv(100)  # until the driver closes it
 
-            thread, _ = in_background(serve)
+            doing = BackgroundCall(serve)
             gripper = make(f"127.0.0.1:{server.getsockname()[1]}", request_timeout=0.1)
             with pytest.raises(DeviceError, match=r"gripper at 127\.0\.0\.1"):
                 gripper.connect(1.0)
             gripper.disconnect()
-            thread.join(30.0)
+            doing.outcome()
 
 
 def test_disconnecting_ends_a_waiting_call(fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]) -> None:
-    thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.02))
+    doing = BackgroundCall(lambda: gripper.grip(0.0, speed=0.02))
     wait_for(gripper.state, lambda state: state is GripperState.MOVING)
     gripper.disconnect()
-    thread.join(30.0)
-    assert isinstance(outcome[0], DeviceError)
+    assert isinstance(doing.outcome(), DeviceError)
     fake.control.do("pace", factor=50.0)
     wait_for(lambda: fake.truth()["registers"]["OBJ"] == 3)  # it completes the motion and holds

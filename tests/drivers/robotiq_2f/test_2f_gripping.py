@@ -1,6 +1,5 @@
 """The 2F gripper: activation, gripping, lost parts, stop, control, scaling, settings."""
 
-import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -24,23 +23,9 @@ from arcor2_hw.exceptions import (
     Refused,
 )
 from arcor2_hw.objects.small import GripperState
+from tests.drivers.background_call import BackgroundCall
 from tests.drivers.surroundings import Carrier
 from tests.fakes.conftest import FakeProcess
-
-
-def in_background(call: Callable[[], Any]) -> tuple[threading.Thread, list[Any]]:
-    """Run a call in a thread; the list gets its result or its exception."""
-    outcome: list[Any] = []
-
-    def run() -> None:
-        try:
-            outcome.append(call())
-        except Exception as error:
-            outcome.append(error)
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    return thread, outcome
 
 
 def test_connecting_and_taking_control_write_nothing(fake: FakeProcess, make: Callable[..., Robotiq2F]) -> None:
@@ -149,14 +134,13 @@ def test_blocked_release_fails(fake: FakeProcess, gripper: Robotiq2F) -> None:
 def test_stop_ends_a_grip_and_keeps_the_part(
     fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]
 ) -> None:
-    thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.02))
+    doing = BackgroundCall(lambda: gripper.grip(0.0, speed=0.02))
     wait_for(gripper.state, lambda state: state is GripperState.MOVING)
     with pytest.raises(Refused, match=r"is busy \(.*\): release has to wait"):
         gripper.release()
     gripper.stop()
     position = fake.truth()["position"]
-    thread.join(30.0)
-    assert isinstance(outcome[0], Cancelled)
+    assert isinstance(doing.outcome(), Cancelled)
     assert 3 < position < 230
     assert fake.truth()["position"] == position
     assert gripper.state() is GripperState.AT_POSITION
@@ -172,11 +156,10 @@ def test_stop_ends_a_grip_and_keeps_the_part(
 
 def test_stop_ends_an_activation(fake: FakeProcess, observed: Robotiq2F, wait_for: Callable[..., Any]) -> None:
     observed.take_control()
-    thread, outcome = in_background(observed.activate)
+    doing = BackgroundCall(observed.activate)
     wait_for(lambda: fake.truth()["registers"]["STA"] == 1)
     observed.stop()
-    thread.join(30.0)
-    assert isinstance(outcome[0], Cancelled)
+    assert isinstance(doing.outcome(), Cancelled)
     assert fake.truth()["registers"]["STA"] == 0
     observed.activate()
     assert observed.state() is GripperState.AT_POSITION
@@ -186,11 +169,10 @@ def test_major_fault_ends_a_grip_and_is_acknowledged(
     fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]
 ) -> None:
     code = 0x0E
-    thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.02))
+    doing = BackgroundCall(lambda: gripper.grip(0.0, speed=0.02))
     wait_for(gripper.state, lambda state: state is GripperState.MOVING)
     fake.control.do("fault", code=code)
-    thread.join(30.0)
-    error = outcome[0]
+    error = doing.outcome()
     assert isinstance(error, DeviceFault)
     assert error.fault_code == code
     assert "gripper at 127.0.0.1" in str(error)
@@ -229,11 +211,10 @@ def test_interference_fails_the_activation(fake: FakeProcess, observed: Robotiq2
 
 
 def test_a_power_cycle_during_a_grip(fake: FakeProcess, gripper: Robotiq2F, wait_for: Callable[..., Any]) -> None:
-    thread, outcome = in_background(lambda: gripper.grip(0.0, speed=0.02))
+    doing = BackgroundCall(lambda: gripper.grip(0.0, speed=0.02))
     wait_for(gripper.state, lambda state: state is GripperState.MOVING)
     fake.control.do("power_cycle")
-    thread.join(30.0)
-    assert isinstance(outcome[0], DeviceFault)
+    assert isinstance(doing.outcome(), DeviceFault)
     assert gripper.state() is GripperState.INACTIVE
     commands = fake.truth()["count"]
     with pytest.raises(Refused, match="activate it first"):
@@ -248,14 +229,14 @@ def test_another_client_is_detected_and_named(
     other = make(fake.ready["ascii"])
     other.connect()
     other.take_control()
-    thread, _ = in_background(lambda: other.grip(0.08, speed=0.02))
+    doing = BackgroundCall(lambda: other.grip(0.08, speed=0.02))
     wait_for(lambda: gripper.control_owner() != "us")
     with pytest.raises(NotInControl, match="another client of the gripper, which requested position 16"):
         gripper.release()
     with pytest.raises(NotInControl, match="another client, which moves the gripper, has it"):
         gripper.take_control()
     other.stop()
-    thread.join(30.0)
+    doing.outcome()
     gripper.take_control()
     gripper.release()
 

@@ -17,8 +17,8 @@ from arcor2_drivers.robotiq_2f.status import Activation, Command, Object, Status
 from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceTimeout, NotConnected, NotInControl
 from arcor2_hw.objects.small import GripperState
+from tests.drivers.background_call import BackgroundCall
 from tests.drivers.robotiq_2f.conftest import make_ready
-from tests.drivers.robotiq_2f.test_2f_gripping import in_background
 from tests.fakes.conftest import FakeProcess
 from tests.waiting import wait_for
 
@@ -26,10 +26,8 @@ from tests.waiting import wait_for
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeProcess]:
     link = tmp_path_factory.mktemp("2f") / "ttyGRIPPER"
-    fake = FakeProcess("robotiq_2f", "--time-scale", "6", "--link", str(link))
-    fake.truth()
-    yield fake
-    fake.end()
+    with FakeProcess("robotiq_2f", "--time-scale", "6", "--link", str(link)) as fake:
+        yield fake
 
 
 @pytest.fixture
@@ -88,11 +86,11 @@ def test_a_complete_cycle(fake: FakeProcess, rtu: Robotiq2F) -> None:
 
 def test_stop(fake: FakeProcess, rtu: Robotiq2F, wait_for: Callable[..., Any]) -> None:
     make_ready(fake, rtu)
-    thread, outcome = in_background(lambda: rtu.grip(0.0, speed=0.02))
+    doing = BackgroundCall(lambda: rtu.grip(0.0, speed=0.02))
     wait_for(rtu.state, lambda state: state is GripperState.MOVING)
     rtu.stop()
-    thread.join(30.0)
-    assert outcome[0].code == "cancelled"
+    outcome = doing.outcome()
+    assert outcome.code == "cancelled"
     assert 3 < fake.truth()["position"] < 230
 
 
@@ -111,12 +109,12 @@ def test_a_line_fault_during_a_grip_is_a_loss_and_recovers(
 ) -> None:
     make_ready(fake, rtu)
     fake.control.do("put_part", width=0.03)
-    thread, outcome = in_background(lambda: rtu.grip(0.0, speed=0.02))
+    doing = BackgroundCall(lambda: rtu.grip(0.0, speed=0.02))
     wait_for(rtu.state, lambda state: state is GripperState.MOVING)
     fake.control.do(fault)
-    thread.join(30.0)
-    assert isinstance(outcome[0], ConnectionLost)
-    assert "unit 9" in str(outcome[0])
+    outcome = doing.outcome()
+    assert isinstance(outcome, ConnectionLost)
+    assert "unit 9" in str(outcome)
     fake.control.do("heal")
     fake.control.do("pace", factor=50.0)
     wait_for(lambda: rtu.connection is Connection.BACK)
@@ -133,11 +131,10 @@ def test_disconnecting_from_a_silent_line_ends_the_request(make_rtu: Callable[..
     tty.setraw(hosts)
     try:
         gripper = make_rtu(os.ttyname(hosts), request_timeout=5.0)
-        thread, outcome = in_background(gripper.connect)
+        doing = BackgroundCall(gripper.connect)
         os.read(ours, 100)  # the request has arrived
         gripper._gripper.close()
-        thread.join(30.0)
-        assert isinstance(outcome[0], DeviceError)
+        assert isinstance(doing.outcome(), DeviceError)
     finally:
         os.close(ours)
         os.close(hosts)

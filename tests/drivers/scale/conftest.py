@@ -7,36 +7,27 @@ import pytest
 
 from arcor2_drivers.scale.mt_sics_scale import MtSicsScale
 from arcor2_drivers.scale.settings import MtSicsScaleSettings
-from tests.fakes.conftest import FakeProcess, start_fake, wait_for
+from tests.drivers.devices import disconnecting
+from tests.fakes.conftest import FakeProcess, fakes_of, start_fake, wait_for
 
 __all__ = ["start_fake", "wait_for"]
 
 
 @pytest.fixture
 def make() -> Iterator[Callable[..., MtSicsScale]]:
-    made: list[MtSicsScale] = []
-
     def build(port: str, **settings: Any) -> MtSicsScale:
-        scale = MtSicsScale("scale_id", "scale", settings=MtSicsScaleSettings(port, **settings))
-        made.append(scale)
-        return scale
+        return MtSicsScale("scale_id", "scale", settings=MtSicsScaleSettings(port, **settings))
 
-    yield build
-    for scale in made:
-        scale.disconnect()
+    with disconnecting(build) as make:
+        yield make
 
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, FakeProcess]]:
     """Start one fake per kind of line for all tests of a file, because starting one takes longer than most of them."""
-    lines = {"pty": ("--link", str(tmp_path_factory.mktemp("dev") / "ttySCALE")), "tcp": ("--tcp", "127.0.0.1:0")}
-    common = ("--settling", "0.2", "--stability-timeout", "0.6")
-    fakes = {kind: FakeProcess("scale", *line, *common) for kind, line in lines.items()}
-    for fake in fakes.values():
-        fake.truth()  # opens the control channel
-    yield fakes
-    for fake in fakes.values():
-        fake.end()
+    tcp, pty = ("--tcp", "127.0.0.1:0"), ("--link", str(tmp_path_factory.mktemp("dev") / "ttySCALE"))
+    with fakes_of("scale", "--settling", "0.2", "--stability-timeout", "0.6", tcp=tcp, pty=pty) as fakes:
+        yield fakes
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ import pytest
 
 from arcor2_drivers.screwdriver.screwdriver import OpenProtocolScrewdriver
 from arcor2_drivers.screwdriver.settings import OpenProtocolScrewdriverSettings
+from tests.drivers.devices import disconnecting
 from tests.fakes.conftest import FakeProcess, start_fake, wait_for
 
 __all__ = ["start_fake", "wait_for"]
@@ -15,29 +16,23 @@ __all__ = ["start_fake", "wait_for"]
 @pytest.fixture
 def make() -> Iterator[Callable[..., OpenProtocolScrewdriver]]:
     """Return ``make("127.0.0.1:4545", keep_alive=0.3)``: a driver that is not connected; the fixture disconnects it."""
-    made: list[OpenProtocolScrewdriver] = []
 
     def build(address: str, **settings: Any) -> OpenProtocolScrewdriver:
         host, _, port = address.rpartition(":")
         settings = {"answer_timeout": 2.0, "keep_alive": 0.3} | settings
-        screwdriver = OpenProtocolScrewdriver(
+        return OpenProtocolScrewdriver(
             "screwdriver_id", "screwdriver", OpenProtocolScrewdriverSettings(host, int(port), **settings)
         )
-        made.append(screwdriver)
-        return screwdriver
 
-    yield build
-    for screwdriver in made:
-        screwdriver.disconnect()
+    with disconnecting(build) as make:
+        yield make
 
 
 @pytest.fixture(scope="module")
 def running() -> Iterator[FakeProcess]:
     """One fake for the tests of a file, because starting one takes longer than most of them."""
-    fake = FakeProcess("screwdriver", "--duration", "0.2", "--response-timeout", "0.4")
-    fake.truth()  # opens the control channel
-    yield fake
-    fake.end()
+    with FakeProcess("screwdriver", "--duration", "0.2", "--response-timeout", "0.4") as fake:
+        yield fake
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ from arcor2_drivers.two_axis_robot.settings import TwoAxisRobotSettings
 from arcor2_drivers.two_axis_robot.two_axis_robot import TwoAxisRobot
 from arcor2_hw.data.geometry import Pose
 from tests.drivers.background_call import BackgroundCall as BackgroundCall
+from tests.drivers.devices import disconnecting
 from tests.fakes.conftest import FakeProcess, start_fake, wait_for
 
 __all__ = ["start_fake", "wait_for"]
@@ -26,17 +27,12 @@ def standing(truth: Any) -> bool:
 
 @pytest.fixture
 def make() -> Iterator[Callable[..., TwoAxisRobot]]:
-    made: list[TwoAxisRobot] = []
-
     def build(port: str, pose: Pose | None = None, **settings: Any) -> TwoAxisRobot:
         wanted = TwoAxisRobotSettings(port, **settings)
-        robot = TwoAxisRobot("arm_id", "arm", pose or Pose(), wanted)
-        made.append(robot)
-        return robot
+        return TwoAxisRobot("arm_id", "arm", pose or Pose(), wanted)
 
-    yield build
-    for robot in made:
-        robot.disconnect()
+    with disconnecting(build) as make:
+        yield make
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ from arcor2_drivers.vacuum_gripper.settings import VacuumGripperSettings
 from arcor2_drivers.vacuum_gripper.suction_gripper import SuctionGripper
 from arcor2_hw.exceptions import NotFound
 from arcor2_hw.objects import Generic
+from tests.drivers.devices import disconnecting
 from tests.fakes.conftest import FakeProcess
 
 POINTS = "part=DI0; vacuum=DO0 on_loss=hold; blow=DO1; falls=DO2; pressure=AI0 unit=Pa"
@@ -18,10 +19,8 @@ POINTS = "part=DI0; vacuum=DO0 on_loss=hold; blow=DO1; falls=DO2; pressure=AI0 u
 
 @pytest.fixture(scope="module")
 def one_fake() -> Iterator[FakeProcess]:
-    fake = FakeProcess("remote_io")
-    fake.truth()  # opens the control channel
-    yield fake
-    fake.end()
+    with FakeProcess("remote_io") as fake:
+        yield fake
 
 
 @pytest.fixture
@@ -46,7 +45,6 @@ Make = Callable[..., SuctionGripper]
 @pytest.fixture
 def make(block: RemoteIO) -> Iterator[Make]:
     """Return ``make(grip_time=1.0)``: an unconnected gripper on the block; the fixture disconnects it."""
-    made: list[SuctionGripper] = []
 
     def find(name: str) -> Generic:
         if name not in (block.name, block.id):
@@ -57,12 +55,10 @@ def make(block: RemoteIO) -> Iterator[Make]:
         chosen = {"carrier": "block", "vacuum_output": "vacuum", "blow_output": "blow", "part_input": "part"}
         gripper = SuctionGripper("gripper_id", "gripper", VacuumGripperSettings(**{**chosen, **settings}))
         gripper.attach(find)
-        made.append(gripper)
         return gripper
 
-    yield build
-    for gripper in made:
-        gripper.disconnect()
+    with disconnecting(build) as make:
+        yield make
 
 
 @pytest.fixture

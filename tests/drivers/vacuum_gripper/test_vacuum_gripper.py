@@ -2,7 +2,6 @@
 
 import threading
 import time
-from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -12,7 +11,6 @@ from arcor2_drivers.vacuum_gripper.settings import VacuumGripperSettings
 from arcor2_drivers.vacuum_gripper.suction_gripper import SuctionGripper
 from arcor2_hw.data.device import Connection, Health, LossKind
 from arcor2_hw.exceptions import (
-    Arcor2Error,
     Cancelled,
     ConnectionLost,
     DeviceFault,
@@ -26,6 +24,7 @@ from arcor2_hw.exceptions import (
     Stale,
 )
 from arcor2_hw.objects import Generic
+from tests.drivers.background_call import BackgroundCall
 from tests.drivers.surroundings import Carrier
 from tests.fakes.conftest import FakeProcess
 from tests.waiting import wait_for
@@ -33,27 +32,6 @@ from tests.waiting import wait_for
 from .conftest import Make
 
 VACUUM, BLOW = 0, 1
-
-
-class BackgroundCall:
-    """A call in its own thread."""
-
-    def __init__(self, call: Callable[[], Any]) -> None:
-        self.error: Arcor2Error | None = None
-
-        def run() -> None:
-            try:
-                call()
-            except Arcor2Error as error:
-                self.error = error
-
-        self._thread = threading.Thread(target=run)
-        self._thread.start()
-
-    def end(self, within: float = 30.0) -> Arcor2Error | None:
-        self._thread.join(within)
-        assert not self._thread.is_alive(), "the call is still running"
-        return self.error
 
 
 def part(fake: FakeProcess, there: bool) -> None:
@@ -78,14 +56,14 @@ def test_a_part_is_gripped_and_released(gripper: SuctionGripper, fake: FakeProce
     time.sleep(0.1)
     assert not gripper.part_held(), "the sensor has not reported a part yet"
     part(fake, True)
-    assert doing.end() is None
+    assert doing.outcome() is None
     assert gripper.is_part_held()
     gripper.check_part()
     doing = BackgroundCall(gripper.release)
     wait_for(lambda: output(fake, BLOW))
     assert not output(fake, VACUUM), "no air is blown while the vacuum is on"
     part(fake, False)
-    assert doing.end() is None
+    assert doing.outcome() is None
     assert not output(fake, BLOW)
     assert gripper.alarms() == []
 
@@ -176,12 +154,12 @@ def test_a_stop_ends_an_action_and_keeps_the_part(gripper: SuctionGripper, fake:
     doing = BackgroundCall(gripper.grip)
     wait_for(lambda: output(fake, VACUUM))
     gripper.stop()
-    assert isinstance(doing.end(), Cancelled)
+    assert isinstance(doing.outcome(), Cancelled)
     assert output(fake, VACUUM)
     doing = BackgroundCall(gripper.blow_off)
     wait_for(lambda: output(fake, BLOW))
     gripper.stop()
-    assert isinstance(doing.end(), Cancelled)
+    assert isinstance(doing.outcome(), Cancelled)
     assert not output(fake, BLOW)
 
 
@@ -192,7 +170,7 @@ def test_one_action_at_a_time(gripper: SuctionGripper, fake: FakeProcess) -> Non
         with pytest.raises(Refused, match="gripper is gripping or releasing"):
             second()
     part(fake, True)
-    assert doing.end() is None
+    assert doing.outcome() is None
 
 
 def test_the_vacuum_detects_a_part_without_a_switch(make: Make, fake: FakeProcess) -> None:
@@ -282,7 +260,7 @@ def test_connecting_waits_for_the_carrier(make: Make, block: RemoteIO) -> None:
     doing = BackgroundCall(lambda: gripper.connect(10.0))
     time.sleep(0.1)
     block.connect()
-    assert doing.end() is None
+    assert doing.outcome() is None
     assert gripper.connection is Connection.ONLINE
 
 

@@ -77,10 +77,8 @@ class Rtu:
 @pytest.fixture(scope="module")
 def block() -> Iterator[FakeProcess]:
     """A remote I/O block on TCP; one process serves the tests of this file."""
-    fake = FakeProcess("remote_io")
-    fake.truth()
-    yield fake
-    fake.end()
+    with FakeProcess("remote_io") as fake:
+        yield fake
 
 
 @pytest.fixture
@@ -94,10 +92,8 @@ def tcp(block: FakeProcess) -> Iterator[Tcp]:
 @pytest.fixture(scope="module")
 def serial_block() -> Iterator[FakeProcess]:
     """A remote I/O block on a pty; one process serves the tests of this file."""
-    fake = FakeProcess("remote_io", "--serial")
-    fake.truth()
-    yield fake
-    fake.end()
+    with FakeProcess("remote_io", "--serial") as fake:
+        yield fake
 
 
 @pytest.fixture

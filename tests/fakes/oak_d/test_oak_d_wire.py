@@ -64,10 +64,8 @@ class Client:
 
 @pytest.fixture(scope="module")
 def running() -> Iterator[FakeProcess]:
-    fake = FakeProcess("oak_d", "--width", str(WIDTH), "--height", str(HEIGHT))
-    assert fake.control.do("commands")
-    yield fake
-    fake.end()
+    with FakeProcess("oak_d", "--width", str(WIDTH), "--height", str(HEIGHT)) as fake:
+        yield fake
 
 
 @pytest.fixture

@@ -41,18 +41,14 @@ class Host:
 
 @pytest.fixture(scope="module")
 def on_pty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeProcess]:
-    fake = FakeProcess("barcode_reader", "--link", str(tmp_path_factory.mktemp("line") / "reader"))
-    fake.truth()  # opens the control channel
-    yield fake
-    fake.end()
+    with FakeProcess("barcode_reader", "--link", str(tmp_path_factory.mktemp("line") / "reader")) as fake:
+        yield fake
 
 
 @pytest.fixture(scope="module")
 def on_tcp() -> Iterator[FakeProcess]:
-    fake = FakeProcess("barcode_reader", "--tcp", "127.0.0.1:0")
-    fake.truth()
-    yield fake
-    fake.end()
+    with FakeProcess("barcode_reader", "--tcp", "127.0.0.1:0") as fake:
+        yield fake
 
 
 @pytest.fixture

@@ -30,10 +30,8 @@ class Line:
 
 @pytest.fixture(scope="module")
 def running() -> Iterator[FakeProcess]:
-    fake = FakeProcess("scale", "--settling", "0.2", "--stability-timeout", "0.3")
-    fake.truth()
-    yield fake
-    fake.end()
+    with FakeProcess("scale", "--settling", "0.2", "--stability-timeout", "0.3") as fake:
+        yield fake
 
 
 @pytest.fixture

@@ -44,10 +44,8 @@ class Client:
 @pytest.fixture(scope="module")
 def running() -> Iterator[FakeProcess]:
     """Start one fake without options for a file, because starting one takes longer than most tests."""
-    fake = FakeProcess("screwdriver", "--duration", "0.1")
-    fake.truth()  # opens the control channel
-    yield fake
-    fake.end()
+    with FakeProcess("screwdriver", "--duration", "0.1") as fake:
+        yield fake
 
 
 @pytest.fixture

@@ -62,10 +62,8 @@ class Host:
 
 @pytest.fixture(scope="module")
 def one_tester() -> Iterator[FakeProcess]:
-    tester = FakeProcess("functional_tester", "--time-scale", "20", "--test-time", "2", "--seed", "7")
-    tester.truth()  # opens the control channel
-    yield tester
-    tester.end()
+    with FakeProcess("functional_tester", "--time-scale", "20", "--test-time", "2", "--seed", "7") as tester:
+        yield tester
 
 
 @pytest.fixture

@@ -53,10 +53,8 @@ def changed(old: str, new: str) -> str:
 
 @pytest.fixture(scope="module")
 def one_fake() -> Iterator[FakeProcess]:
-    fake = FakeProcess(EXAMPLES / "screwdriver_fake.py")
-    fake.truth()
-    yield fake
-    fake.end()
+    with FakeProcess(EXAMPLES / "screwdriver_fake.py") as fake:
+        yield fake
 
 
 @pytest.fixture
