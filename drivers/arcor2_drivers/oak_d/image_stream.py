@@ -148,11 +148,6 @@ class ImageStream(Connected):
             age=age,
         )
 
-    def apply_exposure(self, exposure: float | None) -> None:
-        """Set the exposure time, s; None: automatic. After a reconnect it is set again."""
-        self.feed.set_exposure(exposure, EXPOSURE_TIMEOUT)
-        self._exposure = exposure
-
     # -------------------------------------------------------------------------------- on the observing thread
     def open_link(self, timeout: float) -> None:
         """Open the camera and receive its first image."""

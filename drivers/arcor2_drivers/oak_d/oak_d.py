@@ -14,7 +14,7 @@ from arcor2_hw.objects.camera import Mode
 from arcor2_hw.objects.frame import Frame, PictureNote
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 
-from .image_stream import ImageStream
+from .image_stream import EXPOSURE_TIMEOUT, ImageStream
 from .settings import OakDSettings, Resolution, size_of
 
 if TYPE_CHECKING:
@@ -106,7 +106,8 @@ class OakD(ImageStream, Camera):
                 longest_exposure=LONGEST_EXPOSURE,
                 exposure=exposure,
             )
-        self.apply_exposure(exposure)
+        self.feed.set_exposure(exposure, EXPOSURE_TIMEOUT)
+        self._exposure = exposure  # set again after a reconnect
 
     def stop(self) -> None:
         """End the calls that wait for an image, with Cancelled; the camera continues to capture images."""

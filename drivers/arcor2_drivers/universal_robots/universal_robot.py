@@ -3,12 +3,12 @@
 import time
 from typing import ClassVar, Final, Literal
 
-from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction
+from arcor2_hw.data.device import Identity, LossReaction
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.data.robot import Joint, KinematicCalibration, MoveResult, RobotState, RobotType
 from arcor2_hw.exceptions import DeviceError, OutOfRange, Refused
 from arcor2_hw.messages import Message
-from arcor2_hw.objects.arm import TCP, check_end_effector, named_joints, refuse_acknowledgement
+from arcor2_hw.objects.arm import TCP, SafetyAlarm, check_end_effector, named_joints
 from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.single_arm import SingleArm
 
@@ -26,7 +26,7 @@ from .primary import read_calibration
 from .safe_motion import SafeMotion
 from .safety import SafetySystem
 from .settings import UrSettings
-from .states import power_of, safety_of
+from .states import REMEDIES, power_of, safety_of
 
 STOPS_WITHIN: Final = 1.5
 """Time to standstill when this computer freezes, s: FROZEN_AFTER, one period of the watchdog, and braking."""
@@ -36,7 +36,7 @@ SAME_ANGLE: Final = 0.02
 """Differences between nominal model and controller with the same tool, m and rad: real ones are smaller."""
 
 
-class UniversalRobot(MoveActions, DigitalGripper, SingleArm):
+class UniversalRobot(MoveActions, DigitalGripper, SafetySystem, SingleArm):
     """A Universal Robots arm."""
 
     _ABSTRACT = True
@@ -72,7 +72,7 @@ class UniversalRobot(MoveActions, DigitalGripper, SingleArm):
         self._paths = Paths(self._arm, self._observer, self._control, self._motion)
         self._jog = Jog(self._arm, self._observer, self._control, self._motion)
         self._safe = SafeMotion(self, self._arm, self._observer, self._control, self._motion)
-        self._safety = SafetySystem(self._observer, self._pendant, self._control)
+        self._safety_alarm = SafetyAlarm(REMEDIES)
         self.safe_moves, self.motions = self._safe.moves, self._motion.log
         self.keep_connection(self._observer.who, self._observer.observing)
 
@@ -94,10 +94,6 @@ class UniversalRobot(MoveActions, DigitalGripper, SingleArm):
         self.release_control()
         self._observer.observing.stop()
         self._pendant.dashboard.close()
-
-    def condition(self) -> Health:
-        """Return the condition of the arm."""
-        return self._safety.condition() if self._observer.observing.online else Health.NORMAL
 
     def identify(self) -> Identity:
         """Return model, serial number and version; without a dashboard server, type and version."""
@@ -324,28 +320,3 @@ class UniversalRobot(MoveActions, DigitalGripper, SingleArm):
         if enabled and self.move_in_progress:
             raise Refused("{name} is moving already. Wait until the motion ends, or stop it.", name=self.name)
         self._control.set_teaching(enabled)
-
-    # -------------------------------------------------------------------------------- power and safety
-    def alarms(self) -> list[Alarm]:
-        """Return the active safety stop, if any."""
-        return self._safety.alarms()
-
-    def acknowledge(self, code: str) -> None:
-        """Raise Refused: only a named person can acknowledge a safety stop. Raise NotFound for an inactive alarm."""
-        refuse_acknowledgement(self.name, code, self.alarms(), "acknowledge_protective_stop")
-
-    def power_on(self) -> None:
-        """Switch drive power on; brakes stay closed. Raise NotInControl, Refused or DeviceTimeout."""
-        self._safety.power_on()
-
-    def release_brakes(self) -> None:
-        """Release the brakes; the arm does not move. Raise NotInControl, Refused or DeviceTimeout."""
-        self._safety.release_brakes()
-
-    def acknowledge_protective_stop(self, confirmed_by: str) -> None:
-        """Unlock a protective stop, at the earliest 5 s after it; the old motion does not continue."""
-        self._safety.acknowledge_protective_stop(confirmed_by)
-
-    def restart_safety(self, confirmed_by: str) -> None:
-        """Restart the safety system after a fault or violation; drive power is off afterwards."""
-        self._safety.restart(confirmed_by)
