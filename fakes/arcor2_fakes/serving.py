@@ -24,6 +24,7 @@ class Fake:
         """Whether the ready line was printed."""
         self._wires: dict[str, Wire] = {}
         self._ends: list[Callable[[], object]] = []
+        self._line_state: Callable[[], dict[str, Any]] = dict
 
     def commands(self, **handlers: Handler) -> None:
         """Register commands of the control channel by name."""
@@ -48,9 +49,9 @@ class Fake:
 
         self.commands(**{command: switch(attribute) for command, attribute in attributes.items()})
 
-    def truth(self, read: Callable[[], Any]) -> None:
-        """Register the true state as source `truth` of the control channel."""
-        self.channel.source("truth", read)
+    def truth(self, read: Callable[[], dict[str, Any]]) -> None:
+        """Register the true state, with that of the line, as source `truth` of the control channel."""
+        self.channel.source("truth", lambda: read() | self._line_state())
 
     def at_end(self, call: Callable[[], object]) -> None:
         """Call a function or coroutine function when the fake ends."""
@@ -107,6 +108,7 @@ class Fake:
 
         self.wires((name,) if checked else (), **{name: line})
         self.commands(plug=plug, unplug=unplug)
+        self._line_state = lambda: {"plugged": line.plugged, "port": line.port}
 
     def renewable(self, reset: Callable[[], object]) -> None:
         """Register the command `renew`, which calls `reset` and repairs the wires, for tests that share a process."""

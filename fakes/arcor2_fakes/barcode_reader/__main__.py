@@ -12,18 +12,16 @@ from cyclopts.types import PositiveFloat
 from arcor2_fakes.barcode_reader.reader import HEALTH, Framing, Health, Reader
 from arcor2_fakes.control import one_of, within
 from arcor2_fakes.program import program
-from arcor2_fakes.serial_line import Line, line_at
+from arcor2_fakes.serial_line import line_at
 from arcor2_fakes.serving import Fake
 
 
-def truth(reader: Reader, line: Line) -> dict[str, Any]:
+def truth(reader: Reader) -> dict[str, Any]:
     """Return the real state of the reader."""
     return {
         "code": reader.code,
         "reading": reader.reading,
         "health": reader.health,
-        "plugged": line.plugged,
-        "port": line.port,
         "received": list(reader.received),
         "sent": list(reader.sent),
     }
@@ -85,7 +83,7 @@ async def main(
     register_commands(fake, reader)
     fake.commands(renew=renew, power_cycle=power_cycle)
     fake.line(line, reader.drop_input)
-    fake.truth(lambda: truth(reader, line))
+    fake.truth(lambda: truth(reader))
     fake.at_end(reader.close)
     await fake.run(port=line)
 

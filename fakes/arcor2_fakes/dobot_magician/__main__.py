@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter, validators
 
@@ -80,12 +80,9 @@ async def main(
     commands = Commands(arm, lambda frame: line.send(frame))
     line = PtyLine(commands.feed, link)
 
-    def truth() -> dict[str, Any]:
-        return arm.truth() | {"plugged": line.plugged, "port": line.port, "received": list(commands.received)}
-
     register_commands(fake, arm, commands)
     fake.line(line, commands.drop_input)
-    fake.truth(truth)
+    fake.truth(lambda: arm.truth() | {"received": list(commands.received)})
     fake.simulate(arm.advance, _TICK)
     await fake.run(port=line)
 

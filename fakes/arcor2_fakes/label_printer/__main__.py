@@ -13,13 +13,13 @@ from cyclopts.types import PositiveFloat
 from arcor2_fakes.control import within
 from arcor2_fakes.label_printer.printer import FIRMWARE, SERIAL_NUMBER, LabelPrinter
 from arcor2_fakes.program import program
-from arcor2_fakes.serial_line import Line, line_at
+from arcor2_fakes.serial_line import line_at
 from arcor2_fakes.serving import Fake
 
 FULL_ROLL = 10_000
 
 
-def truth(printer: LabelPrinter, line: Line) -> dict[str, Any]:
+def truth(printer: LabelPrinter) -> dict[str, Any]:
     """Return the real state of the printer, and the printed labels."""
     return {
         "labels": msgspec.to_builtins(list(printer.labels)),
@@ -30,8 +30,6 @@ def truth(printer: LabelPrinter, line: Line) -> dict[str, Any]:
         "paused": printer.paused,
         "head_open": printer.head_open,
         "ribbon_out": printer.ribbon_out,
-        "plugged": line.plugged,
-        "port": line.port,
         "received": list(printer.received),
     }
 
@@ -91,7 +89,7 @@ async def main(
     line = line_at(printer.feed, link, tcp)
     register_commands(fake, printer)
     fake.line(line, printer.drop_input, "data")
-    fake.truth(lambda: truth(printer, line))
+    fake.truth(lambda: truth(printer))
     fake.at_end(printer.close)
     await fake.run(port=line)
 

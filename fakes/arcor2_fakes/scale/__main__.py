@@ -11,11 +11,11 @@ from cyclopts.types import PositiveFloat
 from arcor2_fakes.control import one_of
 from arcor2_fakes.program import program
 from arcor2_fakes.scale.balance import UNITS, Balance
-from arcor2_fakes.serial_line import Line, line_at
+from arcor2_fakes.serial_line import line_at
 from arcor2_fakes.serving import Fake
 
 
-def truth(balance: Balance, line: Line) -> dict[str, Any]:
+def truth(balance: Balance) -> dict[str, Any]:
     """Return the real state; masses in kg."""
     return {
         "load": balance.load,
@@ -24,8 +24,6 @@ def truth(balance: Balance, line: Line) -> dict[str, Any]:
         "stable": balance.stable,
         "display": balance.display,
         "keys": balance.keys,
-        "plugged": line.plugged,
-        "port": line.port,
         "received": list(balance.received),
     }
 
@@ -75,7 +73,7 @@ async def main(
     line = line_at(balance.feed, link, tcp)
     register_commands(fake, balance)
     fake.line(line, balance.drop_input)
-    fake.truth(lambda: truth(balance, line))
+    fake.truth(lambda: truth(balance))
     fake.at_end(balance.cancel)
     await fake.run(port=line)
 

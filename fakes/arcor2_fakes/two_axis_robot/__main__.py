@@ -18,7 +18,7 @@ from arcor2_fakes.two_axis_robot.bus import Bus
 from arcor2_fakes.two_axis_robot.servo import TICKS, VELOCITY_UNIT, Servo
 
 
-def truth(bus: Bus, line: PtyLine) -> dict[str, Any]:
+def truth(bus: Bus) -> dict[str, Any]:
     """Return the true state, regardless of line faults; angles in rad from the middle."""
     found = {}
     for number, servo in bus.servos.items():
@@ -33,7 +33,7 @@ def truth(bus: Bus, line: PtyLine) -> dict[str, Any]:
             **{name: servo[name] for name in ("profile_velocity", "profile_acceleration", "current_limit")},
             "writes": servo.writes[-200:],
         }
-    return {"servos": found, "packets": bus.packets, "plugged": line.plugged, "port": line.port}
+    return {"servos": found, "packets": bus.packets}
 
 
 def motion(bus: Bus) -> dict[str, Any]:
@@ -103,7 +103,7 @@ async def main(
     line = PtyLine(bus.feed, link)
     register_commands(fake, bus)
     fake.line(line, bus.clear, checked=True)
-    fake.truth(lambda: truth(bus, line))
+    fake.truth(lambda: truth(bus))
     fake.channel.source("motion", lambda: motion(bus))
     own.run()
     await fake.run(port=line)
