@@ -98,7 +98,7 @@ class ImpatientErpBench(ErpServiceBench):
 
 def _turn(bench: type[Any], by: float = 0.1) -> Callable[[Generic], object]:
     """Return a motion of a robot by an angle, rad."""
-    return lambda robot: bench()._turn(robot, by)
+    return lambda robot: bench().turn(robot, by)
 
 
 def _take_control(device: Generic) -> None:
