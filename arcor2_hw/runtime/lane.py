@@ -97,7 +97,7 @@ class Job:
         clock = RunningTime()
         while not self.wait(LONGEST_STEP / 2.0):
             if clock() >= timeout:
-                return self.ended
+                return self.wait(0.0)
         return True
 
     def outcome(self) -> Any:

@@ -58,7 +58,8 @@ def tips_of(device: Device) -> list[Position]:
         assert isinstance(robot, Robot)
         return [robot.get_end_effector_pose(each).position for each in robot.get_end_effectors_ids()]
 
-    return device.watch_lane.read("get_end_effector_pose", read_tips, POSITION_TIMEOUT)
+    found: list[Position] = device.watch_lane.call("get_end_effector_pose", read_tips, deadline=POSITION_TIMEOUT)
+    return found
 
 
 def extrapolated(before: Position, now: Position, share: float) -> Position:
