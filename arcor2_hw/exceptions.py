@@ -215,7 +215,7 @@ class AddressChanged(InvalidData):
 
 
 class SeveralNodes(InvalidData):
-    """Objects of a scene name different nodes, on which it cannot run. The message names all objects and nodes."""
+    """Robots and grippers of a scene are on different computers. The message names all of them and the computers."""
 
     code = "several_nodes"
 

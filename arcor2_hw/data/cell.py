@@ -13,7 +13,7 @@ from arcor2_hw.data.nodes import NodeName
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.data.secret import is_reference
-from arcor2_hw.exceptions import InvalidData, NotFound, SeveralNodes
+from arcor2_hw.exceptions import InvalidData, NotFound
 
 MAX_SIZE: Final = 1 << 20
 """Maximum size, bytes; a cell of hundreds of devices has some ten thousand."""
@@ -33,7 +33,7 @@ class CellDevice(Data, frozen=True, forbid_unknown_fields=True):
     bench: for the conformance suite, `module:Class` of a bench with knowledge that the settings don't contain. wire:
     for the suite, the settings with host and port, or the port alone, of the connection that it may interrupt; a number
     is a fixed port of the device. real: whether it is a real device, which the suite uses only when asked; default:
-    whether it is on another machine. node: the computer (`arcor2-hw node`) on which the devices of its scene run.
+    whether it is on another machine. node: the computer (`arcor2-hw node`) on which it runs.
     """
 
     name: str
@@ -116,29 +116,17 @@ def overlay(cell: Cell, scene: Scene) -> list[SceneObjectOverride]:
     return found
 
 
-def node_of(cell: Cell | None, objects: Iterable[SceneObject]) -> str:
-    """Return the node on which these objects of a scene run; empty for this computer.
-
-    All objects of a scene run in one process, so one that names no node runs on the node of the others.
-
-    Raises:
-        SeveralNodes: The objects are on different nodes.
-    """
-    found = objects_by_node(cell, objects)
-    if len(found) > 1:
-        raise SeveralNodes(
-            "The devices of a scene must be on one node: {devices}.",
-            devices=", ".join(f"{name} ({node})" for node, names in found.items() for name in names),
-        )
-    return next(iter(found), "")
+def node_of(cell: Cell | None, scene_object: SceneObject) -> str:
+    """Return the node that an object names; empty for none. The cell file has precedence over the scene."""
+    own = "" if isinstance(scene_object.node, Unset) else scene_object.node
+    return assigned_nodes(cell).get(scene_object.name, own)
 
 
 def objects_by_node(cell: Cell | None, objects: Iterable[SceneObject]) -> dict[str, list[str]]:
-    """Return the names of the objects on each node. The cell file has precedence over the scene."""
-    given = assigned_nodes(cell)
+    """Return the names of the objects by the node that they name. The cell file has precedence over the scene."""
     found: dict[str, list[str]] = {}
     for each in objects:
-        if node := given.get(each.name, "" if isinstance(each.node, Unset) else each.node):
+        if node := node_of(cell, each):
             found.setdefault(node, []).append(each.name)
     return found
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 import msgspec
+from msgspec.structs import replace
 
 from arcor2_hw.actions.json_values import encode as encode_json
 from arcor2_hw.exceptions import Arcor2Error, Cancelled, message_of
@@ -32,6 +33,14 @@ def error_data(error: BaseException, object_id: str = "") -> m.ErrorData:
     code, detail = (error.code, error.detail) if isinstance(error, Arcor2Error) else ("error", "")
     fault = str(getattr(error, "fault_code", "") or getattr(error, "kind", ""))
     return m.ErrorData(code, type(error).__name__, message_of(error), detail, object_id, fault, time.monotonic())
+
+
+def described_error(error: BaseException, device: Device | None) -> m.ErrorData:
+    """Convert an error to the form that is sent to the server, with its device."""
+    data = error_data(error)
+    if device is None:
+        return data
+    return replace(data, object_id=device.id, object_name=device.name, object_type=device.recipe.cls.__name__)
 
 
 class Calls:
@@ -133,7 +142,7 @@ class Calls:
                         given = {name: msgspec.json.decode(value) for name, value in message.arguments.items()}
                         arm = {} if given.get("arm_id") is None else {"arm_id": given["arm_id"]}
                         self._teaching.set(device, arm, given.get("enabled") is True)
-                    self._post(m.CallDone(number, value))
+                    self._post(m.CallDone(number, value, time.monotonic()))
                     return
             self._post(m.CallFailed(number, error_data(describe(device, error), device.id)))
 

@@ -11,16 +11,18 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.device import Connection, Identity
 from arcor2_hw.data.object_type import ObjectModel
-from arcor2_hw.data.scene import Scene, SceneObjectOverride
+from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 from arcor2_hw.data.secret import ObjectSecrets
 from arcor2_hw.exceptions import Arcor2Error, NotConnected, NotFound, ProgramStopped, Refused
+from arcor2_hw.messages import Message
 from arcor2_hw.objects import Camera, Generic, Robot
 from arcor2_hw.runtime.creation import Recipe, load_type, recipe
 from arcor2_hw.runtime.device import CLOSE_DEADLINE, Device, describe, until
 from arcor2_hw.runtime.identification import Identification, Reported
 from arcor2_hw.runtime.lane import Job
-from arcor2_hw.runtime.messages import OpenScene
+from arcor2_hw.runtime.messages import OpenScene, RunPackage
 from arcor2_hw.runtime.methods import overrides
+from arcor2_hw.runtime.remote_objects import RemoteObjects
 from arcor2_hw.runtime.stopping import SentStop, send_stop
 from arcor2_hw.runtime.surroundings import SceneSurroundings
 from arcor2_hw.runtime.world_updates import WorldUpdates
@@ -49,6 +51,7 @@ def recipes(
     overridden: Iterable[SceneObjectOverride] = (),
     failed: Callable[[SceneFault], None] | None = None,
     secrets: Mapping[str, ObjectSecrets] = MappingProxyType({}),
+    remotes: RemoteObjects | None = None,
 ) -> list[Recipe]:
     """Return the recipes of all objects.
 
@@ -59,6 +62,7 @@ def recipes(
         overridden: Parameters that override those of the scene.
         failed: Called for each object without a recipe; the others are returned.
         secrets: Values of secret settings by object id.
+        remotes: The objects of other hosts; None without them.
 
     Raises:
         SceneFault: The first object without a recipe, unless `failed` is given.
@@ -73,8 +77,12 @@ def recipes(
                 raise NotFound(
                     "{name}: object type {type} is not available", name=scene_object.name, type=scene_object.type
                 )
+            model = models.get(scene_object.type)
+            if remotes is not None and remotes.computer(scene_object.id) is not None:
+                found.append(Recipe(scene_object, cls, (model,), {}, "", remotes))
+                continue
             own = secrets.get(scene_object.id, ObjectSecrets())
-            found.append(recipe(scene_object, cls, models.get(scene_object.type), overridden, own))
+            found.append(recipe(scene_object, cls, model, overridden, own))
         except Arcor2Error as error:
             fault = SceneFault(scene_object.id, error)
             if failed is None:
@@ -84,12 +92,16 @@ def recipes(
 
 
 def scene_recipes(
-    message: OpenScene, failed: Callable[[SceneFault], None] | None = None, only: str = ""
+    message: OpenScene,
+    remotes: RemoteObjects,
+    failed: Callable[[SceneFault], None] | None = None,
+    only: str = "",
 ) -> list[Recipe]:
     """Load the object types of a scene and return the recipes of its objects.
 
     Args:
         message: The scene, its types and their models.
+        remotes: The objects of other hosts.
         failed: Called for each object without a recipe; the others are returned.
         only: Id of the only object to prepare; empty for all.
 
@@ -98,7 +110,7 @@ def scene_recipes(
         NotFound: A type does not exist, unless `failed` or `only` is given.
         InvalidData: A type cannot be imported, unless `failed` or `only` is given.
     """
-    objects = [one for one in message.scene.objects if only in ("", one.id)]
+    objects = [one for one in own_objects(message, message.scene) if only in ("", one.id)]
     codes = {code.name: code for code in message.types}
     classes: dict[str, type[Generic]] = {}
     broken: dict[str, Arcor2Error] = {}
@@ -118,7 +130,12 @@ def scene_recipes(
                 raise fault
             failed(fault)
     rest = replace(message.scene, objects=[one for one in objects if one.type not in broken])
-    return recipes(rest, classes, message.models, message.overrides, failed, message.secrets)
+    return recipes(rest, classes, message.models, message.overrides, failed, message.secrets, remotes)
+
+
+def own_objects(message: OpenScene | RunPackage, scene: Scene) -> list[SceneObject]:
+    """Return the objects that a host creates: all in the main host, which has stubs of those of the others."""
+    return [one for one in scene.objects if message.main or one.id not in message.remote]
 
 
 def _import_numpy(classes: Iterable[type[Generic]]) -> None:
@@ -139,6 +156,8 @@ class Cell:
         self._absent: dict[str, Arcor2Error] = {}
         self._ended: SimpleQueue[Job | None] = SimpleQueue()
         self._abandoned = False
+        self.elsewhere: Mapping[str, Message] = {}
+        """The computers of objects that only the main host can call, by their names and ids."""
         self.assets: Mapping[str, str] = {}
         """Files of uploaded meshes and robot models by asset id."""
         self.updates = WorldUpdates()
@@ -170,6 +189,10 @@ class Cell:
         for device in self:
             if name in (device.name, device.id):
                 return device.require()
+        if (computer := self.elsewhere.get(name)) is not None:
+            raise Refused(
+                "{name} runs on another computer ({computer}). Run both on the same one.", name=name, computer=computer
+            )
         raise NotFound("the scene has no object {name}", name=name)
 
     def find_robot(self, name: str) -> Robot:
@@ -242,6 +265,8 @@ class Cell:
             self.find_robot,
             self._identification(how),
         )
+        if how.remotes is not None:
+            how.remotes.follow(device.id, lambda: self.changed(device))
         device.conditions_changed = lambda: self.conditions_changed(device)
         device.state_taken = lambda state: self.state_taken(device, state)
         self._devices[device.id] = device
@@ -254,7 +279,12 @@ class Cell:
         """
         object_id = how.scene_object.id
         identified = self.identified
-        if identified is None or not overrides(how.cls, "identify") or not how.cls.loss_ends_program:
+        if (
+            identified is None
+            or how.remotes is not None
+            or not overrides(how.cls, "identify")
+            or not how.cls.loss_ends_program
+        ):
             return None
         return Identification(
             how.scene_object.name,

@@ -262,18 +262,31 @@ def address_of(settings: Settings | None) -> str:
 
 
 # ------------------------------------------------------------------------------------------------ instances
+class Remotes(typing.Protocol):
+    """The objects of other hosts."""
+
+    def make(self, of: SceneObject, cls: type[Generic], model: ObjectModel | None) -> Generic:
+        """Return a stub of an object."""
+
+    def follow(self, object_id: str, changed: Callable[[], None]) -> None:
+        """Call a function when the state of an object has changed."""
+
+
 @dataclasses.dataclass(frozen=True, slots=True)
 class Recipe:
-    """Class and constructor arguments of one instance."""
+    """Class and constructor arguments of one instance. remotes: makes a stub, because another host has the object."""
 
     scene_object: SceneObject
     cls: type[Generic]
     arguments: tuple[Any, ...]
     keywords: Mapping[str, Any]
     address: str
+    remotes: Remotes | None = None
 
     def make(self) -> Generic:
-        """Call the constructor."""
+        """Call the constructor, or return a stub of an object of another host."""
+        if self.remotes is not None:
+            return self.remotes.make(self.scene_object, self.cls, *self.arguments)
         return self.cls(*self.arguments, **self.keywords)
 
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from arcor2_hw.actions import deadline_of
+from arcor2_hw.actions import deadline_of, metadata_of
 from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import (
     Arcor2Error,
@@ -29,6 +29,7 @@ from arcor2_hw.runtime.identification import Identification
 from arcor2_hw.runtime.lane import Job, Lane
 from arcor2_hw.runtime.methods import OBSERVING, STOP_RACE_TIME, overrides, stop_of
 from arcor2_hw.runtime.own_process.process import START_TIMEOUT, DeviceProcess
+from arcor2_hw.runtime.remote_objects import CONNECT_WITHIN
 from arcor2_hw.runtime.values import decode_arguments
 
 CONSTRUCTION_DEADLINE: Final = 10.0
@@ -103,7 +104,10 @@ class Device:
         """Start to create and connect the instance. Return the call and its deadline, s."""
         cls = self.recipe.cls
         deadline = connect_timeout(cls) + (1.0 if overrides(cls, "connect") else CONSTRUCTION_DEADLINE)
-        deadline += START_TIMEOUT if cls.own_process else 0.0
+        if self.remote:
+            deadline += CONNECT_WITHIN
+        elif cls.own_process:
+            deadline += START_TIMEOUT
         job = self._opening = Job("connect", self._open, notify=notify)
         self.lane.submit(job)
         self.begin_identify()
@@ -128,6 +132,11 @@ class Device:
         """Raise DifferentDevice or Refused unless the device may be commanded. Call it on the lane."""
         if self.identification is not None and self.instance is not None and not self.closing:
             self.identification.require_confirmed(self.instance)
+
+    @property
+    def remote(self) -> bool:
+        """Return whether another host has the object, so that the instance is a stub."""
+        return self.recipe.remotes is not None
 
     @property
     def busy_with(self) -> str:
@@ -164,7 +173,7 @@ class Device:
     def _make(self) -> Generic:
         """Create the instance, in a child process if its type requires one."""
         recipe = self.recipe
-        if not recipe.cls.own_process:
+        if self.remote or not recipe.cls.own_process:
             return recipe.make()
         self._process = DeviceProcess(recipe.cls, self.name, lambda: self._changed(self))
         return self._process.make(recipe.arguments, recipe.keywords)
@@ -297,9 +306,12 @@ class Device:
             return Job(method, getattr, (instance, method), notify=notify), deadline_of(static)
         bound = getattr(instance, method)
         keywords = decode_arguments(bound, arguments, self.name)
+        commands = metadata_of(bound) is not None or method == "take_control"
 
         def run() -> Any:
             with contextlib.nullcontext() if guard is None else guard(keywords):
+                if commands:
+                    self._require_confirmed()
                 if control:
                     self.require_not_lost(method)
                     self.take_control()

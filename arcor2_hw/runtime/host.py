@@ -15,21 +15,21 @@ import socket
 import sys
 import threading
 import types
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Final
+from typing import Final, TypeVar
 
 import msgspec
-from msgspec.structs import replace
 
+from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.held import HeldData
-from arcor2_hw.data.interlocks import InterlockState
+from arcor2_hw.data.interlocks import Interlock, InterlockState
 from arcor2_hw.data.position import MAIN_BRANCH, Frame
 from arcor2_hw.exceptions import Arcor2Error, Conflict, ProgramFinished, ProgramStopped
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
-from arcor2_hw.runtime.calls import Calls, error_data
+from arcor2_hw.runtime.calls import Calls, described_error, error_data
 from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.checkpoints_at_server import CheckpointsAtServer
 from arcor2_hw.runtime.clock import Clock
@@ -42,12 +42,15 @@ from arcor2_hw.runtime.link import Link
 from arcor2_hw.runtime.program import Program, set_current
 from arcor2_hw.runtime.record import RunRecord
 from arcor2_hw.runtime.recorder import Recorder
+from arcor2_hw.runtime.remote_objects import RemoteObjects
 from arcor2_hw.runtime.ring import Ring
 from arcor2_hw.runtime.script import execute, save_traceback, traceback_text
 from arcor2_hw.runtime.stopping import wait_stopped
 from arcor2_hw.runtime.streaming import RatedStreams, Streams
 from arcor2_hw.runtime.teaching import TEACHING_PERIOD, Teaching
 from arcor2_hw.runtime.watch import OBSERVE_PERIOD, Watch
+
+M = TypeVar("M", m.OpenScene, m.RunPackage)
 
 EXIT_TIMEOUT: Final = 1.8
 """Time from the end of the server to the exit of this process, even if a call hangs, s."""
@@ -110,7 +113,8 @@ class Host:
         self._shutting_down = threading.Event()
         self._saved = threading.Event()
         self._stop_requested = threading.Event()
-        self._scene = HostedScene(self._cell, self._watch, self.link)
+        self._remotes = RemoteObjects(self.link.post)
+        self._scene = HostedScene(self._cell, self._watch, self.link, self._remotes)
         self._package: m.RunPackage | None = None
         self._at_server = CheckpointsAtServer(self.link.post)
         self._wake, wake_up = socket.socketpair()
@@ -137,7 +141,10 @@ class Host:
         while True:
             match self._work.get():
                 case m.OpenScene() as message:
-                    if not self._open_scene(message):
+                    if not self._open_scene(self._scene.open, message, message.scene.interlocks):
+                        break
+                case m.RunPackage() as message if not message.main:
+                    if not self._open_scene(self._scene.serve, message):
                         break
                 case m.RunPackage() as message:
                     self._run_package(message)
@@ -153,14 +160,14 @@ class Host:
         self.link.close(FLUSH_TIMEOUT)
         return status
 
-    def _open_scene(self, message: m.OpenScene) -> bool:
-        """Open the scene. Return False if the host has to exit."""
+    def _open_scene(self, opened: Callable[[M], bool], message: M, interlocks: list[Interlock] | Unset = UNSET) -> bool:
+        """Open the scene, or the objects of a package for another host. Return False if the host has to exit."""
         try:
-            if not self._scene.open(message):
+            if not opened(message):
                 return False
         except ProgramStopped:
             return True
-        self._interlocks.configure(message.scene.interlocks)
+        self._interlocks.configure(interlocks)
         self.link.post(m.SceneOpened())
         self.clock.every(message.streaming_period if message.streaming_period > 0 else 0.1, self._stream_subscribed)
         return True
@@ -190,6 +197,7 @@ class Host:
             record=RunRecord.of(message, self.link.post, self._at_server),
             interlock_states=self._interlocks_changed,
             values=message.values,
+            remotes=self._remotes,
         )
         self._package, self._cell = message, program.cell
         self._cell.assets, self._cell.updates = message.assets, self._updates
@@ -232,7 +240,7 @@ class Host:
             m.ProgramChanged(
                 "stopped",
                 not failed and problem is None,
-                None if why is None else _described(why, program.source_of(why)),
+                None if why is None else described_error(why, program.source_of(why)),
             )
         )
 
@@ -286,6 +294,8 @@ class Host:
                     self._updates.put(body)
                 for object_id, calibration in message.calibrations.items():
                     self._updates.calibrate(object_id, calibration)
+                if message.main:
+                    self._remotes.expect(message.remote)
                 self._work.put(message)
             case m.AddBody():
                 self._updates.put(message.body)
@@ -298,6 +308,10 @@ class Host:
                 self._work.put(message)
             case m.Call():
                 self._calls.call(message)
+            case m.RemoteDone() | m.RemoteFailed():
+                self._remotes.answered(message)
+            case m.RemoteChanged():
+                self._remotes.changed(message)
             case m.StopMotion():
                 self._calls.stop_motion(message)
             case m.StopAll():
@@ -338,6 +352,8 @@ class Host:
                 threading.Thread(target=self._confirm_parts, args=(message,), name="confirm parts", daemon=True).start()
             case m.CheckpointAnswer():
                 self._at_server.answered(message)
+        if isinstance(message, m.StopMotion | m.StopAll | m.StopProgram):
+            self._remotes.stopped()
 
     def _device_changed(self, report: m.DeviceChanged) -> None:
         self.link.post(report)
@@ -351,7 +367,7 @@ class Host:
 
     def _held(self, held: HeldData, device: Device, error: BaseException) -> None:
         """Report that the program is held."""
-        self.link.post(m.ProgramHeld(held, _described(error, device)))
+        self.link.post(m.ProgramHeld(held, described_error(error, device)))
 
     def _confirm_identity(self, message: m.ConfirmIdentity) -> None:
         self._cell.identities = {**self._cell.identities, message.object_id: message.identity}
@@ -396,6 +412,7 @@ class Host:
         watchdog.daemon = True
         watchdog.start()
         self._shutting_down.set()
+        self._remotes.end()  # before the stops, which would wait for an answer
         interrupted = self._package is not None and not (self.program is not None and self.program.ended)
         if self.program is not None and self.program.record is not None:
             self.program.record.interrupt()
@@ -446,14 +463,6 @@ class Host:
         program = self.program
         if program is not None and program.stop_requested and not program.inside and not program.ended:
             raise ProgramStopped
-
-
-def _described(error: BaseException, device: Device | None) -> m.ErrorData:
-    """Return an error with its device."""
-    data = error_data(error)
-    if device is None:
-        return data
-    return replace(data, object_id=device.id, object_name=device.name, object_type=device.recipe.cls.__name__)
 
 
 _MAIN: Final = threading.main_thread().ident or 0

@@ -2,20 +2,24 @@
 
 import contextlib
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 
 from msgspec.structs import replace
 
 from arcor2_hw.data.device import Connection, Identity
+from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, ProgramStopped, Refused
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.calls import error_data
-from arcor2_hw.runtime.cell import Cell, SceneFault, scene_recipes
+from arcor2_hw.runtime.cell import Cell, SceneFault, own_objects, scene_recipes
 from arcor2_hw.runtime.creation import write_sources
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.identification import Reported
 from arcor2_hw.runtime.link import Link
 from arcor2_hw.runtime.methods import overrides
+from arcor2_hw.runtime.package import PackageData, package_recipes
+from arcor2_hw.runtime.remote_objects import RemoteObjects
 from arcor2_hw.runtime.script import traceback_text
 from arcor2_hw.runtime.watch import Watch
 
@@ -27,10 +31,12 @@ class HostedScene:
         cell: The devices; none before the scene is opened.
         watch: Reports the connection of each device.
         link: The connection to the server.
+        remotes: The objects of other hosts.
     """
 
-    def __init__(self, cell: Cell, watch: Watch, link: Link) -> None:
+    def __init__(self, cell: Cell, watch: Watch, link: Link, remotes: RemoteObjects) -> None:
         self._cell = cell
+        self._remotes = remotes
         self._watch = watch
         self._link = link
         self._connecting = threading.Lock()
@@ -42,14 +48,41 @@ class HostedScene:
         Raises:
             ProgramStopped: The scene was closed, or the server ended, while the objects were connecting.
         """
-        fault: SceneFault | None = None
         self._opening = message
-        self._cell.assets = message.assets
-        recognise(self._cell, message.identities, self._link)
         failed = self._skip if message.keep_going else None
-        try:
+
+        def create() -> None:
             write_sources(message.types)
-            self._cell.open(scene_recipes(message, failed), failed)
+            self._cell.open(scene_recipes(message, self._remotes, failed), failed)
+
+        return self._open(message, message.scene, create)
+
+    def serve(self, message: m.RunPackage) -> bool:
+        """Open the objects of a package that are in this host, for the program in the main host. Else like `open`."""
+        directory = Path(message.directory)
+        try:
+            data = PackageData(directory, message.values)
+        except Arcor2Error as error:
+            self._link.post(m.SceneFailed(error_data(error)))
+            return False
+
+        def create() -> None:
+            own = own_objects(message, data.scene)
+            self._cell.open(package_recipes(directory, data, message.cell, message.secrets, own, None))
+            self._cell.require_confirmed()
+
+        return self._open(message, data.scene, create)
+
+    def _open(self, message: m.OpenScene | m.RunPackage, scene: Scene, create: Callable[[], None]) -> bool:
+        fault: SceneFault | None = None
+        self._cell.assets = message.assets
+        if not message.main:
+            names = {one.id: one.name for one in scene.objects}
+            places = message.remote.items()
+            self._cell.elsewhere = {key: place for each, place in places for key in (each, names.get(each, each))}
+        recognise(self._cell, message.identities, self._link)
+        try:
+            create()
         except SceneFault as caught:
             fault = caught
         except Arcor2Error as error:
@@ -90,6 +123,7 @@ class HostedScene:
     def _add(self, message: m.AddObject) -> None:
         (added,) = message.opening.scene.objects
         with self._answering(message.id, added.id), self._connecting:
+            self._remotes.expect(message.opening.remote)
             self._extend(message.opening)
             self._connect(added.id)
 
@@ -108,7 +142,7 @@ class HostedScene:
         assert self._opening is not None
         self._watch.report(object_id, Connection.CONNECTING)
         try:
-            (recipe,) = scene_recipes(self._opening, only=object_id)
+            (recipe,) = scene_recipes(self._opening, self._remotes, only=object_id)
             self._cell.retry(recipe)
         except SceneFault as fault:
             self._skip(fault)
@@ -135,6 +169,7 @@ class HostedScene:
             models=scene.models | opening.models,
             overrides=[*scene.overrides, *(each for each in opening.overrides if each.id in added)],
             secrets=scene.secrets | opening.secrets,
+            remote=scene.remote | opening.remote,
         )
         recognise(self._cell, {**self._cell.identities, **opening.identities}, self._link)
 

@@ -447,7 +447,11 @@ class Interlocks:
 
     # -------------------------------------------------------------------------------- states
     def publish(self) -> None:
-        """Publish the states of the interlocks if they have changed."""
+        """Publish the states of the interlocks if they have changed, and stop what must not run in these states.
+
+        A device that does not answer keeps the thread that reads it, which would stop this otherwise.
+        """
+        self._check_guards()
         with self._lock:
             states = [self._state(one) for one in self._interlocks.values()]
             if states == self._posted:

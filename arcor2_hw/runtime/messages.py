@@ -33,6 +33,9 @@ from arcor2_hw.runtime.messages_to_host import (
     Lease as Lease,
     OpenScene as OpenScene,
     Pause as Pause,
+    RemoteChanged as RemoteChanged,
+    RemoteDone as RemoteDone,
+    RemoteFailed as RemoteFailed,
     RemoveBodies as RemoveBodies,
     RenewForces as RenewForces,
     Resume as Resume,
@@ -69,6 +72,8 @@ from arcor2_hw.runtime.messages_to_server import (
     ProgramHeld as ProgramHeld,
     ReadCheckpoint as ReadCheckpoint,
     Ready as Ready,
+    RemoteCall as RemoteCall,
+    RemoteKind as RemoteKind,
     SceneClosed as SceneClosed,
     SceneFailed as SceneFailed,
     SceneOpened as SceneOpened,
@@ -94,6 +99,9 @@ HostBound = (
     | RemoveBodies
     | Calibrate
     | Call
+    | RemoteDone
+    | RemoteFailed
+    | RemoteChanged
     | StopMotion
     | StopAll
     | Subscribe
@@ -123,6 +131,7 @@ ServerBound = (
     | SceneClosed
     | CallDone
     | CallFailed
+    | RemoteCall
     | StreamEvent
     | HoldEnded
     | ForceEnded

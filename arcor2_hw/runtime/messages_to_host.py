@@ -5,7 +5,7 @@ from typing import Literal
 from msgspec import Struct, field
 
 from arcor2_hw.data.cell import Cell
-from arcor2_hw.data.device import Identity
+from arcor2_hw.data.device import Connection, Health, Identity
 from arcor2_hw.data.held import HoldChoice
 from arcor2_hw.data.interlocks import Interlock
 from arcor2_hw.data.object_type import ObjectModel
@@ -17,7 +17,7 @@ from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.data.scene import Scene, SceneObjectOverride
 from arcor2_hw.data.secret import ObjectSecrets
 from arcor2_hw.messages import Message
-from arcor2_hw.runtime.message_parts import AddedBody, TypeCode
+from arcor2_hw.runtime.message_parts import AddedBody, ErrorData, TypeCode
 
 
 class ToHost(Struct, frozen=True, tag=True):
@@ -30,7 +30,8 @@ class OpenScene(ToHost, frozen=True):
     keep_going: whether the scene opens without objects that cannot be created or connected; DeviceChanged reports them.
     assets: files of uploaded meshes and robot models, by id. bodies: obstacles that are not objects of the scene.
     calibrations: kinematics read from robot controllers, by object id. secrets: secret settings, by object id.
-    identities: the confirmed identities, by object id; another device is not commanded.
+    identities: the confirmed identities, by object id; another device is not commanded. remote: the computers of the
+    objects that another host has, by object id. main: whether this host calls the objects of the others.
     """
 
     scene: Scene
@@ -45,6 +46,8 @@ class OpenScene(ToHost, frozen=True):
     calibrations: dict[str, KinematicCalibration] = field(default_factory=dict)
     secrets: dict[str, ObjectSecrets] = field(default_factory=dict)
     identities: dict[str, Identity] = field(default_factory=dict)
+    remote: dict[str, Message] = field(default_factory=dict)
+    main: bool = True
 
 
 class RetryObject(ToHost, frozen=True):
@@ -64,6 +67,8 @@ class AddObject(ToHost, frozen=True):
 class RunPackage(ToHost, frozen=True):
     """Run script.py of a package directory. ProgramChanged and ProgramEvent report its progress.
 
+    A host that is not `main` opens the objects of the package for the main host instead, and answers as to OpenScene.
+
     cell: settings of devices in this cell, which override those of the package. breakpoints: ids of action points and
     actions, all of which must exist. shared_breakpoints: further ids; those that the project lacks are ignored. assets,
     bodies, calibrations, secrets, identities: as in OpenScene. hold_on_error: whether a failed action holds the
@@ -73,7 +78,8 @@ class RunPackage(ToHost, frozen=True):
     values of constants and variables of the project by their ids, JSON in a string, which replace those of the package.
     recordings: directory in which the host stores the recording of a run that the end of the server interrupts; empty
     to store nothing. records_at_server: whether the host reads and stores checkpoints by messages, because it runs on
-    another computer; `records` is empty then.
+    another computer; `records` is empty then. remote, main:
+    as in OpenScene.
     """
 
     package_id: str
@@ -96,6 +102,8 @@ class RunPackage(ToHost, frozen=True):
     values: dict[str, str] = field(default_factory=dict)
     identities: dict[str, Identity] = field(default_factory=dict)
     recordings: str = ""
+    remote: dict[str, Message] = field(default_factory=dict)
+    main: bool = True
     records_at_server: bool = False
 
 
@@ -132,6 +140,32 @@ class Call(ToHost, frozen=True):
     control: bool = False
     cancel: bool = False
     deadline: float | None = None
+
+
+class RemoteDone(ToHost, frozen=True):
+    """A RemoteCall returned. `value`: the result as JSON, empty for None. stamp: as in CallDone."""
+
+    id: int
+    value: bytes = b""
+    stamp: float = 0.0
+
+
+class RemoteFailed(ToHost, frozen=True):
+    """A RemoteCall failed."""
+
+    id: int
+    error: ErrorData
+
+
+class RemoteChanged(ToHost, frozen=True):
+    """The state of an object of another host has changed. The fields are those of DeviceChanged."""
+
+    object_id: str
+    connection: Connection
+    health: Health
+    reason: Message | None = None
+    in_the_way: bool = True
+    values: dict[str, float] = field(default_factory=dict)
 
 
 class StopMotion(ToHost, frozen=True):

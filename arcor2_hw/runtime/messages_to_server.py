@@ -1,5 +1,7 @@
 """Messages from the cell host to the server."""
 
+from enum import StrEnum, auto
+
 from msgspec import Struct, field
 
 from arcor2_hw.data.device import Alarm, Connection, Health, Identity
@@ -9,6 +11,16 @@ from arcor2_hw.data.parts import PartBooks
 from arcor2_hw.data.position import MAIN_BRANCH, Frame
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime.message_parts import ErrorData, HeldPart
+
+
+class RemoteKind(StrEnum):
+    """What a RemoteCall does."""
+
+    CALL = auto()
+    CANCEL = auto()
+    """Call the method that cancels `method`, without waiting for the running call."""
+    STOP = auto()
+    """Stop the object without waiting for its running call."""
 
 
 class ToServer(Struct, frozen=True, tag=True):
@@ -42,10 +54,11 @@ class SceneClosed(ToServer, frozen=True):
 
 
 class CallDone(ToServer, frozen=True):
-    """The method returned. `value`: the result as JSON, empty for None."""
+    """The method returned. `value`: the result as JSON, empty for None. stamp: when, on the host's own clock, s."""
 
     id: int
     value: bytes = b""
+    stamp: float = 0.0
 
 
 class CallFailed(ToServer, frozen=True):
@@ -53,6 +66,22 @@ class CallFailed(ToServer, frozen=True):
 
     id: int
     error: ErrorData
+
+
+class RemoteCall(ToServer, frozen=True):
+    """Call a method of an object of another host. Answer: RemoteDone or RemoteFailed with this id.
+
+    stops: number of stops that the sender has received. A call is not executed if its device was stopped after it.
+    deadline: s; None for the deadline of the method.
+    """
+
+    id: int
+    object_id: str
+    method: str
+    arguments: dict[str, bytes] = field(default_factory=dict)
+    kind: RemoteKind = RemoteKind.CALL
+    deadline: float | None = None
+    stops: int = 0
 
 
 class StreamEvent(ToServer, frozen=True):

@@ -43,6 +43,11 @@ def overrides(cls: type[Generic], name: str) -> bool:
     return getattr(cls, name, None) is not getattr(Generic, name)
 
 
+def stop_name(cls: type[Generic]) -> str:
+    """Return the name of the method that stops the devices of a type."""
+    return "halt" if issubclass(cls, Axis) else "stop"
+
+
 def stop_of(instance: Generic | None) -> Callable[[], Any] | None:
     """Return the method that stops a device, or None if it has none."""
     if isinstance(instance, Axis):

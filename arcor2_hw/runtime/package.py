@@ -8,17 +8,22 @@ from types import MappingProxyType
 from typing import Any, TypeVar
 
 import msgspec
+from msgspec.structs import replace
 
+from arcor2_hw.data.cell import Cell as CellFile, overlay
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Box, Cylinder, Mesh, Models, ObjectModel, Sphere
 from arcor2_hw.data.package import CollisionModels
 from arcor2_hw.data.project import ActionPoint, BareActionPoint, Project, ProjectRobotJoints
 from arcor2_hw.data.project_index import ProjectIndex, global_pose
-from arcor2_hw.data.scene import Scene
-from arcor2_hw.runtime.creation import prepare_for_sources
+from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_hw.data.secret import ObjectSecrets
+from arcor2_hw.runtime.cell import recipes
+from arcor2_hw.runtime.creation import Recipe, find_type, prepare_for_sources
 from arcor2_hw.runtime.documents import read_document
 from arcor2_hw.runtime.program import ACTION_POINT_ATTRIBUTE
 from arcor2_hw.runtime.program_values import with_values
+from arcor2_hw.runtime.remote_objects import RemoteObjects
 
 T = TypeVar("T")
 
@@ -103,3 +108,34 @@ def put_on_path(directory: Path) -> None:
     if path in sys.path:
         sys.path.remove(path)
     sys.path.insert(0, path)
+
+
+def package_recipes(
+    directory: Path,
+    data: PackageData,
+    cell_file: CellFile | None,
+    secrets: Mapping[str, ObjectSecrets],
+    objects: list[SceneObject],
+    remotes: RemoteObjects | None,
+) -> list[Recipe]:
+    """Load the object types of a package and return the recipes of objects of its scene.
+
+    Args:
+        directory: The package.
+        data: Its documents.
+        cell_file: Settings of devices in this cell.
+        secrets: Values of secret settings by object id.
+        objects: The objects.
+        remotes: The objects of other hosts; None without them.
+
+    Raises:
+        SceneFault: The first object without a recipe.
+        NotFound: A type does not exist.
+        InvalidData: A type cannot be imported, or an object has another type in the cell file.
+    """
+    put_on_path(directory)
+    classes = {name: find_type(name) for name in dict.fromkeys(each.type for each in objects)}
+    local = [] if cell_file is None else overlay(cell_file, data.scene)
+    overridden = [*data.project.object_overrides, *local]
+    scene = replace(data.scene, objects=objects)
+    return recipes(scene, classes, data.models, overridden, secrets=secrets, remotes=remotes)

@@ -43,6 +43,7 @@ from arcor2_hw.runtime.interlocks import Interlocks
 from arcor2_hw.runtime.pacing import Gate
 from arcor2_hw.runtime.record import RunRecord
 from arcor2_hw.runtime.recovery import ActionCall, Decision, Post, Recovery, mark_decided
+from arcor2_hw.runtime.remote_objects import RemoteObjects
 from arcor2_hw.runtime.stopping import SentStop, wait_stopped
 from arcor2_hw.runtime.values import encode_shown, results
 
@@ -87,6 +88,7 @@ class Program:
         record: RunRecord | None = None,
         interlock_states: Callable[[list[InterlockState]], None] = lambda _: None,
         values: Mapping[str, str] = MappingProxyType({}),
+        remotes: RemoteObjects | None = None,
     ) -> None:
         self.channel = channel
         self.record = record
@@ -97,6 +99,7 @@ class Program:
         """Values of the secret settings by object id."""
         self.values = values
         """Values of constants and variables by id, JSON in a string, which replace those of the package."""
+        self.remotes = remotes
         self.package_id = package_id
         self.cell = Cell()
         self.interlocks = Interlocks(lambda: self.cell, interlock_states)

@@ -6,17 +6,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast, overload
 
-from arcor2_hw.data.cell import overlay
 from arcor2_hw.data.events import PackageInfoData
 from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.project import ActionPoint, Project, ProjectRobotJoints
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, ProgramFinished, ProgramStopped
 from arcor2_hw.objects import Generic
-from arcor2_hw.runtime.cell import SceneFault, recipes
-from arcor2_hw.runtime.creation import find_type, prepare_for_sources
+from arcor2_hw.runtime.cell import SceneFault
+from arcor2_hw.runtime.creation import prepare_for_sources
 from arcor2_hw.runtime.functions import F, function_of
-from arcor2_hw.runtime.package import PackageData, WorldPoints, package_name, put_on_path
+from arcor2_hw.runtime.package import PackageData, WorldPoints, package_name, package_recipes
 from arcor2_hw.runtime.parallel import run_parallel
 from arcor2_hw.runtime.program import ActionError, Program, current
 from arcor2_hw.runtime.proxy import proxy
@@ -162,14 +161,14 @@ class Resources:
         return self
 
     def _open(self) -> None:
-        put_on_path(self._directory)
         program, data = self._program, self._data
         program.check()
-        classes = {name: find_type(name) for name in {o.type for o in data.scene.objects}}
         try:
-            local = [] if program.cell_file is None else overlay(program.cell_file, data.scene)
-            overridden = [*data.project.object_overrides, *local]
-            program.cell.open(recipes(data.scene, classes, data.models, overridden, secrets=program.secrets))
+            program.cell.open(
+                package_recipes(
+                    self._directory, data, program.cell_file, program.secrets, data.scene.objects, program.remotes
+                )
+            )
             program.interlocks.configure(data.scene.interlocks)
             program.check()
             program.cell.require_confirmed()

@@ -72,6 +72,42 @@ def return_hint(bound: types.MethodType) -> Any:
     return _inherited(cls, bound.__name__).get("return")
 
 
+def decode_result(cls: type, name: str, raw: bytes, whose: str) -> Any:
+    """Decode the result of a method or property from JSON by its type hint.
+
+    Args:
+        cls: The object type.
+        name: Name of the method or property.
+        raw: The result; not empty.
+        whose: Name of the device, for messages.
+
+    Raises:
+        InvalidData: The result is of another type, or it has no type hint and is more than a number, a text or a list.
+    """
+    hint = _result_hint(cls, name)
+    try:
+        value = _decode(raw, Any if hint is None else hint)
+    except (InvalidData, UnicodeDecodeError) as error:
+        raise InvalidData(
+            "{whose}: the result of {function}: {reason}", whose=whose, function=name, reason=error
+        ) from error
+    if hint is None and isinstance(value, dict):
+        raise InvalidData(
+            "{whose}: the result of {function} has no type hint, so it cannot be passed to another computer",
+            whose=whose,
+            function=name,
+        )
+    return value
+
+
+@functools.cache
+def _result_hint(cls: type, name: str) -> Any:
+    member = inspect.getattr_static(cls, name)
+    if isinstance(member, property) and member.fget is not None:
+        return _signature(member.fget)[1].get("return")
+    return _inherited(cls, name).get("return")
+
+
 def _decode(raw: bytes, hint: Any) -> Any:
     name = hint if isinstance(hint, str) else getattr(hint, "__name__", "")
     module = "" if isinstance(hint, str) else getattr(hint, "__module__", "")

@@ -63,9 +63,9 @@ class Watch:
                 self._start(device)
 
     def _start(self, device: Device) -> None:
-        """Start the check of a device, unless one is in progress."""
+        """Start the check of a device, unless one is in progress or its own host checks it."""
         before = self._pending.get(device.id)
-        if device.instance is None or device.closing or (before is not None and not before.ended):
+        if device.remote or device.instance is None or device.closing or (before is not None and not before.ended):
             return
         job = Job("watch", self._observe, (device, device.instance))
         self._pending[device.id] = job

@@ -9,12 +9,16 @@ from playwright.async_api import Browser, expect
 
 from arcor2_hw.client.errors import RequestFailed
 from arcor2_hw.data import rpc
+from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.parameter import Parameter
 from tests.e2e.harness import Cell
 from tests.editor import texts
 from tests.editor.screen import screen_of
 from tests.server.nodes.conftest import Broker, Node
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
+
+ROBOT = [Parameter("host", "string", '"127.0.0.1"')]
 
 
 @pytest.fixture
@@ -59,14 +63,22 @@ async def test_a_device_is_set_on_a_node_that_is_lost(node: Node, served: Cell, 
         await expect(row).to_contain_text("Devices of this scene: clock")
         await expect(row.locator(".tag")).to_have_text("connected")
 
-        await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs("second", "TimeActions"))
-        while (second := (await client.next_event("SceneObjectChanged")).data).name != "second":
-            continue
-        await client.call("SetObjectNode", rpc.SetObjectNodeArgs(second.id, "oven"))
-        with pytest.raises(RequestFailed, match=r"on one node: clock \(press\), second \(oven\)") as refused:
-            await client.call("StartScene")
+        for name, where in (("left", "press"), ("right", "")):
+            await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs(name, "UR5e", Pose(), ROBOT))
+            while (robot := (await client.next_event("SceneObjectChanged")).data).name != name:
+                continue
+            await client.call("SetObjectNode", rpc.SetObjectNodeArgs(robot.id, where))
+        apart = r"left \(node press\), right \(the computer of the server\)"
+        with pytest.raises(RequestFailed, match=apart) as refused:
+            await client.call("StartScene", dry_run=True)
         assert refused.value.reason == "several_nodes"
-        await client.call("Undo")
+        await tools.get_by_role("button", name=texts.OBJECTS, exact=True).click()
+        await page.get_by_role("treegrid", name="Without a pose").get_by_role("row").filter(has_text="clock").click()
+        await expect(page.get_by_text("left (press), right (computer of the server)")).to_be_visible()
+        await screen.picture("robots-apart")
+        for _ in range(2):
+            await client.call("Undo")
+        await tools.get_by_role("button", name=texts.DEVICES, exact=True).click()
 
         node.end()
         await expect(row.locator(".tag")).to_have_text("not connected")

@@ -148,7 +148,9 @@ class Server:
         shared = SharedData(storage)
         type_notifications = self.type_notifications = closed(TypeNotifications(types, hub))
         compute = self.compute = closed(Compute(settings.compute_idle))
-        hosts = self.hosts = CellHosts(settings.device_files_dirs, settings.cell, settings.broker_credentials)
+        hosts = self.hosts = CellHosts(
+            settings.device_files_dirs, settings.cell, settings.broker_credentials, types.derives_from
+        )
         scene_host = self.scene_host = HostSession(hub, hosts, "scene")
         program_host = self.program_host = HostSession(hub, hosts, "program", to_all_clients=True)
 

@@ -17,7 +17,7 @@ from arcor2_hw.messages import Message, translatable
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
 from arcor2_server.execution.runs import Runs
-from arcor2_server.hosts.process import CellHost
+from arcor2_server.hosts.group import HostGroup
 
 log = structlog.get_logger(__name__)
 
@@ -109,7 +109,7 @@ class ProgramHold:
             choices=choices,
         )
 
-    async def decide(self, host: CellHost | None, args: DecideHeldArgs, by: str) -> None:
+    async def decide(self, host: HostGroup | None, args: DecideHeldArgs, by: str) -> None:
         """Continue the held program. The first decision counts.
 
         Raises:

@@ -19,7 +19,7 @@ from arcor2_hw.runtime.checkpoints import CheckpointFile, stored_scenes
 from arcor2_hw.runtime.ledger import Ledger
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
-from arcor2_server.hosts.process import CellHost
+from arcor2_server.hosts.group import HostGroup
 
 log = structlog.get_logger(__name__)
 
@@ -143,7 +143,7 @@ class AllPartBooks:
             if books is not None and (books.places or not isinstance(books.run, Unset))
         ]
 
-    async def confirm(self, host: CellHost | None, args: ConfirmPartsArgs, by: str) -> None:
+    async def confirm(self, host: HostGroup | None, args: ConfirmPartsArgs, by: str) -> None:
         """Record where a person has found parts. Nothing moves.
 
         Args:

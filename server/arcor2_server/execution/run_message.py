@@ -55,9 +55,9 @@ class RunMessages:
             recordings=str(self._settings.recordings_dir.resolve()),
         )
 
-    async def objects(self, message: m.RunPackage) -> list[SceneObject]:
+    async def objects(self, directory: Path) -> list[SceneObject]:
         """Return the objects of a package; none if it is damaged, which its host reports."""
-        file = Path(message.directory) / "data" / "scene.json"
+        file = directory / "data" / "scene.json"
         try:
             return (await asyncio.to_thread(read_document, file, Scene)).objects
         except InvalidPackage:

@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable
 from arcor2_hw.data.held import HoldDecidedData
 from arcor2_hw.runtime import messages as m
 from arcor2_server.execution.runs import How
-from arcor2_server.hosts.process import CellHost
+from arcor2_server.hosts.group import HostGroup
 
 
 class RunObservers:
@@ -14,7 +14,7 @@ class RunObservers:
     def __init__(self) -> None:
         self.on_error: list[Callable[[m.ErrorData, int, str], None]] = []
         """Called with the error that ends or holds a program, before its devices are gone, the run, and the action."""
-        self.on_failed: list[Callable[[int, m.ErrorData | None, CellHost | None], None]] = []
+        self.on_failed: list[Callable[[int, m.ErrorData | None, HostGroup | None], None]] = []
         """Called with each run that has failed or was interrupted, the reason, and its host, which ends."""
         self.on_decided: list[Callable[[HoldDecidedData], None]] = []
         """Called with each decision about a held program."""

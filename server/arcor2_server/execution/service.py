@@ -35,7 +35,9 @@ from arcor2_server.execution.run_observers import RunObservers
 from arcor2_server.execution.run_statistics import verdicts_of
 from arcor2_server.execution.runs import How, Runs
 from arcor2_server.hosts.devices import DeviceBoard, overlay_for
-from arcor2_server.hosts.process import CellHost, json_of
+from arcor2_server.hosts.group import HostGroup
+from arcor2_server.hosts.placement import Placement
+from arcor2_server.hosts.process import json_of
 from arcor2_server.hosts.session import HostSession, decoded_info
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.online_scene import OnlineScene
@@ -194,6 +196,7 @@ class Execution(PackageLibrary, RunObservers):
         requested_at = time.monotonic()
         directory = await asyncio.to_thread(self.packages.directory, package_id)
         project_id = await asyncio.to_thread(self.packages.project_id, package_id) if how.shared_breakpoints else ""
+        placement = self._host.place(await self._messages.objects(directory))
         scene_id = await self.parts.require_confirmed(directory)
         if how.continues:
             if how.on_error is not OnError.HOLD:
@@ -210,13 +213,12 @@ class Execution(PackageLibrary, RunObservers):
         self._host.package_info = None
         self.board.clear()
         self._enter(S.STARTED)
-        message = self._messages.prepare(package_id, directory, how)
         program.begin(how, temporary=temporary)
-        message = replace(message, run=program.number)
+        message = replace(self._messages.prepare(package_id, directory, how), run=program.number)
         self.parts.begin_run(scene_id)
         for begin in self.on_begin:
             begin(program.number, package_id, scene_id, how)
-        self._background.spawn(self._begin(message), "program start")
+        self._background.spawn(self._begin(message, placement), "program start")
         self._background.spawn(program.describe(self.packages), "description of the run")
 
     def reserve(self) -> None:
@@ -237,9 +239,9 @@ class Execution(PackageLibrary, RunObservers):
         if self._online.state.value != "stopped":
             raise RequestRefused("The scene is online and uses the devices. Stop the scene first.")
 
-    async def _begin(self, message: m.RunPackage) -> None:
+    async def _begin(self, message: m.RunPackage, placement: Placement) -> None:
         try:
-            host = await self._host.take(await self._messages.objects(message))
+            host = await self._host.take(placement)
             message = await self._messages.complete(message, self.program.shared_of)
         except Arcor2Error as error:
             self._fail(error.message, type(error).__name__)
@@ -268,7 +270,7 @@ class Execution(PackageLibrary, RunObservers):
         if self._host.host is not None:
             self._killing = asyncio.get_running_loop().call_later(self.stop_within, self._kill, self._host.host)
 
-    def begin_stop_all(self, by: str) -> CellHost | None:
+    def begin_stop_all(self, by: str) -> HostGroup | None:
         """Start stopping the program in any state; return its host, None if there is no host."""
         if self.state in RUN_STATES | {S.STARTED}:
             self._stop(by)
@@ -346,13 +348,13 @@ class Execution(PackageLibrary, RunObservers):
         if self.program.shared_of == project_id and self.state not in _IDLE:
             self._host.send(m.SetBreakpoints(sorted(ids)))
 
-    def _require(self, states: "set[PackageStateEnum] | frozenset[PackageStateEnum]", what: str) -> CellHost:
+    def _require(self, states: "set[PackageStateEnum] | frozenset[PackageStateEnum]", what: str) -> HostGroup:
         host = self._host.host
         if self.state not in states or host is None:
             raise RequestRefused("The package is {value} and cannot be {what}.", value=self.state.value, what=what)
         return host
 
-    def _kill(self, host: CellHost) -> None:
+    def _kill(self, host: HostGroup) -> None:
         log.warning("program killed because it did not stop", package=self.program.package_id, within=self.stop_within)
         host.kill()
 
@@ -370,7 +372,7 @@ class Execution(PackageLibrary, RunObservers):
         await self._background.cancel()
 
     # -------------------------------------------------------------------------------- from the host
-    def _handle(self, host: CellHost, message: m.ServerBound) -> None:
+    def _handle(self, host: HostGroup, message: m.ServerBound) -> None:
         match message:
             case m.ProgramEvent():
                 self.program.handle_event(message)
@@ -445,7 +447,7 @@ class Execution(PackageLibrary, RunObservers):
         self.program.handle_held(self.hold.seconds)
         self._state_changed()
 
-    def _program_changed(self, host: CellHost, message: m.ProgramChanged) -> None:
+    def _program_changed(self, host: HostGroup, message: m.ProgramChanged) -> None:
         if message.state == "stopped":
             self.program.handle_end(message.error)
             if message.error is not None and self.program.stopped_by is None and not self.hold.ended_program:

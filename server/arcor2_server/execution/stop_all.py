@@ -12,7 +12,7 @@ from arcor2_hw.messages import Message
 from arcor2_hw.runtime.messages import DeviceStop
 from arcor2_server.documents import Session
 from arcor2_server.execution.service import Execution
-from arcor2_server.hosts.process import CellHost
+from arcor2_server.hosts.group import HostGroup
 from arcor2_server.online.actions import RunningAction
 from arcor2_server.online.online_scene import OnlineScene
 
@@ -24,7 +24,7 @@ log = structlog.get_logger(__name__)
 SILENT: Final = Message.of("the cell host that controls the devices does not answer; go offline to end it")
 
 
-async def _stop(host: CellHost, board: "DeviceBoard") -> tuple[Message | None, list[DeviceStop]]:
+async def _stop(host: HostGroup, board: "DeviceBoard") -> tuple[Message | None, list[DeviceStop]]:
     """Stop everything in a host; return the reason for a failure, None on success, and the outcome per device."""
     try:
         return None, await host.stop_all()
@@ -70,14 +70,14 @@ class StopAll:
         log.warning("stop all", by=by, stopped=len(outcomes) - len(missed), not_stopped=missed)
         return StopAllData(outcomes)
 
-    async def _program(self, host: CellHost | None) -> list[StopOutcome]:
+    async def _program(self, host: HostGroup | None) -> list[StopOutcome]:
         execution = self._execution
         package, board = execution.program.package_id, execution.board
         names = {status.id: status.name for status in board.statuses()}
         reason, devices = (None, []) if host is None else await _stop(host, board)
         return [_outcome(StopKind.PROGRAM, package, package, reason), *_of_devices(devices, names)]
 
-    async def _scene(self, host: CellHost, running: RunningAction | None) -> list[StopOutcome]:
+    async def _scene(self, host: HostGroup, running: RunningAction | None) -> list[StopOutcome]:
         cell = self._online
         names = {status.id: status.name for status in cell.board.statuses()}
         reason, devices = await _stop(host, cell.board)

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
@@ -13,7 +13,10 @@ import structlog
 from arcor2_hw.data.cell import BROKER_CREDENTIALS, BROKER_URL, Cell, node_of
 from arcor2_hw.data.device import DEVICE_FILES
 from arcor2_hw.data.scene import SceneObject
-from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, NotFound
+from arcor2_hw.messages import Message
+from arcor2_server.hosts.group import GroupUser, HostGroup
+from arcor2_server.hosts.placement import Placement, place
 from arcor2_server.hosts.process import CellHost, HostUser
 
 log = structlog.get_logger(__name__)
@@ -31,15 +34,23 @@ class CellHosts:
         device_files: directories of the files that settings of devices may name.
         cell: names the nodes of devices that are not on this computer.
         broker: file with the credentials of the server for the broker of nodes; it may be missing.
+        derives: returns whether an object type derives from a base class.
     """
 
-    def __init__(self, device_files: Sequence[Path], cell: Cell | None = None, broker: Path | None = None) -> None:
-        self._cell = cell
+    def __init__(
+        self,
+        device_files: Sequence[Path],
+        cell: Cell | None = None,
+        broker: Path | None = None,
+        derives: Callable[[str, str], bool] = lambda *_: False,
+    ) -> None:
+        self._cell, self._derives = cell, derives
         self._environment = os.environ | {DEVICE_FILES: os.pathsep.join(map(str, device_files))}
         if broker is not None:
             self._environment.setdefault(BROKER_CREDENTIALS, str(broker))
         self._spare: asyncio.Task[CellHost] | None = None
         self._taken: set[CellHost] = set()
+        self._retiring: set[asyncio.Task[None]] = set()
         self._closed = False
 
     def prepare(self) -> None:
@@ -48,26 +59,70 @@ class CellHosts:
             self._spare = asyncio.create_task(self._start(), name="spare cell host")
             self._spare.add_done_callback(_log_failure)
 
-    def node_of(self, objects: Iterable[SceneObject]) -> str:
-        """Return the node on which objects of a scene run; empty for this computer.
+    def node_of(self, scene_object: SceneObject) -> str:
+        """Return the node that an object names; empty for this computer."""
+        return node_of(self._cell, scene_object)
+
+    def place(self, objects: Iterable[SceneObject]) -> Placement:
+        """Return where the objects of a scene run. Raise SeveralNodes if they cannot work together like this."""
+
+        def derives(name: str, base: str) -> bool:
+            try:
+                return self._derives(name, base)
+            except NotFound:  # a type that only a package contains; its host reports what cannot work
+                return False
+
+        return place(self._cell, objects, derives)
+
+    async def take_all(self, user: GroupUser, placement: Placement) -> HostGroup:
+        """Return hosts for a scene or program, which are started together.
+
+        Args:
+            user: receives the messages of the hosts.
+            placement: where the objects run.
 
         Raises:
-            SeveralNodes: they are on different nodes.
+            Arcor2Error: one of the hosts cannot be started. The others are closed.
         """
-        return node_of(self._cell, objects)
+        if self._retiring:
+            await asyncio.wait(self._retiring)  # they may still use the devices
+        nodes = placement.all
+        started = await asyncio.gather(*(self._take(node) for node in nodes), return_exceptions=True)
+        hosts = [each for each in started if isinstance(each, CellHost)]
+        for node, each in zip(nodes, started, strict=True):
+            error = each if isinstance(each, BaseException) else None
+            if isinstance(each, CellHost) and each.reason is not None:
+                error = ConnectionLost(each.reason)
+            if error is None:
+                continue
+            await asyncio.gather(*(host.close() for host in hosts))
+            if isinstance(error, Arcor2Error) and len(nodes) > 1:
+                text = "{reason} These objects run there: {names}."
+                raise error.with_message(Message.of(text, reason=error.message, names=placement.on(node)))
+            raise error
+        return HostGroup(user, placement, hosts, self._retire)
 
-    async def take(self, user: HostUser, objects: Iterable[SceneObject] = ()) -> CellHost:
+    def _retire(self, host: CellHost) -> None:
+        """Close a host in the background, because another one of its group has ended."""
+        task = asyncio.create_task(host.close(), name=f"end of cell host {host.pid}")
+        self._retiring.add(task)
+        task.add_done_callback(self._retiring.discard)
+
+    async def take(self, user: HostUser, node: str = "") -> CellHost:
         """Return the spare host, or a new one. Raise Arcor2Error if no host can be started.
 
         Args:
             user: receives the messages of the host.
-            objects: the objects that will run in it, which decide on which computer it runs.
+            node: on which it runs; empty for this computer.
         """
-        node = self.node_of(objects)
+        host = await self._take(node)
+        host.user = user
+        return host
+
+    async def _take(self, node: str) -> CellHost:
         if node and find_spec("nats") is None:
             raise Arcor2Error("Devices on nodes need the extra `nodes` of arcor2-hw. Install it on the server.")
         host = await (self._start(node) if node else self._take_local())
-        host.user = user
         self._taken.add(host)
         host.ended.add_done_callback(lambda _: self._taken.discard(host))
         return host
@@ -100,7 +155,7 @@ class CellHosts:
         """Close all hosts."""
         self._closed = True
         hosts = self._taken | await self._withdraw_spare()
-        await asyncio.gather(*(host.close() for host in hosts))
+        await asyncio.gather(*(host.close() for host in hosts), *self._retiring)
 
     async def _withdraw_spare(self) -> set[CellHost]:
         """Return the spare host, which the caller closes; empty if there is none."""

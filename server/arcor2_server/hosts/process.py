@@ -47,6 +47,7 @@ class CellError(Arcor2Error):
 
     def __init__(self, data: m.ErrorData) -> None:
         super().__init__(data.message, data.detail)
+        self.data = data
         self.code = data.code  # type: ignore[misc]
         self.type = data.type
         self.object_id = data.object_id
@@ -119,7 +120,7 @@ class CellHost:
         """Why the host has ended; empty while it runs."""
         self._connection = connection
         self._number = itertools.count(1)
-        self._calls: dict[int, asyncio.Future[bytes]] = {}
+        self._calls: dict[int, asyncio.Future[m.CallDone]] = {}
         self._waiting: list[tuple[type[m.ToServer], asyncio.Future[Any]]] = []
         self._received_at = asyncio.get_running_loop().time()
         self._silent = False
@@ -204,15 +205,30 @@ class CellHost:
     ) -> bytes:
         """Call a method of a device, or cancel the call; return the result as JSON, empty for None.
 
+        Raises the same errors as `ask`.
+        """
+        done = await self.ask(object_id, method, arguments, control=control, cancel=cancel, deadline=deadline)
+        return done.value
+
+    async def ask(
+        self,
+        object_id: str,
+        method: str,
+        arguments: Mapping[str, bytes] | None = None,
+        *,
+        control: bool = False,
+        cancel: bool = False,
+        deadline: float | None = None,
+    ) -> m.CallDone:
+        """Call a method of a device, or cancel the call; return the answer.
+
         Raises:
             CellError: the device refused the call or failed.
             ConnectionLost: the host ended.
             DeviceTimeout: the host did not answer in time.
         """
         limit = None if deadline is None else deadline + ANSWER_TIMEOUT
-        return await self._request(
-            m.Call, object_id, method, dict(arguments or {}), control, cancel, deadline, limit=limit
-        )
+        return await self._ask(m.Call, object_id, method, dict(arguments or {}), control, cancel, deadline, limit=limit)
 
     async def stop_motion(self, object_id: str) -> None:
         """Stop a device, also while it executes a call. Raise CellError or ConnectionLost if that is impossible."""
@@ -315,11 +331,17 @@ class CellHost:
     async def _request(
         self, message: Callable[..., m.ToHost], *fields: Any, limit: float | None = None, **more: Any
     ) -> bytes:
+        """Send a message with a new number, and return the value of the answer."""
+        return (await self._ask(message, *fields, limit=limit, **more)).value
+
+    async def _ask(
+        self, message: Callable[..., m.ToHost], *fields: Any, limit: float | None = None, **more: Any
+    ) -> m.CallDone:
         """Send a message with a new number and wait for the answer at most `limit` s."""
         if self.reason is not None:
             raise ConnectionLost(self.reason)
         number = next(self._number)
-        future: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
+        future: asyncio.Future[m.CallDone] = asyncio.get_running_loop().create_future()
         self._calls[number] = future
         self.send(message(number, *fields, **more))
         try:
@@ -427,7 +449,7 @@ class CellHost:
                 if future is None or future.done():
                     return
                 if isinstance(message, m.CallDone):
-                    future.set_result(message.value)
+                    future.set_result(message)
                 else:
                     future.set_exception(CellError(message.error))
                 return

@@ -1,4 +1,4 @@
-"""The use of a cell host by the online scene or a program: process, device states, calls and streams."""
+"""The use of cell hosts by the online scene or a program: process, device states, calls and streams."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final
@@ -14,8 +14,10 @@ from arcor2_hw.runtime import messages as m
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub
 from arcor2_server.hosts.devices import DeviceBoard
+from arcor2_server.hosts.group import HostGroup
+from arcor2_server.hosts.placement import Placement
 from arcor2_server.hosts.pool import CellHosts
-from arcor2_server.hosts.process import CellHost, json_of
+from arcor2_server.hosts.process import json_of
 from arcor2_server.hosts.streams import RobotStreams
 
 log = structlog.get_logger(__name__)
@@ -37,7 +39,7 @@ class HostSession:
     """
 
     def __init__(self, hub: EventHub, pool: CellHosts, what: str, *, to_all_clients: bool = False) -> None:
-        self.host: CellHost | None = None
+        self.host: HostGroup | None = None
         self.online = False
         """Whether the devices are in operation. Set by the owner of the session."""
         self.package_info: bytes | None = None
@@ -48,13 +50,15 @@ class HostSession:
         """Number of hosts that have ended by themselves since the start of the server."""
         self.on_death: list[Callable[[Message], None]] = []
         """Called with the reason when the host has ended by itself, before the devices are gone."""
-        self._on_message: Callable[[CellHost, m.ServerBound], None] = lambda _host, _message: None
+        self._on_message: Callable[[HostGroup, m.ServerBound], None] = lambda _host, _message: None
         self._on_end: Callable[[Message], None] = lambda _reason: None
         self._pool = pool
         self._what = what
         hub.on_leave.append(self.streams.forget)
 
-    def observe(self, on_message: Callable[[CellHost, m.ServerBound], None], on_end: Callable[[Message], None]) -> None:
+    def observe(
+        self, on_message: Callable[[HostGroup, m.ServerBound], None], on_end: Callable[[Message], None]
+    ) -> None:
         """Register the owner of the session.
 
         Args:
@@ -64,20 +68,20 @@ class HostSession:
         self._on_message, self._on_end = on_message, on_end
 
     # -------------------------------------------------------------------------------- the process
-    async def take(self, objects: Iterable[SceneObject]) -> CellHost:
-        """Take a host from the pool. The caller assigns it to `host`; its messages may arrive before.
+    async def take(self, placement: Placement) -> HostGroup:
+        """Take hosts for a placement from the pool. Raise Arcor2Error if one cannot be started.
 
-        Args:
-            objects: the objects that will run in it, which decide on which computer it runs.
-
-        Raises:
-            Arcor2Error: no host can be started.
+        The caller assigns them to `host`; their messages may arrive before.
         """
-        return await self._pool.take(self, objects)
+        return await self._pool.take_all(self, placement)
 
-    def node_of(self, objects: Iterable[SceneObject]) -> str:
-        """Return the node on which objects run; empty for this computer. Raise SeveralNodes for different nodes."""
-        return self._pool.node_of(objects)
+    def place(self, objects: Iterable[SceneObject]) -> Placement:
+        """Return where the objects of a scene run. Raise SeveralNodes if they cannot work together like this."""
+        return self._pool.place(objects)
+
+    def node_of(self, scene_object: SceneObject) -> str:
+        """Return the node that an object names; empty for this computer."""
+        return self._pool.node_of(scene_object)
 
     def prepare(self) -> None:
         """Start a spare host if there is none."""
@@ -88,7 +92,7 @@ class HostSession:
         if self.host is not None:
             self.host.send(message)
 
-    def host_message(self, host: CellHost, message: m.ServerBound) -> None:
+    def host_message(self, host: HostGroup, message: m.ServerBound) -> None:
         """Handle a message of the host."""
         match message:
             case m.StreamEvent():
@@ -114,13 +118,13 @@ class HostSession:
             case _:
                 self._on_message(host, message)
 
-    def host_silent(self, host: CellHost, silent: bool) -> None:
+    def host_silent(self, host: HostGroup, silent: bool) -> None:
         """Note whether the host answers."""
         if host is self.host:
             self.board.set_answering(not silent)
             log.warning(f"{self._what} does not answer" if silent else f"{self._what} answers again", pid=host.pid)
 
-    def host_ended(self, host: CellHost, reason: Message) -> None:
+    def host_ended(self, host: HostGroup, reason: Message) -> None:
         """Report that the host has ended."""
         if host is self.host:
             self.deaths += 1
@@ -134,7 +138,7 @@ class HostSession:
         await self._pool.close()
 
     # -------------------------------------------------------------------------------- calls
-    def require_online(self) -> CellHost:
+    def require_online(self) -> HostGroup:
         """Return the host. Raise RequestRefused unless the devices are in operation."""
         if not self.online or self.host is None:
             raise RequestRefused("The scene is offline. Start it first.")
@@ -186,9 +190,9 @@ class HostSession:
         """Create and connect a failed device again."""
         await self.require_online().retry(object_id)
 
-    async def add(self, opening: m.OpenScene) -> None:
-        """Create and connect the only object of a scene in addition to the present ones."""
-        await self.require_online().add(opening)
+    async def add(self, opening: m.OpenScene, node: str) -> None:
+        """Create and connect the only object of a scene in addition to the present ones, on the node of a host."""
+        await self.require_online().add(opening, node)
 
     async def stop_motion(self, object_id: str) -> None:
         """Stop a device, also while it executes a call."""

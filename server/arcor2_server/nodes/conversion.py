@@ -13,7 +13,8 @@ STOPS: Final = frozenset({"StopAll", "StopMotion", "StopProgram"})
 PASSIVE: Final = frozenset(
     {
         "AddBody", "Calibrate", "CheckpointAnswer", "CloseScene", "ConfirmIdentity", "EndForce", "Pause",
-        "RemoveBodies", "RenewForces", "SetBreakpoints", "SetInterlocks", "Stream", "Subscribe",
+        "RemoteChanged", "RemoteDone", "RemoteFailed", "RemoveBodies", "RenewForces", "SetBreakpoints",
+        "SetInterlocks", "Stream", "Subscribe",
     }
 )  # fmt: skip
 """Messages that start nothing at a device."""

@@ -66,7 +66,7 @@ class ConnectionCheck:
         message, _ = await self._opening.prepare(Scene("", objects=[obj]), False)
         began = time.monotonic()
         outcome = _Outcome()
-        host = await self._pool.take(outcome, [obj])
+        host = await self._pool.take(outcome, self._pool.node_of(obj))
         try:
             host.send(message)
             try:

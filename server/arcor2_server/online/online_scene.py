@@ -23,7 +23,8 @@ from arcor2_server.documents.changes import Edit, Kind
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
 from arcor2_server.hosts.devices import DeviceBoard
-from arcor2_server.hosts.process import CellHost
+from arcor2_server.hosts.group import HostGroup
+from arcor2_server.hosts.placement import shown
 from arcor2_server.hosts.session import READ_TIMEOUT, HostSession
 from arcor2_server.hosts.streams import RobotStreams
 from arcor2_server.online.actions import LastStop, RunningAction
@@ -155,12 +156,12 @@ class OnlineScene:
 
         Raises:
             RequestRefused: the scene cannot go online now.
-            SeveralNodes: its devices are on different nodes.
+            SeveralNodes: its robots and grippers are on different computers.
             Locked: a user is editing the scene or project.
         """
         self._session.require_scene_open()
         self.require_offline()
-        self.host.node_of(self._session.require_scene().objects)
+        self.host.place(self._session.require_scene().objects)
         for check in self.before_start:
             check()
         if self._session.project is None and (locked := self._locks.write_locked_roots()):
@@ -207,7 +208,7 @@ class OnlineScene:
         message, overlaid = await self._opening.prepare(scene, keep_going)
         self.board.show(scene.objects, overlaid)
         self._answer = asyncio.get_running_loop().create_future()
-        host = self.host.host = await self.host.take(scene.objects)
+        host = self.host.host = await self.host.take(self.host.place(scene.objects))
         host.send(self._opening.with_workspace(message, scene))
         try:
             async with asyncio.timeout(START_WITHIN):
@@ -239,16 +240,16 @@ class OnlineScene:
         self.host.prepare()
 
     def require_connectable(self, obj: SceneObject) -> None:
-        """Raise RequestRefused if the scene is online on a computer on which an added object does not run."""
-        if not self.online or (host := self.host.host) is None:
+        """Raise RequestRefused or SeveralNodes if an added object cannot be connected while the scene is online."""
+        if not self.online or (hosts := self.host.host) is None:
             return
-        node = self.host.node_of([obj])
-        if node and node != host.node:
+        placement = self.host.place([*self._session.require_scene().objects, obj])
+        node = placement.nodes[obj.id]
+        if placement.main != hosts.placement.main or not hosts.has(node):
             raise RequestRefused(
-                "{name} runs on the node {node}, and the scene is online on {computer}. Go offline first.",
+                "{name} runs on {computer}, where the scene is not online. Go offline first.",
                 name=obj.name,
-                node=node,
-                computer=host.node or Message.of("this computer"),
+                computer=shown(node),
             )
 
     def connect_added(self, obj: SceneObject) -> None:
@@ -259,7 +260,7 @@ class OnlineScene:
         try:
             message, overlaid = await self._opening.prepare(replace(self._session.require_scene(), objects=[obj]), True)
             self.board.add(obj, overlaid.get(obj.id, []))
-            await self.host.add(message)
+            await self.host.add(message, self.host.place(self._session.require_scene().objects).nodes[obj.id])
         except Arcor2Error as error:  # ObjectState has reported the reason, unless the scene went offline meanwhile
             log.warning("added object is not connected", object=obj.name, reason=str(error))
 
@@ -322,7 +323,7 @@ class OnlineScene:
         await self.background.cancel()
 
     # -------------------------------------------------------------------------------- from the host
-    def _handle(self, host: CellHost, message: m.ServerBound) -> None:  # noqa: ARG002
+    def _handle(self, host: HostGroup, message: m.ServerBound) -> None:  # noqa: ARG002
         match message:
             case m.HoldEnded():
                 self.held.ended(message)
@@ -368,7 +369,7 @@ class OnlineScene:
         self.last_stop.require_none_since(requested_at)
         return await self.host.call(object_id, method, args, control=control, deadline=deadline)
 
-    def begin_stop_all(self, by: str) -> CellHost | None:
+    def begin_stop_all(self, by: str) -> HostGroup | None:
         """End all holds and prevent requested motion from starting; return the host, None if offline."""
         self.last_stop.note()
         self.held.stop(by)

@@ -156,11 +156,10 @@ class SceneObjectRequests:
         return await self._connection_check.run(obj)
 
     def _node_of(self, object_id: str) -> str | Unset:
-        """Return the node on which an object of the open scene runs, or on which another one would run with it."""
+        """Return the node on which an object of the open scene runs."""
         scene = self._session.document.scene
-        objects = scene.objects if scene else []
-        own = self._online.host.node_of([each for each in objects if each.id == object_id])
-        return own or self._online.host.node_of(objects) or UNSET
+        own = [each for each in (scene.objects if scene else []) if each.id == object_id]
+        return (self._online.host.node_of(own[0]) if own else "") or UNSET
 
     @rpc("FindDevices")
     async def find_devices(self, context: Context, args: FindDevicesArgs) -> list[FoundDevice]:

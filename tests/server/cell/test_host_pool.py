@@ -73,10 +73,8 @@ async def test_a_scene_with_a_device_on_a_node_needs_the_node(monkeypatch: pytes
     arm, belt, lamp = (SceneObject(name, "Arm", id=f"obj_{name}") for name in ("arm", "belt", "lamp"))
     try:
         with pytest.raises(Arcor2Error, match=r"The broker at 127\.0\.0\.1:1 cannot be reached"):
-            await hosts.take(USER, [arm, belt])
-        with pytest.raises(Arcor2Error, match=r"must be on one node: arm \(press\), lamp \(oven\)"):
-            await hosts.take(USER, [arm, lamp])
-        assert (await hosts.take(USER, [belt])).node == ""
+            await hosts.take_all(USER, hosts.place([arm, belt, lamp]))
+        assert (await hosts.take_all(USER, hosts.place([belt]))).placement.all == [""]
     finally:
         await hosts.close()
 
@@ -97,6 +95,6 @@ async def test_the_server_uses_its_credentials_for_the_broker(tmp_path: Path) ->
     hosts = pool.CellHosts([], Cell([on_node("arm", "press")]), file)
     try:
         with pytest.raises(Arcor2Error, match=r"The broker at 127\.0\.0\.1:1 cannot be reached"):
-            await hosts.take(USER, [SceneObject("arm", "Arm", id="obj_arm")])
+            await hosts.take(USER, hosts.node_of(SceneObject("arm", "Arm", id="obj_arm")))
     finally:
         await hosts.close()

@@ -1,7 +1,7 @@
 /** On which computer the selected object runs. A separate chunk. */
 
 import { t } from "@lingui/core/macro";
-import { notMovable, objectsByNode, setNode } from "../../commands/nodes";
+import { notMovable, objectsByNode, robotsApart, setNode } from "../../commands/nodes";
 import { heldBy } from "../../store/selectors";
 import { useEditor } from "../../store/store";
 import { Pick } from "../kit/fields";
@@ -10,6 +10,7 @@ import type { Section } from "../workplace/section";
 
 const Body: Section["Body"] = ({ selection: { id } }) => {
   const object = useEditor((state) => state.doc?.objects[id]);
+  const apart = useEditor(robotsApart);
   const objects = useEditor((state) => state.doc?.objects);
   const nodes = useEditor((state) => state.nodes);
   const holder = useEditor((state) => heldBy(state, id));
@@ -22,8 +23,6 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
   const others = Object.keys(byNode);
   const names = [...new Set([...nodes.nodes.map(({ name }) => name), ...others])].sort();
   const silent = nodes.nodes.find(({ name }) => name === chosen)?.state === "silent";
-  const follows = others.length === 1 && !chosen ? others[0] : undefined;
-  const devices = others.flatMap((node) => (byNode[node] ?? []).map((name) => `${name} (${node})`)).join(", ");
   return (
     <>
       {why && <p className="quiet small">{why}</p>}
@@ -32,15 +31,13 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
         value={chosen}
         isDisabled={why !== "" || busy}
         choices={[
-          ["", follows ? t`as the other devices: ${follows}` : t`computer of the server`],
+          ["", t`computer of the server`],
           ...names.map((each) => [each, each] as const),
         ]}
         onChange={(node) => void ask(setNode(id, node))}
       />
       {silent && <p className="small alarm">{t`The node ${chosen} is not connected.`}</p>}
-      {others.length > 1 && (
-        <RefusedText>{t`All devices of a scene must run on the same node: ${devices}.`}</RefusedText>
-      )}
+      {apart && <p className="small alarm">{t`All robots of a scene must run on one computer: ${apart}.`}</p>}
       <RefusedText>{refused}</RefusedText>
     </>
   );
