@@ -1,4 +1,4 @@
-"""Cell hosts on a node: calls, stops next to pictures, and a cut cable; broker, bare socket and Zenoh side by side.
+"""Cell hosts on nodes: calls, stops, several nodes, a cut cable; broker, socket and Zenoh side by side.
 
 Zenoh is measured if it is installed: `pip install eclipse-zenoh`.
 """
@@ -8,6 +8,7 @@ import contextlib
 import importlib.util
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -15,19 +16,28 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import nats
+from msgspec.structs import replace
 from nats.aio.client import Client
 
+from arcor2_hw.data.cell import BROKER_URL
+from arcor2_hw.data.project import Project
+from arcor2_hw.data.scene import SceneObject
+from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.access.authority import Authority
+from arcor2_server.hosts.group import HostGroup
+from arcor2_server.hosts.pool import CellHosts
 from arcor2_server.hosts.process import CellHost
 from benchmarks.metrics import Metric, Report, percentile
 from benchmarks.node_echo import SUBJECT, Frames, context, zenoh_session
-from tests.runtime.conftest import open_scene, scene_object, type_code
+from tests.runtime.conftest import HEADER, Package, open_scene, scene_object, type_code
 from tests.server.fleet.broker import free_port
 from tests.server.nodes.cable import Cable, CannotIsolate
 from tests.server.nodes.conftest import NODE, Broker, Node
 from tests.server.nodes.test_cut_cable import cut_and_heal
+from tests.waiting import wait_for
 
 CALLS = 1000
 STOPS = 200
@@ -37,6 +47,7 @@ PICTURE_RATE = 30.0
 """Rate of the camera, 1/s."""
 CUTS = 3
 WITHIN = 60.0
+SECOND = "oven"
 DEVICE = type_code(
     "Device",
     f"""
@@ -50,8 +61,15 @@ DEVICE = type_code(
         def picture(self) -> str:
             return self.picture_
 
+        def move(self, file: str) -> None:
+            self.moving = True
+            Path(file).touch()
+            while self.moving:
+                time.sleep(0.001)
+            Path(file).write_text(str(time.monotonic()))
+
         def stop(self) -> None:
-            pass
+            self.moving = False
 """,
 )
 
@@ -135,6 +153,101 @@ async def _cuts(report: Report, folder: Path) -> None:
         named.append(float(str(found["named"])))
     report.add(Metric("node_cut_stopped_s", max(stopped), CUTS, "the longest"))
     report.add(Metric("node_cut_named_s", max(named), CUTS, "the longest"))
+
+
+# ------------------------------------------------------------------------------------------------ several nodes
+TIMED_CALLS = f"""
+import json, statistics
+here, there = res.objects["obj_arm"], res.objects["obj_camera"]
+samples = {{"here": [], "there": []}}
+for number in range({CALLS + 50}):
+    for name, device in (("here", here), ("there", there)):
+        begin = time.perf_counter()
+        device.add(1, 2)
+        samples[name].append((time.perf_counter() - begin) * 1e3)
+with open(FILE, "w") as file:
+    json.dump({{name: found[50:] for name, found in samples.items()}}, file)
+"""
+
+
+class _Group:
+    """The hosts of a scene or program on this computer and on nodes, and what they report."""
+
+    def __init__(self) -> None:
+        self.messages: asyncio.Queue[m.ServerBound] = asyncio.Queue()
+        self.ended_at = 0.0
+
+    def host_message(self, host: HostGroup, message: m.ServerBound) -> None:  # noqa: ARG002
+        self.messages.put_nowait(message)
+
+    def host_silent(self, host: HostGroup, silent: bool) -> None:
+        """Ignore it."""
+
+    def host_ended(self, host: HostGroup, reason: Message) -> None:  # noqa: ARG002
+        self.ended_at = time.monotonic()
+
+    async def until(self, *kinds: type[m.ToServer]) -> m.ServerBound:
+        """Return the next message of these types."""
+        async with asyncio.timeout(WITHIN):
+            while not isinstance(message := await self.messages.get(), kinds):
+                continue
+        return message
+
+
+def _objects(*nodes: str) -> list[SceneObject]:
+    return [
+        replace(scene_object(name, "Device"), node=node)
+        for name, node in zip(("arm", "camera", "belt"), nodes, strict=False)
+    ]
+
+
+async def _several(report: Report, folder: Path, broker: Broker) -> None:
+    """Measure calls of a program of an object on a node, stops of all hosts, and the loss of a node."""
+    pool = CellHosts([])
+    try:
+        objects, samples = _objects("", NODE), folder / "samples.json"
+        package = Package(folder / "package")
+        source = DEVICE.source.removeprefix(HEADER)
+        package.write({"Device": source}, objects, Project("p", "scn_1"), f"FILE = {str(samples)!r}\n{TIMED_CALLS}")
+        user = _Group()
+        group = await pool.take_all(user, pool.place(objects))
+        group.send(m.RunPackage("bench", str(package.directory)))
+        while (message := await user.until(m.ProgramChanged)).state != "stopped":  # type: ignore[union-attr]
+            continue
+        await group.wait_or_kill()
+        if message.error is not None:  # type: ignore[union-attr]
+            raise RuntimeError(message.error)  # type: ignore[union-attr]
+        found = msgspec.json.decode(samples.read_bytes(), type=dict[str, list[float]])
+        for percent in (50, 99):
+            here, there = (percentile(found[name], percent) for name in ("here", "there"))
+            note = f"local {here:.2f} ms, on a node {there:.2f} ms"
+            report.add(Metric(f"node_program_call_added_p{percent}_ms", there - here, CALLS, note))
+
+        objects = _objects("", NODE, SECOND)
+        user = _Group()
+        group = await pool.take_all(user, pool.place(objects))
+        group.send(open_scene([DEVICE], *objects))
+        await user.until(m.SceneOpened)
+        stops = [await timed(group.stop_all) for _ in range(STOPS)]
+        report.add(
+            Metric("node_stop_all_p99_ms", percentile(stops, 99), STOPS, f"median {percentile(stops, 50):.1f} ms")
+        )
+
+        file = folder / "moving"
+        moving = asyncio.create_task(group.call("obj_arm", "move", {"file": msgspec.json.encode(str(file))}))
+        await asyncio.to_thread(wait_for, file.exists)
+        cut_at = time.monotonic()
+        os.kill(broker.process.pid, signal.SIGSTOP)
+        try:
+            text = await asyncio.to_thread(wait_for, file.read_text)
+        finally:
+            os.kill(broker.process.pid, signal.SIGCONT)
+        moving.cancel()
+        report.add(
+            Metric("node_lost_others_stopped_s", float(text) - cut_at, 1, "a device on the computer of the server")
+        )
+    finally:
+        await pool.close()
 
 
 # ------------------------------------------------------------------------------------------------ engines side by side
@@ -241,7 +354,7 @@ async def run(report: Report, directory: Path) -> None:
     """Measure all of it."""
     folder = directory / "nodes"
     folder.mkdir()
-    places = [folder / name for name in ("broker", "cache", "engines")]
+    places = [folder / name for name in ("broker", "cache", "engines", "several")]
     for place in places:
         place.mkdir()
     broker = Broker(places[0])
@@ -254,6 +367,13 @@ async def run(report: Report, directory: Path) -> None:
                 await _stops(report, local, remote)
             finally:
                 await asyncio.gather(local.close(), remote.close())
+            second = Node(broker.url, places[1], name=SECOND)
+            os.environ[BROKER_URL] = broker.url
+            try:
+                await _several(report, places[3], broker)
+            finally:
+                del os.environ[BROKER_URL]
+                second.end()
         finally:
             node.end()
     finally:
