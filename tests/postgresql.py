@@ -180,9 +180,32 @@ _current: list[Databases] = []
 """The databases of the present test, if it uses PostgreSQL."""
 
 
+_lasting: dict[Path, Databases] = {}
+"""The databases of data directories whose servers outlive the present test."""
+
+
+@contextlib.contextmanager
+def lasting(directory: Path) -> Iterator[None]:
+    """Keep the database of a data directory until the end of the block, if the present test uses PostgreSQL.
+
+    Fixtures whose server outlives a test need it: the databases of a test are emptied and used again after the test.
+    """
+    if not _current:
+        yield
+        return
+    databases = _lasting[directory] = Databases()
+    try:
+        yield
+    finally:
+        del _lasting[directory]
+        databases.close()
+
+
 def variables(directory: Path) -> dict[str, str]:
     """Return the environment variables of a server with a data directory: those for PostgreSQL if the test uses it."""
-    return {VARIABLE: _current[0].url(directory)} if _current else {}
+    if not _current:
+        return {}
+    return {VARIABLE: _lasting.get(directory, _current[0]).url(directory)}
 
 
 @pytest.fixture(scope="session")

@@ -7,6 +7,7 @@ from pathlib import Path
 import psutil
 import pytest
 
+from tests.postgresql import lasting
 from tests.server.core.serving import ServerProcess, until
 
 
@@ -14,13 +15,13 @@ from tests.server.core.serving import ServerProcess, until
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
     """Start a server with short time-outs of locks."""
     directory: Path = tmp_path_factory.mktemp("server") / "data"
-    process = ServerProcess(
-        directory,
-        ARCOR2_ARSERVER_LOCK_TIMEOUT="0.3",
-        ARCOR2_ARSERVER_LOCK_RETRIES="2",
-        ARCOR2_ARSERVER_LOCK_RETRY_WAIT="0.05",
-    )
-    with asyncio.Runner() as runner:
+    with lasting(directory), asyncio.Runner() as runner:
+        process = ServerProcess(
+            directory,
+            ARCOR2_ARSERVER_LOCK_TIMEOUT="0.3",
+            ARCOR2_ARSERVER_LOCK_RETRIES="2",
+            ARCOR2_ARSERVER_LOCK_RETRY_WAIT="0.05",
+        )
         runner.run(process.start())
         # The spare host starts after `ready`. Wait for it, so that no test pays for its start.
         runner.run(until(lambda: psutil.Process(process.process.pid).children()))
