@@ -44,7 +44,10 @@ class LogOnAnswer(Struct, frozen=True, tag=True):
 
 
 class CallAnswer(Struct, frozen=True, tag=True):
-    """Answer to Command and Acknowledge. result: as in the Modbus block, 0 if executed. text: why it is refused."""
+    """Answer to Command, SetMode and Acknowledge.
+
+    result: as in the Modbus block, 0 if executed. text: why it is refused.
+    """
 
     number: int
     result: int
@@ -80,6 +83,15 @@ class Command(Struct, frozen=True, tag=True):
     address: str
 
 
+class SetMode(Struct, frozen=True, tag=True):
+    """Change the mode of the cell. mode: number of PackML."""
+
+    number: int
+    mode: int
+    user: User
+    address: str
+
+
 class Acknowledge(Struct, frozen=True, tag=True):
     """Acknowledge an alarm."""
 
@@ -91,7 +103,7 @@ class Acknowledge(Struct, frozen=True, tag=True):
 
 
 ToProcess = Setup | Update | LogOnAnswer | CallAnswer
-FromProcess = Started | LogOn | Command | Acknowledge
+FromProcess = Started | LogOn | Command | SetMode | Acknowledge
 
 decode_to_process: Any = msgspec.msgpack.Decoder(ToProcess).decode
 decode_from_process: Any = msgspec.msgpack.Decoder(FromProcess).decode

@@ -5,7 +5,7 @@ import itertools
 import logging
 import socket
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
@@ -103,7 +103,7 @@ class Process:
         server.set_security_policy(policies, permission_ruleset=Services())  # type: ignore[arg-type]
         space = self._space = Space(server)
         await space.load()
-        self._unit = Unit(space, setup, self._execute)
+        self._unit = Unit(space, setup, self._execute, self._set_mode)
         await self._unit.add()
         await Conditions.prepare(server)
         self._conditions = Conditions(space, self._source, self._acknowledge)
@@ -185,19 +185,21 @@ class Process:
         answer: m.LogOnAnswer = await self._ask(m.LogOn(next(self._numbers), name, secret, address))
         return answer.user
 
-    async def _execute(self, command: int, job: int, request: str) -> m.CallAnswer:
+    async def _ask_as_user(self, message: Callable[[int, m.User, str], Any]) -> m.CallAnswer:
+        """Send a request of the calling client. `message`: makes it from its number, the user and the address."""
         client = caller.get()
         if client is None or client.user is None:
             return m.CallAnswer(0, 1, "Log on with a user first.")
-        message = m.Command(next(self._numbers), command, job, request, client.user, client.address)
-        answer: m.CallAnswer = await self._ask(message)
+        answer: m.CallAnswer = await self._ask(message(next(self._numbers), client.user, client.address))
         return answer
 
-    async def _acknowledge(self, alarm: int, note: str) -> m.CallAnswer:
-        client = caller.get()
-        if client is None or client.user is None:
-            return m.CallAnswer(0, 1, "Log on with a user first.")
-        answer: m.CallAnswer = await self._ask(
-            m.Acknowledge(next(self._numbers), alarm, note, client.user, client.address)
+    async def _execute(self, command: int, job: int, request: str) -> m.CallAnswer:
+        return await self._ask_as_user(
+            lambda number, user, address: m.Command(number, command, job, request, user, address)
         )
-        return answer
+
+    async def _set_mode(self, mode: int) -> m.CallAnswer:
+        return await self._ask_as_user(lambda number, user, address: m.SetMode(number, mode, user, address))
+
+    async def _acknowledge(self, alarm: int, note: str) -> m.CallAnswer:
+        return await self._ask_as_user(lambda number, user, address: m.Acknowledge(number, alarm, note, user, address))

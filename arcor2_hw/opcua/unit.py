@@ -50,13 +50,15 @@ _ITEM_STATES: Final = {
 _OPERATION_MODES: Final = {UnitMode.PRODUCE: "Processing", UnitMode.MAINTENANCE: "Maintenance"}
 Execute = Callable[[int, int, str], Awaitable[CallAnswer]]
 """Executes a command: number of the command, job, identifier of the request."""
+SetMode = Callable[[int], Awaitable[CallAnswer]]
+"""Changes the mode: its number."""
 
 
 class Unit:
     """The cell in the address space."""
 
-    def __init__(self, space: Space, setup: Setup, execute: Execute) -> None:
-        self._space, self._setup, self._execute = space, setup, execute
+    def __init__(self, space: Space, setup: Setup, execute: Execute, set_mode: SetMode) -> None:
+        self._space, self._setup, self._execute, self._set_mode = space, setup, execute, set_mode
         self.node = space.own("cell")
         """The machine."""
         self.components = space.own("cell", "Components")
@@ -166,7 +168,9 @@ class Unit:
                 await space.add_method(node, pack(command), self._command(MachineCommand[command.upper()]))
         parameter = _argument("Parameter", space.standard("packml", 16), "Job: number of the job", rank=1)
         await space.add_method(execute, pack("Start"), self._start, [parameter])
-        for method in ("SetUnitMode", "SetMachSpeed", "SetProduct", "SetParameter"):
+        mode = _argument("RequestedMode", ua.ObjectIds.Int32, "Number of the mode in UnitSupportedModes")
+        await space.add_method(unit, pack("SetUnitMode"), self._change_mode, [mode])
+        for method in ("SetMachSpeed", "SetProduct", "SetParameter"):
             await space.add_method(unit, pack(method), None)
 
     async def _add_machine(self, node: ua.NodeId, states: dict[str, int]) -> StateMachine:
@@ -208,6 +212,17 @@ class Unit:
         parameters = arguments[0].Value if arguments and arguments[0].Value else []
         job = next((round(each.Value) for each in parameters if getattr(each, "Name", "") == JOB), 0)
         return _status(await self._execute(MachineCommand.START, job, ""))
+
+    async def _change_mode(self, _parent: ua.NodeId, *arguments: ua.Variant) -> ua.StatusCode | ua.CallMethodResult:
+        if len(arguments) != 1:
+            codes = ua.StatusCodes
+            return status_code(codes.BadTooManyArguments if arguments else codes.BadArgumentsMissing)
+        mode = arguments[0].Value
+        if arguments[0].VariantType is not ua.VariantType.Int32 or isinstance(mode, list):
+            return _invalid_argument(ua.StatusCodes.BadTypeMismatch)
+        if mode not in list(UnitMode):
+            return _invalid_argument(ua.StatusCodes.BadOutOfRange)
+        return _status(await self._set_mode(mode))
 
     # -------------------------------------------------------------------------------- values
     async def set(self, data: UnitData) -> None:
@@ -258,6 +273,14 @@ def _time_or_none(alarm: AlarmRecord) -> datetime:
 
 def _status(answer: CallAnswer) -> ua.StatusCode:
     return status_code(REFUSED.get(answer.result, ua.StatusCodes.BadInvalidState) if answer.result else 0)
+
+
+def _invalid_argument(reason: Any) -> ua.CallMethodResult:
+    """Return the result of a call whose only argument is refused."""
+    result = ua.CallMethodResult()
+    result.StatusCode = status_code(ua.StatusCodes.BadInvalidArgument)
+    result.InputArgumentResults = [status_code(reason)]
+    return result
 
 
 def _count(name: str, number: int) -> Any:

@@ -3,8 +3,9 @@
 from typing import Final
 
 from arcor2_hw.data.audit import AuditOutcome
-from arcor2_hw.data.packml import MachineCommand
+from arcor2_hw.data.packml import MachineCommand, UnitMode
 from arcor2_hw.data.role import Role
+from arcor2_hw.data.rpc import RPCS
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.messages import Message
 from arcor2_hw.opcua import messages as m
@@ -19,6 +20,8 @@ from arcor2_server.packml.states import COMMANDS
 
 LONGEST_REQUEST_ID: Final = 100
 LONGEST_NOTE: Final = 500
+SET_MODE: Final = RPCS["SetCellMode"].role
+"""The least role that changes the mode, as on the screens."""
 
 
 class PlantRequests:
@@ -93,6 +96,29 @@ class PlantRequests:
             user=user.name,
             role=role,
             address=address,
+            reason="" if text is None else text.text,
+        )
+        return m.CallAnswer(request.number, int(result), "" if text is None else text.text)
+
+    async def set_mode(self, request: m.SetMode) -> m.CallAnswer:
+        """Change the mode of the cell, for which a user needs the same role as on the screens."""
+        user, role, mode = request.user, None, UnitMode(request.mode)
+        text: Message | None
+        try:
+            role = await self._role(user)
+            if role < SET_MODE:
+                raise AccessRefused("Changing the mode needs the role {role} or a higher one.", role=SET_MODE.shown)
+        except Arcor2Error as error:
+            result, text = RequestResult.NO_AUTHORITY, error.message
+        else:
+            result, text = await self._plc.set_mode(mode, f"{user.name} (OPC UA)")
+        self._audit.note(
+            AuditOutcome.REFUSED if result else AuditOutcome.DONE,
+            "OPC UA SetUnitMode",
+            target=mode.name.lower(),
+            user=user.name,
+            role=role,
+            address=request.address,
             reason="" if text is None else text.text,
         )
         return m.CallAnswer(request.number, int(result), "" if text is None else text.text)

@@ -90,6 +90,8 @@ class OpcUa:
                     return await self._requests.log_on(request)
                 case m.Command():
                     return await self._requests.command(request)
+                case m.SetMode():
+                    return await self._requests.set_mode(request)
                 case _:
                     return await self._requests.acknowledge(request)
         except Exception as error:

@@ -11,7 +11,7 @@ import structlog
 
 from arcor2_hw.data.audit import AuditOutcome
 from arcor2_hw.data.base import UNSET
-from arcor2_hw.data.cell_state import CellAuthority, PlcLink
+from arcor2_hw.data.cell_state import CellAuthority, CellMode, PlcLink
 from arcor2_hw.data.held import OnError
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.data.packml import MachineCommand, MachineState, UnitMode
@@ -45,6 +45,8 @@ SILENT: Final = "plc_silent"
 """Code of the alarm for a life counter that does not change."""
 _STOPPING: Final = frozenset({MachineCommand.STOP, MachineCommand.ABORT})
 """Commands that need neither authority nor mode."""
+
+_NO_AUTHORITY: Final = Message.of("The PLC does not have the authority over the cell.")
 
 
 class Input(enum.IntEnum):
@@ -342,6 +344,19 @@ class Plc:
             await self._store_plant_request(request, command, result, "" if text is None else text.text)
             return result, text
 
+    async def set_mode(self, mode: UnitMode, by: str) -> tuple[RequestResult, Message | None]:
+        """Change the mode for a plant system; return the result and the reason for a refusal."""
+        async with self._executing:
+            if self._cell.authority is not CellAuthority.PLC:
+                return R.NO_AUTHORITY, _NO_AUTHORITY
+            try:
+                await self._cell.set_mode(CellMode[mode.name], by)
+            except RequestRefused as error:
+                return R.WRONG_STATE, error.message
+            except Arcor2Error as error:
+                return R.REFUSED, error.message
+        return R.ACCEPTED, None
+
     async def _store_plant_request(self, request: str, command: int, result: RequestResult, text: str) -> None:
         if not request:
             return
@@ -363,7 +378,7 @@ class Plc:
             return R.UNKNOWN_COMMAND, Message.of("The command {number} does not exist.", number=number)
         command = MachineCommand(number)
         if command not in _STOPPING and cell.authority is not CellAuthority.PLC:
-            return R.NO_AUTHORITY, Message.of("The PLC does not have the authority over the cell.")
+            return R.NO_AUTHORITY, _NO_AUTHORITY
         try:
             cell.require(command)
         except RequestRefused as error:

@@ -50,9 +50,9 @@ class Plant:
     server: ServerProcess
 
     @contextlib.asynccontextmanager
-    async def connected(self) -> AsyncIterator[Client]:
+    async def connected(self, user: str = "Line 7") -> AsyncIterator[Client]:
         """Connect with the right user."""
-        client = await plant.connected(await plant.encrypted(self.url, self.files, "Line 7", PIN))
+        client = await plant.connected(await plant.encrypted(self.url, self.files, user, PIN))
         try:
             yield client
         finally:
@@ -95,6 +95,7 @@ async def cell(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Plant]
     try:
         async with talking(f"{server.url}/?token={secret}", "technician", max_queue=None) as hub:
             await hub.granted("AddPerson", {"name": "Line 7", "role": "operator", "pin": PIN})
+            await hub.granted("AddPerson", {"name": "Shift lead", "role": "technician", "pin": PIN})
             await hub.granted("SetCellJobs", {"jobs": [{"number": 7, "package_id": "pkg_1"}]})
             files = plant.client_certificate(folder)
             yield Plant(data, f"opc.tcp://127.0.0.1:{port}/arcor2hw/", hub, robot, files, server)
@@ -186,6 +187,41 @@ async def test_only_trusted_clients_with_the_right_user_read(cell: Plant) -> Non
             )
 
 
+async def set_mode(client: Client, *arguments: ua.Variant) -> None:
+    await command(await unit_of(client), "SetUnitMode", *arguments)
+
+
+async def test_the_mode_is_set_with_the_authority_by_the_role_of_the_screens(cell: Plant) -> None:
+    maintenance, produce = (ua.Variant(number, ua.VariantType.Int32) for number in (2, 1))
+    async with cell.connected() as operator, cell.connected("Shift lead") as technician:
+        unit = await unit_of(technician)
+        mode = await plant.child(unit, (plant.PACKML, "Status"), (plant.PACKML, "UnitModeCurrent"))
+        method = await plant.child(unit, (plant.PACKML, "SetUnitMode"))
+        assert (await method.read_attribute(ua.AttributeIds.Executable)).Value.Value
+        (argument,) = await (await method.get_child("0:InputArguments")).read_value()
+        assert (argument.Name, argument.DataType) == ("RequestedMode", ua.NodeId(ua.ObjectIds.Int32))
+        with pytest.raises(ua.UaStatusCodeError, match="BadUserAccessDenied"):
+            await set_mode(technician, maintenance)  # the plant has no authority
+        await cell.hub.granted("SetCellAuthority", {"authority": "plc"})
+        with pytest.raises(ua.UaStatusCodeError, match="BadUserAccessDenied"):
+            await set_mode(operator, maintenance)
+        await set_mode(technician, maintenance)
+        await plant.eventually(mode.read_value, lambda number: number == 2)
+        assert (await cell.hub.granted("GetCell"))["mode"] == "maintenance"
+        for wrong in (
+            ua.Variant(5, ua.VariantType.Int32),
+            ua.Variant("produce"),
+            ua.Variant([1], ua.VariantType.Int32),
+        ):
+            with pytest.raises(ua.UaStatusCodeError, match="BadInvalidArgument"):
+                await set_mode(technician, wrong)
+        with pytest.raises(ua.UaStatusCodeError, match="BadArgumentsMissing"):
+            await set_mode(technician)
+        await set_mode(technician, produce)
+        await plant.eventually(mode.read_value, lambda number: number == 1)
+    await cell.hub.granted("SetCellAuthority", {"authority": "hub"})
+
+
 async def test_a_command_needs_the_authority_and_is_executed_once(cell: Plant) -> None:
     async with cell.connected() as client:
         await client.load_data_type_definitions()
@@ -208,6 +244,9 @@ async def test_a_command_needs_the_authority_and_is_executed_once(cell: Plant) -
         with pytest.raises(ua.UaStatusCodeError, match="BadInvalidState"):
             await command(execute, "Start", [parameter])
         assert cell.starts == 1
+        async with cell.connected("Shift lead") as technician:
+            with pytest.raises(ua.UaStatusCodeError, match="BadInvalidState"):  # a program is running
+                await set_mode(technician, ua.Variant(2, ua.VariantType.Int32))
         mode = await plant.child(await unit_of(client), (plant.PACKML, "Status"), (plant.PACKML, "UnitModeCurrent"))
         assert await mode.read_value() == 1
 
@@ -318,8 +357,8 @@ async def test_a_removed_person_commands_nothing_more(cell: Plant) -> None:
     async with cell.connected() as client:
         method = await request_method(client)
         assert (await call_request(client, method, "reset 1", 1, 0))[0] == 0
-        person = (await cell.hub.granted("AddPerson", {"name": "Eva", "role": "programmer", "pin": "77123"}))["id"]
-        (line,) = [each for each in (await cell.hub.granted("ListPersons"))["persons"] if each["id"] != person]
+        await cell.hub.granted("AddPerson", {"name": "Eva", "role": "programmer", "pin": "77123"})
+        (line,) = [each for each in (await cell.hub.granted("ListPersons"))["persons"] if each["name"] == "Line 7"]
         await cell.hub.granted("RemovePerson", {"id": line["id"]})
         result, text = await call_request(client, method, "stop 1", 3, 0)
         assert result == 1
