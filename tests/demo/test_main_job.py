@@ -6,6 +6,7 @@ import json
 import random
 import re
 import signal
+import socket
 import zipfile
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any
 
 import pytest
 import pytest_asyncio
+from asyncua import Client as OpcUaClient
 from pymodbus.client import AsyncModbusTcpClient
 
 from arcor2_fakes.cell.boards import draw_boards
@@ -79,6 +81,12 @@ class Cell:
                     return problem
 
 
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
 async def watch(url: str, results: list[bool], order: list[str]) -> None:
     """Observe the server without registering a user; collect the events of the script.
 
@@ -103,7 +111,8 @@ async def watch(url: str, results: list[bool], order: list[str]) -> None:
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def cell(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Cell]:
     print(f"seed {SEED}")  # noqa: T201
-    async with demo(tmp_path_factory.mktemp("demo"), "--boards", str(BOARDS), "--seed", str(SEED)) as run:
+    options = ("--boards", str(BOARDS), "--seed", str(SEED), "--opcua", "--opcua-port", str(free_port()))
+    async with demo(tmp_path_factory.mktemp("demo"), *options) as run:
         at = await until(run.at, "the demo prints its addresses", 40)
         script: list[bool] = []
         order: list[str] = []
@@ -149,6 +158,17 @@ async def test_five_readings_agree(cell: Cell) -> None:
     boxes = {place.kind: set(place.parts) for place in books.places if place.kind.is_box}
     assert boxes[PlaceKind.GOOD] == {board["code"] for board in world["boards"] if board["good"]}
     assert boxes[PlaceKind.BAD] == {board["code"] for board in world["boards"] if not board["good"]}
+
+
+async def test_any_opcua_client_reads_the_counts(cell: Cell) -> None:
+    at = cell.run.at()
+    assert at is not None
+    async with OpcUaClient(at["opcua"]) as client:
+        index = await client.get_namespace_index("http://opcfoundation.org/UA/PackML/")
+        (unit,) = await (await client.nodes.objects.get_child(f"{index}:PackMLObjects")).get_children()
+        await client.load_data_type_definitions()
+        (processed,) = await (await unit.get_child([f"{index}:Admin", f"{index}:ProdProcessedCount"])).read_value()
+    assert processed.Count == BOARDS
 
 
 async def test_the_belt_brings_the_next_board_while_the_tester_works(cell: Cell) -> None:

@@ -1,6 +1,7 @@
 """`arcor2-hw demo`: start the demo cell on this machine and run its program."""
 
 import asyncio
+import importlib.util
 import random
 from pathlib import Path
 from typing import Annotated
@@ -24,6 +25,8 @@ def demo(
     port: Annotated[int, Parameter(validator=validators.Number(gte=0, lte=65535))] = 6789,
     data_dir: Path | None = None,
     fast: bool = False,
+    opcua: Annotated[bool, Parameter(negative="")] = False,
+    opcua_port: Annotated[int, Parameter(validator=validators.Number(gte=1, lte=65535))] = 4840,
     picture: Path | None = None,
 ) -> int:
     """Start the demo cell and run its program.
@@ -45,16 +48,30 @@ def demo(
         Data directory for scenes, projects and packages.
     fast
         Run the robots, the tester and the conveyor faster.
+    opcua
+        Serve the cell over OPC UA too. On 127.0.0.1 any client may read, without user or encryption.
+    opcua_port
+        Port of the OPC UA server.
     picture
         Write the terminal output at the last board to this SVG file.
     """
+    if opcua and importlib.util.find_spec("asyncua") is None:
+        return fail("demo", "--opcua needs the library asyncua: pip install 'arcor2-hw[opcua]'", ExitStatus.USAGE)
     directory = data_dir if data_dir is not None else default_data_dir() / "demo"
     seed = seed if seed is not None else random.randrange(1_000_000)
     console = Console(highlight=False)
     with Display(console, boards) as display:
         display.note(f"{boards} boards, seed {seed}")
         job = Demo(
-            host=host, port=port, data_dir=directory, boards=boards, seed=seed, once=once, display=display, fast=fast
+            host=host,
+            port=port,
+            data_dir=directory,
+            boards=boards,
+            seed=seed,
+            once=once,
+            display=display,
+            fast=fast,
+            opcua_port=opcua_port if opcua else None,
         )
         try:
             outcome = asyncio.run(job.run())

@@ -62,7 +62,10 @@ class Demo:
         once: bool,
         display: Display,
         fast: bool = False,
+        opcua_port: int | None = None,
     ) -> None:
+        self._opcua = "" if opcua_port is None else f"{f'[{host}]' if ':' in host else host}:{opcua_port}"
+        """Address of the OPC UA server; empty without one."""
         self._host = host
         self._port = port
         self._data_dir = data_dir
@@ -123,7 +126,10 @@ class Demo:
         at: dict[str, Any] = {name: ready for name, (_, ready) in started.items()}
         at["world"] = await world.start_json()
         self._display.addresses(server_at, wires(started))
-        self._write_addresses({"url": server_at, **at})
+        opcua = {"opcua": f"opc.tcp://{self._opcua}/arcor2hw/"} if self._opcua else {}
+        if opcua:
+            self._display.note(f"OPC UA server at {opcua['opcua']}")
+        self._write_addresses({"url": server_at, **opcua, **at})
         settings: dict[str, Scalar] = {"outbox": str((self._data_dir / "outbox").absolute())}
         settings |= FAST_ACCELERATIONS if self._fast else ACCELERATIONS
         for fake, ready in started.values():
@@ -166,6 +172,7 @@ class Demo:
                 *("arcor2_server.cli.main", "serve", "--host", self._host, "--port", str(self._port)),
                 *("--data-dir", str(self._data_dir), "--markers", str(markers_file())),
                 *(["--history"] if importlib.util.find_spec("duckdb") is not None else []),
+                *(["--opcua", self._opcua] if self._opcua else []),
             ),
         )
         children = [self._child(fake.name, fake.command()) for fake in wanted]
