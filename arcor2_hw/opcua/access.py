@@ -17,6 +17,7 @@ from asyncua.server.uaprocessor import UaProcessor
 from asyncua.ua.ua_binary import struct_from_binary
 
 from arcor2_hw.opcua.certificates import TrustedClients
+from arcor2_hw.opcua.interest import Interest
 from arcor2_hw.opcua.messages import User
 from arcor2_hw.opcua.space import node_id
 
@@ -75,7 +76,44 @@ class Users:
 
 
 class Session(InternalSession):
-    """A session that knows its user during calls."""
+    """A session that knows its user during calls, and gets current values.
+
+    Values of devices are read only while clients want them. Nodes of points exist since they were read for the first
+    time.
+    """
+
+    @property
+    def _interest(self) -> Interest:
+        server: Any = self.iserver
+        interest: Interest = server.interest
+        return interest
+
+    async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
+        """Read values."""
+        await self._interest.need(
+            each.NodeId for each in params.NodesToRead if each.AttributeId == ua.AttributeIds.Value
+        )
+        return await super().read(params)
+
+    async def browse(self, params: ua.BrowseParameters) -> list[ua.BrowseResult]:
+        """Browse nodes."""
+        await self._interest.need(each.NodeId for each in params.NodesToBrowse)
+        return await super().browse(params)
+
+    async def translate_browsepaths_to_nodeids(self, params: list[ua.BrowsePath]) -> list[ua.BrowsePathResult]:
+        """Find nodes by browse names."""
+        results = await super().translate_browsepaths_to_nodeids(params)
+        if all(each.StatusCode.is_good() for each in results):
+            return results
+        await self._interest.need_all()
+        return await super().translate_browsepaths_to_nodeids(params)
+
+    async def create_monitored_items(
+        self, params: ua.CreateMonitoredItemsParameters
+    ) -> list[ua.MonitoredItemCreateResult]:
+        """Monitor values or events."""
+        await self._interest.need(each.ItemToMonitor.NodeId for each in params.ItemsToCreate)
+        return await super().create_monitored_items(params)
 
     async def call(self, params: list[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
         """Call methods."""
@@ -106,6 +144,7 @@ class Internal(InternalServer):
         super().__init__(user_manager=Users())  # type: ignore[arg-type]
         self.trusted, self.check, self.unencrypted = trusted, check, unencrypted
         self.acknowledge: AcknowledgeCondition
+        self.interest: Interest
         self.max_connections = MOST_CONNECTIONS
         self.max_subscriptions = MOST_SUBSCRIPTIONS
         self.max_monitored_item_queue_size = MOST_QUEUED

@@ -129,6 +129,17 @@ class Device:
         """Whether the device is connected."""
         return self._connection in _CONNECTED
 
+    @property
+    def nodes(self) -> list[ua.NodeId]:
+        """The component, and the robot if it is one. Each has a stream of values."""
+        return [self.node] if self.robot is None else [self.node, self.robot.node]
+
+    @property
+    def monitored(self) -> bool:
+        """Whether a client monitors a value of the device."""
+        axes = () if self.robot is None else self.robot.axes
+        return any(tag.monitored for tag in (*self._points.values(), *axes))
+
     async def set_state(self, state: DeviceState) -> None:
         """Show connection, health and alarms."""
         self._connection = state.connection
@@ -199,6 +210,11 @@ class Robot:
         self.node = space.own("robots", info.id)
         self._axes: dict[str, tuple[Tag, Tag]] = {}
         self._last: tuple[float, dict[str, float]] = (0.0, {})
+
+    @property
+    def axes(self) -> list[Tag]:
+        """The variables of the axes."""
+        return [tag for tags in self._axes.values() for tag in tags]
 
     async def add(self) -> None:
         """Add the system to the device set."""
@@ -315,9 +331,8 @@ class Robot:
     async def invalidate(self, status: int) -> None:
         """Mark the axes as stale or not connected."""
         self._last = (0.0, {})
-        for tags in self._axes.values():
-            for tag in tags:
-                await tag.invalidate(status)
+        for tag in self.axes:
+            await tag.invalidate(status)
 
 
 def _number(value: Any) -> Any:

@@ -60,6 +60,12 @@ class Started(Struct, frozen=True, tag=True):
     fingerprint: str
 
 
+class Watch(Struct, frozen=True, tag=True):
+    """Send the points and joints of these devices, and of no others."""
+
+    devices: list[str]
+
+
 class LogOn(Struct, frozen=True, tag=True):
     """Check a user. secret: the PIN of a person, or a token."""
 
@@ -103,7 +109,7 @@ class Acknowledge(Struct, frozen=True, tag=True):
 
 
 ToProcess = Setup | Update | LogOnAnswer | CallAnswer
-FromProcess = Started | LogOn | Command | SetMode | Acknowledge
+FromProcess = Started | Watch | LogOn | Command | SetMode | Acknowledge
 
 decode_to_process: Any = msgspec.msgpack.Decoder(ToProcess).decode
 decode_from_process: Any = msgspec.msgpack.Decoder(FromProcess).decode

@@ -21,6 +21,7 @@ from arcor2_hw.opcua.access import Internal, OpcUaServer, Services, caller
 from arcor2_hw.opcua.certificates import TrustedClients, application_uri, own_certificate
 from arcor2_hw.opcua.conditions import Conditions
 from arcor2_hw.opcua.devices import Device
+from arcor2_hw.opcua.interest import Interest
 from arcor2_hw.opcua.space import Space
 from arcor2_hw.opcua.unit import VENDOR, Unit
 from arcor2_hw.plant.messages import BEAT_PERIOD, STALE_AFTER, DeviceInfo, UnitData, Update
@@ -48,6 +49,7 @@ class Process:
         self._numbers = itertools.count(1)
         self._answers: dict[int, asyncio.Future[Any]] = {}
         self._devices: dict[str, Device] = {}
+        self._interest = Interest(self._devices, lambda devices: self._link.send(m.Watch(devices)))
         self._unit_data = UnitData()
         self._heard = time.monotonic()
 
@@ -107,7 +109,7 @@ class Process:
         await self._unit.add()
         await Conditions.prepare(server)
         self._conditions = Conditions(space, self._source, self._acknowledge)
-        internal.acknowledge = self._conditions.acknowledge
+        internal.acknowledge, internal.interest = self._conditions.acknowledge, self._interest
         bound = socket.socket(fileno=setup.listener)
         bound.setblocking(False)
         await server.listen(bound)
@@ -154,12 +156,16 @@ class Process:
         if isinstance(data, RobotJointsData):
             if (device := self._devices.get(data.robot_id)) is not None and data.time_ms:
                 await device.set_joints(data.joints, data.time_ms)
-        elif (device := self._devices.get(data.object_id)) is not None and not data.reason:
-            await device.set_points(data.points, data.time_ms)
+                self._interest.arrived(device.nodes[-1])
+        elif (device := self._devices.get(data.object_id)) is not None:
+            if not data.reason:
+                await device.set_points(data.points, data.time_ms)
+            self._interest.arrived(device.node)
 
     async def _watch(self) -> None:
         """Mark values as stale that are not renewed, also because the server does not answer."""
         while True:
+            self._interest.update()
             await asyncio.sleep(BEAT_PERIOD)
             silent = time.monotonic() - self._heard > STALE_AFTER
             for device in list(self._devices.values()):

@@ -79,6 +79,11 @@ class Tag:
         self._last: tuple[Any, int] | None = None
         self._at = -math.inf
 
+    @property
+    def monitored(self) -> bool:
+        """Whether a client monitors the value."""
+        return bool(self._server.iserver.aspace[self.node].attributes[ua.AttributeIds.Value].datachange_callbacks)
+
     async def write(self, value: Any, status: int = GOOD, at: datetime | None = None) -> None:
         """Write a value with its status and the time at which it was read."""
         at = at or datetime.now(UTC)

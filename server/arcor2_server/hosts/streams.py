@@ -60,14 +60,20 @@ class RobotStreams:
         self._update_host_rates(robot_id)
 
     def observe(self, object_id: str, what: str, rate: float, receive: Callable[[bytes], None], *, owner: str) -> None:
-        """Pass the encoded events of a stream at `rate`, 1/s, to another part of the server until `clear`.
+        """Pass the encoded events of a stream at `rate`, 1/s, to another part of the server.
 
-        `owner` names that part. A part that calls this again for the same stream replaces its rate and function.
+        It ends by `end_observing` or `clear`. `owner` names that part. A part that calls this again for the same
+        stream replaces its rate and function.
         """
         observers = self._observers.setdefault((object_id, what), {})
         before = observers.get(owner)
         observers[owner] = rate, receive
         if before is None or before[0] != rate:
+            self._update_host_rates(object_id)
+
+    def end_observing(self, object_id: str, what: str, *, owner: str) -> None:
+        """End what `observe` has started."""
+        if self._observers.get((object_id, what), {}).pop(owner, None) is not None:
             self._update_host_rates(object_id)
 
     def publish(self, message: m.StreamEvent) -> None:

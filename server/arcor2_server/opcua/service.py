@@ -42,10 +42,11 @@ class OpcUa:
         """Start to serve clients on a bound socket. The process is started in the background."""
         listener.listen()  # clients wait while the process is not running
         self._cell.has_opcua = True
+        self._reader = self._feed.reader(with_streams=False)
         self._process = PlantProcess(
             NAME,
             "arcor2_hw.opcua",
-            self._feed.reader(),
+            self._reader,
             self._alarms,
             "opcua_ended",
             lambda: self._setup(listener),
@@ -79,6 +80,9 @@ class OpcUa:
         match m.decode_from_process(body):
             case m.Started(fingerprint):
                 log.info("OPC UA server is ready", certificate=fingerprint)
+                return None
+            case m.Watch(devices):
+                self._reader.watch(devices)
                 return None
             case request:
                 return await self._answer(request)

@@ -1,7 +1,8 @@
 """Collects the data for plant systems: only changes, and of each stream only the newest event."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import Final
 
 import structlog
@@ -44,13 +45,23 @@ class FeedReader:
 
     def __init__(self, feed: "CellFeed", *, with_streams: bool) -> None:
         self._feed = feed
-        self.with_streams = with_streams
+        self._watched: frozenset[str] | None = None if with_streams else frozenset()
+        """The devices whose points and joints it gets; None: all."""
         self._devices: list[DeviceInfo] = []
         self._states: dict[str, DeviceState] = {}
         self._unit: UnitData | None = None
         self.streams: dict[tuple[str, str], bytes] = {}
         self.alarms: dict[int, AlarmRecord] = {}
         self.left: deque[Unit] = deque(maxlen=MOST_LEFT)
+
+    def wants(self, object_id: str) -> bool:
+        """Return whether it gets the points and joints of a device."""
+        return self._watched is None or object_id in self._watched
+
+    def watch(self, devices: Iterable[str]) -> None:
+        """Get the points and joints of these devices, and of no others."""
+        self._watched = frozenset(devices)
+        self._feed.observe_wanted()
 
     async def everything(self) -> Update:
         """Return the present state for a process that has started, and the units that left while none was running."""
@@ -117,14 +128,12 @@ class CellFeed:
         self._readers: list[FeedReader] = []
 
     def reader(self, *, with_streams: bool = True) -> FeedReader:
-        """Return a new reader. It gets all changes from now on; points and joints only `with_streams`."""
+        """Return a new reader. It gets all changes from now on; points and joints `with_streams` or by `watch`."""
         if not self._readers:
             self._start()
         reader = FeedReader(self, with_streams=with_streams)
         self._readers.append(reader)
-        for host in self._hosts:
-            for report in host.board.reports.values():
-                self._observe(host, report)
+        self.observe_wanted()
         return reader
 
     def _start(self) -> None:
@@ -158,19 +167,29 @@ class CellFeed:
         self._observe(host, report)
 
     def _observe(self, host: HostSession, report: DeviceChanged) -> None:
-        """Read the points and joints of a connected device, if a reader wants them."""
-        if report.connection in _CONNECTED and any(reader.with_streams for reader in self._readers):
-            key = report.object_id
-            host.streams.observe(key, POINTS, POINTS_RATE, lambda encoded: self._put(key, POINTS, encoded), owner=OWNER)
-            if self._robot_type(host, key):
-                joints = RobotEventKind.JOINTS.value
-                host.streams.observe(
-                    key, joints, JOINTS_RATE, lambda encoded: self._put(key, joints, encoded), owner=OWNER
-                )
+        """Read the points and joints of a connected device while a reader wants them."""
+        if report.connection not in _CONNECTED:
+            return
+        key = report.object_id
+        streams = {POINTS: POINTS_RATE}
+        if self._robot_type(host, key):
+            streams[RobotEventKind.JOINTS.value] = JOINTS_RATE
+        wanted = any(reader.wants(key) for reader in self._readers)
+        for kind, rate in streams.items():
+            if wanted:
+                host.streams.observe(key, kind, rate, partial(self._put, key, kind), owner=OWNER)
+            else:
+                host.streams.end_observing(key, kind, owner=OWNER)
+
+    def observe_wanted(self) -> None:
+        """Read what readers want, and nothing else."""
+        for host in self._hosts:
+            for report in host.board.reports.values():
+                self._observe(host, report)
 
     def _put(self, object_id: str, kind: str, encoded: bytes) -> None:
         for reader in self._readers:
-            if reader.with_streams:
+            if reader.wants(object_id):
                 reader.streams[object_id, kind] = encoded
 
     # -------------------------------------------------------------------------------- what readers send

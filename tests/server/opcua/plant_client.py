@@ -16,6 +16,7 @@ WITHIN = 40.0
 DI, MACHINERY, ROBOTICS, PACKML = (
     f"http://opcfoundation.org/UA/{name}/" for name in ("DI", "Machinery", "Robotics", "PackML")
 )
+OWN = "urn:arcor2-hw:cell"
 URI = "urn:example:scada"
 
 

@@ -22,7 +22,7 @@ from arcor2_hw.data.packml import MachineCommand, MachineState, UnitMode
 from arcor2_hw.data.points import LivePoint, PointUse
 from arcor2_hw.data.robot import RobotMeta, RobotType
 from arcor2_hw.data.units import Unit, UnitState
-from arcor2_hw.opcua import access, unit
+from arcor2_hw.opcua import access, interest, unit
 from arcor2_hw.opcua.certificates import TrustedClients, application_uri, own_certificate
 from arcor2_hw.opcua.conditions import Conditions
 from arcor2_hw.opcua.devices import Device
@@ -207,7 +207,7 @@ class Cell:
             object=self.object,
         )
         self.observed: dict[tuple[str, str], Any] = {}
-        self.streams = SimpleNamespace(observe=self.observe)
+        self.streams = SimpleNamespace(observe=self.observe, end_observing=self.end_observing)
         self.parts, self.program = SimpleNamespace(on_change=[]), SimpleNamespace(number=1)
         self.on_changed: list[Any] = []
         self.on_left: list[Any] = []
@@ -219,6 +219,9 @@ class Cell:
 
     def observe(self, object_id: str, what: str, rate: float, receive: Any, owner: str) -> None:
         self.observed[object_id, what] = receive
+
+    def end_observing(self, object_id: str, what: str, owner: str) -> None:
+        self.observed.pop((object_id, what), None)
 
     def object(self, object_id: str) -> Any:
         return SimpleNamespace(name=object_id, type={"obj_table": "Table", "obj_arm": "UR5e"}.get(object_id, "Block"))
@@ -275,6 +278,15 @@ async def test_the_feed_shows_devices_and_sends_only_changes() -> None:
     assert (changed.unit.last_job, changed.unit.job_end) == (7, "completed")
 
     assert cell.observed == {}
+    reader.watch(["obj_arm"])
+    assert len(cell.observed) == 2  # points and joints
+    other.watch(["obj_io", "obj_unknown"])
+    cell.observed["obj_io", POINTS](b"only for the other one")
+    assert ((await reader.changes()).streams, (await other.changes()).streams) == ([], [b"only for the other one"])
+    reader.watch([])
+    assert list(cell.observed) == [("obj_io", POINTS)]
+    other.watch([])
+    assert cell.observed == {}
     streamed = feed.reader()
     assert len(cell.observed) == 4  # the points of three objects, and the joints of the robot
     cell.observed["obj_io", POINTS](b"values")
@@ -319,6 +331,41 @@ async def test_values_that_are_not_renewed_become_stale_and_keep_value_and_time(
     assert abs((stale.SourceTimestamp - good.SourceTimestamp).total_seconds()) < 0.001
     await device.set_points([point], at)
     assert written.values[-1].StatusCode.is_good()
+
+
+async def test_only_devices_are_read_that_clients_monitor_or_have_just_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = {key: (ua.NodeId(f"devices/{key}", 9), ua.NodeId(f"robots/{key}", 9)) for key in ("io", "arm", "off")}
+    devices: Any = {
+        key: SimpleNamespace(nodes=list(nodes), monitored=False, connected=key != "off") for key, nodes in names.items()
+    }
+    watched: list[list[str]] = []
+    wanted = interest.Interest(devices, watched.append)
+    wanted.update()
+    assert watched == [[]]
+    await wanted.need([ua.NodeId(2258), ua.NodeId("cell/Production", 9), ua.NodeId("devices/off/Points/DI1", 9)])
+    assert watched == [[]]
+
+    reading = asyncio.create_task(wanted.need([ua.NodeId("robots/arm/Axes/j1", 9)]))
+    await asyncio.sleep(0)
+    assert watched[-1] == ["arm"]
+    wanted.arrived(names["arm"][0])
+    await asyncio.sleep(0)
+    assert not reading.done()  # the points have arrived, but not the joints
+    wanted.arrived(names["arm"][1])
+    await reading
+    await wanted.need([ua.NodeId("robots/arm/Axes/j2", 9)])  # current already
+
+    monkeypatch.setattr(interest, "FIRST_VALUES", 0.0)
+    await wanted.need([ua.NodeId("devices/io/Points/DI1", 9)])  # a device that does not answer delays no client longer
+    assert watched[-1] == ["arm", "io"]
+    devices["io"].monitored = True
+    later = time.monotonic() + interest.LEASE
+    monkeypatch.setattr(interest, "time", SimpleNamespace(monotonic=lambda: later))
+    wanted.update()
+    assert watched[-1] == ["io"]
+    devices["io"].monitored = False
+    wanted.update()
+    assert watched[-1] == []
 
 
 async def test_a_momentary_alarm_is_one_event_and_a_retained_one_ends_with_an_event() -> None:

@@ -136,13 +136,16 @@ async def robot_of(client: Client) -> Node:
     return system
 
 
-async def positions(system: Node) -> list[Node]:
-    """Return the variables ActualPosition of the two axes."""
+async def positions(system: Node, browses: int = 1000) -> list[Node]:
+    """Return the variables ActualPosition of the two axes, which exist after at most this number of browses."""
     devices = await plant.child(system, (plant.ROBOTICS, "MotionDevices"))
     (device,) = await plant.typed(devices, plant.ROBOTICS, "MotionDeviceType")
     axes = await plant.child(device, (plant.ROBOTICS, "Axes"))
     names = (plant.DI, "ParameterSet"), (plant.ROBOTICS, "ActualPosition")
-    found = await plant.eventually(lambda: plant.typed(axes, plant.ROBOTICS, "AxisType"), lambda found: len(found) == 2)
+    found: list[Node] = []
+    while len(found) < 2:
+        assert browses > 0
+        found, browses = await plant.typed(axes, plant.ROBOTICS, "AxisType"), browses - 1
     return [await plant.child(axis, *names) for axis in found]
 
 
@@ -249,6 +252,18 @@ async def test_a_command_needs_the_authority_and_is_executed_once(cell: Plant) -
                 await set_mode(technician, ua.Variant(2, ua.VariantType.Int32))
         mode = await plant.child(await unit_of(client), (plant.PACKML, "Status"), (plant.PACKML, "UnitModeCurrent"))
         assert await mode.read_value() == 1
+
+
+async def test_a_client_that_only_reads_gets_current_values(cell: Plant) -> None:
+    async with cell.connected() as client:
+        device = await plant.child(await machine_of(client), (plant.MACHINERY, "Components"), (plant.OWN, "arm"))
+        await plant.eventually(
+            (await plant.child(device, (plant.OWN, "Connection"))).read_value, lambda state: state == "online"
+        )
+        values = await positions(await robot_of(client), browses=1)
+        for value in [await values[0].read_data_value(), await values[1].read_data_value()]:
+            assert value.StatusCode.is_good()
+            assert abs((datetime.now(UTC) - value.SourceTimestamp).total_seconds()) < 30.0
 
 
 async def request_method(client: Client) -> Node:
