@@ -81,7 +81,18 @@ class Authority:
             ) from error
         return True
 
-    def _load(self) -> "_Known | None":
+    def issuer(self) -> "Issuer | None":
+        """Return the certificate and the key of the authority for issuing another certificate for `hosts`.
+
+        None if there is no authority, if it may not certify these names, or if it may not sign a revocation list, as
+        those that were created before it was needed.
+        """
+        known = self._load()
+        if known is None or not _permits(known[0], _names(self._hosts())):
+            return None
+        return known if known[0].extensions.get_extension_for_class(x509.KeyUsage).value.crl_sign else None
+
+    def _load(self) -> "Issuer | None":
         """Return the certificate and the key of the authority; None if they are missing, damaged or expire soon."""
         try:
             certificate = x509.load_pem_x509_certificate(self.file.read_bytes())
@@ -93,13 +104,13 @@ class Authority:
         # The certificate of the server must not outlive the authority.
         return (certificate, key) if _lasts(certificate, VALID_DAYS) else None
 
-    def _create(self, names: list[x509.GeneralName]) -> "_Known":
+    def _create(self, names: list[x509.GeneralName]) -> "Issuer":
         key = ec.generate_private_key(ec.SECP256R1())
         name = _subject(f"ARCOR2-HW authority of {socket.gethostname()}")
         certificate = (
             _builder(name, name, key.public_key(), AUTHORITY_DAYS)
             .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
-            .add_extension(_usage(key_cert_sign=True), critical=True)
+            .add_extension(_usage(authority=True), critical=True)
             # Not critical: a system that cannot check addresses would refuse the authority.
             .add_extension(x509.NameConstraints(_permitted(names), None), critical=False)
             .sign(key, hashes.SHA256())
@@ -110,7 +121,7 @@ class Authority:
         replace_file(self.file, certificate.public_bytes(serialization.Encoding.PEM), mode=0o644)
         return certificate, key
 
-    def _issue(self, authority: "_Known", names: list[x509.GeneralName]) -> None:
+    def _issue(self, authority: "Issuer", names: list[x509.GeneralName]) -> None:
         issuer, issuer_key = authority
         key = ec.generate_private_key(ec.SECP256R1())
         certificate = (
@@ -127,7 +138,8 @@ class Authority:
         replace_file(self.files[0], certificate.public_bytes(pem) + issuer.public_bytes(pem), mode=0o644)
 
 
-_Known = tuple[x509.Certificate, ec.EllipticCurvePrivateKey]
+Issuer = tuple[x509.Certificate, ec.EllipticCurvePrivateKey]
+"""An authority: its certificate and its key."""
 
 
 def _names(hosts: Iterable[str]) -> list[x509.GeneralName]:
@@ -208,15 +220,15 @@ def _subject(name: str) -> x509.Name:
     return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name[:64])])
 
 
-def _usage(*, key_cert_sign: bool = False, digital_signature: bool = False) -> x509.KeyUsage:
+def _usage(*, authority: bool = False, digital_signature: bool = False) -> x509.KeyUsage:
     return x509.KeyUsage(
         digital_signature=digital_signature,
         content_commitment=False,
         key_encipherment=False,
         data_encipherment=False,
         key_agreement=False,
-        key_cert_sign=key_cert_sign,
-        crl_sign=False,
+        key_cert_sign=authority,
+        crl_sign=authority,
         encipher_only=False,
         decipher_only=False,
     )

@@ -210,7 +210,10 @@ def serve(
                 plc = sockets.enter_context(contextlib.closing(listen(settings.plc.host, settings.plc.port)))
             plant = None
             if settings.opcua is not None:
+                from arcor2_server.opcua.certificate import issue_certificate  # takes time, and few servers need it
+
                 plant = sockets.enter_context(contextlib.closing(listen(settings.opcua.host, settings.opcua.port)))
+                issue_certificate(settings)
             welcome(settings, listener.getsockname()[1])
             with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
                 runner.run(run(settings, [listener, *classic_listeners], legacy_listener, certificate, plc, plant))

@@ -2,6 +2,7 @@
 
 import asyncio
 import socket
+import subprocess
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +13,7 @@ import pytest
 from asyncua import ua
 from asyncua.common.utils import ServiceError
 from cryptography import x509
+from cryptography.hazmat.primitives import serialization
 from msgspec.structs import replace
 
 from arcor2_hw.data.alarms import AlarmCategory, AlarmRecord, Priority
@@ -29,12 +31,16 @@ from arcor2_hw.opcua.devices import Device
 from arcor2_hw.opcua.space import Tag
 from arcor2_hw.plant import messages as m
 from arcor2_hw.runtime.messages import DeviceChanged, Stream, StreamEvent
+from arcor2_server.access.addresses import certified_hosts
+from arcor2_server.access.authority import Authority
 from arcor2_server.hosts.streams import POINTS, RobotStreams
+from arcor2_server.opcua.certificate import issue_certificate
 from arcor2_server.packml.plc import Plc
 from arcor2_server.packml.record import CellFile, JobEnd, RequestResult as R
 from arcor2_server.plant import process
 from arcor2_server.plant.feed import CellFeed
 from arcor2_server.plant.process import PlantProcess
+from arcor2_server.settings import OpcUaListener, ServerSettings
 from tests.server.opcua.plant_client import client_certificate
 from tests.server.packml.test_rules import new_cell
 
@@ -47,6 +53,47 @@ def test_the_certificate_names_the_machine_and_is_renewed_only_for_another_name(
     assert first[1].stat().st_mode & 0o77 == 0
     assert own_certificate(tmp_path, "cell-7", [])[0].read_bytes() == before
     assert own_certificate(tmp_path, "cell-8", [])[0].read_bytes() != before
+
+
+def test_a_client_that_trusts_the_authority_trusts_the_endpoint(tmp_path: Path) -> None:
+    hosts = certified_hosts("127.0.0.1")
+    authority = Authority(tmp_path, lambda: hosts)
+    authority.renew()
+    settings = ServerSettings(data_dir=tmp_path, opcua=OpcUaListener("127.0.0.1", 4840), authority=authority.file)
+    issue_certificate(settings)
+    file, key = tmp_path / "opcua-certificate.pem", tmp_path / "opcua-key.pem"
+    leaf = x509.load_pem_x509_certificate(file.read_bytes())
+    issuer = x509.load_der_x509_certificate((tmp_path / "opcua-authority.der").read_bytes())
+    assert leaf.issuer == issuer.subject
+    assert leaf.not_valid_after_utc <= issuer.not_valid_after_utc
+    crl = x509.load_der_x509_crl((tmp_path / "opcua-authority.crl").read_bytes())
+    (tmp_path / "crl.pem").write_bytes(crl.public_bytes(serialization.Encoding.PEM))
+    check = ["openssl", "verify", "-x509_strict", "-check_ss_sig", "-crl_check", "-purpose", "sslserver"]
+    check += ["-verify_ip", "127.0.0.1", "-CAfile", str(authority.file), "-CRLfile", str(tmp_path / "crl.pem")]
+    assert subprocess.run([*check, str(file)], capture_output=True, text=True).stdout == f"{file}: OK\n"
+    # A restart, with and without the authority, keeps it. Another authority, or another name, replaces it.
+    before = file.read_bytes()
+    issue_certificate(settings)
+    assert own_certificate(tmp_path, socket.gethostname(), hosts)[0].read_bytes() == before
+    hosts.append("cell-7.local")
+    assert own_certificate(tmp_path, socket.gethostname(), hosts, authority.issuer())[0].read_bytes() != before
+    authority.file.unlink()
+    authority.renew()
+    before, crl_before = file.read_bytes(), (tmp_path / "opcua-authority.crl").read_bytes()
+    issue_certificate(settings)
+    assert file.read_bytes() != before
+    assert (tmp_path / "opcua-authority.crl").read_bytes() != crl_before
+    assert key.stat().st_mode & 0o77 == 0
+
+
+def test_a_certificate_that_clients_trust_already_stays(tmp_path: Path) -> None:
+    hosts = ["localhost", "127.0.0.1"]
+    before = own_certificate(tmp_path, socket.gethostname(), hosts)[0].read_bytes()
+    authority = Authority(tmp_path, lambda: hosts)
+    authority.renew()
+    assert own_certificate(tmp_path, socket.gethostname(), hosts, authority.issuer())[0].read_bytes() == before
+    foreign = Authority(tmp_path, lambda: ["cell.example.com"])
+    assert foreign.issuer() is None  # its constraints do not permit the name
 
 
 def test_only_certificates_in_the_folder_are_trusted(tmp_path: Path) -> None:
