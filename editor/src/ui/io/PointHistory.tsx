@@ -12,7 +12,8 @@ import { OneOf } from "../kit/fields";
 import { Button, Waiting } from "../kit/kit";
 import { RefusedText, useRefusal } from "../points/Refusal";
 import { useTheme } from "../settings/Settings";
-import { BUCKETS, columnsOf, overall, SPANS, type Span } from "./history";
+import { useVisible } from "../useVisible";
+import { BUCKETS, columnsOf, overall, pauseOf, SPANS, type Span } from "./history";
 import { valueText } from "./points";
 import "uplot/dist/uPlot.min.css";
 import "../trends/trends.css";
@@ -38,10 +39,12 @@ export default function PointHistory({ objectId, device, id, name, unit, onClose
   const [summary, setSummary] = useState<PointSummary | null>(null);
   const [failed, setFailed] = useState("");
   const { refused, busy, ask } = useRefusal();
+  const visible = useVisible();
+  useEffect(() => setSummary(null), [objectId, id, span]);
   useEffect(() => {
+    if (!visible) return;
     let open = true;
-    setSummary(null);
-    setFailed("");
+    let next = 0;
     const load = async () => {
       const found = await findPoint(objectId, id);
       if (!found) throw new Error(t`This point has not been recorded yet.`);
@@ -49,12 +52,20 @@ export default function PointHistory({ objectId, device, id, name, unit, onClose
       if (!open) return;
       setPoint(found);
       setSummary(loaded);
+      setFailed("");
     };
-    load().catch((error: unknown) => open && setFailed(sentence(error)));
+    const follow = () =>
+      load()
+        .catch((error: unknown) => open && setFailed(sentence(error)))
+        .finally(() => {
+          if (open) next = window.setTimeout(follow, pauseOf(span));
+        });
+    follow();
     return () => {
       open = false;
+      window.clearTimeout(next);
     };
-  }, [objectId, id, span]);
+  }, [objectId, id, span, visible]);
   const output = `${device}: ${name}`;
   const save = () => exportPoint(point?.number ?? 0, SPANS[span], `${device} ${name}`);
   return (
@@ -130,14 +141,16 @@ function Fact({ label, value }: { label: string; value: string }) {
 
 function Chart({ summary, digital, unit, label }: ContentProps) {
   const box = useRef<HTMLDivElement>(null);
+  const chart = useRef<UPlot>(null);
+  const shown = useRef(summary);
+  shown.current = summary;
   const theme = useTheme();
+  const days = (summary.until - summary.since) / 1000 > DAY;
+  const [unitShown, factor] = digital ? ["", 1] : shownUnit("double", { unit });
   useEffect(() => {
     const { current } = box;
     if (!current) return;
     const { colour, axis } = plotStyle(current);
-    const [shown, factor] = digital ? ["", 1] : shownUnit("double", { unit });
-    const { since, until } = summary;
-    const days = (until - since) / 1000 > DAY;
     const line = { points: { show: false }, spanGaps: false };
     const edge = { ...line, show: !digital, stroke: `${colour("--trend-1")}66`, width: 1 };
     const made = new UPlot(
@@ -147,7 +160,7 @@ function Chart({ summary, digital, unit, label }: ContentProps) {
         legend: { show: false },
         cursor: { show: false },
         scales: {
-          x: { range: () => [since / 1000, until / 1000] },
+          x: { range: () => [shown.current.since / 1000, shown.current.until / 1000] },
           y: digital ? { range: [-0.05, 1.05] } : { range: (_, least, most) => valueRange(least, most) },
         },
         axes: [
@@ -157,22 +170,25 @@ function Chart({ summary, digital, unit, label }: ContentProps) {
             size: 68,
             space: 28,
             values: (_, splits) => splits.map((each) => (digital ? `${decimal(each * 100, 0)} %` : decimal(each, 6))),
-            ...(shown && { label: shown, labelSize: 20, labelFont: axis.font }),
+            ...(unitShown && { label: unitShown, labelSize: 20, labelFont: axis.font }),
           },
         ],
         series: [{}, { ...line, stroke: colour("--trend-1"), width: 2 }, edge, edge],
         bands: digital ? [] : [{ series: [3, 2], fill: `${colour("--trend-1")}33` }],
       },
-      columnsOf(summary, factor) as UPlot.AlignedData,
+      columnsOf(shown.current, factor) as UPlot.AlignedData,
       current,
     );
+    chart.current = made;
     const watch = new ResizeObserver(() => made.setSize({ width: current.clientWidth, height: HEIGHT }));
     watch.observe(current);
     return () => {
       watch.disconnect();
+      chart.current = null;
       made.destroy();
     };
-  }, [summary, digital, unit, theme]);
+  }, [days, digital, unitShown, factor, theme]);
+  useEffect(() => chart.current?.setData(columnsOf(summary, factor) as UPlot.AlignedData), [summary, factor]);
   return <div ref={box} className="trend-chart" role="img" aria-label={label} />;
 }
 

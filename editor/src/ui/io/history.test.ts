@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { columnsOf, overall } from "./history";
+import { columnsOf, overall, pauseOf } from "./history";
 
 const SUMMARY = {
   since: 0,
@@ -22,4 +22,9 @@ test("a chart has a gap where nothing is known", () => {
 test("the whole period has a lowest, a mean and a highest value", () => {
   expect(overall(SUMMARY)).toEqual([0, 5 / 3, 4]);
   expect(overall({ ...SUMMARY, lowest: [], highest: [], mean: [] })).toBeNull();
+});
+
+test("a chart that follows the present reads at most every 5 s, and at least once per minute", () => {
+  expect(pauseOf("hour")).toBe(6000);
+  expect(pauseOf("week")).toBe(60_000);
 });

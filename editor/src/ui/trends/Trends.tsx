@@ -12,6 +12,7 @@ import { isLive } from "../../store/selectors";
 import { now, useEditor } from "../../store/store";
 import { STALE, telemetry } from "../../store/telemetry";
 import { RefusedText } from "../points/Refusal";
+import { useVisible } from "../useVisible";
 import { Chart, MOST } from "./Chart";
 import { charts, type History, NO_HISTORY, RATE, type Series, shownValue, withObservations } from "./history";
 import "./trends.css";
@@ -111,15 +112,4 @@ function textOf({ binary, unit, last }: Series): string {
   if (binary) return value ? t`on` : t`off`;
   const text = decimal(value, Math.abs(value) < 10 ? 3 : 1);
   return unit ? `${text}\u00a0${unit}` : text;
-}
-
-/** Return whether the page is visible. */
-function useVisible(): boolean {
-  const [visible, setVisible] = useState(!document.hidden);
-  useEffect(() => {
-    const changed = () => setVisible(!document.hidden);
-    document.addEventListener("visibilitychange", changed);
-    return () => document.removeEventListener("visibilitychange", changed);
-  }, []);
-  return visible;
 }
