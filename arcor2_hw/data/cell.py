@@ -2,10 +2,10 @@
 
 from collections.abc import Collection, Iterable
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import msgspec
-from msgspec import field
+from msgspec import Meta, field
 
 from arcor2_hw.data.base import UNSET, Data, Unset, is_valid_name
 from arcor2_hw.data.geometry import Pose
@@ -17,6 +17,8 @@ from arcor2_hw.exceptions import InvalidData, NotFound
 
 MAX_SIZE: Final = 1 << 20
 """Maximum size, bytes; a cell of hundreds of devices has some ten thousand."""
+LARGEST_BAND: Final = 1e12
+"""Maximum dead band."""
 BROKER_URL: Final = "ARCOR2_HW_NATS_URL"
 """The variable with the address of the broker between a server and its nodes. It may contain a password."""
 LOCAL_BROKER: Final = "nats://127.0.0.1:4222"
@@ -44,6 +46,7 @@ class CellDevice(Data, frozen=True, forbid_unknown_fields=True):
     wire: list[str | int] | Unset = UNSET
     real: bool | Unset = UNSET
     node: NodeName | Unset = UNSET
+    dead_bands: dict[str, Annotated[float, Meta(ge=0, le=LARGEST_BAND)]] | Unset = UNSET
 
     def __post_init__(self) -> None:
         if not is_valid_name(self.name):

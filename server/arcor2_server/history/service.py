@@ -93,9 +93,7 @@ class History:
     ) -> None:
         self._settings, self._compute, self._hosts, self._clock = settings, compute, hosts, clock
         self._file = HistoryFile(settings.point_history_dir)
-        self._recorder = PointRecorder(
-            settings.point_history_interval, [DeadBand.parse(each) for each in settings.point_history_dead_bands]
-        )
+        self._recorder = PointRecorder(settings.point_history_interval, dead_bands(settings))
         self._runs: list[PastRun] = []
         self._thread = ThreadPoolExecutor(1, "history")
         self._background = BackgroundTasks()
@@ -331,6 +329,18 @@ class History:
             return HistoryState(recording=False, problem=str(self._problem or ""))
         sizes = await self._in_thread(self._file.sizes)
         return HistoryState(True, *sizes, self._recorder.dropped, str(self._problem or ""))
+
+
+def dead_bands(settings: ServerSettings) -> list[DeadBand]:
+    """Return the dead bands in the order in which they count: those of cell.yaml, then those of the variable."""
+    devices = [] if settings.cell is None else settings.cell.devices
+    of_devices = [
+        DeadBand(f"{device.name}.{point}", band)
+        for device in devices
+        if not isinstance(device.dead_bands, Unset)
+        for point, band in device.dead_bands.items()
+    ]
+    return of_devices + [DeadBand.parse(each) for each in settings.point_history_dead_bands]
 
 
 def _milliseconds(stamp: Timestamp) -> int:

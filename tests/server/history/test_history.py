@@ -26,6 +26,7 @@ from arcor2_hw.compute.history_tasks import (
     WriteColdFile,
 )
 from arcor2_hw.compute.worker_state import WorkerState
+from arcor2_hw.data.cell import read_cell
 from arcor2_hw.data.device import Connection
 from arcor2_hw.data.editor import Run, RunEnd, RunStatistics
 from arcor2_hw.data.events import Event
@@ -34,7 +35,7 @@ from arcor2_hw.data.points import LivePoint, ObjectPointsData, PointQuality, Poi
 from arcor2_hw.exceptions import InvalidData, NotFound, StorageError
 from arcor2_server.errors import RequestRefused
 from arcor2_server.history.recorder import PointRecorder
-from arcor2_server.history.service import DAY, HOUR, History, past_run
+from arcor2_server.history.service import DAY, HOUR, History, dead_bands, past_run
 from arcor2_server.settings import DeadBand, ServerSettings
 from arcor2_server.storage import history as storage_history
 from arcor2_server.storage.history import HistoryFile, Sample
@@ -80,6 +81,19 @@ def test_changes_beyond_the_dead_band_are_recorded_with_the_time_of_their_source
         ("door", 2000, 1.0, "good"),
         ("temperature", 2750, 20.6, "good"),
     ]
+
+
+def test_dead_bands_of_the_cell_file_count_before_those_of_the_variable(tmp_path: Path) -> None:
+    file = tmp_path / "cell.yaml"
+    file.write_text(
+        "devices: [{name: oven, type: Oven, dead_bands: {temperature: 0.5, 'zone*': 2}}, {name: lamp, type: L}]"
+    )
+    settings = ServerSettings(data_dir=tmp_path, cell=read_cell(file), point_history_dead_bands=("oven.*=9", "*=0.1"))
+    assert dead_bands(settings) == [("oven.temperature", 0.5), ("oven.zone*", 2.0), ("oven.*", 9.0), ("*", 0.1)]
+    assert dead_bands(ServerSettings(data_dir=tmp_path)) == []
+    file.write_text("devices: [{name: oven, type: Oven, dead_bands: {temperature: -1}}]")
+    with pytest.raises(InvalidData, match="dead_bands"):
+        read_cell(file)
 
 
 @pytest.mark.parametrize(
