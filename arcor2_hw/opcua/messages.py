@@ -60,6 +60,12 @@ class Started(Struct, frozen=True, tag=True):
     fingerprint: str
 
 
+class Clients(Struct, frozen=True, tag=True):
+    """The number of connections of clients has changed."""
+
+    count: int
+
+
 class Watch(Struct, frozen=True, tag=True):
     """Send the points and joints of these devices, and of no others."""
 
@@ -109,7 +115,7 @@ class Acknowledge(Struct, frozen=True, tag=True):
 
 
 ToProcess = Setup | Update | LogOnAnswer | CallAnswer
-FromProcess = Started | Watch | LogOn | Command | SetMode | Acknowledge
+FromProcess = Started | Clients | Watch | LogOn | Command | SetMode | Acknowledge
 
 decode_to_process: Any = msgspec.msgpack.Decoder(ToProcess).decode
 decode_from_process: Any = msgspec.msgpack.Decoder(FromProcess).decode

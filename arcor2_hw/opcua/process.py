@@ -164,8 +164,13 @@ class Process:
 
     async def _watch(self) -> None:
         """Mark values as stale that are not renewed, also because the server does not answer."""
+        clients = 0
         while True:
             self._interest.update()
+            listener = self._server.bserver
+            if (count := len(listener.clients) if listener else 0) != clients:
+                clients = count
+                self._link.send(m.Clients(clients))
             await asyncio.sleep(BEAT_PERIOD)
             silent = time.monotonic() - self._heard > STALE_AFTER
             for device in list(self._devices.values()):

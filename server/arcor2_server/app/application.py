@@ -1,6 +1,6 @@
 """The ASGI application: routes of the websocket, the REST operations and the editor."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from litestar import Litestar, Request, Response, WebSocket, websocket
 from litestar.exceptions import HTTPException, MethodNotAllowedException, NotFoundException
@@ -21,6 +21,9 @@ from arcor2_server.websocket.classic_ports import SOCKET
 from arcor2_server.websocket.endpoint import Endpoint
 from arcor2_server.websocket.execution_endpoint import execution_service
 from arcor2_server.websocket.routes import Service, routes
+
+if TYPE_CHECKING:
+    from arcor2_server.rest.plant_metrics import PlantMetrics
 
 
 @websocket(["/", "/{path:path}"], opt={ROLE: Role.OPERATOR})
@@ -69,9 +72,16 @@ def metrics_of(s: Server, served: dict[str, Endpoint]) -> Metrics:
     """Return what reads the metrics of the parts."""
     hosts = {"scene": s.scene_host, "program": s.program_host}
     requests = {service: endpoint.durations for service, endpoint in served.items()}
+
+    def plant() -> "PlantMetrics":
+        from arcor2_server.rest.plant_metrics import PlantMetrics  # few servers are asked for metrics
+
+        return PlantMetrics(s.nodes, s.fleet, s.history, s.opcua, s.mqtt)
+
     return Metrics(
-        s.settings, s.hub, s.storage, s.execution, s.online, s.cell, s.units, s.alarms, s.system_alarms, hosts, requests
-    )
+        s.settings, s.hub, s.storage, s.execution, s.online, s.cell, s.units, s.alarms, s.system_alarms, hosts,
+        requests, plant,
+    )  # fmt: skip
 
 
 def create_app(server: Server) -> Litestar:

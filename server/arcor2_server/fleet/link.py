@@ -88,6 +88,8 @@ class FleetLink:
         self._execution, self._runs, self._units, self._alarms = execution, runs, units, alarms
         self._users, self._locks = users, locks
         self._background = BackgroundTasks()
+        self.connected = False
+        """Whether the broker of the fleet is connected."""
         self._address = ""
         self._reader: FeedReader
         self._delivery: Delivery | None = None
@@ -136,6 +138,15 @@ class FleetLink:
     async def close(self) -> None:
         """End the connection. What is not sent yet is sent after the next start."""
         await self._background.cancel()
+
+    @property
+    def configured(self) -> bool:
+        """Whether the cell belongs to a fleet."""
+        return bool(self._outboxes)
+
+    async def waiting(self) -> int:
+        """Return the number of results that wait to be sent. Raise StorageError if it cannot be read."""
+        return sum([await outbox.count() for outbox in self._outboxes])
 
     def _mark_alarms(self) -> None:
         self._alarms_changed = True
@@ -228,9 +239,11 @@ class FleetLink:
         tasks = BackgroundTasks()
         assert self._delivery is not None
         tasks.spawn(self._delivery.run(client), "results for the fleet")
+        self.connected = True
         try:
             await self._publish_states(client)
         finally:
+            self.connected = False
             await tasks.cancel()
 
     async def _publish_states(self, client: "Client") -> None:

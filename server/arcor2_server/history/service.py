@@ -101,6 +101,11 @@ class History:
         self._problem: Message | None = None
         self._open = False
 
+    @property
+    def configured(self) -> bool:
+        """Whether the server was started with the history."""
+        return self._settings.point_history
+
     async def open(self) -> None:
         """Open the history and start to record. A history that cannot be used is reported in the log only."""
         if not self._settings.point_history:

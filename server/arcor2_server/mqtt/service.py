@@ -31,24 +31,28 @@ class Mqtt:
 
     def __init__(self, settings: ServerSettings, feed: CellFeed, alarms: Alarms) -> None:
         self._settings, self._feed, self._alarms = settings, feed, alarms
-        self._process: PlantProcess | None = None
+        self.process: PlantProcess | None = None
         self._lost: dict[str, asyncio.TimerHandle] = {}
         """Timers of the alarm of the links without a connection."""
+        self.connected: dict[str, bool] = {}
+        """Whether each link is connected to the broker."""
+        self.dropped = 0
+        """Number of values that were dropped."""
 
     def start(self) -> None:
         """Start the process in the background."""
         reader = self._feed.reader()
-        self._process = PlantProcess(
+        self.process = PlantProcess(
             NAME, "arcor2_hw.mqtt", reader, self._alarms, "mqtt_ended", self._setup, self._received
         )
-        self._process.start()
+        self.process.start()
 
     async def close(self) -> None:
         """End the process. It publishes death certificates."""
         for timer in self._lost.values():
             timer.cancel()
-        if self._process is not None:
-            await self._process.close()
+        if self.process is not None:
+            await self.process.close()
 
     def _setup(self) -> m.Setup:
         mqtt = self._settings.mqtt
@@ -65,12 +69,14 @@ class Mqtt:
             case m.LinkChanged(link, connected, reason):
                 self._link_changed(link, reason, connected=connected)
             case m.Dropped(count):
+                self.dropped += count
                 log.warning("values dropped: too many waited for the MQTT broker or the host", count=count)
 
     def _link_changed(self, link: str, reason: str, *, connected: bool) -> None:
         mqtt = self._settings.mqtt
         assert mqtt is not None
         broker = f"{mqtt.host}:{mqtt.port}"
+        self.connected[link] = connected
         if (timer := self._lost.pop(link, None)) is not None:
             timer.cancel()
         if connected:

@@ -36,14 +36,16 @@ class OpcUa:
     ) -> None:
         self._settings, self._feed, self._requests, self._cell = settings, feed, requests, cell
         self._alarms = alarms
-        self._process: PlantProcess | None = None
+        self.process: PlantProcess | None = None
+        self.clients = 0
+        """Number of connections of clients."""
 
     def serve(self, listener: socket.socket) -> None:
         """Start to serve clients on a bound socket. The process is started in the background."""
         listener.listen()  # clients wait while the process is not running
         self._cell.has_opcua = True
         self._reader = self._feed.reader(with_streams=False)
-        self._process = PlantProcess(
+        self.process = PlantProcess(
             NAME,
             "arcor2_hw.opcua",
             self._reader,
@@ -52,12 +54,12 @@ class OpcUa:
             lambda: self._setup(listener),
             self._received,
         )
-        self._process.start(inherited=(listener.fileno(),))
+        self.process.start(inherited=(listener.fileno(),))
 
     async def close(self) -> None:
         """End the process."""
-        if self._process is not None:
-            await self._process.close()
+        if self.process is not None:
+            await self.process.close()
 
     def _setup(self, listener: socket.socket) -> m.Setup:
         settings, machine = self._settings, socket.gethostname()
@@ -79,7 +81,11 @@ class OpcUa:
     async def _received(self, body: bytes) -> m.LogOnAnswer | m.CallAnswer | None:
         match m.decode_from_process(body):
             case m.Started(fingerprint):
+                self.clients = 0
                 log.info("OPC UA server is ready", certificate=fingerprint)
+                return None
+            case m.Clients(count):
+                self.clients = count
                 return None
             case m.Watch(devices):
                 self._reader.watch(devices)

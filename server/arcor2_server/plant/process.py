@@ -59,6 +59,10 @@ class PlantProcess:
         self._alarms, self._alarm = alarms, alarm
         self._setup, self._received = setup, received
         self._background = BackgroundTasks()
+        self.running = False
+        """Whether the process is running."""
+        self.ends = 0
+        """Number of times that it has ended by itself."""
 
     def start(self, *, inherited: Sequence[int] = ()) -> None:
         """Start the process in the background, with file descriptors that it inherits."""
@@ -77,6 +81,8 @@ class PlantProcess:
                 await self._run(inherited)
             except (OSError, ValueError) as error:
                 log.error(f"{self._name} failed", reason=str(error))
+            self.running = False
+            self.ends += 1
             lasted = time.monotonic() - started > LONGEST_PAUSE
             lasting.cancel()
             pause = FIRST_PAUSE if lasted else min(2.0 * pause, LONGEST_PAUSE)
@@ -103,6 +109,7 @@ class PlantProcess:
         try:
             process = await ChildProcess.start(("-P", "-m", self._module), theirs, inherited=inherited)
             log.info(f"{self._name} starts", pid=process.pid)
+            self.running = True
             writer.write(encode(self._setup()))
             tasks.spawn(self._log_output(process), f"output of the {self._name}")
             sending = tasks.spawn(self._send(writer), f"updates of the {self._name}")

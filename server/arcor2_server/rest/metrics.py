@@ -3,7 +3,7 @@
 import asyncio
 import importlib
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from importlib.metadata import version
@@ -39,6 +39,8 @@ from arcor2_server.websocket.hub import Hub
 if TYPE_CHECKING:
     from prometheus_client.core import Metric
 
+    from arcor2_server.rest.plant_metrics import PlantMetrics
+
 CONTENT_TYPE: Final = "text/plain; version=0.0.4"
 """Media type of the text format; Litestar adds the character set."""
 MOST_DEVICES: Final = 200
@@ -63,11 +65,12 @@ class Metrics:
     hosts: Mapping[str, HostSession]
     requests: Mapping[str, Durations]
     """Durations of requests by name, by websocket service."""
+    plant: "Callable[[], PlantMetrics]"
 
     async def text(self) -> bytes:
         """Return all metrics in the text format of Prometheus."""
         exposition = await asyncio.to_thread(importlib.import_module, "prometheus_client.exposition")  # slow to import
-        found = [*self._program(), *self._devices(), *self._server()]
+        found = [*self._program(), *self._devices(), *self._server(), *await self.plant().read()]
         encoded: bytes = await asyncio.to_thread(lambda: exposition.generate_latest(_Registry([*found, *self._disk()])))
         return encoded
 

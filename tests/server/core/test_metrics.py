@@ -4,14 +4,19 @@ import asyncio
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import httpx
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
+from arcor2_hw.data.history import HistoryState
+from arcor2_hw.data.nodes import NodesData, NodeSession, NodeState, NodeStatus
 from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.main import app
 from arcor2_server.durations import BOUNDS, Durations
+from arcor2_server.rest.plant_metrics import PlantMetrics
 from tests.server.core.serving import running, talking
 
 REFERENCE = Path(__file__).parents[3] / "docs" / "reference"
@@ -21,6 +26,54 @@ DOCUMENTED = {
     for name, kind, labels, _ in ROW.findall((REFERENCE / "metrics.md").read_text())
 }
 CLASSES = ("_bucket", "_count", "_sum")
+
+
+class Parts:
+    """Nodes, fleet, history, OPC UA and MQTT, all of them used, with what the metrics read."""
+
+    configured = connected = running = True
+    ends, clients, dropped = 2, 3, 4
+
+    def __init__(self) -> None:
+        self.process = self
+        since = {"since": "2026-01-02T03:04:05+00:00", "load": 0.5, "free": 7}
+        used = NodeStatus("arm", NodeState.CONNECTED, **since, sessions=[NodeSession("scene", "cell", since["since"])])
+        self.nodes = NodesData(True, [used, NodeStatus("never_seen", NodeState.SILENT)])
+
+    def data(self) -> NodesData:
+        return self.nodes
+
+    async def waiting(self) -> int:
+        return 5
+
+    async def state(self) -> HistoryState:
+        return HistoryState(True, hot_bytes=10, cold_bytes=20, dropped=1, problem="The disk is full.")
+
+
+async def plant_metrics() -> dict[str, tuple[str, frozenset[str], dict[str, float]]]:
+    """Return kind, labels and values of the metrics of a server that is connected to a plant."""
+    parts: Any = Parts()
+    mqtt: Any = SimpleNamespace(process=parts, connected={"JSON": True, "Sparkplug": False}, dropped=4)
+    found = {}
+    for family in await PlantMetrics(parts, parts, parts, parts, mqtt).read():
+        name = f"{family.name}_total" if family.type == "counter" else family.name
+        labels = frozenset(label for sample in family.samples for label in sample.labels)
+        found[name] = family.type, labels, {"".join(each.labels.values()): each.value for each in family.samples}
+    return found
+
+
+async def test_metrics_of_what_connects_the_cell_to_the_plant() -> None:
+    found = await plant_metrics()
+    for name, (kind, labels, _) in found.items():
+        assert DOCUMENTED[name] == (kind, labels)
+    values = {name.removeprefix("arcor2_hw_"): each for name, (_, _, each) in found.items()}
+    assert values["node_connected"] == {"arm": 1, "never_seen": 0}
+    assert values["node_load"] == {"arm": 0.5}
+    assert values["fleet_waiting"] == {"": 5}
+    assert values["history_recording"] == {"": 0}  # the disk is full
+    assert values["history_bytes"] == {"recent": 10, "files": 20}
+    assert values["plant_process_ends_total"] == {"opcua": 2, "mqtt": 2}
+    assert values["mqtt_connected"] == {"json": 1, "sparkplug": 0}
 
 
 async def test_metrics_follow_requests_and_need_their_own_token(
@@ -68,7 +121,8 @@ async def test_metrics_follow_requests_and_need_their_own_token(
             name = f"{family.name}_total" if family.type == "counter" else family.name
             labels = {label for sample in family.samples for label in sample.labels} - {"le"}
             found[name] = family.type, frozenset(labels)
-        unused = {"arcor2_hw_device_online", "arcor2_hw_device_health_normal"}  # no device is online
+        # No device is online, and nothing connects the cell to a plant.
+        unused = {"arcor2_hw_device_online", "arcor2_hw_device_health_normal", *await plant_metrics()}
         assert {name: each for name, each in found.items() if name not in unused} == {
             name: each for name, each in DOCUMENTED.items() if name not in unused
         }
