@@ -163,7 +163,7 @@ async def test_five_readings_agree(cell: Cell) -> None:
 async def test_any_opcua_client_reads_the_counts(cell: Cell) -> None:
     at = cell.run.at()
     assert at is not None
-    async with OpcUaClient(at["opcua"]) as client:
+    async with OpcUaClient(at["opcua"], timeout=40.0) as client:
         index = await client.get_namespace_index("http://opcfoundation.org/UA/PackML/")
         (unit,) = await (await client.nodes.objects.get_child(f"{index}:PackMLObjects")).get_children()
         await client.load_data_type_definitions()

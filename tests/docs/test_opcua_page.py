@@ -34,6 +34,8 @@ def test_the_page_states_the_limits_of_the_server() -> None:
 
 def test_the_options_exist() -> None:
     named = set(re.findall(r"--opcua[\w-]*", PAGE))
-    help_text = " ".join(str(each.name) for each in app["serve"].assemble_argument_collection())
+    help_text = " ".join(
+        str(each.name) for command in ("serve", "demo") for each in app[command].assemble_argument_collection()
+    )
     assert named
     assert [option for option in named if option not in help_text] == []

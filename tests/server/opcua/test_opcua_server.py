@@ -15,13 +15,15 @@ from typing import Any
 import pytest
 import pytest_asyncio
 from asyncua import Client, Node, ua
+from asyncua.crypto.truststore import TrustStore
+from asyncua.crypto.validator import CertificateValidator, CertificateValidatorOptions
 
 from arcor2_hw.data.role import Role
 from arcor2_server.access.tokens import TokenFile
 from tests.fakes.conftest import FakeProcess
 from tests.runtime.conftest import Package, scene_object
 from tests.server.cell.test_execution import LAMP, OBJ, PROJECT
-from tests.server.core.serving import ServerProcess, Talker, talking
+from tests.server.core.serving import ServerProcess, Talker, running, talking
 from tests.server.opcua import plant_client as plant
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -378,3 +380,21 @@ async def test_a_removed_person_commands_nothing_more(cell: Plant) -> None:
         result, text = await call_request(client, method, "stop 1", 3, 0)
         assert result == 1
         assert text
+
+
+async def test_a_client_that_trusts_the_authority_connects(tmp_path: Path) -> None:
+    data, port = tmp_path / "data", free_port()
+    async with running(data, "--self-signed", "--opcua", f"127.0.0.1:{port}"):
+        for name, ending in (("trusted", "der"), ("revocations", "crl")):
+            (tmp_path / name).mkdir()
+            (tmp_path / name / f"authority.{ending}").write_bytes((data / f"opcua-authority.{ending}").read_bytes())
+        store = TrustStore([tmp_path / "trusted"], [tmp_path / "revocations"])
+        await store.load()
+        files = plant.client_certificate(tmp_path)
+        (data / "opcua-trusted").mkdir(exist_ok=True)
+        (data / "opcua-trusted" / "scada.der").write_bytes(files[0].read_bytes())
+        client = await plant.encrypted(f"opc.tcp://127.0.0.1:{port}/arcor2hw/", files)
+        checks = CertificateValidatorOptions.EXT_VALIDATION | CertificateValidatorOptions.PEER_SERVER
+        client.certificate_validator = CertificateValidator(checks, store)
+        async with client:
+            assert (await machine_of(client)).nodeid.Identifier == "cell"
