@@ -58,6 +58,7 @@ async def shows_the_history(screen: Screen) -> None:
     async with screen.page.expect_response(lambda response: "/api/history/summary" in response.url):
         pass  # it follows the present by itself, in the same chart
     assert await chart.evaluate("(canvas, before) => canvas === before", before)
+    await screen.picture("point-history-hour")
     await dialog.get_by_role("radio", name="1 day").click()
     await expect(dialog.get_by_role("img", name="signal: lamp")).to_be_visible()
     await screen.settle()
