@@ -130,8 +130,8 @@ def write_authority(folder: Path, issuer: Issuer) -> None:
         .add_extension(x509.AuthorityKeyIdentifier.from_issuer_public_key(key.public_key()), critical=False)
         .sign(key, hashes.SHA256())
     )
-    _write(list_file, revocations.public_bytes(der), 0o644)
-    _write(folder / AUTHORITY, content, 0o644)
+    replace_file(list_file, revocations.public_bytes(der), mode=0o644)
+    replace_file(folder / AUTHORITY, content, mode=0o644)
 
 
 def _content(file: Path) -> bytes:

@@ -19,7 +19,7 @@ from arcor2_hw.objects.settings import within
 from arcor2_hw.objects.state_observer import Snapshot
 
 from . import registers
-from .points import Point
+from .points import Point, arming
 from .registers import Image, WatchdogState
 from .settings import LONGEST_WATCHDOG, BlockSettings
 
@@ -96,7 +96,7 @@ class Block(ModbusDevice[Image]):
             DeviceFault: The watchdog does not run, so nothing may be switched on.
             Refused: The block did not store the settings of the watchdog.
         """
-        armed = registers.arming(self.block_points.values(), self._s.watchdog_ms, self._number)
+        armed = arming(self.block_points.values(), self._s.watchdog_ms, self._number)
         self.link.write_registers(self._watchdog + registers.COMMAND, registers.ACKNOWLEDGE)
         self.link.write_verified(self._watchdog, *armed)
         self.set_alarm(WATCHDOG, False)

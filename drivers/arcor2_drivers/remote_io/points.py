@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Collection
 from typing import Final
 
 from arcor2_hw.data.base import Data
@@ -69,3 +70,14 @@ def parse_address(text: str, parameter: str) -> tuple[str, int]:
             "{parameter} must use {kind}0 to {last}, not {text}", parameter=parameter, kind=kind, last=last, text=text
         )
     return kind, channel
+
+
+def arming(points: Collection[Point], time_ms: int, number: int) -> list[int]:
+    """Return the ten registers that start a watchdog which guards the outputs among the points."""
+
+    def outputs(kind: str, *on_loss: OnLoss) -> int:
+        return sum(1 << point.channel for point in points if point.kind == kind and point.io.on_loss in on_loss)
+
+    switched = (OnLoss.OFF, OnLoss.ON)
+    digital = (outputs("DO", *OnLoss), outputs("DO", *switched), outputs("DO", OnLoss.ON))
+    return [time_ms, number, 0, *digital, outputs("AO", *OnLoss), outputs("AO", *switched), 0, 0]

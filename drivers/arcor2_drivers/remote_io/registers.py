@@ -1,13 +1,8 @@
 """The register map (docs/devices/remote-io.md) as data. Pure functions."""
 
 import enum
-from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
-
-from arcor2_hw.objects.small import OnLoss
-
-if TYPE_CHECKING:
-    from .points import Point
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
 CHANNELS: Final = {"DI": 16, "DO": 16, "AI": 4, "AO": 2}
 WATCHDOGS: Final = 4
@@ -68,14 +63,3 @@ def decode(words: Sequence[int]) -> Image:
     if (state := max(words[9:13])) > WatchdogState.EXPIRED:
         raise ValueError(f"unknown state {state} of the watchdog")
     return Image(words)
-
-
-def arming(points: Collection["Point"], time_ms: int, number: int) -> list[int]:
-    """Return the ten registers that start a watchdog which guards the outputs among the points."""
-
-    def outputs(kind: str, *on_loss: OnLoss) -> int:
-        return sum(1 << point.channel for point in points if point.kind == kind and point.io.on_loss in on_loss)
-
-    switched = (OnLoss.OFF, OnLoss.ON)
-    digital = (outputs("DO", *OnLoss), outputs("DO", *switched), outputs("DO", OnLoss.ON))
-    return [time_ms, number, 0, *digital, outputs("AO", *OnLoss), outputs("AO", *switched), 0, 0]

@@ -2249,7 +2249,7 @@ export interface ObjectTypeMeta {
 }
 
 /**
- * Data of the event ObjectValues: visible state of a device, such as an open door, for displays. Missing values are unknown.
+ * Data of the event ObjectValues: visible state of a device, such as an open door. Missing values are unknown.
  *
  * values: by name, in SI units, such as the width of a gripper; 1 for on. parts: carried by a robot.
  */
@@ -2465,7 +2465,7 @@ export interface Person {
 export type Pivot = "top" | "middle" | "bottom";
 
 /**
- * A place: id and name of the object, or of an action point at no object that is a place.
+ * A place of parts: id and name of its object, or of an action point that belongs to no object with a place.
  *
  * capacity: how many parts fit; 0: any number. parts: serial numbers of the newest parts in a box. sensed: whether the
  * sensor detects a part; omitted if there is no sensor, or if it was not read.

@@ -30,10 +30,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
         label={t`Runs on`}
         value={chosen}
         isDisabled={why !== "" || busy}
-        choices={[
-          ["", t`computer of the server`],
-          ...names.map((each) => [each, each] as const),
-        ]}
+        choices={[["", t`computer of the server`], ...names.map((each) => [each, each] as const)]}
         onChange={(node) => void ask(setNode(id, node))}
       />
       {silent && <p className="small alarm">{t`The node ${chosen} is not connected.`}</p>}
