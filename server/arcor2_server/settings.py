@@ -136,7 +136,7 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     fleet_address: str = ""
     """Address of the page with all cells, to which the editor links; empty: none."""
     fleet_broker: str = ""
-    """Address of the broker (NATS) of the fleet; empty: none."""
+    """Address of the broker (NATS) of the fleet; empty: that of the pairing, if there was one."""
     fleet_authority: str = ""
     """File of the certificate to trust for this broker; empty: those that the system trusts."""
     plc_life_timeout: float = 2.0
@@ -203,7 +203,12 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def in_fleet(self) -> bool:
         """Whether the cell publishes its state and results."""
-        return bool(self.cell_name and self.fleet_broker)
+        return bool(self.cell_name and (self.fleet_broker or self.fleet_credentials.exists()))
+
+    @property
+    def fleet_credentials(self) -> Path:
+        """The file with the credentials of a paired cell for the broker of the fleet."""
+        return self.data_dir / "fleet" / f"{self.cell_name}.json"
 
     @property
     def documents_database(self) -> Path:

@@ -21,12 +21,13 @@ from arcor2_server.access.addresses import server_addresses
 from arcor2_server.access.admission import PARAMETER, Access, is_local
 from arcor2_server.access.tokens import TokenFile
 from arcor2_server.audit.command_line import note_command
+from arcor2_server.cli import fleet_members
 from arcor2_server.cli.certificates import certificate_of, renew_certificate
 from arcor2_server.cli.exit_status import CannotServe, ExitStatus, fail
 from arcor2_server.cli.serve import data_directory, listen
 from arcor2_server.deployment.service_manager import ServiceManager
 from arcor2_server.log import setup as server_logging
-from arcor2_server.settings import FLEET_AUTHORITY, FLEET_BROKER, ServerSettings, default_data_dir
+from arcor2_server.settings import FLEET_AUTHORITY, FLEET_BROKER, ServerSettings
 
 if TYPE_CHECKING:
     from arcor2_server.nodes.credentials import Credentials
@@ -35,12 +36,13 @@ FIRST_SCREEN: Final = "first screen"
 """Name of the token that the first start on a network creates."""
 
 app = App(name="fleet")
+fleet_members.add_to(app)
 
 
 @app.command
 def serve(
     *,
-    broker: Annotated[str, Parameter(env_var=FLEET_BROKER)] = LOCAL_BROKER,
+    broker: Annotated[str | None, Parameter(env_var=FLEET_BROKER)] = None,
     ca: Annotated[Path | None, Parameter(env_var=FLEET_AUTHORITY)] = None,
     host: str = "127.0.0.1",
     port: Annotated[int, Parameter(validator=validators.Number(gte=0, lte=65535))] = 6780,
@@ -57,10 +59,10 @@ def serve(
     Parameters
     ----------
     broker
-        Address of the broker (nats-server), with tls:// if it is on another computer. User and password are part of it;
-        set the variable instead of the option to hide them from other users.
+        Address of a broker (nats-server) without `fleet broker`, with tls:// if it is on another computer. User and
+        password are part of it; set the variable instead of the option to hide them from other users.
     ca
-        Certificate to trust for tls://.
+        Certificate to trust for such a broker.
     host
         Address to listen on. The default 127.0.0.1 is only reachable from this machine.
     port
@@ -80,17 +82,20 @@ def serve(
         return fail("fleet", "install the extra `nodes` of arcor2-hw", ExitStatus.FAILED)
     os.umask(0o077)  # only the user may read the files of the server
     try:
-        from arcor2_server.nodes.credentials import of_address
+        from arcor2_server.nodes.credentials import load, of_address
 
-        credentials = of_address(broker, str(ca or ""))
-        credentials.options()  # report errors before the start
         settings = ServerSettings.from_environment(
             host=host,
             port=port,
-            data_dir=data_dir or default_data_dir().with_name("arcor2-hw-fleet"),
+            data_dir=fleet_members.fleet_data_dir(data_dir),
             insecure=insecure,
             default_role=Role.TECHNICIAN,
         )
+        if broker is None and settings.broker_credentials.exists():
+            credentials = load(settings.broker_credentials)
+        else:
+            credentials = of_address(broker or LOCAL_BROKER, str(ca or ""))
+        credentials.options()  # report errors before the start
         server_logging.set_up(log_level)
     except (InvalidData, KeyError, StorageError) as error:
         return fail("fleet", error, ExitStatus.USAGE)

@@ -2,27 +2,19 @@
 
 import asyncio
 import contextlib
-import logging
 import os
 import signal
 import sys
 from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
-from urllib.parse import urlsplit
 
 import uvloop
 from cyclopts import App, Parameter
-from rich.table import Table
 
 from arcor2_hw.data.cell import BROKER_AUTHORITY, BROKER_URL, LOCAL_BROKER
-from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
-from arcor2_server.access.authority import AUTHORITY
-from arcor2_server.audit.command_line import note_command
-from arcor2_server.cli.exit_status import ExitStatus, fail
-from arcor2_server.cli.server_connection import printable, status_of
-from arcor2_server.cli.tables import console
+from arcor2_hw.exceptions import InvalidData
+from arcor2_server.cli import members
 from arcor2_server.deployment.service_manager import ServiceManager
 from arcor2_server.log import setup as server_logging
 from arcor2_server.settings import ServerSettings, default_data_dir
@@ -110,20 +102,10 @@ def pair(name: str, *, server: str, data_dir: DataDir = None) -> int:
     """
 
     def work() -> None:
-        from arcor2_server.nodes import pairing
-        from arcor2_server.nodes.credentials import check_name, node_file
-        from arcor2_server.nodes.nkeys import SigningKey
+        from arcor2_server.nodes.credentials import node_file
 
-        check_name(name)
-        host, port = _address(server, pairing.PORT)
-        if sys.stdin.isatty():
-            sys.stderr.write("Code that the server shows: ")
-            sys.stderr.flush()
-        code = sys.stdin.readline()
-        found = asyncio.run(pairing.pair(name, host, port, code))
-        file = node_file(_data_dir(data_dir), name)
-        found.save(file)
-        key = pairing.short_key(SigningKey.from_seed(found.seed).public)
+        found, key = members.pair("node", name, server)
+        found.save(node_file(_data_dir(data_dir), name))
         sys.stdout.write(f"paired {name}, key {key}\nStart it: arcor2-hw node run {name}\n")
 
     return _run(work)
@@ -181,18 +163,13 @@ def broker(
 
     def work() -> None:
         settings = _settings(data_dir)
-        if address.startswith("tls://") and not (certificate and key):
-            raise InvalidData("The broker needs a certificate: --certificate FILE --key FILE.")
-        trusted = ca or settings.data_dir / AUTHORITY
-        try:
-            authority = trusted.read_text() if ca or trusted.exists() else ""
-        except (OSError, ValueError) as error:
-            raise InvalidData("{file} cannot be used: {reason}", file=trusted, reason=error) from error
+        members.check_certificate(address, certificate, key)
+        authority = members.trusted_authority(settings, ca)
         configuration = _accounts(settings).set_up(
             address, authority, certificate=certificate, key_file=key, folder=folder
         )
         sys.stdout.write(configuration)
-        _note(settings, "broker", address)
+        members.note(settings, "node broker", address)
 
     return _run(work)
 
@@ -220,26 +197,8 @@ def accept(
     """
 
     def work() -> None:
-        from arcor2_server.nodes import pairing
-
         settings = _settings(data_dir)
-        accounts = _accounts(settings)
-        accounts.check_new(name)
-        where = urlsplit(accounts.url()).hostname
-
-        async def waiting() -> str:
-            invitation = pairing.Invitation(name, lambda key, address: accounts.accept(name, key, address))
-            async with invitation.listening(host, pairing.PORT if port is None else port) as used:
-                server = where if used == pairing.PORT else f"{where}:{used}"
-                sys.stdout.write(
-                    f"Run on the node: arcor2-hw node pair {name} --server {server}\nCode: {invitation.code}\n"
-                )
-                sys.stdout.flush()
-                return await invitation.accepted()
-
-        key = pairing.short_key(asyncio.run(waiting()))
-        sys.stdout.write(f"accepted {name}, key {key}\n")
-        _note(settings, "accept", f"{name}, key {key}")
+        members.accept(settings, _accounts(settings), "node", "on the node", name, host, port)
 
     return _run(work)
 
@@ -249,16 +208,8 @@ def list_nodes(*, data_dir: DataDir = None) -> int:
     """On the server: list the accepted nodes."""
 
     def work() -> None:
-        from arcor2_server.nodes.pairing import short_key
-
-        nodes = _accounts(_settings(data_dir)).nodes()
-        if not nodes:
-            sys.stdout.write("There are no nodes. Accept one with `arcor2-hw node accept NAME`.\n")
-            return
-        table = Table("name", "key", "accepted", "from", box=None, pad_edge=False)
-        for name, node in sorted(nodes.items()):
-            table.add_row(name, short_key(node.key), node.accepted[:16], node.address)
-        console().print(table)
+        empty = "There are no nodes. Accept one with `arcor2-hw node accept NAME`."
+        members.show(_accounts(_settings(data_dir)), empty)
 
     return _run(work)
 
@@ -277,29 +228,14 @@ def revoke(name: str, *, data_dir: DataDir = None) -> int:
 
     def work() -> None:
         settings = _settings(data_dir)
-        asyncio.run(_accounts(settings).revoke(name))
-        sys.stdout.write(f"revoked {name}\n")
-        _note(settings, "revoke", name)
+        members.revoke(settings, _accounts(settings), "node", name)
 
     return _run(work)
 
 
 def _run(work: Callable[[], Any]) -> int:
     """Do the work of a command and print errors; return its exit status."""
-    if find_spec("nats") is None:
-        return fail("node", "install the extra `nodes` of arcor2-hw", ExitStatus.FAILED)
-    logging.getLogger("asyncio").setLevel(logging.ERROR)  # it warns of each end of a TLS connection
-    try:
-        work()
-    except StorageError as error:
-        return fail("node", printable(str(error)), ExitStatus.DATA_UNUSABLE)
-    except InvalidData as error:
-        return fail("node", printable(str(error)), ExitStatus.USAGE)
-    except Arcor2Error as error:
-        return fail("node", printable(str(error)), status_of(error))
-    except OSError as error:
-        return fail("node", error, ExitStatus.PORT_TAKEN)
-    return ExitStatus.OK
+    return members.run("node", work)
 
 
 def _data_dir(data_dir: Path | None) -> Path:
@@ -314,22 +250,3 @@ def _accounts(settings: ServerSettings) -> "Accounts":
     from arcor2_server.nodes.accounts import Accounts
 
     return Accounts(settings)
-
-
-def _address(text: str, port: int) -> tuple[str, int]:
-    """Return host and port. Raise InvalidData if the text is not an address."""
-    try:
-        parts = urlsplit(f"//{text}")
-        if parts.hostname:
-            return parts.hostname, parts.port or port
-    except ValueError:
-        pass
-    raise InvalidData("{address!r} is not an address HOST:PORT.", address=text)
-
-
-def _note(settings: ServerSettings, command: str, target: str) -> None:
-    """Add an entry to the audit trail. The change has been made, so a failure is only reported."""
-    try:
-        note_command(settings.audit_file, f"node {command}", target)
-    except StorageError as error:
-        fail("node", error, ExitStatus.OK)

@@ -185,7 +185,7 @@ def serve(
             from arcor2_server.nodes.credentials import require_tls  # imported only if needed, because it takes time
 
             require_tls(broker)
-        if settings.in_fleet:
+        if settings.in_fleet and settings.fleet_broker:
             from arcor2_server.nodes.credentials import require_tls
 
             require_tls(settings.fleet_broker)

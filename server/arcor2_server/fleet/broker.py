@@ -6,10 +6,10 @@ from collections.abc import Awaitable, Callable
 from typing import Final
 
 import structlog
-from nats.aio.client import Client
+from nats.aio.client import DEFAULT_INBOX_PREFIX, Client
 from nats.errors import Error as NatsError
 
-from arcor2_hw.exceptions import InvalidData
+from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.nodes.credentials import Credentials, address_of
 
 log = structlog.get_logger(__name__)
@@ -25,19 +25,24 @@ RETRY_PERIOD: Final = 1.0
 
 
 async def keep_connected(
-    credentials: Credentials, name: str, use: Callable[[Client], Awaitable[None]], lost: Callable[[], None]
+    credentials: Callable[[], Credentials],
+    name: str,
+    use: Callable[[Client], Awaitable[None]],
+    lost: Callable[[], None],
+    answers: str = "",
 ) -> None:
     """Connect to the broker and use the connection; connect again after it was lost, until this is cancelled.
 
     Losing the connection and having it again is logged once each, a missing broker once.
 
     Args:
-        credentials: address and credentials of the broker.
+        credentials: returns address and credentials of the broker, before each attempt. They may be paired again.
         name: of the connection, for the monitoring of the broker.
         use: uses a connection; it is cancelled when the connection is lost.
         lost: called after a connection was lost.
+        answers: start of the subjects on which answers to requests are received; empty for the usual one.
     """
-    reported, address = False, address_of(credentials.url)
+    reported, address = False, ""
 
     def unreached(error: Exception) -> None:
         nonlocal reported
@@ -49,8 +54,10 @@ async def keep_connected(
     while True:
         ended = asyncio.Event()
         try:
-            client = await _connect(credentials, name, ended, unreached)
-        except (NatsError, OSError, TimeoutError, InvalidData) as error:
+            current = credentials()
+            address = address_of(current.url)
+            client = await _connect(current, name, ended, unreached, answers)
+        except (NatsError, OSError, TimeoutError, Arcor2Error) as error:
             unreached(error)
             await asyncio.sleep(RETRY_PERIOD)
             continue
@@ -78,7 +85,7 @@ async def keep_connected(
 
 
 async def _connect(
-    credentials: Credentials, name: str, ended: asyncio.Event, unreached: Callable[[Exception], None]
+    credentials: Credentials, name: str, ended: asyncio.Event, unreached: Callable[[Exception], None], answers: str
 ) -> Client:
     reported: set[str] = set()
     connected, address = False, address_of(credentials.url)
@@ -107,6 +114,7 @@ async def _connect(
                 disconnected_cb=disconnected,
                 closed_cb=disconnected,
                 error_cb=failed,
+                inbox_prefix=answers or DEFAULT_INBOX_PREFIX,
                 **credentials.options(),
             )
     except BaseException:

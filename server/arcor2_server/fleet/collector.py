@@ -12,7 +12,9 @@ import structlog
 from nats.aio.client import Client
 from nats.aio.msg import Msg
 from nats.errors import Error as NatsError
-from nats.js.api import AckPolicy, ConsumerConfig
+from nats.js.api import AckPolicy, ConsumerConfig, DiscardPolicy, RetentionPolicy, StorageType
+from nats.js.client import JetStreamContext
+from nats.js.errors import NotFoundError
 
 from arcor2_hw.data.base import now
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
@@ -31,6 +33,8 @@ SAVE_PERIOD: Final = 10.0
 """Period of storing the cells, s."""
 CONSUMER: Final = "fleet"
 """Name of the consumer at the stream of each cell."""
+STREAM_BYTES: Final = 1 << 30
+"""Maximum size of the stream of a cell at the broker, bytes. Further results wait in the cell."""
 BATCH: Final = 200
 """Maximum number of results that are stored in one transaction."""
 FETCH_WITHIN: Final = 10.0
@@ -76,7 +80,7 @@ class Collector:
 
     def start(self) -> None:
         """Start to receive."""
-        connecting = keep_connected(self._broker, "arcor2-hw fleet", self._receive, self._lost)
+        connecting = keep_connected(lambda: self._broker, "arcor2-hw fleet", self._receive, self._lost)
         self._background.spawn(connecting, "connection to the broker")
         self._background.spawn(self._watch(), "cells without a signal")
         self._background.spawn(self._save(), "stored cells")
@@ -181,6 +185,7 @@ class Collector:
         while True:
             try:
                 stream = client.jetstream(domain=source.domain or None)
+                await _ensure_stream(stream, source.name)
                 subscription = await stream.pull_subscribe(
                     "",
                     durable=CONSUMER,
@@ -214,6 +219,22 @@ class Collector:
             await self._in_file(lambda: self._file.put_results(received))
         for message in stored:
             await message.ack()
+
+
+async def _ensure_stream(stream: JetStreamContext, cell: str) -> None:
+    """Create the stream of a cell unless it exists. Cells have no right to do it, since a stream can read others."""
+    try:
+        await stream.stream_info(r.stream_name(cell))
+    except NotFoundError:
+        await stream.add_stream(
+            name=r.stream_name(cell),
+            subjects=r.result_subjects(cell),
+            retention=RetentionPolicy.WORK_QUEUE,  # a result that was stored here is deleted there
+            storage=StorageType.FILE,
+            discard=DiscardPolicy.NEW,
+            max_bytes=STREAM_BYTES,
+            max_msg_size=r.LARGEST_RESULT,
+        )
 
 
 def _received(name: str, message: Msg) -> ReceivedResult:

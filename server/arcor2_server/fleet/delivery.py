@@ -11,7 +11,7 @@ import structlog
 from msgspec.structs import replace
 from nats.aio.client import Client
 from nats.errors import Error as NatsError
-from nats.js.api import DiscardPolicy, PubAck, RetentionPolicy, StorageType
+from nats.js.api import PubAck
 from nats.js.client import JetStreamContext
 from nats.js.errors import NotFoundError
 
@@ -28,10 +28,10 @@ STORED_WITHIN: Final = 10.0
 """Time limit for the broker to store a batch of results, s."""
 POLL_PERIOD: Final = 5.0
 """Period in which the outbox is checked, also without an event, and time before a failed batch is sent again, s."""
+CREATED_WITHIN: Final = 0.5
+"""Time between two checks whether the stream of this cell exists, s."""
 HEADERS: Final = 4096
 """Size that is left for the headers of a message, bytes."""
-STREAM_BYTES: Final = 1 << 30
-"""Maximum size of the stream of a cell at the broker, bytes. Further results wait in the cell."""
 
 
 class Delivery:
@@ -63,6 +63,9 @@ class Delivery:
                     log.info("results are stored by the broker again")
                 reported = ""
                 await self._deliver_to(client, stream)
+            except NotFoundError:
+                await asyncio.sleep(CREATED_WITHIN)  # after the server of the page has seen a state with the domain
+                continue
             except (NatsError, TimeoutError, Arcor2Error) as error:
                 if (reason := f"{type(error).__name__}: {error}") != reported:
                     reported = reason
@@ -70,21 +73,14 @@ class Delivery:
             await asyncio.sleep(POLL_PERIOD)
 
     async def _stream(self, client: Client) -> JetStreamContext:
-        """Return the JetStream of the broker, in which the stream of this cell exists."""
+        """Return the JetStream of the broker. The server of the page creates the stream of this cell.
+
+        Raises:
+            NotFoundError: the stream does not exist yet.
+        """
         stream = client.jetstream(timeout=STORED_WITHIN)
         self.domain = (await stream.account_info()).domain or ""
-        try:
-            await stream.stream_info(r.stream_name(self._name))
-        except NotFoundError:
-            await stream.add_stream(
-                name=r.stream_name(self._name),
-                subjects=r.result_subjects(self._name),
-                retention=RetentionPolicy.WORK_QUEUE,  # the server of the fleet acknowledges what it has stored
-                storage=StorageType.FILE,
-                discard=DiscardPolicy.NEW,
-                max_bytes=STREAM_BYTES,
-                max_msg_size=r.LARGEST_RESULT,
-            )
+        await stream.stream_info(r.stream_name(self._name))
         return stream
 
     async def _deliver_to(self, client: Client, stream: JetStreamContext) -> None:

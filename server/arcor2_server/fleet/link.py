@@ -120,7 +120,7 @@ class FleetLink:
             return
         from arcor2_server.fleet.broker import keep_connected  # needs the extra `nodes`
         from arcor2_server.fleet.delivery import Delivery
-        from arcor2_server.nodes.credentials import of_address
+        from arcor2_server.nodes.credentials import load, of_address
 
         self._address = self._settings.cell_address or address
         self._identity, self._boot, self._number = identity_of(self._settings.data_dir), uuid.uuid4().hex, 0
@@ -129,10 +129,18 @@ class FleetLink:
         self._alarms.on_changed.append(lambda _: self._mark_alarms())
         self._background.spawn(self._follow(), "state for the fleet")
         settings = self._settings
-        connecting = keep_connected(
-            of_address(settings.fleet_broker, settings.fleet_authority), f"arcor2-hw cell {settings.cell_name}",
-            self._publish, lambda: None,
-        )  # fmt: skip
+        name = settings.cell_name
+        if settings.fleet_broker:
+            credentials = of_address(settings.fleet_broker, settings.fleet_authority)
+            connecting = keep_connected(lambda: credentials, f"arcor2-hw cell {name}", self._publish, lambda: None)
+        else:
+            connecting = keep_connected(
+                lambda: load(settings.fleet_credentials),
+                f"arcor2-hw cell {name}",
+                self._publish,
+                lambda: None,
+                r.answer_subject(name),
+            )
         self._background.spawn(connecting, "connection to the fleet")
 
     async def close(self) -> None:

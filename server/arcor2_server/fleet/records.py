@@ -117,6 +117,11 @@ def result_subjects(cell: str) -> list[str]:
     return [f"{PREFIX}.{cell}.{kind}" for kind in ("unit", "alarm")]
 
 
+def answer_subject(cell: str) -> str:
+    """Return the start of the subjects on which a paired cell receives answers of the broker."""
+    return f"{PREFIX}.{cell}.answer"
+
+
 def stream_name(cell: str) -> str:
     """Return the name of the stream with the results of a cell."""
     return f"ARCOR2_HW_FLEET_{cell}"

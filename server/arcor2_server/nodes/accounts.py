@@ -1,6 +1,6 @@
-"""The keys of the server, and the nodes that it has accepted.
+"""The keys of the server, and the members that it has accepted: nodes, or cells and sites of the fleet.
 
-The broker trusts one operator key. The operator signs two accounts: one in which the server, its nodes and other
+The broker trusts one operator key. The operator signs two accounts: one in which the server, its members and other
 services exchange messages, and one of the broker itself, over which the server revokes users.
 """
 
@@ -8,8 +8,8 @@ import contextlib
 import fcntl
 import os
 import time
-from collections.abc import Iterator
-from typing import Final
+from collections.abc import Callable, Iterator
+from typing import Final, NamedTuple
 
 import msgspec
 from nats.errors import Error as NatsError
@@ -18,6 +18,7 @@ from arcor2_hw.data.base import now
 from arcor2_hw.exceptions import Conflict, ConnectionLost, NotFound, StorageError
 from arcor2_server.files import DIRECTORY_MODE, FILE_MODE, write_private
 from arcor2_server.nodes import claims
+from arcor2_server.nodes.claims import Rights
 from arcor2_server.nodes.connections import connect_client
 from arcor2_server.nodes.credentials import Credentials, address_of, check_name, load, require_tls
 from arcor2_server.nodes.lanes import PREFIX
@@ -31,25 +32,47 @@ UPDATE_WITHIN: Final = 2.0
 """Time limit for the broker to accept a changed account, s."""
 
 
-class AcceptedNode(msgspec.Struct, frozen=True):
-    """A node that may connect. key: its public key. accepted: when (UTC). address: of the node at that time."""
+class Members(NamedTuple):
+    """What the members of an account are.
+
+    command: the group of commands for them. rights: returns those of a member, or of the broker of a site, by its name.
+    server: rights of the server; None for everything in the account.
+    """
+
+    command: str
+    rights: Callable[[str, bool], Rights]
+    server: Rights | None = None
+
+
+class AcceptedMember(msgspec.Struct, frozen=True):
+    """A member that may connect.
+
+    key: its public key. accepted: when (UTC). address: of its computer at that time. site: whether it is the broker of
+    a site.
+    """
 
     key: str
     accepted: str
     address: str = ""
+    site: bool = False
 
 
 class _State(msgspec.Struct):
-    """The content of the file. operator, account, system: private keys. issued: time of the last claim, s."""
+    """The content of the file.
+
+    operator, account, system: private keys. nodes: the members. issued: time of the last claim, s. sites: address for
+    the brokers of sites; empty if they are not accepted.
+    """
 
     url: str
     operator: str
     account: str
     system: str
     authority: str = ""
-    nodes: dict[str, AcceptedNode] = {}
+    nodes: dict[str, AcceptedMember] = {}
     revoked: list[str] = []
     issued: int = 0
+    sites: str = ""
 
 
 class _Answer(msgspec.Struct, frozen=True):
@@ -58,27 +81,45 @@ class _Answer(msgspec.Struct, frozen=True):
     error: dict[str, object] | None = None
 
 
+def node_rights(name: str, _site: bool) -> Rights:
+    """Return the rights of a node.
+
+    The server must not answer messages of nodes: the broker does not check the subject for an answer, which could be
+    one of another node.
+    """
+    subjects = [f"{PREFIX}.{name}.>"]
+    return Rights(subjects, subjects)
+
+
+NODES: Final = Members("node", node_rights)
+
+
 class Accounts:
     """The accounts of a broker. Other processes may change the file at any time.
 
     Args:
         settings: name the files, which are created when they are needed.
+        members: what its members are.
     """
 
-    def __init__(self, settings: ServerSettings) -> None:
+    def __init__(self, settings: ServerSettings, members: Members = NODES) -> None:
+        self._members = members
         self._directory, self._server_file = settings.broker_dir, settings.broker_credentials
         self._file = self._directory / FILE
 
     # -------------------------------------------------------------------------------- broker
-    def set_up(self, url: str, authority: str, *, certificate: str = "", key_file: str = "", folder: str) -> str:
+    def set_up(
+        self, url: str, authority: str, *, certificate: str = "", key_file: str = "", folder: str, sites: str = ""
+    ) -> str:
         """Create keys unless they exist, and the credentials of the server; return the configuration for the broker.
 
         Args:
-            url: address of the broker, for the server and for nodes.
+            url: address of the broker, for the server and the members.
             authority: certificates to trust (PEM); empty for those that the system trusts.
             certificate: file of the certificate of the broker, on the broker's computer.
             key_file: file of its key.
             folder: in which the broker stores the accounts.
+            sites: address of the broker for the brokers of sites; empty: they are not accepted.
 
         Raises:
             InvalidData: the address is invalid, or without TLS on another computer.
@@ -89,13 +130,13 @@ class Accounts:
         with self._locked():
             if self._file.exists():
                 state = self._load()
-                state.url, state.authority = url, authority
+                state.url, state.authority, state.sites = url, authority, sites
                 # Its key stays the same, because the claim of an earlier key would stay valid.
                 server = msgspec.structs.replace(load(self._server_file), url=url, authority=authority)
             else:
-                state = _new_state(url, authority)
+                state = _new_state(url, authority, sites)
                 key = SigningKey.create(Kind.USER)
-                claim = claims.user(SigningKey.from_seed(state.account), key.public, "server")
+                claim = claims.user(SigningKey.from_seed(state.account), key.public, "server", self._members.server)
                 server = Credentials(url, authority, claim, key.seed)
             claim = self._account_claim(state)
             server.save(self._server_file)
@@ -116,32 +157,37 @@ class Accounts:
         ]
         return "\n".join(lines) + "\n"
 
-    # -------------------------------------------------------------------------------- nodes
+    # -------------------------------------------------------------------------------- members
+    def account_key(self) -> str:
+        """Return the public key of the account. Raise NotFound if there is none."""
+        return SigningKey.from_seed(self._load().account).public
+
     def url(self) -> str:
         """Return the address of the broker. Raise NotFound if there is none."""
         return self._load().url
 
-    def nodes(self) -> dict[str, AcceptedNode]:
-        """Return the accepted nodes by name. Raise StorageError if the file cannot be used."""
+    def members(self) -> dict[str, AcceptedMember]:
+        """Return the accepted members by name. Raise StorageError if the file cannot be used."""
         return self._load().nodes if self._file.exists() else {}
 
-    def check_new(self, name: str) -> None:
-        """Check that a node can be accepted.
+    def check_new(self, name: str, *, site: bool = False) -> None:
+        """Check that a member can be accepted.
 
         Raises:
-            InvalidData: the text is not a name of a node.
+            InvalidData: the text is not a name.
             NotFound: the broker has not been set up.
-            Conflict: the name is used.
+            Conflict: the name is used, or the broker does not accept sites.
         """
-        _check(name, self._load())
+        self._check(name, self._load(), site)
 
-    def accept(self, name: str, key: str, address: str) -> Credentials:
-        """Accept a node; return its credentials without its private key.
+    def accept(self, name: str, key: str, address: str, *, site: bool = False) -> Credentials:
+        """Accept a member; return its credentials without its private key.
 
         Args:
             name: its name.
             key: its public key.
             address: where it is, for the list.
+            site: whether it is the broker of a site.
 
         Raises:
             InvalidData, NotFound, Conflict: as of `check_new`.
@@ -149,36 +195,36 @@ class Accounts:
         """
         with self._locked():
             state = self._load()
-            _check(name, state)
-            state.nodes[name] = AcceptedNode(key, now(), address)
+            self._check(name, state, site)
+            state.nodes[name] = AcceptedMember(key, now(), address, site)
             self._save(state)
-        claim = claims.user(SigningKey.from_seed(state.account), key, name, node_subjects(name))
-        return Credentials(state.url, state.authority, claim)
+        claim = claims.user(SigningKey.from_seed(state.account), key, name, self._members.rights(name, site))
+        return Credentials(state.sites if site else state.url, state.authority, claim, leaf=site)
 
     async def revoke(self, name: str) -> None:
-        """Revoke a node. The broker ends its connections at once.
+        """Revoke a member. The broker ends its connections at once.
 
         Raises:
-            NotFound: there is no such node.
-            ConnectionLost: the broker cannot be reached. The node is still in the list, so that this can be repeated.
+            NotFound: there is no such member.
+            ConnectionLost: the broker cannot be reached. The member is still in the list, so that this can be repeated.
             StorageError: the file cannot be used.
         """
         with self._locked():
             state = self._load()
-            node = state.nodes.get(name)
-            if node is None:
-                raise NotFound("There is no node {node}.", node=name)
-            if node.key not in state.revoked:
-                state.revoked.append(node.key)
+            member = state.nodes.get(name)
+            if member is None:
+                raise NotFound("{name} has not been accepted.", name=name)
+            if member.key not in state.revoked:
+                state.revoked.append(member.key)
             claim = self._account_claim(state)
             self._save(state)
             try:
                 await self._send(state, claim)
             except ConnectionLost as error:
                 raise ConnectionLost(
-                    "The node {node} may still have access, revoke it again: {reason}",
+                    "{name} may still have access, revoke it again: {reason}",
                     error.detail,
-                    node=name,
+                    name=name,
                     reason=error,
                 ) from error
             del state.nodes[name]
@@ -199,6 +245,20 @@ class Accounts:
         if found.error is not None:
             raise ConnectionLost("The broker does not accept the change.", str(found.error))
 
+    def _check(self, name: str, state: _State, site: bool) -> None:
+        check_name(name)
+        command = self._members.command
+        if name in state.nodes:
+            raise Conflict(
+                "{name} is accepted already. Revoke it first: arcor2-hw {command} revoke {name}",
+                name=name,
+                command=command,
+            )
+        if site and not state.sites:
+            raise Conflict(
+                "The broker accepts no sites. Run `arcor2-hw {command} broker` with --sites first.", command=command
+            )
+
     # -------------------------------------------------------------------------------- file
     def _account_claim(self, state: _State) -> str:
         """Return the claim of the account, newer than all earlier ones even if the clock was set back."""
@@ -211,7 +271,9 @@ class Accounts:
         try:
             return msgspec.json.decode(self._file.read_bytes(), type=_State)
         except FileNotFoundError as error:
-            raise NotFound("The broker is not set up. Run `arcor2-hw node broker` first.") from error
+            raise NotFound(
+                "The broker is not set up. Run `arcor2-hw {command} broker` first.", command=self._members.command
+            ) from error
         except (OSError, msgspec.MsgspecError) as error:
             raise StorageError("{file} cannot be used: {reason}.", file=self._file, reason=error) from error
 
@@ -238,24 +300,9 @@ class Accounts:
             os.close(lock)
 
 
-def _new_state(url: str, authority: str) -> _State:
+def _new_state(url: str, authority: str, sites: str) -> _State:
     operator, account, system = (SigningKey.create(kind) for kind in (Kind.OPERATOR, Kind.ACCOUNT, Kind.ACCOUNT))
-    return _State(url, operator.seed, account.seed, system.seed, authority)
-
-
-def node_subjects(name: str) -> list[str]:
-    """Return the subjects that a node may publish and subscribe.
-
-    The server must not answer messages of nodes: the broker does not check the subject for an answer, which could be
-    one of another node.
-    """
-    return [f"{PREFIX}.{name}.>"]
-
-
-def _check(name: str, state: _State) -> None:
-    check_name(name)
-    if name in state.nodes:
-        raise Conflict("There is a node {node} already. Revoke it first: arcor2-hw node revoke {node}", node=name)
+    return _State(url, operator.seed, account.seed, system.seed, authority, sites=sites)
 
 
 def listening_address(url: str) -> str:

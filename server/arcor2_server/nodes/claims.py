@@ -7,7 +7,7 @@ import base64
 import secrets
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import msgspec
 
@@ -24,6 +24,14 @@ _STORAGE: Final = {"mem_storage": _UNLIMITED, "disk_storage": _UNLIMITED, "strea
 """Limits of JetStream, which an account may use if the broker has it."""
 _FOREVER: Final = 253_402_300_799
 """End of the year 9999, s since 1970. A revoked key is never used again, so no clock matters."""
+
+
+class Rights(NamedTuple):
+    """What a user may publish and subscribe. leaf: whether it is a broker that connects as a leaf node."""
+
+    publish: Sequence[str]
+    subscribe: Sequence[str]
+    leaf: bool = False
 
 
 def operator(key: SigningKey, system_account: str) -> str:
@@ -56,21 +64,22 @@ def account(
     return _signed(signer, account_key, name, claim, issued)
 
 
-def user(signer: SigningKey, user_key: str, name: str, subjects: Sequence[str] | None = None) -> str:
+def user(signer: SigningKey, user_key: str, name: str, rights: Rights | None = None) -> str:
     """Return the claim of a user.
 
     Args:
         signer: key of the account.
         user_key: public key of the user.
         name: its name.
-        subjects: what it may publish and subscribe; None for everything in the account. It may not answer requests in
+        rights: what it may publish and subscribe; None for everything in the account. It may not answer requests in
             general: it could send a request with any subject for the answer to itself.
     """
-    allowed = {} if subjects is None else {"allow": list(subjects)}
-    claim: dict[str, Any] = {"type": "user", "pub": allowed, "sub": allowed}
+    claim: dict[str, Any] = {"type": "user", "pub": {}, "sub": {}}
     claim |= {"subs": _UNLIMITED, "data": _UNLIMITED, "payload": _UNLIMITED}
-    if subjects is not None:
-        claim["allowed_connection_types"] = ["STANDARD"]  # no leaf node, websocket or MQTT
+    if rights is not None:
+        claim |= {"pub": {"allow": list(rights.publish)}, "sub": {"allow": list(rights.subscribe)}}
+        # No websocket or MQTT, and a leaf node only if it is one.
+        claim["allowed_connection_types"] = ["LEAFNODE" if rights.leaf else "STANDARD"]
     return _signed(signer, user_key, name, claim)
 
 

@@ -23,12 +23,14 @@ class Credentials(msgspec.Struct, frozen=True):
 
     url: address, with tls:// unless the broker is on this computer. authority: certificates to trust (PEM); empty for
     those that the system trusts. claim: signed by the server; empty without. seed: private key of this computer.
+    leaf: whether a broker uses them, which connects as a leaf node.
     """
 
     url: str
     authority: str = ""
     claim: str = ""
     seed: str = ""
+    leaf: bool = False
 
     def __repr__(self) -> str:
         return f"Credentials({address_of(self.url)})"
@@ -134,14 +136,10 @@ def address_of(url: str) -> str:
     return f"{parts.hostname or url}:{parts.port or 4222}"
 
 
-def check_name(node: str) -> None:
-    """Check a name of a node.
-
-    Raises:
-        InvalidData: the text is not a name of a node.
-    """
-    if not re.fullmatch(NAME, node):
-        raise InvalidData("{name!r} is not a name of a node: use lower-case letters, digits, - and _.", name=node)
+def check_name(name: str) -> None:
+    """Check a name of a node, or of a cell or site of the fleet. Raise InvalidData if the text is none."""
+    if not re.fullmatch(NAME, name):
+        raise InvalidData("{name!r} is not a valid name: use lower-case letters, digits, - and _.", name=name)
 
 
 def node_file(data_dir: Path, node: str) -> Path:

@@ -1,5 +1,7 @@
 """Pairing: with a one-time code, a node and the server prove to each other who they are.
 
+Cells and sites of the fleet pair in the same manner.
+
 The server listens with TLS and a certificate made for this pairing. Both ends prove that they know the code, with HMACs
 of the certificate that each of them sees and of what they send. A computer in the middle needs another certificate, so
 it can neither pass proofs on nor change a message. It could guess the code from a proof of the node, but scrypt makes
@@ -87,10 +89,19 @@ class Invitation:
         name: name of the node.
         accept: accepts the public key of a node at an address; returns its credentials.
         valid: time for which the code is valid, s.
+        same_version: whether the node must run the version of the server.
     """
 
-    def __init__(self, name: str, accept: Callable[[str, str], Credentials], valid: float = VALID) -> None:
+    def __init__(
+        self,
+        name: str,
+        accept: Callable[[str, str], Credentials],
+        valid: float = VALID,
+        *,
+        same_version: bool = True,
+    ) -> None:
         self.code = new_code()
+        self._same_version = same_version
         self._name, self._accept, self._valid = name, accept, valid
         self._wrong = 0
         self._one_at_a_time = asyncio.Lock()
@@ -158,10 +169,10 @@ class Invitation:
 
     def _answer(self, request: Request, address: str) -> tuple[Answer, str | Arcor2Error | None]:
         """Return the answer to a node that knows the code, and the outcome of the pairing."""
-        if request.version != own_version():
+        if self._same_version and request.version != own_version():
             return Answer(own_version()), None
         if request.name != self._name or not is_user_key(request.key):
-            refusal = Message.of("This code is for the node {node}.", node=self._name)
+            refusal = Message.of("This code is for {name}.", name=self._name)
             return Answer(own_version(), refusal=refusal), None
         try:
             return Answer(own_version(), self._accept(request.key, address)), request.key
@@ -170,7 +181,9 @@ class Invitation:
 
 
 # -------------------------------------------------------------------------------------------------------- node
-async def pair(name: str, host: str, port: int, code: str) -> Credentials:
+async def pair(
+    name: str, host: str, port: int, code: str, *, command: str = "node", same_version: bool = True
+) -> Credentials:
     """Create a key for a node and let the server accept it; return the credentials.
 
     Args:
@@ -178,9 +191,11 @@ async def pair(name: str, host: str, port: int, code: str) -> Credentials:
         host: address of the server.
         port: its port for pairing.
         code: the code that the server shows.
+        command: the group of commands for messages.
+        same_version: whether the server must run the version of the node.
 
     Raises:
-        InvalidData: the text is not a name of a node.
+        InvalidData: the text is not a name.
         ConnectionLost: the server cannot be reached.
         Refused: the code is wrong, or the server refuses the node.
         Arcor2Error: server and node have different versions.
@@ -203,19 +218,20 @@ async def pair(name: str, host: str, port: int, code: str) -> Credentials:
             await _close(writer)
     except (OSError, TimeoutError, EOFError, asyncio.LimitOverrunError) as error:
         raise ConnectionLost(
-            "The server at {address} does not answer. Run `arcor2-hw node accept {node}` there first.",
+            "The server at {address} does not answer. Run `arcor2-hw {command} accept {name}` there first.",
             f"{type(error).__name__}: {error}",
             address=address,
-            node=name,
+            command=command,
+            name=name,
         ) from error
     if not hmac.compare_digest(proof, _proof(secret, b"server", body + content)):
         raise Refused("The code is wrong, or the computer at {address} is not the server.", address=address)
     answer = msgspec.json.decode(content, type=Answer)
-    refusal = refusal_of(name, Opening("", answer.version)) or answer.refusal
+    refusal = (refusal_of(name, Opening("", answer.version)) if same_version else None) or answer.refusal
     if refusal is not None:
         raise Refused(refusal)
     if answer.credentials is None:
-        raise Refused("The server refused the node.")
+        raise Refused("The server refused the request.")
     return msgspec.structs.replace(answer.credentials, seed=key.seed)
 
 

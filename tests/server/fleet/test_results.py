@@ -62,7 +62,7 @@ class SmallCell:
         self.units = UnitStore(storage, self.outbox)
         self._delivery = Delivery([self.outbox], CELL, IDENTITY)
         self._domain = domain
-        self._task = asyncio.create_task(keep_connected(of_address(url), "cell", self._publish, lambda: None))
+        self._task = asyncio.create_task(keep_connected(lambda: of_address(url), "cell", self._publish, lambda: None))
 
     async def _publish(self, client: object) -> None:
         async with asyncio.TaskGroup() as tasks:

@@ -121,7 +121,7 @@ def test_nodes_are_listed(server: Server, capsys: pytest.CaptureFixture[str]) ->
     accepted(server, NODE)
     cli.list_nodes(data_dir=data)
     name, key, *_ = capsys.readouterr().out.splitlines()[1].split()
-    assert (name, key) == (NODE, pairing.short_key(server.accounts.nodes()[NODE].key))
+    assert (name, key) == (NODE, pairing.short_key(server.accounts.members()[NODE].key))
     assert cli.revoke("oven", data_dir=data) == ExitStatus.NOT_FOUND
 
 
@@ -226,10 +226,10 @@ async def test_a_revocation_that_does_not_reach_the_broker_can_be_repeated(serve
         ConnectionLost, match=r"press may still have access, revoke it again: The broker at .* cannot be reached"
     ):
         await server.accounts.revoke(NODE)
-    assert NODE in server.accounts.nodes()
+    assert NODE in server.accounts.members()
     await asyncio.to_thread(server.restart_broker)
     await server.accounts.revoke(NODE)
-    assert NODE not in server.accounts.nodes()
+    assert NODE not in server.accounts.members()
     with pytest.raises(ConnectionLost, match="refuses the credentials"):
         await connect_client(credentials, "test")
 
@@ -285,7 +285,7 @@ async def test_a_code_is_valid_once() -> None:
     async with offered() as offer:
         with pytest.raises(Refused, match="The code is wrong"):
             await offer.pair("WRNG-CDEE")
-        with pytest.raises(Refused, match=f"This code is for the node {NODE}"):
+        with pytest.raises(Refused, match=f"This code is for {NODE}"):
             await offer.pair(offer.invitation.code, name="oven")
         found = await offer.pair(offer.invitation.code)
         key = await offer.invitation.accepted()
@@ -369,7 +369,7 @@ def test_a_name_is_used_once_and_has_no_wildcards(tmp_path: Path) -> None:
     with pytest.raises(Conflict, match="Revoke it first"):
         accounts.check_new(NODE)
     for name in ("*", ">", "a.b", "", "../x", "A"):
-        with pytest.raises(InvalidData, match="is not a name of a node"):
+        with pytest.raises(InvalidData, match="is not a valid name"):
             accounts.check_new(name)
 
 
