@@ -2,10 +2,7 @@
 
 import asyncio
 import contextlib
-import json
-import os
 import subprocess
-import sys
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 
@@ -15,32 +12,39 @@ from nats.aio.client import Client
 from nats.aio.msg import Msg
 
 from arcor2_hw.exceptions import Conflict
+from arcor2_server.access.authority import Authority
 from arcor2_server.cli import fleet_members as cli
 from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.fleet.accounts import fleet_accounts, save_hub, set_up
-from arcor2_server.fleet.records import answer_subject, encode, state_subject, stream_name
+from arcor2_server.fleet.records import answer_subject, state_subject, stream_name
 from arcor2_server.nodes.credentials import Credentials, load
 from arcor2_server.nodes.nkeys import Kind, SigningKey
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
 from tests.server.fleet.broker import free_port, listens
-from tests.server.fleet.cells import state_of, unit
+from tests.server.fleet.cells import unit
 from tests.server.fleet.test_results import CELL, FleetProcess, SmallCell, until
 from tests.server.nodes.conftest import CLI, NATS_SERVER
-from tests.waiting import WITHIN, wait_for
+from tests.waiting import wait_for
 
 pytestmark = pytest.mark.xdist_group("fleet")
 
 
 class Hub:
-    """A broker whose configuration `set_up` writes, with its data directory."""
+    """A broker whose configuration `set_up` writes, with its data directory. That of the hub has TLS."""
 
     def __init__(self, folder: Path, domain: str, *, sites: bool = False) -> None:
         folder.mkdir(exist_ok=True)
         self.settings = ServerSettings(data_dir=folder / "data")
         self.accounts = fleet_accounts(self.settings)
         self.port, self.folder, self.domain = free_port(), folder, domain
-        self.sites = f"nats://127.0.0.1:{free_port()}" if sites else ""
+        self.sites = f"tls://127.0.0.1:{free_port()}" if sites else ""
+        self.authority = self.certificate = self.key = ""
+        if sites:
+            authority = Authority(folder, lambda: ["127.0.0.1"])
+            authority.renew()
+            self.certificate, self.key = map(str, authority.files)
+            self.authority = authority.file.read_text()
 
     def start(self) -> None:
         store = self.folder / "broker"
@@ -49,13 +53,18 @@ class Hub:
             if (file := self.settings.broker_dir / name).exists():
                 (store / name).write_bytes(file.read_bytes())
         config = self.folder / "nats.conf"
-        url = f"nats://127.0.0.1:{self.port}"
         config.write_text(
             set_up(
-                self.settings, url, "", domain=self.domain, certificate="", key_file="", folder=str(store),
+                self.settings,
+                f"{'tls' if self.authority else 'nats'}://127.0.0.1:{self.port}",
+                self.authority,
+                domain=self.domain,
+                certificate=self.certificate,
+                key_file=self.key,
+                folder=str(store),
                 sites=self.sites,
             )
-        )  # fmt: skip
+        )
         log = self.folder / "nats.log"
         self.process = subprocess.Popen((NATS_SERVER, "-c", str(config), "-l", str(log)))
         wait_for(lambda: listens(self.port))
@@ -154,3 +163,69 @@ async def test_a_cell_publishes_only_under_its_own_name(hub: Hub) -> None:
             await here.client.publish(subject, b"x")
         await here.client.flush()
         assert len(here.errors) == 3
+
+
+async def test_a_site_delivers_states_and_results_and_is_revoked(hub: Hub, tmp_path: Path) -> None:
+    site = Hub(tmp_path / "brno", "brno")
+    save_hub(site.settings, "brno", hub.accept("brno", site=True))
+    with pytest.raises(Conflict, match="Use --domain brno"):
+        set_up(site.settings, site.sites, "", domain="hub", certificate="", key_file="", folder="/unused")
+    site.start()
+    fleet = FleetProcess("", hub.settings.data_dir)
+    storage = await Storage.open(ServerSettings(data_dir=tmp_path))
+    paired = site.accept(CELL)
+    cell = SmallCell(storage, paired, "brno")
+    try:
+        await cell.units.put([unit(1)])
+        await until(fleet.numbers, [1])
+        alive = lambda: [each["alive"] for each in fleet.cells()]  # noqa: E731
+        await until(alive, [True])
+        # A revoked site has no signal and keeps its results; it is accepted again.
+        await hub.accounts.revoke("brno")
+        await until(alive, [False])
+        await cell.units.put([unit(2)])
+        await cell.sent()
+        site.end()
+        save_hub(site.settings, "brno", hub.accept("brno", site=True))
+        site.start()
+        await until(fleet.numbers, [1, 2])
+        # The site revokes its cells itself.
+        await site.accounts.revoke(CELL)
+        await until(alive, [False])
+    finally:
+        await cell.close()
+        await storage.close()
+        fleet.kill()
+        site.end()
+
+
+# ---------------------------------------------------------------------------------------------------- command line
+def test_a_technician_pairs_lists_and_revokes(hub: Hub, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    data = ("--data-dir", str(hub.settings.data_dir))
+    for name, options, saved in (
+        (CELL, (), "fleet/press-3.json"),
+        ("brno", ("--site",), "broker/hub.creds"),
+    ):
+        accepting = subprocess.Popen(
+            [*CLI, "fleet", "accept", name, *options, "--host", "127.0.0.1", "--port", "0", *data],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        with accepting:
+            assert accepting.stdout is not None
+            command, code = accepting.stdout.readline().split(), accepting.stdout.readline().removeprefix("Code: ")
+            pairing = [*CLI, *command[command.index("fleet") :], "--data-dir", str(tmp_path / name)]
+            pair = subprocess.run(pairing, input=code.lower(), capture_output=True, text=True, check=False)
+            assert pair.returncode == 0, pair.stderr
+            accepted = accepting.stdout.readline()
+        assert accepted.removeprefix("accepted ") == pair.stdout.splitlines()[0].removeprefix("paired ") + "\n"
+        assert (tmp_path / name / saved).stat().st_mode & 0o077 == 0
+    assert ServerSettings(data_dir=tmp_path / CELL, cell_name=CELL).in_fleet
+    assert not ServerSettings(data_dir=tmp_path / CELL, cell_name="press-4").in_fleet
+    capfd.readouterr()
+    assert cli.list_members(data_dir=hub.settings.data_dir) == ExitStatus.OK
+    assert [line.split()[:2] for line in capfd.readouterr().out.splitlines()[1:]] == [["brno", "site"], [CELL, "cell"]]
+    assert cli.revoke(CELL, data_dir=hub.settings.data_dir) == ExitStatus.OK
+    assert cli.revoke(CELL, data_dir=hub.settings.data_dir) == ExitStatus.NOT_FOUND
+    assert "arcor2-hw fleet: press-3 has not been accepted." in capfd.readouterr().err
+    assert cli.accept("press 3", data_dir=hub.settings.data_dir) == ExitStatus.USAGE

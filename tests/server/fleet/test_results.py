@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import httpx
 import msgspec
@@ -15,8 +16,8 @@ from arcor2_hw.data.units import UnitState
 from arcor2_server.fleet.broker import keep_connected
 from arcor2_server.fleet.delivery import Delivery
 from arcor2_server.fleet.file import FILE, FleetFile, ReceivedResult
-from arcor2_server.fleet.records import encode, state_subject
-from arcor2_server.nodes.credentials import of_address
+from arcor2_server.fleet.records import answer_subject, encode, state_subject
+from arcor2_server.nodes.credentials import Credentials, of_address
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
 from arcor2_server.storage.outbox import OutboxKind, UnitOutbox
@@ -34,7 +35,7 @@ class FleetProcess:
 
     def __init__(self, url: str, data_dir: Path, *options: str) -> None:
         self.command = [sys.executable, "-P", "-m", "arcor2_server.cli.main", "fleet", "serve", "--port", "0"]
-        self.command += ["--broker", url, "--data-dir", str(data_dir), *options]
+        self.command += [*(("--broker", url) if url else ()), "--data-dir", str(data_dir), *options]
         self.start()
 
     def start(self) -> None:
@@ -48,6 +49,10 @@ class FleetProcess:
         assert self.process.stdout is not None
         self.process.stdout.close()
 
+    def cells(self) -> list[dict[str, Any]]:
+        found: list[dict[str, Any]] = httpx.get(f"{self.url}/api/fleet/cells").json()["cells"]
+        return found
+
     def numbers(self) -> list[int]:
         """Return the numbers of the stored units in order. They may arrive in another one."""
         found = httpx.get(f"{self.url}/api/fleet/results", params={"kind": "unit", "limit": 1000}).json()
@@ -57,12 +62,15 @@ class FleetProcess:
 class SmallCell:
     """The database of a cell, and the tasks that publish its state and results."""
 
-    def __init__(self, storage: Storage, url: str, domain: str) -> None:
+    def __init__(self, storage: Storage, broker: str | Credentials, domain: str) -> None:
         self.outbox = UnitOutbox(storage)
         self.units = UnitStore(storage, self.outbox)
         self._delivery = Delivery([self.outbox], CELL, IDENTITY)
         self._domain = domain
-        self._task = asyncio.create_task(keep_connected(lambda: of_address(url), "cell", self._publish, lambda: None))
+        credentials = of_address(broker) if isinstance(broker, str) else broker
+        answers = answer_subject(CELL) if credentials.claim else ""
+        connecting = keep_connected(lambda: credentials, "cell", self._publish, lambda: None, answers)
+        self._task = asyncio.create_task(connecting)
 
     async def _publish(self, client: object) -> None:
         async with asyncio.TaskGroup() as tasks:
