@@ -20,6 +20,7 @@ from arcor2_hw.data.events import EVENTS, ChangeType
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS
 from arcor2_server.fleet.registry import FleetUpdate
+from arcor2_server.fleet.reports import FleetAlarm, FleetCause, FleetProduction, FleetUnit
 
 TARGET: Final = Path(__file__).resolve().parent / "src" / "protocol" / "types.ts"
 """Generated file."""
@@ -122,8 +123,9 @@ def typescript() -> str:
         declarations.add_sent(rpc.data)
     for event in EVENTS.values():
         declarations.add_sent(event.data)
-    declarations.add_sent(FleetUpdate)
-    declarations.expression(FleetUpdate)
+    for sent in (FleetUpdate, FleetProduction, FleetUnit, FleetAlarm, FleetCause):
+        declarations.add_sent(sent)
+        declarations.expression(sent)
     requests, roles_of_requests = [], []
     for name, rpc in sorted(RPCS.items()):
         args = "undefined" if rpc.args is None else declarations.expression(rpc.args)

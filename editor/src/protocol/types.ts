@@ -354,6 +354,12 @@ export interface AlarmStatisticsData {
   by_duration: AlarmFrequency[];
 }
 
+/** An alarm with the translations of its texts by its cell. */
+export interface AlarmSummary {
+  record: AlarmRecord;
+  translations: Record<string, Record<string, string>>;
+}
+
 /** An assumption of a dry run, as a sentence. action_id: the action that it concerns. */
 export interface Assumption {
   text: string;
@@ -1044,13 +1050,27 @@ export interface FindDevicesArgs {
   addresses?: string;
 }
 
-/** The alarm of a cell that needs a person first. device: its name; empty for the program and the system. */
+/**
+ * The alarm of a cell that needs a person first.
+ *
+ * device: its name; empty for the program and the system. translations: of its text, as far as a driver has them.
+ */
 export interface FirstAlarm {
   priority: Priority;
   text: string;
   raised: string;
   device: string;
   text_message?: Message;
+  translations: Record<string, Record<string, string>>;
+}
+
+/** An alarm of a cell. id: of the result. at: when it was raised, s since the epoch. duration: s, up to now. */
+export interface FleetAlarm {
+  id: number;
+  at: number;
+  cell: string;
+  duration: number;
+  alarm: AlarmSummary;
 }
 
 /**
@@ -1066,6 +1086,33 @@ export interface FleetCard {
   conflict: boolean;
   seen: string;
   state: FleetState;
+}
+
+/** Alarms of a cell with the same cause. newest: the last one of them. duration: sum, s. */
+export interface FleetCause {
+  cell: string;
+  count: number;
+  duration: number;
+  newest: AlarmSummary;
+}
+
+/** Units of a cell, product and program that left the cell. product, program: empty if they are not known. */
+export interface FleetCount {
+  cell: string;
+  product: string;
+  program: string;
+  good: number;
+  bad: number;
+  rejected: number;
+}
+
+/** What cells have produced. since, until: the period in whole quarters of an hour. step: length of its parts, s. */
+export interface FleetProduction {
+  since: number;
+  until: number;
+  step: number;
+  counts: FleetCount[];
+  times: FleetTime[];
 }
 
 /**
@@ -1106,6 +1153,21 @@ export interface FleetState {
   controlling: string[];
   missing: string[];
   waiting: number;
+}
+
+/** Units in a part of the period that begins `at`, s since the epoch. bad: with rejected ones. */
+export interface FleetTime {
+  at: number;
+  good: number;
+  bad: number;
+}
+
+/** A unit of a cell. id: of the result. at: when it left, s since the epoch. */
+export interface FleetUnit {
+  id: number;
+  at: number;
+  cell: string;
+  unit: UnitSummary;
 }
 
 /** An update of the page. cells: changed cards. removed: ids of cards. broker: whether the broker is connected. */
@@ -3823,6 +3885,26 @@ export interface UnitStep {
   results?: string[];
   error?: string;
   attempt?: number;
+}
+
+/**
+ * A unit without its steps.
+ *
+ * step, error: the action that explains why it is bad, and the error of this action; empty if there is none.
+ */
+export interface UnitSummary {
+  number: number;
+  serial: string;
+  part: number;
+  state: UnitState;
+  entered: string;
+  left?: string;
+  verdict?: boolean;
+  order: string;
+  product: string;
+  program: string;
+  step: string;
+  error: string;
 }
 
 /** What an action does while a condition is not met: wait, then hold the program; or hold it at once. */

@@ -9,7 +9,7 @@ from litestar.exceptions import HTTPException, WebSocketDisconnect
 from litestar.params import Parameter
 
 from arcor2_hw.data.role import Role
-from arcor2_hw.exceptions import Arcor2Error, Conflict, NotFound, StorageError
+from arcor2_hw.exceptions import Conflict, NotFound, StorageError
 from arcor2_hw.messages import translatable
 from arcor2_server.access.admission import Access, AccessRefused, role_needed
 from arcor2_server.access.origin import HostNames, own_pages_only
@@ -20,6 +20,7 @@ from arcor2_server.fleet import records
 from arcor2_server.fleet.collector import Collector
 from arcor2_server.fleet.file import FleetResult
 from arcor2_server.fleet.registry import FleetUpdate
+from arcor2_server.fleet.report_routes import json_response, refusal, report_routes
 from arcor2_server.rest.responses import http_refusal
 from arcor2_server.settings import ServerSettings
 from arcor2_server.web.application import Application
@@ -49,6 +50,7 @@ class _Routes:
     def __init__(self, collector: Collector, access: Access, audit: AuditTrail) -> None:
         self._collector, self._access, self._audit = collector, access, audit
         self.handlers = [self._page(), self._cells(), self._remove(), self._results(), self._translations()]
+        self.handlers += report_routes(collector)
 
     def _page(self) -> Any:
         @websocket("/ws", opt={ROLE: Role.OPERATOR})
@@ -97,7 +99,7 @@ class _Routes:
         def cells() -> Response[bytes]:
             """Return all cells."""
             registry = self._collector.registry
-            return _json(FleetUpdate(registry.cards(), [], self._collector.connected))
+            return json_response(FleetUpdate(registry.cards(), [], self._collector.connected))
 
         return cells
 
@@ -108,7 +110,7 @@ class _Routes:
             try:
                 await self._collector.remove(card_id)
             except (NotFound, Conflict, StorageError) as error:
-                raise _refusal(error) from None
+                raise refusal(error) from None
 
         return remove
 
@@ -124,8 +126,8 @@ class _Routes:
             try:
                 found: list[FleetResult] = await self._collector.results(cell, kind, before, limit)
             except StorageError as error:
-                raise _refusal(error) from None
-            return _json(found)
+                raise refusal(error) from None
+            return json_response(found)
 
         return results
 
@@ -136,18 +138,9 @@ class _Routes:
             """Return the translations of the server's messages, for alarms."""
             from arcor2_server.object_types import translations as texts  # not needed for pages in English
 
-            return _json(await asyncio.to_thread(texts.into, language, ()))
+            return json_response(await asyncio.to_thread(texts.into, language, ()))
 
         return translations
-
-
-def _json(data: object) -> Response[bytes]:
-    return Response(records.encode(data), media_type="application/json")
-
-
-def _refusal(error: Arcor2Error) -> HTTPException:
-    status = 404 if isinstance(error, NotFound) else 409 if isinstance(error, Conflict) else 500
-    return HTTPException(status_code=status, detail=str(error), extra=error.message.translation())
 
 
 def refused(request: Request[Any, Any, Any], error: HTTPException) -> Response[Any]:

@@ -23,6 +23,8 @@ from arcor2_server.fleet import records as r
 from arcor2_server.fleet.broker import keep_connected
 from arcor2_server.fleet.file import FleetFile, FleetResult, ReceivedResult
 from arcor2_server.fleet.registry import MOST_PER_NAME, Registry
+from arcor2_server.fleet.reports import FleetReports
+from arcor2_server.fleet.summaries import of_alarm, of_unit
 from arcor2_server.nodes.credentials import Credentials
 
 log = structlog.get_logger(__name__)
@@ -75,6 +77,8 @@ class Collector:
         self._background = BackgroundTasks()
         self._sources: dict[_Source, asyncio.Task[None]] = {}
         self._writer = ThreadPoolExecutor(1, "fleet file")
+        self._reports = FleetReports(file.path)
+        self._reader = ThreadPoolExecutor(1, "fleet reports")
         self._reported: dict[str, tuple[float, int]] = {}
         self._seen_revision = self.registry.revision
 
@@ -90,7 +94,9 @@ class Collector:
         await self._background.cancel()
         with contextlib.suppress(StorageError):
             await self._in_file(lambda: self._file.put_cells(list(self.registry.stored())))
-        self._writer.shutdown()
+        for executor in (self._reader, self._writer):
+            executor.shutdown()
+        self._reports.close()
         self._file.close()
 
     async def remove(self, card_id: str) -> None:
@@ -102,6 +108,10 @@ class Collector:
     async def results(self, cell: str, kind: str, before: int, limit: int) -> list[FleetResult]:
         """Return stored results, newest first, as FleetFile does."""
         return await self._in_file(lambda: self._file.results(cell, kind, before, limit))
+
+    async def report(self, work: Callable[[FleetReports], T]) -> T:
+        """Return the result of a query, which does not delay the storing of results. Raise what the query raises."""
+        return await asyncio.get_running_loop().run_in_executor(self._reader, work, self._reports)
 
     async def _in_file(self, work: Callable[[], T]) -> T:
         return await asyncio.get_running_loop().run_in_executor(self._writer, work)
@@ -241,10 +251,13 @@ def _received(name: str, message: Msg) -> ReceivedResult:
     if r.cell_of(message.subject) != name:
         raise InvalidData("The stream of {name} contains a message of another cell.", name=name)
     result = r.decode_result(message.data)
+    received = message.metadata.timestamp.timestamp()
     if isinstance(result, r.UnitResult):
         kind, since = "unit", result.record.entered
+        columns = of_unit(result.record, int(received))
     else:
         kind, since = "alarm", result.record.raised
-    stamp = int(message.metadata.timestamp.timestamp() * 1e6)
+        columns = of_alarm(result.record, result.translations, int(received))
     document = msgspec.json.encode(result.record)
-    return ReceivedResult(name, result.identity, kind, result.record.number, since, stamp, document)
+    stamp = int(received * 1e6)
+    return ReceivedResult(name, result.identity, kind, result.record.number, since, stamp, document, columns)

@@ -12,7 +12,9 @@ import structlog
 from arcor2_hw.data.base import Data, Timestamp
 from arcor2_hw.exceptions import StorageError
 from arcor2_server.files import ensure_private
+from arcor2_server.fleet import columns
 from arcor2_server.fleet.registry import StoredCell
+from arcor2_server.fleet.summaries import Columns
 
 log = structlog.get_logger(__name__)
 
@@ -20,7 +22,7 @@ FILE: Final = "fleet.sqlite"
 """Name in the data directory."""
 MOST_RESULTS: Final = 1_000_000
 """Maximum number of stored results. Beyond it the oldest are deleted."""
-_VERSION: Final = 1
+_VERSION: Final = 2
 _SCHEMA: Final = """
 create table if not exists cell (
   name text not null, identity text not null, document blob not null, primary key (name, identity)
@@ -32,11 +34,6 @@ create table if not exists result (
 );
 create index if not exists result_of_cell on result (cell, kind, id);
 """
-_PUT: Final = """
-insert into result (cell, identity, kind, number, since, stamp, document) values (?, ?, ?, ?, ?, ?, ?)
-on conflict (identity, kind, number, since) do update set document = excluded.document, stamp = excluded.stamp
-where excluded.stamp > stamp
-"""
 _encode = msgspec.json.Encoder().encode
 _decode = msgspec.json.Decoder(StoredCell).decode
 
@@ -46,6 +43,7 @@ class ReceivedResult(NamedTuple):
 
     number, since: of the record, and when the unit entered or the alarm was raised; a cell whose data was restored may
     use a number again. stamp: when the broker stored it, µs since the epoch. document: the record as JSON.
+    columns: what queries use, from the record.
     """
 
     cell: str
@@ -55,6 +53,7 @@ class ReceivedResult(NamedTuple):
     since: Timestamp
     stamp: int
     document: bytes
+    columns: Columns
 
 
 class FleetResult(Data, frozen=True):
@@ -71,7 +70,7 @@ class FleetFile:
     """The file. All methods may raise StorageError; one thread at a time may call them."""
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        self.path = path
         with self._guarded():
             ensure_private(path)
             self._connection = sqlite3.connect(path, isolation_level=None, check_same_thread=False, timeout=5.0)
@@ -81,7 +80,11 @@ class FleetFile:
             if version > _VERSION:
                 raise StorageError("{file} was written by a newer version. Update arcor2-hw.", file=path)
             self._connection.executescript(_SCHEMA)
-            self._connection.execute(f"pragma user_version={_VERSION}")
+            if version < _VERSION:
+                with self._connection:
+                    self._connection.execute("begin immediate")
+                    columns.add_to(self._connection)
+                    self._connection.execute(f"pragma user_version={_VERSION}")
 
     def close(self) -> None:
         """Close the file."""
@@ -92,7 +95,7 @@ class FleetFile:
         try:
             yield
         except (sqlite3.Error, OSError) as error:
-            raise StorageError("{file} cannot be used: {reason}.", file=self._path, reason=error) from error
+            raise StorageError("{file} cannot be used: {reason}.", file=self.path, reason=error) from error
 
     @contextlib.contextmanager
     def _transaction(self) -> Iterator[None]:
@@ -128,7 +131,7 @@ class FleetFile:
     def put_results(self, results: Sequence[ReceivedResult]) -> None:
         """Store results durably. A result that is stored already is replaced by a newer version, else left alone."""
         with self._transaction():
-            self._connection.executemany(_PUT, results)
+            self._connection.executemany(columns.PUT, [(*each[:-1], *each.columns) for each in results])
             self._connection.execute("delete from result where id <= (select max(id) from result) - ?", (MOST_RESULTS,))
 
     def results(self, cell: str, kind: str, before: int, limit: int) -> list[FleetResult]:

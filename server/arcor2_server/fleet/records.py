@@ -3,7 +3,7 @@
 from typing import Annotated, Any, Final
 
 import msgspec
-from msgspec import Meta
+from msgspec import Meta, field
 
 from arcor2_hw.data.alarms import AlarmRecord, Priority
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
@@ -36,14 +36,22 @@ Address = Annotated[str, Meta(max_length=300, pattern=r"^(https?://[^\s]+)?$")]
 Domain = Annotated[str, Meta(max_length=63, pattern=r"^[A-Za-z0-9_-]*$")]
 
 
+Translations = dict[str, dict[str, str]]
+"""Translations of texts by language and English text or template. Drivers of a cell have some of their own."""
+
+
 class FirstAlarm(Data, frozen=True):
-    """The alarm of a cell that needs a person first. device: its name; empty for the program and the system."""
+    """The alarm of a cell that needs a person first.
+
+    device: its name; empty for the program and the system. translations: of its text, as far as a driver has them.
+    """
 
     priority: Priority
     text: Text
     raised: Timestamp
     device: Name = ""
     text_message: Message | Unset = UNSET
+    translations: Translations = field(default_factory=dict)
 
 
 class FleetState(Data, frozen=True, kw_only=True):
@@ -94,10 +102,11 @@ class UnitResult(Data, frozen=True, tag="unit", tag_field="kind"):
 
 
 class AlarmResult(Data, frozen=True, tag="alarm", tag_field="kind"):
-    """The record of an alarm. identity: of the cell."""
+    """The record of an alarm. identity: of the cell. translations: of its texts, as far as a driver has them."""
 
     identity: Id
     record: AlarmRecord
+    translations: Translations = field(default_factory=dict)
 
 
 Result = UnitResult | AlarmResult

@@ -1,0 +1,92 @@
+"""The columns of stored results that reports use, and counts of units for each quarter of an hour."""
+
+import sqlite3
+from typing import Final
+
+import msgspec
+
+from arcor2_hw.data.alarms import AlarmRecord
+from arcor2_hw.data.units import UnitRecord
+from arcor2_server.fleet.summaries import Columns, of_alarm, of_unit
+
+SLOT: Final = 900
+"""Time for which units are counted together, s. All time zones differ by a multiple of it."""
+_COLUMNS: Final = {
+    "at": "integer not null default 0",
+    "until": "integer",
+    "state": "text not null default ''",
+    "label": "text not null default '' collate nocase",
+    "program": "text not null default ''",
+    "product": "text not null default ''",
+    "times": "integer not null default 1",
+    "summary": "blob not null default ''",
+}
+"""The fields of `Columns`."""
+_FIELDS: Final = ("cell", "identity", "kind", "number", "since", "stamp", "document", *_COLUMNS)
+_REPLACED: Final = ("document", "stamp", *_COLUMNS)
+PUT: Final = (
+    f"insert into result ({', '.join(_FIELDS)}) values ({', '.join('?' * len(_FIELDS))}) "  # noqa: S608 (names from above)
+    "on conflict (identity, kind, number, since) do update set "
+    f"{', '.join(f'{name} = excluded.{name}' for name in _REPLACED)} where excluded.stamp > stamp"
+)
+"""Stores a result, or replaces it by a newer version."""
+_BATCH: Final = 10_000
+
+
+def _counted(row: str, sign: str) -> str:
+    """Return a statement of a trigger that adds a row to the counts (sign +), or subtracts it (-)."""
+    parts = ("good", "bad", "rejected")
+    values = ", ".join(f"{sign}({row}.state = '{part}')" for part in parts)
+    return (
+        "insert into unit_count values "  # noqa: S608 (only texts from above)
+        f"({row}.at / {SLOT}, {row}.cell, {row}.program, {row}.product, "
+        f"{values}) on conflict do update set "
+        f"{', '.join(f'{part} = {part} + excluded.{part}' for part in parts)};"
+    )
+
+
+_REPORTS: Final = (
+    """create table unit_count (
+      slot integer not null, cell text not null, program text not null, product text not null,
+      good integer not null, bad integer not null, rejected integer not null, primary key (slot, cell, program, product)
+    ) without rowid""",
+    "create index unit_at on result (at, id, label, cell) where kind = 'unit'",
+    "create index bad_unit_at on result (at, id, cell) where kind = 'unit' and state in ('bad', 'rejected')",
+    "create index alarm_at on result (at, id, cell, label, times, until) where kind = 'alarm'",
+    f"create trigger unit_added after insert on result when new.kind = 'unit' begin {_counted('new', '+')} end",
+    f"create trigger unit_removed after delete on result when old.kind = 'unit' begin {_counted('old', '-')} end",
+    "create trigger unit_changed after update of at, state, program, product on result when new.kind = 'unit' "
+    f"begin {_counted('old', '-')} {_counted('new', '+')} end",
+)
+_ALL: Final = (
+    f"insert into unit_count select at / {SLOT}, cell, program, product, "  # noqa: S608 (a number from above)
+    "sum(state = 'good'), sum(state = 'bad'), sum(state = 'rejected') "
+    "from result where kind = 'unit' group by 1, 2, 3, 4"
+)
+
+
+def add_to(connection: sqlite3.Connection) -> None:
+    """Add the columns, counts and indexes to a file of version 1. A million results take about a minute.
+
+    Raises:
+        sqlite3.Error: the file cannot be changed.
+    """
+    for name, kind in _COLUMNS.items():
+        connection.execute(f"alter table result add column {name} {kind}")
+    change = f"update result set {', '.join(f'{name} = ?' for name in _COLUMNS)} where id = ?"  # noqa: S608 (names)
+    select = "select id, kind, stamp, document from result where id > ? order by id limit ?"
+    last = -1
+    while rows := connection.execute(select, (last, _BATCH)).fetchall():
+        connection.executemany(change, [(*columns_of(*row[1:]), row[0]) for row in rows])
+        last = rows[-1][0]
+    for statement in _REPORTS:
+        connection.execute(statement)
+    connection.execute(_ALL)
+
+
+def columns_of(kind: str, stamp: int, document: bytes) -> Columns:
+    """Return the columns of a stored record."""
+    received = stamp // 1_000_000
+    if kind == "unit":
+        return of_unit(msgspec.json.decode(document, type=UnitRecord), received)
+    return of_alarm(msgspec.json.decode(document, type=AlarmRecord), {}, received)

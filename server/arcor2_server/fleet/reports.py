@@ -1,0 +1,223 @@
+"""Queries of the stored results: counts of units, lists, and the most frequent alarms. Its methods block."""
+
+import contextlib
+import sqlite3
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+
+from arcor2_hw.data.base import Data
+from arcor2_hw.data.units import UnitRecord
+from arcor2_hw.exceptions import NotFound, StorageError
+from arcor2_server.fleet.columns import SLOT
+from arcor2_server.fleet.summaries import AlarmSummary, UnitSummary
+
+HOUR: Final = 3600
+_LONG: Final = 49 * HOUR
+"""Length of a period from which it is divided into parts of 6 hours instead of 1 hour, s."""
+_MOST_CAUSES: Final = 50
+"""Maximum number of causes of alarms."""
+_BAD: Final = "state in ('bad', 'rejected')"
+_unit = msgspec.json.Decoder(UnitSummary).decode
+_alarm = msgspec.json.Decoder(AlarmSummary).decode
+_record = msgspec.json.Decoder(UnitRecord).decode
+
+
+class Period(Data, frozen=True):
+    """A period, s since the epoch. until: the first second after it. cell: name of a cell; empty for all."""
+
+    since: int
+    until: int
+    cell: str = ""
+
+
+class FleetCount(Data, frozen=True):
+    """Units of a cell, product and program that left the cell. product, program: empty if they are not known."""
+
+    cell: str
+    product: str
+    program: str
+    good: int
+    bad: int
+    rejected: int
+
+
+class FleetTime(Data, frozen=True):
+    """Units in a part of the period that begins `at`, s since the epoch. bad: with rejected ones."""
+
+    at: int
+    good: int
+    bad: int
+
+
+class FleetProduction(Data, frozen=True):
+    """What cells have produced. since, until: the period in whole quarters of an hour. step: length of its parts, s."""
+
+    since: int
+    until: int
+    step: int
+    counts: list[FleetCount]
+    times: list[FleetTime]
+
+
+class FleetUnit(Data, frozen=True):
+    """A unit of a cell. id: of the result. at: when it left, s since the epoch."""
+
+    id: int
+    at: int
+    cell: str
+    unit: UnitSummary
+
+
+class FleetAlarm(Data, frozen=True):
+    """An alarm of a cell. id: of the result. at: when it was raised, s since the epoch. duration: s, up to now."""
+
+    id: int
+    at: int
+    cell: str
+    duration: int
+    alarm: AlarmSummary
+
+
+class FleetCause(Data, frozen=True):
+    """Alarms of a cell with the same cause. newest: the last one of them. duration: sum, s."""
+
+    cell: str
+    count: int
+    duration: int
+    newest: AlarmSummary
+
+
+class FleetReports:
+    """Queries. All methods may raise StorageError; one thread at a time may call them.
+
+    Args:
+        path: file of the results, which exists.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        with self._guarded():
+            self._connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, check_same_thread=False)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._connection.close()
+
+    @contextlib.contextmanager
+    def _guarded(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.Error as error:
+            raise StorageError("{file} cannot be used: {reason}.", file=self._path, reason=error) from error
+
+    def _rows(self, query: str, *values: object) -> list[Any]:
+        with self._guarded():
+            return self._connection.execute(query, values).fetchall()
+
+    def production(self, period: Period) -> FleetProduction:
+        """Return the units of a period by cell, product and program, and over time."""
+        first, end = period.since // SLOT, -(-period.until // SLOT)
+        step = (6 * HOUR if (end - first) * SLOT > _LONG else HOUR) // SLOT
+        of_cell, values = _of_cell(period)
+        where = f"from unit_count where slot >= ? and slot < ?{of_cell}"
+        sums = "sum(good), sum(bad), sum(rejected)"
+        counts = self._rows(
+            f"select cell, product, program, {sums} {where} group by cell, product, program", first, end, *values
+        )
+        times = self._rows(
+            f"select (slot - ?) / ? part, sum(good), sum(bad) + sum(rejected) {where} group by part",
+            *(first, step, first, end, *values),
+        )
+        return FleetProduction(
+            first * SLOT,
+            end * SLOT,
+            step * SLOT,
+            [FleetCount(*row) for row in counts],
+            [FleetTime((first + part * step) * SLOT, good, bad) for part, good, bad in times],
+        )
+
+    def bad_units(self, period: Period, before: tuple[int, int] | None, limit: int) -> list[FleetUnit]:
+        """Return bad and rejected units of a period, the newest first. Arguments as of `alarms`."""
+        of_cell, values = _of_cell(period)
+        return self._units(
+            f"{_BAD} and at >= ? and at < ?{of_cell}", (period.since, period.until, *values), before, limit
+        )
+
+    def find_units(self, serial: str, cell: str, before: tuple[int, int] | None, limit: int) -> list[FleetUnit]:
+        """Return all units whose serial number contains a text, the newest first. Arguments as of `alarms`."""
+        pattern = serial.replace("\\", "\\\\").replace("%", "\\%").replace("_", "\\_")
+        where, values = "label like ? escape '\\'", (f"%{pattern}%",)
+        if cell:
+            where, values = f"{where} and cell = ?", (*values, cell)
+        return self._units(where, values, before, limit)
+
+    def _units(
+        self, where: str, values: tuple[object, ...], before: tuple[int, int] | None, limit: int
+    ) -> list[FleetUnit]:
+        rows = self._listed("unit", where, values, before, limit)
+        return [FleetUnit(row[0], row[1], row[2], _unit(row[4])) for row in rows]
+
+    def unit(self, number: int) -> UnitRecord:
+        """Return the whole record of a unit by the id of its result. Raise NotFound if there is none."""
+        rows = self._rows("select document from result where id = ? and kind = 'unit'", number)
+        if not rows:
+            raise NotFound("The unit {number} is not stored.", number=number)
+        found: UnitRecord = _record(rows[0][0])
+        return found
+
+    def alarms(self, period: Period, before: tuple[int, int] | None, limit: int) -> list[FleetAlarm]:
+        """Return alarms that were raised in a period, the newest first.
+
+        Args:
+            period: the period and cell.
+            before: `at` and `id` of the last one of the previous page; None for the first page.
+            limit: maximum number.
+        """
+        of_cell, values = _of_cell(period)
+        rows = self._listed(
+            "alarm", f"at >= ? and at < ?{of_cell}", (period.since, period.until, *values), before, limit
+        )
+        present = int(time.time())
+        return [
+            FleetAlarm(number, at, cell, max(0, (present if until is None else until) - at), _alarm(summary))
+            for number, at, cell, until, summary in rows
+        ]
+
+    def causes(self, period: Period) -> list[FleetCause]:
+        """Return the causes of the alarms of a period, the most frequent first."""
+        of_cell, values = _of_cell(period)
+        query = (
+            "select cell, sum(times), sum(max(0, coalesce(until, ?) - at)), max(id) "  # noqa: S608 (texts from above)
+            "from result "
+            f"where kind = 'alarm' and at >= ? and at < ?{of_cell} "
+            "group by cell, label order by 2 desc, 3 desc limit ?"
+        )
+        rows = self._rows(query, int(time.time()), period.since, period.until, *values, _MOST_CAUSES)
+        wanted = ", ".join("?" * len(rows))
+        newest = self._rows(f"select id, summary from result where id in ({wanted})", *(row[3] for row in rows))  # noqa: S608
+        summaries = {number: _alarm(summary) for number, summary in newest}
+        return [
+            FleetCause(cell, count, duration, summaries[number])
+            for cell, count, duration, number in rows
+            if number in summaries  # deleted meanwhile
+        ]
+
+    def _listed(
+        self, kind: str, where: str, values: tuple[object, ...], before: tuple[int, int] | None, limit: int
+    ) -> list[Any]:
+        if before is not None:
+            where, values = f"{where} and (at, id) < (?, ?)", (*values, *before)
+        query = (
+            "select id, at, cell, until, summary from result "  # noqa: S608 (only texts from above)
+            f"where kind = '{kind}' and {where} "
+            "order by at desc, id desc limit ?"
+        )
+        return self._rows(query, *values, limit)
+
+
+def _of_cell(period: Period) -> tuple[str, tuple[str, ...]]:
+    return (" and cell = ?", (period.cell,)) if period.cell else ("", ())
