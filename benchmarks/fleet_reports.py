@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.alarms import AlarmCategory, AlarmRecord, Priority
 from arcor2_hw.data.recipes import RecipeState, UsedRecipe
-from arcor2_hw.data.units import UnitState
+from arcor2_hw.data.units import UnitRecord, UnitState
 from arcor2_server.fleet.columns import columns_of
 from arcor2_server.fleet.file import MOST_RESULTS, FleetFile, ReceivedResult
 from benchmarks.fleet_cells import PROGRAMS, name_of
@@ -33,10 +33,9 @@ def fill(path: Path, units: int = MOST_RESULTS - ALARMS, alarms: int = ALARMS) -
         at = time.strftime("%Y-%m-%dT%H:%M:%S+00:00", time.gmtime(end - SPAN * (1 - number / total)))
         cell = number % CELLS
         if number % every == every - 1:
-            kind, record = "alarm", _alarm(number, cell, at, chance)
+            kind, document = "alarm", msgspec.json.encode(_alarm(number, chance.randrange(CELLS), at, chance))
         else:
-            kind, record = "unit", _unit(number, cell, at, chance)
-        document = msgspec.json.encode(record)
+            kind, document = "unit", msgspec.json.encode(_unit(number, cell, at, chance))
         stamp = int((end - SPAN * (1 - number / total)) * 1e6)
         columns = columns_of(kind, stamp, document)
         batch.append(ReceivedResult(name_of(cell), f"{cell:032x}", kind, number, at, stamp, document, columns))
@@ -47,7 +46,7 @@ def fill(path: Path, units: int = MOST_RESULTS - ALARMS, alarms: int = ALARMS) -
     file.close()
 
 
-def _unit(number: int, cell: int, at: str, chance: random.Random) -> object:
+def _unit(number: int, cell: int, at: str, chance: random.Random) -> UnitRecord:
     state = UnitState.GOOD if chance.random() > 0.03 else chance.choice((UnitState.BAD, UnitState.REJECTED))
     record = unit(number, 1, state)
     steps = [replace(record.steps[0], results=["true" if state is UnitState.GOOD else "false"])]
@@ -56,7 +55,12 @@ def _unit(number: int, cell: int, at: str, chance: random.Random) -> object:
     return replace(record, entered=at, left=at, steps=steps, recipe=recipe, package_name=program)
 
 
-TEXTS: Final = ("The gripper found no part.", "The door was opened.", "The feeder is empty.", "No answer from the camera.")
+TEXTS: Final = (
+    "The gripper found no part.",
+    "The door was opened.",
+    "The feeder is empty.",
+    "No answer from the camera.",
+)
 
 
 def _alarm(number: int, cell: int, at: str, chance: random.Random) -> AlarmRecord:

@@ -89,6 +89,11 @@ export function clock(time: string | number, seconds = false): string {
   });
 }
 
+/** Return a day without its year, "2 Jan". `time` is in ms since 1970. */
+export function shortDate(time: number): string {
+  return new Date(time).toLocaleDateString(i18n.locale, { day: "numeric", month: "short" });
+}
+
 /** Return date and time of day. `time` is RFC 3339. */
 export function dateAndTime(time: string): string {
   return new Date(time).toLocaleString(i18n.locale, { dateStyle: "medium", timeStyle: "medium" });
@@ -112,4 +117,11 @@ export function duration(seconds: number): string {
   if (seconds < 59.5) return `${fixed(seconds, 1)} s`;
   const whole = Math.round(seconds);
   return `${Math.floor(whole / 60)} min ${whole % 60} s`;
+}
+
+/** Return how long something took, with hours. `seconds` is in s. */
+export function hours(seconds: number): string {
+  if (seconds < 3600) return duration(seconds);
+  const minutes = Math.round(seconds / 60);
+  return `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }

@@ -63,7 +63,13 @@ describe("cells that need attention", () => {
   });
 
   it("is explained by the first alarm, else by missing devices", () => {
-    const first_alarm = { priority: "high", text: "No part.", raised: "", device: "Gripper" } as const;
+    const first_alarm = {
+      priority: "high",
+      text: "No part.",
+      raised: "",
+      device: "Gripper",
+      translations: {},
+    } as const;
     expect(reasonOf(card("a", { first_alarm, missing: ["camera"] }))).toBe("Gripper: No part.");
     const addressed = { ...first_alarm, text: "tower at 127.0.0.1:41893: no answer", device: "" };
     expect(reasonOf(card("a", { first_alarm: addressed }))).toBe("tower: no answer");

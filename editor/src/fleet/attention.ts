@@ -58,7 +58,7 @@ export function reasonOf({ alive, conflict, seen, state }: FleetCard): string {
   const { first_alarm: alarm, missing } = state;
   if (alarm) {
     // Its address is for technicians, who see it in the cell.
-    const { text } = splitAddress(translate(alarm.text_message ?? { text: alarm.text }));
+    const { text } = splitAddress(translate(alarm.text_message ?? { text: alarm.text }, alarm.translations));
     return alarm.device ? t`${alarm.device}: ${text}` : text;
   }
   if (missing.length > 0) return t`Not connected: ${missing.join(", ")}`;

@@ -91,7 +91,7 @@ interface Checked {
 
 function explained({ problems = [], problem_messages }: Checked): Pick<Entry, "problems" | "explanations"> {
   const messages = problem_messages ?? problems.map((text) => ({ text }));
-  return { problems, explanations: messages.map(translate) };
+  return { problems, explanations: messages.map((each) => translate(each)) };
 }
 
 function from(id: string, of: { id: string; name: string }[] | null): Entry["from"] {

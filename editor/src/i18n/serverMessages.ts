@@ -12,6 +12,9 @@ export interface ServerMessage {
   values?: Readonly<Record<string, string | ServerMessage>> | undefined;
 }
 
+/** Translations by language and English text or template. */
+export type Translations = Readonly<Record<string, Readonly<Record<string, string>>>>;
+
 /** An alarm of a device. */
 interface TranslatableAlarm {
   text: string;
@@ -34,18 +37,21 @@ export function serverCatalogue(translations: Readonly<Record<string, string>>):
   return Object.fromEntries(Object.entries(translations).map(([text, translated]) => [SERVER + text, translated]));
 }
 
-function translated(text: string): string {
+function translated(text: string, own: Translations): string {
   const found = i18n.messages[SERVER + text];
-  return typeof found === "string" ? found : text;
+  return typeof found === "string" ? found : (own[i18n.locale]?.[text] ?? text);
 }
 
-/** Return a message in the user's language as far as it is translated, else in English. */
-export function translate({ text, key, values }: ServerMessage): string {
-  if (key === undefined || values === undefined) return translated(text);
-  return translated(key).replace(/\{\{|\}\}|\{(\w+)\}/g, (found, name?: string) => {
+/**
+ * Return a message in the user's language as far as it is translated, else in English. `own` are translations that
+ * came with it; those of the server have precedence.
+ */
+export function translate({ text, key, values }: ServerMessage, own: Translations = {}): string {
+  if (key === undefined || values === undefined) return translated(text, own);
+  return translated(key, own).replace(/\{\{|\}\}|\{(\w+)\}/g, (found, name?: string) => {
     if (name === undefined) return found.charAt(0);
     const value = values[name] ?? found;
-    if (typeof value !== "string") return translate(value);
+    if (typeof value !== "string") return translate(value, own);
     return VERSION.test(name) ? value : value.replace(DECIMAL, `$1${decimalPoint()}$2`);
   });
 }

@@ -306,7 +306,9 @@ class Server:
 
             self.mqtt = closed(service.Mqtt(settings, feed, alarms))
         outboxes = [each for each in (unit_outbox, alarm_store.outbox) if each is not None]
-        self.fleet = closed(FleetLink(settings, outboxes, feed, cell, execution, runs, units, alarms, users, locks))
+        self.fleet = closed(
+            FleetLink(settings, outboxes, feed, cell, execution, runs, units, alarms, users, locks, types)
+        )
         temporary_runs = self.temporary_runs = TemporaryRuns(
             hub, locks, storage, types, session, online, execution, build, tasks
         )

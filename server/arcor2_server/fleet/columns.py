@@ -52,6 +52,7 @@ _REPORTS: Final = (
     ) without rowid""",
     "create index unit_at on result (at, id, label, cell) where kind = 'unit'",
     "create index bad_unit_at on result (at, id, cell) where kind = 'unit' and state in ('bad', 'rejected')",
+    "create index bad_unit_of_cell on result (cell, at, id) where kind = 'unit' and state in ('bad', 'rejected')",
     "create index alarm_at on result (at, id, cell, label, times, until) where kind = 'alarm'",
     f"create trigger unit_added after insert on result when new.kind = 'unit' begin {_counted('new', '+')} end",
     f"create trigger unit_removed after delete on result when old.kind = 'unit' begin {_counted('old', '-')} end",

@@ -15,9 +15,11 @@ from nats.js.api import PubAck
 from nats.js.client import JetStreamContext
 from nats.js.errors import NotFoundError
 
+from arcor2_hw.data.alarms import AlarmRecord
 from arcor2_hw.data.units import UnitRecord
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.fleet import records as r
+from arcor2_server.fleet.driver_texts import DriverTexts, texts_of
 from arcor2_server.storage.outbox import Outbox, OutboxKind, Waiting
 
 log = structlog.get_logger(__name__)
@@ -41,10 +43,11 @@ class Delivery:
         outboxes: the results.
         name: of the cell.
         identity: of the cell.
+        texts: translations of the texts of alarms.
     """
 
-    def __init__(self, outboxes: Sequence[Outbox], name: str, identity: str) -> None:
-        self._outboxes, self._name, self._identity = outboxes, name, identity
+    def __init__(self, outboxes: Sequence[Outbox], name: str, identity: str, texts: DriverTexts) -> None:
+        self._outboxes, self._name, self._identity, self._texts = outboxes, name, identity, texts
         self._added = asyncio.Event()
         for outbox in outboxes:
             outbox.on_added.append(self._added.set)
@@ -102,7 +105,10 @@ class Delivery:
         sent: list[int] = []
         pending: list[asyncio.Future[PubAck]] = []
         for waiting in await outbox.first(BATCH):
-            encoded = self._encoded(waiting, limit)
+            if waiting.kind is OutboxKind.ALARM:  # reads files of drivers
+                encoded = await asyncio.to_thread(self._encoded, waiting, limit)
+            else:
+                encoded = self._encoded(waiting, limit)
             if len(encoded) > limit:
                 log.error("result is too large for the broker and not sent", kind=waiting.kind, size=len(encoded))
                 done.append(waiting.number)
@@ -125,7 +131,10 @@ class Delivery:
 
     def _encoded(self, waiting: Waiting, limit: int) -> bytes:
         """Return the message of a result. Steps of a unit that do not fit are left out."""
-        head = {"kind": waiting.kind.value, "identity": self._identity}
+        head: dict[str, object] = {"kind": waiting.kind.value, "identity": self._identity}
+        if waiting.kind is OutboxKind.ALARM:
+            alarm = msgspec.json.decode(waiting.document, type=AlarmRecord)
+            head["translations"] = self._texts.of(texts_of(alarm))
         encoded = r.encode(head | {"record": msgspec.Raw(waiting.document)})
         if len(encoded) <= limit or waiting.kind is not OutboxKind.UNIT:
             return encoded

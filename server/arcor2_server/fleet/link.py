@@ -28,7 +28,9 @@ from arcor2_server.collaboration.users import Users
 from arcor2_server.execution.runs import Runs
 from arcor2_server.execution.service import Execution
 from arcor2_server.fleet import records as r
+from arcor2_server.fleet.driver_texts import DriverTexts, texts_of
 from arcor2_server.fleet.identity import identity_of
+from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.packml.cell import PackmlCell
 from arcor2_server.plant.feed import CellFeed, FeedReader
 from arcor2_server.production.units import Units
@@ -69,6 +71,7 @@ class FleetLink:
         alarms: the alarms.
         users: who is connected.
         locks: who has locked something.
+        types: have the folders of drivers.
     """
 
     def __init__(
@@ -83,10 +86,12 @@ class FleetLink:
         alarms: Alarms,
         users: Users,
         locks: Locks,
+        types: ObjectTypes,
     ) -> None:
         self._settings, self._outboxes, self._feed, self._cell = settings, outboxes, feed, cell
         self._execution, self._runs, self._units, self._alarms = execution, runs, units, alarms
         self._users, self._locks = users, locks
+        self._texts = DriverTexts(types.installed_folders)
         self._background = BackgroundTasks()
         self.connected = False
         """Whether the broker of the fleet is connected."""
@@ -124,7 +129,7 @@ class FleetLink:
 
         self._address = self._settings.cell_address or address
         self._identity, self._boot, self._number = identity_of(self._settings.data_dir), uuid.uuid4().hex, 0
-        self._delivery = Delivery(self._outboxes, self._settings.cell_name, self._identity)
+        self._delivery = Delivery(self._outboxes, self._settings.cell_name, self._identity, self._texts)
         self._reader = self._feed.reader(with_streams=False)
         self._alarms.on_changed.append(lambda _: self._mark_alarms())
         self._background.spawn(self._follow(), "state for the fleet")
@@ -190,10 +195,10 @@ class FleetLink:
             self._counted = loop.time()
         if self._alarms_changed:
             self._alarms_changed = False
-            self._summarise(await self._alarms.find(ListAlarmsArgs(show=AlarmFilter.RETAINED, limit=1000)))
+            await self._summarise(await self._alarms.find(ListAlarmsArgs(show=AlarmFilter.RETAINED, limit=1000)))
         self._state, self._collected = self._present(), loop.time()
 
-    def _summarise(self, alarms: list[AlarmRecord]) -> None:
+    async def _summarise(self, alarms: list[AlarmRecord]) -> None:
         self._by_priority = Counter(alarm.priority for alarm in alarms)
         # Of those that nobody has recognised yet, the most urgent one, and of these the oldest one.
         first = min(
@@ -204,7 +209,8 @@ class FleetLink:
             device = "" if isinstance(first.object_name, Unset) else first.object_name
             text = first.text[:1000]
             message = first.text_message if text == first.text else UNSET
-            self._first_alarm = r.FirstAlarm(first.priority, text, first.raised, _short(device), message)
+            translations = await asyncio.to_thread(self._texts.of, texts_of(first)[:1])
+            self._first_alarm = r.FirstAlarm(first.priority, text, first.raised, _short(device), message, translations)
 
     def _present(self) -> r.FleetState:
         unit, cell, execution = self._unit, self._cell, self._execution

@@ -150,10 +150,10 @@ class FleetReports:
     def find_units(self, serial: str, cell: str, before: tuple[int, int] | None, limit: int) -> list[FleetUnit]:
         """Return all units whose serial number contains a text, the newest first. Arguments as of `alarms`."""
         pattern = serial.replace("\\", "\\\\").replace("%", "\\%").replace("_", "\\_")
-        where, values = "label like ? escape '\\'", (f"%{pattern}%",)
+        where = "label like ? escape '\\'"
         if cell:
-            where, values = f"{where} and cell = ?", (*values, cell)
-        return self._units(where, values, before, limit)
+            return self._units(f"{where} and cell = ?", (f"%{pattern}%", cell), before, limit)
+        return self._units(where, (f"%{pattern}%",), before, limit)
 
     def _units(
         self, where: str, values: tuple[object, ...], before: tuple[int, int] | None, limit: int

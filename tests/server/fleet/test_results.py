@@ -15,6 +15,7 @@ import pytest
 from arcor2_hw.data.units import UnitState
 from arcor2_server.fleet.broker import keep_connected
 from arcor2_server.fleet.delivery import Delivery
+from arcor2_server.fleet.driver_texts import DriverTexts
 from arcor2_server.fleet.file import FILE, FleetFile, ReceivedResult
 from arcor2_server.fleet.records import answer_subject, encode, state_subject
 from arcor2_server.nodes.credentials import Credentials, of_address
@@ -65,7 +66,7 @@ class SmallCell:
     def __init__(self, storage: Storage, broker: str | Credentials, domain: str) -> None:
         self.outbox = UnitOutbox(storage)
         self.units = UnitStore(storage, self.outbox)
-        self._delivery = Delivery([self.outbox], CELL, IDENTITY)
+        self._delivery = Delivery([self.outbox], CELL, IDENTITY, DriverTexts(list))
         self._domain = domain
         credentials = of_address(broker) if isinstance(broker, str) else broker
         answers = answer_subject(CELL) if credentials.claim else ""

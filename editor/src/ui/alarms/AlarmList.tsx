@@ -1,13 +1,13 @@
 /** All alarms with filters, and the ones that occur most often or last longest. */
 
-import { i18n, type MessageDescriptor } from "@lingui/core";
-import { msg, t } from "@lingui/core/macro";
+import { i18n } from "@lingui/core";
+import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { ask } from "../../commands/requests";
 import { ago, clock, duration } from "../../formats";
 import { translate } from "../../i18n/serverMessages";
 import { splitAddress } from "../../program/messages";
-import type { AlarmFrequency, AlarmRecord, AlarmStatisticsData, Priority, RecordingInfo } from "../../protocol/types";
+import type { AlarmFrequency, AlarmRecord, AlarmStatisticsData, RecordingInfo } from "../../protocol/types";
 import { call } from "../../session/connection";
 import { whyUnavailable } from "../../store/permissions";
 import { useEditor } from "../../store/store";
@@ -18,14 +18,9 @@ import { useRecordings } from "../recording/useRecordings";
 import { useTicking } from "../times";
 import { Acknowledge } from "./AlarmCard";
 import { type Show, timesOf, useAlarms } from "./useAlarms";
+import { PRIORITIES } from "./words";
 import "./alarms.css";
 
-const PRIORITIES: Record<Priority, MessageDescriptor> = {
-  urgent: msg`urgent`,
-  high: msg`high`,
-  medium: msg`medium`,
-  low: msg`low`,
-};
 /** Time for which the button shelves an alarm, s. */
 const SHELVED_FOR = 3600;
 const DAYS = 7;

@@ -6,12 +6,13 @@ import { useEffect, useState } from "react";
 import { Input, Label, SearchField } from "react-aria-components";
 import { exportUnits, shownRecipe } from "../../commands/production";
 import { refusal } from "../../commands/requests";
-import { dateAndTime, decimal, duration } from "../../formats";
+import { dateAndTime, decimal, hours } from "../../formats";
 import type { Production, Unit, UnitRecord } from "../../protocol/types";
 import { call } from "../../session/connection";
 import { OneOf } from "../kit/fields";
 import { Button, Waiting } from "../kit/kit";
 import { RefusedText, useRefusal } from "../points/Refusal";
+import { nameOf, UnitDetails } from "./UnitDetails";
 import { ACTIVITIES, UNIT_STATES, UNIT_TONES } from "./words";
 
 /** Number of units that a search loads. */
@@ -59,7 +60,7 @@ export function Units({ onClose }: { onClose: () => void }) {
                 isDisabled={busy}
                 onPress={() => void ask(refusal(async () => setOpened(await call("GetUnit", { number: unit.number }))))}
               >
-                <strong data-name={unit.serial}>{unit.serial || `#${unit.part}`}</strong>
+                <strong data-name={unit.serial}>{nameOf(unit)}</strong>
                 <span className={`tag ${UNIT_TONES[unit.state]}`}>{i18n._(UNIT_STATES[unit.state])}</span>
                 <span className="quiet small">{dateAndTime(unit.left ?? unit.entered)}</span>
                 {unit.recipe && (
@@ -140,7 +141,7 @@ function Numbers() {
         <p className="quiet small">
           {Object.entries(ACTIVITIES)
             .filter(([key]) => (found.seconds[key] ?? 0) > 0)
-            .map(([key, name]) => `${i18n._(name)}: ${long(found.seconds[key] ?? 0)}`)
+            .map(([key, name]) => `${i18n._(name)}: ${hours(found.seconds[key] ?? 0)}`)
             .join(" · ")}
         </p>
       )}
@@ -151,52 +152,11 @@ function Numbers() {
   );
 }
 
-/** Return a duration with hours. */
-function long(seconds: number): string {
-  if (seconds < 3600) return duration(seconds);
-  const minutes = Math.round(seconds / 60);
-  return `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
-}
-
 function Details({ unit, onBack }: { unit: UnitRecord; onBack: () => void }) {
-  const verdict = unit.verdict === undefined ? "–" : unit.verdict ? t`Passed` : t`Failed`;
-  const facts: [string, string][] = [
-    [t`State`, i18n._(UNIT_STATES[unit.state])],
-    [t`Test`, verdict],
-    [t`Entered`, dateAndTime(unit.entered)],
-    [t`Left`, unit.left ? dateAndTime(unit.left) : "–"],
-    [t`Order`, unit.order || "–"],
-    [t`Recipe`, unit.recipe ? shownRecipe(unit.recipe) : "–"],
-    [t`Package`, unit.package_name],
-    [t`Started by`, unit.started_by || "–"],
-    [
-      t`Calibrations`,
-      unit.calibrations.map(({ object_name, date }) => `${object_name}, ${dateAndTime(date)}`).join("; ") || "–",
-    ],
-  ];
   return (
     <>
-      <h3 data-name>{unit.serial || `#${unit.part}`}</h3>
-      <dl className="facts">
-        {facts.map(([name, value]) => (
-          <div key={name}>
-            <dt className="quiet small">{name}</dt>
-            <dd data-name>{value}</dd>
-          </div>
-        ))}
-      </dl>
-      <div className="units" tabIndex={0} role="group" aria-label={t`Steps`}>
-        <ol>
-          {unit.steps.map(({ name, started, ...step }) => (
-            <li key={`${step.run}-${step.number}`}>
-              <strong data-name>{name}</strong> <span className="quiet small">{dateAndTime(started)}</span>{" "}
-              {step.duration !== undefined && <span className="quiet small">{duration(step.duration)}</span>}{" "}
-              {step.results && <span data-name>{step.results.join(", ")}</span>}
-              {step.error && <span className="error small">{step.error}</span>}
-            </li>
-          ))}
-        </ol>
-      </div>
+      <h3 data-name>{nameOf(unit)}</h3>
+      <UnitDetails unit={unit} />
       <div className="actions">
         <Button onPress={onBack}>{t`Back`}</Button>
       </div>
