@@ -78,7 +78,7 @@
     if (Math.min(area.width, area.height) < smallest - 0.5) {
       faults.push(`${name(element)}: ${Math.round(area.width)} x ${Math.round(area.height)} px`);
     }
-    if (element.closest(".panel-body, .puck-fields, .home > main, .operator > [data-runs=false] > :not(.alarms), .dialog")) continue; // these scroll
+    if (element.closest(".panel-body, .puck-fields, .home > main, .fleet > main, .operator > [data-runs=false] > :not(.alarms), .dialog")) continue; // these scroll
     if (box.left < -1 || box.top < -1 || box.right > innerWidth + 1 || box.bottom > innerHeight + 1) {
       faults.push(`${name(element)}: off the screen`);
       continue;

@@ -1,22 +1,78 @@
-"""The page with all cells: a cell starts without a broker, appears, is opened, left again, and loses its signal."""
+"""The page with all cells: a cell starts without a broker, appears, is opened, left again, and loses its signal.
+
+Then the stored results of all cells.
+"""
 
 import re
 from pathlib import Path
 
+import msgspec
 import pytest
+from msgspec.structs import replace
 from playwright.async_api import Browser, expect
 
-from tests.editor.screen import FONTS, screen_of
+from arcor2_hw.data.alarms import AlarmCategory, AlarmRecord, Priority
+from arcor2_hw.data.base import now
+from arcor2_hw.data.units import UnitState
+from arcor2_server.fleet.file import FILE, FleetFile, ReceivedResult
+from arcor2_server.fleet.summaries import of_alarm
+from tests.editor.screen import FONTS, Screen, screen_of
 from tests.server.core.serving import running
 from tests.server.fleet.broker import Server, free_port
+from tests.server.fleet.cells import unit
+from tests.server.fleet.test_reports import received
 from tests.server.fleet.test_results import FleetProcess
 
 pytestmark = pytest.mark.asyncio(loop_scope="session")
 NOT_REACHED = "the broker is not reached"
 
 
+def store_results(folder: Path) -> None:
+    """Store a good and a bad unit, and an alarm whose driver has Czech texts."""
+    folder.mkdir()
+    file = FleetFile(folder / FILE)
+    states = (UnitState.GOOD, UnitState.BAD)
+    good, bad = (replace(unit(number, state=state), left=now()) for number, state in enumerate(states, 1))
+    bad = replace(bad, steps=[replace(bad.steps[0], name="weld", error="no arc")])
+    alarm = AlarmRecord(3, "d-1", "no_part", Priority.HIGH, AlarmCategory.DEVICE, "No part.", now(), 3)
+    columns = of_alarm(alarm, {"cs": {"No part.": "Chybí díl."}}, 0)
+    document = msgspec.json.encode(alarm)
+    results = [received(good), received(bad), ReceivedResult("oven", "b" * 32, "alarm", 3, now(), 1, document, columns)]
+    file.put_results(results)
+    file.close()
+
+
+async def results_are_shown(screen: Screen) -> None:
+    page = screen.page
+    await page.get_by_role("link", name="Units").click()
+    await expect(page.get_by_role("row", name="press-3 1 1 0 50 %")).to_be_visible()
+    await expect(page.get_by_text("weld: no arc")).to_be_visible()
+    assert await screen.faults_with(FONTS) == []
+    assert await screen.barriers() == []
+    await screen.picture("fleet units phone")
+    await page.get_by_label("Search all units by serial number").fill("000001")
+    await page.get_by_role("button", name="SN-000001").press("Enter")
+    await expect(page.get_by_role("dialog")).to_contain_text("Passed")
+    await page.keyboard.press("Escape")
+    async with page.expect_download() as download:
+        await page.get_by_role("button", name="Export CSV").click()
+    saved = Path(await (await download.value).path()).read_text().splitlines()
+    assert (len(saved), "SN-000001" in saved[1]) == (2, True)
+    await page.get_by_role("link", name="Alarms").click()
+    await expect(page.get_by_text("No part.").first).to_be_visible()
+    await page.get_by_label("Language").select_option("cs")
+    await expect(page.get_by_text("Chybí díl.")).to_have_count(2)
+    assert await screen.faults_with(FONTS) == []
+    assert await screen.barriers() == []
+    await screen.picture("fleet alarms phone")
+    await page.get_by_text("Den", exact=True).click()
+    await page.get_by_label("Den", exact=True).last.fill("2020-01-01")
+    await expect(page.get_by_text("Žádné alarmy.").first).to_be_visible()
+
+
 async def test_a_tablet_moves_between_workplaces(browser: Browser, built_editor: Path, tmp_path: Path) -> None:
     port = free_port()
+    store_results(tmp_path / "fleet")
     fleet = FleetProcess(f"nats://fleet:f@127.0.0.1:{port}", tmp_path / "fleet")
     environment = {
         "ARCOR2_HW_FLEET_NATS_URL": f"nats://cell:c@127.0.0.1:{port}",
@@ -57,6 +113,7 @@ async def test_a_tablet_moves_between_workplaces(browser: Browser, built_editor:
             await expect(screen.page.locator('.fleet-card[data-level="gone"]')).to_contain_text("No signal since")
             await screen.page.get_by_role("button", name="Remove press-3 from this page").click()
             await screen.sees("No cells yet")
+            await results_are_shown(screen)
     finally:
         fleet.kill()
         if broker is not None:

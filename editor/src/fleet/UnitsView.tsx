@@ -156,7 +156,7 @@ function Units({ choice }: { choice: Choice }) {
     { name: t`Unit` },
     { name: t`Cell` },
     { name: t`State` },
-    { name: t`Left` },
+    { name: t`Left the cell` },
     { name: t`Product` },
     { name: t`Reason` },
   ];

@@ -16,8 +16,8 @@ export function UnitDetails({ unit }: { unit: UnitRecord }) {
   const facts: [string, string][] = [
     [t`State`, i18n._(UNIT_STATES[unit.state])],
     [t`Test`, verdict],
-    [t`Entered`, dateAndTime(unit.entered)],
-    [t`Left`, unit.left ? dateAndTime(unit.left) : "–"],
+    [t`Entered the cell`, dateAndTime(unit.entered)],
+    [t`Left the cell`, unit.left ? dateAndTime(unit.left) : "–"],
     [t`Order`, unit.order || "–"],
     [t`Recipe`, unit.recipe ? shownRecipe(unit.recipe) : "–"],
     [t`Package`, unit.package_name],
