@@ -2,6 +2,7 @@
 
 import random
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -12,14 +13,17 @@ from arcor2_hw.data.alarms import AlarmCategory, AlarmRecord, Priority
 from arcor2_hw.data.recipes import RecipeState, UsedRecipe
 from arcor2_hw.data.units import UnitRecord, UnitState
 from arcor2_server.fleet.columns import columns_of
-from arcor2_server.fleet.file import MOST_RESULTS, FleetFile, ReceivedResult
+from arcor2_server.fleet.file import FILE, MOST_RESULTS, FleetFile, ReceivedResult
+from arcor2_server.fleet.reports import FleetReports, Period
 from benchmarks.fleet_cells import PROGRAMS, name_of
+from benchmarks.metrics import Metric, Report, percentile
 from tests.server.fleet.cells import unit
 
 CELLS: Final = 50
 ALARMS: Final = 100_000
 SPAN: Final = 7 * 86400
 """Time in which all results were made, s."""
+REPEATED: Final = 9
 _BATCH: Final = 20_000
 
 
@@ -70,3 +74,31 @@ def _alarm(number: int, cell: int, at: str, chance: random.Random) -> AlarmRecor
         at, number, object_id=f"obj_{cell}", object_name=("Gripper", "Guard", "Feeder", "Camera")[which],
         active=False, cleared=at[:17] + "59+00:00",
     )  # fmt: skip
+
+
+def run(report: Report, directory: Path) -> None:
+    """Measure the queries of the views over all stored results."""
+    path = directory / FILE
+    fill(path)
+    reports = FleetReports(path)
+    present = int(time.time())
+    week = Period(present - SPAN - 3600, present + 3600)
+    of_cell = Period(week.since, week.until, name_of(3))
+    queries: dict[str, Callable[[], object]] = {
+        "production": lambda: reports.production(week),
+        "bad_units": lambda: reports.bad_units(week, None, 50),
+        "bad_units_of_cell": lambda: reports.bad_units(of_cell, None, 50),
+        "search": lambda: reports.find_units("900123", "", None, 50),
+        "alarms": lambda: reports.alarms(week, None, 50),
+        "causes": lambda: reports.causes(week),
+    }
+    for name, query in queries.items():
+        walls, used = [], []
+        for _ in range(REPEATED):
+            begin, before = time.perf_counter(), time.thread_time()
+            query()
+            walls.append((time.perf_counter() - begin) * 1e3)
+            used.append((time.thread_time() - before) * 1e3)
+        note = f"processor time {percentile(used, 50):.1f} ms"
+        report.add(Metric(f"fleet_{name}_ms", percentile(walls, 50), REPEATED, note))
+    reports.close()

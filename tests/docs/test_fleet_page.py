@@ -15,7 +15,7 @@ PAGE = (DOCS / "how-to" / "fleet.md").read_text()
 
 
 def test_the_broker_accepts_the_configurations(tmp_path: Path) -> None:
-    blocks = [block for block in re.findall(r"```\n(.*?)```", PAGE, re.DOTALL) if "server_name" in block]
+    blocks = [block for _, block in re.findall(r"```(\w*)\n(.*?)```", PAGE, re.DOTALL) if "server_name" in block]
     assert len(blocks) == 2
     for block in blocks:
         file = tmp_path / "nats.conf"
@@ -36,7 +36,8 @@ def test_the_page_states_the_limits_variables_and_options() -> None:
     assert f"up to {collector.ACKNOWLEDGED_WITHIN:g} s later" in PAGE
     named = set(re.findall(r"ARCOR2_HW_\w+", PAGE))
     assert named - set(_VARIABLES) == set()
-    options = set(re.findall(r"fleet serve (.*)", PAGE)[0].split()) - {"0.0.0.0", "authority.pem"}
-    help_text = " ".join(str(each.name) for each in app["fleet"]["serve"].assemble_argument_collection())
-    assert options
-    assert [option for option in options if option not in help_text] == []
+    for command in ("serve", "broker", "accept", "pair"):
+        options = set(re.findall(r"--[a-z]+", " ".join(re.findall(rf"arcor2-hw fleet {command}\b([^`\n]*)", PAGE))))
+        help_text = " ".join(str(each.name) for each in app["fleet"][command].assemble_argument_collection())
+        assert options, command
+        assert [option for option in options if option not in help_text] == [], command

@@ -14,7 +14,8 @@ authorization { users: [
   { user: fleet, password: f,
     permissions: { publish: ["$JS.>"], subscribe: ["arcor2hw.fleet.*.state", "_INBOX.>"] } }
   { user: cell, password: c,
-    permissions: { publish: ["arcor2hw.fleet.press-3.>", "$JS.API.>"], subscribe: ["_INBOX.>"] } }
+    permissions: { publish: ["arcor2hw.fleet.press-3.>", "$JS.API.INFO", "$JS.API.STREAM.INFO.*"],
+                   subscribe: ["_INBOX.>"] } }
 ] }
 """
 """The permissions of docs/how-to/fleet.md."""
