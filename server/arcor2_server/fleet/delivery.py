@@ -19,7 +19,7 @@ from arcor2_hw.data.alarms import AlarmRecord
 from arcor2_hw.data.units import UnitRecord
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.fleet import records as r
-from arcor2_server.fleet.driver_texts import DriverTexts, texts_of
+from arcor2_server.fleet.driver_texts import DriverTexts
 from arcor2_server.storage.outbox import Outbox, OutboxKind, Waiting
 
 log = structlog.get_logger(__name__)
@@ -134,7 +134,7 @@ class Delivery:
         head: dict[str, object] = {"kind": waiting.kind.value, "identity": self._identity}
         if waiting.kind is OutboxKind.ALARM:
             alarm = msgspec.json.decode(waiting.document, type=AlarmRecord)
-            head["translations"] = self._texts.of(texts_of(alarm))
+            head["translations"] = self._texts.of_alarm(alarm)
         encoded = r.encode(head | {"record": msgspec.Raw(waiting.document)})
         if len(encoded) <= limit or waiting.kind is not OutboxKind.UNIT:
             return encoded

@@ -37,6 +37,14 @@ class DriverTexts:
                     found.setdefault(file.stem, {}).update((key, texts[key]) for key in keys if key in texts)
         return {language: texts for language, texts in found.items() if texts}
 
+    def of_text(self, alarm: AlarmRecord) -> Translations:
+        """Return the translations of the text of an alarm. It reads files."""
+        return self.of(texts_of(alarm)[:1])
+
+    def of_alarm(self, alarm: AlarmRecord) -> Translations:
+        """Return the translations of all texts of an alarm. It reads files."""
+        return self.of(texts_of(alarm))
+
     def _read(self, file: Path) -> dict[str, str]:
         try:
             changed = file.stat().st_mtime_ns

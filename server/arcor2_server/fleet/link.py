@@ -28,7 +28,6 @@ from arcor2_server.collaboration.users import Users
 from arcor2_server.execution.runs import Runs
 from arcor2_server.execution.service import Execution
 from arcor2_server.fleet import records as r
-from arcor2_server.fleet.driver_texts import DriverTexts, texts_of
 from arcor2_server.fleet.identity import identity_of
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.packml.cell import PackmlCell
@@ -41,6 +40,7 @@ if TYPE_CHECKING:
     from nats.aio.client import Client
 
     from arcor2_server.fleet.delivery import Delivery
+    from arcor2_server.fleet.driver_texts import DriverTexts
 
 log = structlog.get_logger(__name__)
 
@@ -91,13 +91,14 @@ class FleetLink:
         self._settings, self._outboxes, self._feed, self._cell = settings, outboxes, feed, cell
         self._execution, self._runs, self._units, self._alarms = execution, runs, units, alarms
         self._users, self._locks = users, locks
-        self._texts = DriverTexts(types.installed_folders)
+        self._types = types
         self._background = BackgroundTasks()
         self.connected = False
         """Whether the broker of the fleet is connected."""
         self._address = ""
         self._reader: FeedReader
         self._delivery: Delivery | None = None
+        self._texts: DriverTexts
         self._unit = UnitData()
         self._names: dict[str, str] = {}
         self._missing: set[str] = set()
@@ -125,10 +126,12 @@ class FleetLink:
             return
         from arcor2_server.fleet.broker import keep_connected  # needs the extra `nodes`
         from arcor2_server.fleet.delivery import Delivery
+        from arcor2_server.fleet.driver_texts import DriverTexts
         from arcor2_server.nodes.credentials import load, of_address
 
         self._address = self._settings.cell_address or address
         self._identity, self._boot, self._number = identity_of(self._settings.data_dir), uuid.uuid4().hex, 0
+        self._texts = DriverTexts(self._types.installed_folders)
         self._delivery = Delivery(self._outboxes, self._settings.cell_name, self._identity, self._texts)
         self._reader = self._feed.reader(with_streams=False)
         self._alarms.on_changed.append(lambda _: self._mark_alarms())
@@ -209,7 +212,7 @@ class FleetLink:
             device = "" if isinstance(first.object_name, Unset) else first.object_name
             text = first.text[:1000]
             message = first.text_message if text == first.text else UNSET
-            translations = await asyncio.to_thread(self._texts.of, texts_of(first)[:1])
+            translations = await asyncio.to_thread(self._texts.of_text, first)
             self._first_alarm = r.FirstAlarm(first.priority, text, first.raised, _short(device), message, translations)
 
     def _present(self) -> r.FleetState:

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 import subprocess
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from pathlib import Path
 
 import nats
@@ -25,7 +25,7 @@ from tests.server.fleet.broker import free_port, listens
 from tests.server.fleet.cells import unit
 from tests.server.fleet.test_results import CELL, FleetProcess, SmallCell, until
 from tests.server.nodes.conftest import CLI, NATS_SERVER
-from tests.waiting import wait_for
+from tests.waiting import WITHIN, wait_for
 
 pytestmark = pytest.mark.xdist_group("fleet")
 
@@ -152,17 +152,23 @@ async def test_a_cell_publishes_only_under_its_own_name(hub: Hub) -> None:
         deletion = "$JS.API.STREAM.DELETE.ARCOR2_HW_FLEET_oven"
         await press.client.publish("arcor2hw.fleet.press-3.unit", b"", reply=deletion)
         await press.client.publish("$JS.API.INFO", b"", reply=deletion)
-        await press.client.flush()
-        await here.client.flush()
-        await asyncio.sleep(0.3)
+        await reached(lambda: len(press.errors), len(FORBIDDEN) + 5)
+        await reached(lambda: len(received), 1)
         assert (await stream.stream_info(stream_name("oven"))).state.messages == 0
         assert received == [state_subject(CELL)]
-        assert len([each for each in press.errors if "permissions violation" in each]) == len(FORBIDDEN) + 5
+        assert all("permissions violation" in each for each in press.errors)
         # The server of the page commands nothing.
         for subject in ("arcor2hw.fleet.press-3.state", "arcor2.press.open", "$JS.API.STREAM.DELETE.X"):
             await here.client.publish(subject, b"x")
-        await here.client.flush()
-        assert len(here.errors) == 3
+        await reached(lambda: len(here.errors), 3)
+
+
+async def reached(read: Callable[[], int], expected: int) -> None:
+    """Wait until a number is reached. Clients send what they have published after a ping."""
+    async with asyncio.timeout(WITHIN):
+        while read() < expected:
+            await asyncio.sleep(0.02)
+    assert read() == expected
 
 
 async def test_a_site_delivers_states_and_results_and_is_revoked(hub: Hub, tmp_path: Path) -> None:

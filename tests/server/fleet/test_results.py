@@ -14,6 +14,7 @@ import pytest
 
 from arcor2_hw.data.units import UnitState
 from arcor2_server.fleet.broker import keep_connected
+from arcor2_server.fleet.columns import columns_of
 from arcor2_server.fleet.delivery import Delivery
 from arcor2_server.fleet.driver_texts import DriverTexts
 from arcor2_server.fleet.file import FILE, FleetFile, ReceivedResult
@@ -163,7 +164,8 @@ def file(tmp_path: Path) -> Iterator[FleetFile]:
 
 
 def received(number: int, stamp: int, state: UnitState = UnitState.GOOD, since: str = ENTERED) -> ReceivedResult:
-    return ReceivedResult(CELL, IDENTITY, "unit", number, since, stamp, msgspec.json.encode(unit(number, state=state)))
+    document = msgspec.json.encode(unit(number, state=state))
+    return ReceivedResult(CELL, IDENTITY, "unit", number, since, stamp, document, columns_of("unit", stamp, document))
 
 
 def test_a_result_that_is_delivered_again_is_stored_once(file: FleetFile) -> None:
