@@ -1,6 +1,6 @@
 /**
- * The page with all cells: who needs somebody first, and what was stored of all of them. A tap on a card opens the
- * operator's screen of the cell on its own server.
+ * The page with all cells: those that need attention come first, and what was stored of all of them. A tap on a card
+ * opens the operator's screen of the cell.
  */
 
 import { i18n } from "@lingui/core";

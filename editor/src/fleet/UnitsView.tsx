@@ -62,7 +62,10 @@ const share = (counts: Counts) => {
   return found === undefined ? "–" : `${decimal(found * 100, 1)}\u00a0%`;
 };
 
+const timeOf = (seconds: number) => dateAndTime(new Date(seconds * 1000).toISOString());
+
 function Produced({ production }: { production: FleetProduction }) {
+  const [since, until] = [timeOf(production.since), timeOf(production.until)];
   const sum = sumOf(production.counts);
   const empty = sum.good + sum.bad + sum.rejected === 0;
   const facts: [string, string, string?][] = [
@@ -81,9 +84,7 @@ function Produced({ production }: { production: FleetProduction }) {
           </div>
         ))}
       </dl>
-      <p className="quiet small">
-        {t`From ${dateAndTime(new Date(production.since * 1000).toISOString())} to ${dateAndTime(new Date(production.until * 1000).toISOString())}`}
-      </p>
+      <p className="quiet small">{t`From ${since} to ${until}`}</p>
       {empty && <p className="quiet">{t`No unit left a cell in this period.`}</p>}
       {!empty && <UnitsChart production={production} />}
     </section>
@@ -172,7 +173,7 @@ function Units({ choice }: { choice: Choice }) {
       <span key="state" className={`tag ${UNIT_TONES[each.unit.state]}`}>
         {i18n._(UNIT_STATES[each.unit.state])}
       </span>,
-      dateAndTime(new Date(each.at * 1000).toISOString()),
+      timeOf(each.at),
       each.unit.product || each.unit.program || "–",
       reasonOf(each),
     ],
