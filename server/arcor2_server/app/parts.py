@@ -1,21 +1,25 @@
 """Builds the parts of the server from the bottom up and passes each its collaborators."""
 
-import os
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable
 from contextlib import AsyncExitStack, asynccontextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from arcor2_hw.data.audit import AuditOutcome
-from arcor2_hw.data.cell import BROKER_CREDENTIALS, BROKER_URL, assigned_nodes, objects_by_node
 from arcor2_hw.data.events import Event
-from arcor2_hw.messages import Message
-from arcor2_hw.runtime.messages import ToHost
 from arcor2_hw.runtime.ring import Ring
 from arcor2_server.access.admission import Access
 from arcor2_server.alarms.kinds import AlarmKinds
 from arcor2_server.alarms.service import Alarms
 from arcor2_server.alarms.system import SystemAlarms
+from arcor2_server.app.wiring import (
+    audit_end_of_force,
+    board_of_nodes,
+    connect_alarms,
+    connect_devices,
+    connect_edits,
+    connect_production,
+    stored_name,
+    to_both,
+)
 from arcor2_server.audit.trail import AuditTrail
 from arcor2_server.build.importing import PackageImport
 from arcor2_server.build.script_editing import ScriptEditing
@@ -52,14 +56,12 @@ from arcor2_server.hosts.session import HostSession
 from arcor2_server.log.redaction import REDACTION
 from arcor2_server.maintenance.devices import Devices
 from arcor2_server.maintenance.parameters import Parameters
-from arcor2_server.nodes.board import NodeBoard
 from arcor2_server.object_types.catalog import KnownTypes
 from arcor2_server.object_types.installations import InstallationWatch
 from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.cameras import Cameras
 from arcor2_server.online.connection_check import ConnectionCheck
-from arcor2_server.online.forces import Force
 from arcor2_server.online.motion import RobotMotion
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.online.scene_calibration import SceneCalibration
@@ -109,208 +111,339 @@ if TYPE_CHECKING:
     from arcor2_server.mqtt.service import Mqtt
 
 
+class _Closable(Protocol):
+    def close(self) -> Awaitable[None] | None: ...
+
+
+P = TypeVar("P", bound=_Closable)
+
+
 class Server:
     """The parts of a running server. Only the composition root and tests see all of them."""
 
     async def start(self, settings: ServerSettings, stack: AsyncExitStack) -> None:
-        """Build and start all parts; `stack` closes them in reverse order.
+        """Build and start all parts from the lowest layer up; `stack` closes them in reverse order.
 
         Raises:
             StorageError: the data directory cannot be used.
         """
+        self.settings, self._stack = settings, stack
+        await self._open_stores()
+        await self._open_session()
+        self._build_workspace()
+        await self._build_online_scene()
+        await self._build_execution()
+        await self._build_production()
+        await self._build_alarms()
+        await self._build_plant()
 
-        def closed(part: P) -> P:
-            stack.push_async_callback(_close, part)
-            return part
+    def _closed(self, part: P) -> P:
+        """Close a part at the end, and return it."""
+        self._stack.push_async_callback(_close, part)
+        return part
 
-        self.settings = settings
-        # ------------------------------------------------------------------------------------ stores
-        tighten(settings.data_dir)
+    async def _open_stores(self) -> None:
+        """Open the stores: documents, assets, object types, credentials and the audit trail."""
+        tighten(self.settings.data_dir)
         hub = self.hub = Hub()
         known_types = KnownTypes()
-        secrets = self.secrets = SettingSecrets(known_types, SecretStore(settings.secrets_file), settings.cell)
-        storage = self.storage = closed(await Storage.open(settings, secrets))
-        assets = self.assets = await AssetStore.open(settings.assets_dir)
-        types = self.types = ObjectTypes(known_types, storage, assets, settings.analysis_file)
+        secrets = self.secrets = SettingSecrets(
+            known_types, SecretStore(self.settings.secrets_file), self.settings.cell
+        )
+        storage = self.storage = self._closed(await Storage.open(self.settings, secrets))
+        assets = self.assets = await AssetStore.open(self.settings.assets_dir)
+        types = self.types = ObjectTypes(known_types, storage, assets, self.settings.analysis_file)
         await types.load()
-        damage = self.damage = DataDamage(settings.data_dir, hub)
+        damage = self.damage = DataDamage(self.settings.data_dir, hub)
         damage.load()
-        access = self.access = Access(settings)
+        access = self.access = Access(self.settings)
         if problem := access.repair():
             damage.report(problem)
         secrets.store.load(damage)
         REDACTION.hide(lambda: secrets.store.values)
-        audit = self.audit = closed(AuditTrail(settings.audit_file, REDACTION.in_text))
+        audit = self.audit = self._closed(AuditTrail(self.settings.audit_file, REDACTION.in_text))
         if edited := await audit.open():
             damage.report(edited)
-        packages = Packages(settings.packages_dir, secrets.hide_in_package)
+        packages = self._packages = Packages(self.settings.packages_dir, secrets.hide_in_package)
         await migrate_secrets(storage, packages, secrets)
-        shared = SharedData(storage)
-        type_notifications = self.type_notifications = closed(TypeNotifications(types, hub))
-        compute = self.compute = closed(Compute(settings.compute_idle))
+        self._shared = SharedData(storage)
+        type_notifications = self.type_notifications = self._closed(TypeNotifications(types, hub))
+        self.compute = self._closed(Compute(self.settings.compute_idle))
         hosts = self.hosts = CellHosts(
-            settings.device_files_dirs, settings.cell, settings.broker_credentials, types.derives_from
+            self.settings.device_files_dirs, self.settings.cell, self.settings.broker_credentials, types.derives_from
         )
-        scene_host = self.scene_host = HostSession(hub, hosts, "scene")
-        program_host = self.program_host = HostSession(hub, hosts, "program", to_all_clients=True)
+        self.scene_host = HostSession(hub, hosts, "scene")
+        self.program_host = HostSession(hub, hosts, "program", to_all_clients=True)
 
         installations = InstallationWatch(types, type_notifications, hosts.renew)
         installations.start()
-        closed(installations)
+        self._closed(installations)
 
-        # ------------------------------------------------------------------------------------ session
-        session = self.session = Session(settings, storage, types, damage, secrets)
+    async def _open_session(self) -> None:
+        """Restore the open document, and build what several users share."""
+        session = self.session = Session(self.settings, self.storage, self.types, self.damage, self.secrets)
         await session.open()
-        closed(session)
-        nodes = self.nodes = closed(board_of_nodes(settings, hub, session))
+        self._closed(session)
+        nodes = self.nodes = self._closed(board_of_nodes(self.settings, self.hub, session))
         nodes.start()
-        dependents = self.dependents = Dependents(storage, types, session)
-        self.saved_problems = closed(SavedProblems(storage, types, settings.problems_file))
-        edit_notifications = self.edit_notifications = closed(EditNotifications(hub, session))
+        self.dependents = Dependents(self.storage, self.types, session)
+        self.saved_problems = self._closed(SavedProblems(self.storage, self.types, self.settings.problems_file))
+        self.edit_notifications = self._closed(EditNotifications(self.hub, session))
         locks = self.locks = Locks(
-            session, stored_name(types, storage), settings.lock_retries, settings.lock_retry_wait
+            session, stored_name(self.types, self.storage), self.settings.lock_retries, self.settings.lock_retry_wait
         )
-        users = self.users = closed(Users(hub, locks, settings))
-        persons = self.persons = Persons(PersonStore(storage), CardHashes(settings.data_dir))
-        log_ons = self.log_ons = closed(LogOns(hub, users, persons, audit, settings.log_off_after))
-        lock_takeover = self.lock_takeover = LockTakeover(locks, users, session.name_of)
-        tasks = self.tasks = closed(Tasks(hub))
-        presence = self.presence = closed(PresenceBoard(hub, users))
-        previews = self.previews = closed(Previews(hub, locks))
-        view_states = self.view_states = ViewStates(hub, shared)
+        users = self.users = self._closed(Users(self.hub, locks, self.settings))
+        persons = self.persons = Persons(PersonStore(self.storage), CardHashes(self.settings.data_dir))
+        self.log_ons = self._closed(LogOns(self.hub, users, persons, self.audit, self.settings.log_off_after))
+        self.lock_takeover = LockTakeover(locks, users, session.name_of)
+        self.tasks = self._closed(Tasks(self.hub))
+        self.presence = self._closed(PresenceBoard(self.hub, users))
+        self.previews = self._closed(Previews(self.hub, locks))
+        self.view_states = ViewStates(self.hub, self._shared)
 
-        # ------------------------------------------------------------------------------------ workspace
-        markers = self.markers = Markers(settings.markers_file, settings.markers)
-        markers.load(damage)
-        robots = self.robots = SceneRobots(assets, types, session, scene_host)
-        robot_calibrations = self.robot_calibrations = closed(
-            RobotCalibrations(settings, hub, types, session, scene_host, compute, damage, robots)
+    def _build_workspace(self) -> None:
+        """Build the models of the workplace: robots, obstacles and kinematics."""
+        markers = self.markers = Markers(self.settings.markers_file, self.settings.markers)
+        markers.load(self.damage)
+        robots = self.robots = SceneRobots(self.assets, self.types, self.session, self.scene_host)
+        robot_calibrations = self.robot_calibrations = self._closed(
+            RobotCalibrations(
+                self.settings, self.hub, self.types, self.session, self.scene_host, self.compute, self.damage, robots
+            )
         )
         robot_calibrations.load()
         robot_models = self.robot_models = RobotModels(robots, robot_calibrations)
-        collisions = self.collisions = ObstacleRegistry(settings.scene_inflation)
+        collisions = self.collisions = ObstacleRegistry(self.settings.scene_inflation)
         scene_collisions = self.scene_collisions = SceneCollisions(
-            assets, types, session, compute, collisions, robots, robot_models, scene_host, program_host
+            self.assets,
+            self.types,
+            self.session,
+            self.compute,
+            collisions,
+            robots,
+            robot_models,
+            self.scene_host,
+            self.program_host,
         )
-        host_world = HostWorld(collisions, robot_calibrations, assets, scene_host, program_host)
-        kinematics = self.kinematics = Kinematics(types, scene_host, compute, robots, robot_models, scene_collisions)
-        self.reachability = closed(ReachabilityBoard(
-            hub, types, session, scene_host, compute, collisions, robot_calibrations, robots, robot_models,
-            scene_collisions,
+        self._host_world = HostWorld(collisions, robot_calibrations, self.assets, self.scene_host, self.program_host)
+        self.kinematics = Kinematics(self.types, self.scene_host, self.compute, robots, robot_models, scene_collisions)
+        self.reachability = self._closed(ReachabilityBoard(
+            self.hub, self.types, self.session, self.scene_host, self.compute, collisions, robot_calibrations, robots,
+            robot_models, scene_collisions,
         ))  # fmt: skip
         self.object_aiming = ObjectAimings()
-        self.display_models = closed(DisplayModels(assets, compute, tasks, settings.prepared_dir))
-
-        # ------------------------------------------------------------------------------------ services
-        maintenance_store = MaintenanceStore(storage)
-        devices = self.devices = Devices(hub, maintenance_store, to_both(scene_host, program_host))
-        await devices.open()
-        closed(devices)
-        opening = SceneOpening(settings, types, session, secrets, host_world, devices.identities)
-        self.connection_check = ConnectionCheck(hosts, opening)
-        online = self.online = closed(
-            OnlineScene(scene_host, opening, hub, locks, session, robots, tasks, robot_calibrations)
+        self.display_models = self._closed(
+            DisplayModels(self.assets, self.compute, self.tasks, self.settings.prepared_dir)
         )
-        log_ons.on_end += [online.held.logged_off, online.forces.logged_off]
-        online.forces.on_end.append(audit_end_of_force(audit))
-        self.undo = Undo(locks, storage, types, session, online, dependents)
-        motion = self.motion = RobotMotion(hub, types, session, online, robots, kinematics)
-        cameras = self.cameras = Cameras(types, session, online)
-        calibration = self.calibration = Calibration(compute, markers)
-        calibration_records = self.calibration_records = Calibrations(storage)
+
+    async def _build_online_scene(self) -> None:
+        """Build what works with connected devices."""
+        maintenance_store = self._maintenance_store = MaintenanceStore(self.storage)
+        devices = self.devices = Devices(self.hub, maintenance_store, to_both(self.scene_host, self.program_host))
+        await devices.open()
+        self._closed(devices)
+        opening = SceneOpening(
+            self.settings, self.types, self.session, self.secrets, self._host_world, devices.identities
+        )
+        self.connection_check = ConnectionCheck(self.hosts, opening)
+        online = self.online = self._closed(
+            OnlineScene(
+                self.scene_host,
+                opening,
+                self.hub,
+                self.locks,
+                self.session,
+                self.robots,
+                self.tasks,
+                self.robot_calibrations,
+            )
+        )
+        self.log_ons.on_end += [online.held.logged_off, online.forces.logged_off]
+        online.forces.on_end.append(audit_end_of_force(self.audit))
+        self.undo = Undo(self.locks, self.storage, self.types, self.session, online, self.dependents)
+        motion = self.motion = RobotMotion(self.hub, self.types, self.session, online, self.robots, self.kinematics)
+        cameras = self.cameras = Cameras(self.types, self.session, online)
+        calibration = self.calibration = Calibration(self.compute, self.markers)
+        calibration_records = self.calibration_records = Calibrations(self.storage)
         self.scene_calibration = SceneCalibration(
-            hub, locks, types, session, online, calibration, calibration_records, markers, tasks, robot_models,
-            motion, cameras,
+            self.hub, self.locks, self.types, self.session, online, calibration, calibration_records, self.markers,
+            self.tasks, self.robot_models, motion, cameras,
         )  # fmt: skip
-        build = self.build = BuildService(settings, storage, types)
-        self.script_editing = ScriptEditing(storage, types, session)
-        self.package_import = PackageImport(storage, assets, types, session, type_notifications)
-        runs = self.runs = Runs(hub)
-        history = self.history = closed(History(settings, compute, (scene_host, program_host)))
+
+    async def _build_execution(self) -> None:
+        """Build what creates, checks and runs programs."""
+        self.build = BuildService(self.settings, self.storage, self.types)
+        self.script_editing = ScriptEditing(self.storage, self.types, self.session)
+        self.package_import = PackageImport(
+            self.storage, self.assets, self.types, self.session, self.type_notifications
+        )
+        runs = self.runs = Runs(self.hub)
+        history = self.history = self._closed(
+            History(self.settings, self.compute, (self.scene_host, self.program_host))
+        )
         await history.open()
         runs.on_end.append(history.run_ended)
-        await runs.open(shared)
-        closed(runs)
-        self.dry_runs = closed(DryRuns(hub, types, session, tasks, compute, robots, scene_collisions, runs))
-        breakpoints = self.breakpoints = SharedBreakpoints(hub, storage, session, shared)
-        connect_edits(edit_notifications, previews, breakpoints)
-        messages = RunMessages(settings, secrets, breakpoints, host_world, devices.identities)
-        books = AllPartBooks(hub, settings.checkpoints_dir)
-        execution = self.execution = closed(
-            Execution(packages, program_host, online, settings, hub, types, runs, breakpoints, secrets, messages, books)
+        await runs.open(self._shared)
+        self._closed(runs)
+        self.dry_runs = self._closed(
+            DryRuns(
+                self.hub, self.types, self.session, self.tasks, self.compute, self.robots, self.scene_collisions, runs
+            )
         )
-        execution.before_start.append(lambda _: online.forces.require_none())
+        breakpoints = self.breakpoints = SharedBreakpoints(self.hub, self.storage, self.session, self._shared)
+        connect_edits(self.edit_notifications, self.previews, breakpoints)
+        messages = RunMessages(self.settings, self.secrets, breakpoints, self._host_world, self.devices.identities)
+        books = self._books = AllPartBooks(self.hub, self.settings.checkpoints_dir)
+        execution = self.execution = self._closed(
+            Execution(
+                self._packages,
+                self.program_host,
+                self.online,
+                self.settings,
+                self.hub,
+                self.types,
+                runs,
+                breakpoints,
+                self.secrets,
+                messages,
+                books,
+            )
+        )
+        execution.before_start.append(lambda _: self.online.forces.require_none())
+
+    async def _build_production(self) -> None:
+        """Build the records of what is produced: recipes, units, and times of the cell."""
         recipes = self.recipes = Recipes(
-            hub, RecipeStore(storage), packages, persons, released_only=settings.released_only
+            self.hub, RecipeStore(self.storage), self._packages, self.persons, released_only=self.settings.released_only
         )
         await recipes.open()
-        unit_outbox = UnitOutbox(storage) if settings.in_fleet else None
-        unit_store = UnitStore(storage, unit_outbox)
-        units = self.units = closed(Units(hub, unit_store, runs, packages, calibration_records))
-        await units.open(books.all)
-        cell_time = self.cell_time = closed(CellTime(unit_store, lambda: activity_of(execution)))
+        unit_outbox = self._unit_outbox = UnitOutbox(self.storage) if self.settings.in_fleet else None
+        unit_store = UnitStore(self.storage, unit_outbox)
+        units = self.units = self._closed(
+            Units(self.hub, unit_store, self.runs, self._packages, self.calibration_records)
+        )
+        await units.open(self._books.all)
+        cell_time = self.cell_time = self._closed(CellTime(unit_store, lambda: activity_of(self.execution)))
         cell_time.start()
-        connect_production(recipes, units, cell_time, execution)
-        alarm_store = closed(AlarmStore(settings.alarms_file, storage, sends=settings.in_fleet))
+        connect_production(recipes, units, cell_time, self.execution)
+
+    async def _build_alarms(self) -> None:
+        """Build alarms, device cards and recordings."""
+        alarm_store = self._alarm_store = self._closed(
+            AlarmStore(self.settings.alarms_file, self.storage, sends=self.settings.in_fleet)
+        )
         if damaged := await alarm_store.open():
-            damage.report(damaged)
+            self.damage.report(damaged)
         alarms = self.alarms = Alarms(
-            hub,
+            self.hub,
             alarm_store,
-            AlarmKinds(types.installed_folder),
-            lambda: execution.program.number if execution.active else 0,
+            AlarmKinds(self.types.installed_folder),
+            lambda: self.execution.program.number if self.execution.active else 0,
         )
         await alarms.open()
-        closed(alarms)
-        connect_alarms(alarms, scene_host, program_host, execution, damage)
-        connect_devices(devices, scene_host, program_host, online, execution)
-        devices.start()
-        self.parameters = Parameters(devices, maintenance_store, online, execution)
+        self._closed(alarms)
+        connect_alarms(alarms, self.scene_host, self.program_host, self.execution, self.damage)
+        connect_devices(self.devices, self.scene_host, self.program_host, self.online, self.execution)
+        self.devices.start()
+        self.parameters = Parameters(self.devices, self._maintenance_store, self.online, self.execution)
 
         def ring() -> Ring | None:
-            host = program_host.host or scene_host.host
+            host = self.program_host.host or self.scene_host.host
             return None if host is None else host.ring
 
-        recordings = self.recordings = closed(Recordings(hub, RecordingFiles(settings.recordings_dir), ring))
-        await recordings.open(runs.error_of)
+        recordings = self.recordings = self._closed(
+            Recordings(self.hub, RecordingFiles(self.settings.recordings_dir), ring)
+        )
+        await recordings.open(self.runs.error_of)
         alarms.on_raised.append(recordings.alarm)
-        execution.on_failed.append(
+        self.execution.on_failed.append(
             lambda run, error, host: recordings.run_failed(
                 run, None if error is None else error.message, None if host is None else host.ring
             )
         )
-        system_alarms = self.system_alarms = closed(
+        system_alarms = self.system_alarms = self._closed(
             SystemAlarms(
                 alarms,
-                hub,
-                settings.data_dir,
-                settings.certificate,
-                lambda: runs.starter(execution.program.number) if execution.running else "",
-                nodes.lost,
+                self.hub,
+                self.settings.data_dir,
+                self.settings.certificate,
+                lambda: self.runs.starter(self.execution.program.number) if self.execution.running else "",
+                self.nodes.lost,
             )
         )
         system_alarms.start()
-        stop_all = self.stop_all = StopAll(session, online, execution)
-        storage.on_deleted += [view_states.forget, breakpoints.forget, session.forget_history]
-        package_runs = PackageRuns(hub, users, locks, session, online, execution, presence, lock_takeover)
+
+    async def _build_plant(self) -> None:
+        """Build the cell as plant systems see it, and the connections to them."""
+        stop_all = self.stop_all = StopAll(self.session, self.online, self.execution)
+        self.storage.on_deleted += [self.view_states.forget, self.breakpoints.forget, self.session.forget_history]
+        package_runs = PackageRuns(
+            self.hub,
+            self.users,
+            self.locks,
+            self.session,
+            self.online,
+            self.execution,
+            self.presence,
+            self.lock_takeover,
+        )
         self.package_runs = package_runs
-        cell_file = CellFile(settings.cell_state_file)
-        cell_file.load(damage)
-        cell = self.cell = PackmlCell(hub, execution, runs, online, stop_all, cell_file)
-        plc = self.plc = closed(Plc(cell, cell_file, package_runs, alarms, audit, settings.plc_life_timeout))
-        feed = CellFeed((scene_host, program_host), cell, execution, runs, units, types, devices, alarms)
-        self.opcua = closed(OpcUa(settings, feed, PlantRequests(access, persons, plc, alarms, audit), cell, alarms))
+        cell_file = CellFile(self.settings.cell_state_file)
+        cell_file.load(self.damage)
+        cell = self.cell = PackmlCell(self.hub, self.execution, self.runs, self.online, stop_all, cell_file)
+        plc = self.plc = self._closed(
+            Plc(cell, cell_file, package_runs, self.alarms, self.audit, self.settings.plc_life_timeout)
+        )
+        feed = CellFeed(
+            (self.scene_host, self.program_host),
+            cell,
+            self.execution,
+            self.runs,
+            self.units,
+            self.types,
+            self.devices,
+            self.alarms,
+        )
+        self.opcua = self._closed(
+            OpcUa(
+                self.settings,
+                feed,
+                PlantRequests(self.access, self.persons, plc, self.alarms, self.audit),
+                cell,
+                self.alarms,
+            )
+        )
         self.mqtt: Mqtt | None = None
-        if settings.mqtt is not None:
+        if self.settings.mqtt is not None:
             from arcor2_server.mqtt import service  # imported only if needed, because it takes time
 
-            self.mqtt = closed(service.Mqtt(settings, feed, alarms))
-        outboxes = [each for each in (unit_outbox, alarm_store.outbox) if each is not None]
-        self.fleet = closed(
-            FleetLink(settings, outboxes, feed, cell, execution, runs, units, alarms, users, locks, types)
+            self.mqtt = self._closed(service.Mqtt(self.settings, feed, self.alarms))
+        outboxes = [each for each in (self._unit_outbox, self._alarm_store.outbox) if each is not None]
+        self.fleet = self._closed(
+            FleetLink(
+                self.settings,
+                outboxes,
+                feed,
+                cell,
+                self.execution,
+                self.runs,
+                self.units,
+                self.alarms,
+                self.users,
+                self.locks,
+                self.types,
+            )
         )
         temporary_runs = self.temporary_runs = TemporaryRuns(
-            hub, locks, storage, types, session, online, execution, build, tasks
+            self.hub,
+            self.locks,
+            self.storage,
+            self.types,
+            self.session,
+            self.online,
+            self.execution,
+            self.build,
+            self.tasks,
         )
         await temporary_runs.recover()
 
@@ -318,13 +451,6 @@ class Server:
         """Return the first events for a client: the open document, the running program or main screen, and notices."""
         state = self.session.greeting(self.online.state) or self.execution.greeting() or [self.hub.main_screen]
         return state + self.damage.greeting()
-
-
-class _Closable(Protocol):
-    def close(self) -> Awaitable[None] | None: ...
-
-
-P = TypeVar("P", bound=_Closable)
 
 
 async def _close(part: _Closable) -> None:
@@ -343,99 +469,3 @@ async def running_server(settings: ServerSettings) -> AsyncIterator[Server]:
         server = Server()
         await server.start(settings, stack)
         yield server
-
-
-def stored_name(types: ObjectTypes, storage: Storage) -> Callable[[str], Awaitable[str | None]]:
-    """Return a function that returns the name of an object type, or of a saved scene or project; None if unknown."""
-
-    async def find(item: str) -> str | None:
-        return item if types.known(item) else await storage.name_of(item)
-
-    return find
-
-
-def board_of_nodes(settings: ServerSettings, hub: Hub, session: Session) -> NodeBoard:
-    """Return the board of nodes, which follows the open scene."""
-    assigned = assigned_nodes(settings.cell)
-
-    def needed() -> dict[str, list[str]]:
-        scene = session.document.scene
-        return {} if scene is None else objects_by_node(settings.cell, scene.objects)
-
-    environment = {BROKER_CREDENTIALS: str(settings.broker_credentials)} | os.environ
-    credentials = Path(environment[BROKER_CREDENTIALS])
-
-    def configured() -> bool:
-        return bool(environment.get(BROKER_URL) or assigned or needed()) or credentials.is_file()
-
-    return NodeBoard(hub, assigned, needed, configured, environment)
-
-
-def connect_alarms(
-    alarms: Alarms, scene_host: HostSession, program_host: HostSession, execution: Execution, damage: DataDamage
-) -> None:
-    """Connect the alarm service to the reports of the hosts, the program and the storage."""
-    for host, what in ((scene_host, "scene"), (program_host, "program")):
-        alarms.watch(host.board, what)
-        host.on_death.append(lambda reason: alarms.system("host_died", None, reason, with_devices=True))
-    execution.on_error.append(alarms.failed)
-    execution.on_decided.append(alarms.decided)
-    for notice in damage.notices:
-        alarms.data_damaged(notice)
-    damage.on_report.append(alarms.data_damaged)
-
-
-def audit_end_of_force(audit: AuditTrail) -> Callable[[Force, Message], None]:
-    """Return a function that notes the end of a force without a request."""
-
-    def note(force: Force, reason: Message) -> None:
-        audit.note(
-            AuditOutcome.DONE,
-            "EndForce",
-            target=force.output,
-            user=force.point.user,
-            role=force.client.role,
-            address=force.client.address,
-            reason=str(reason),
-            changes=[force.change(force.point.value, force.before)],
-        )
-
-    return note
-
-
-def to_both(scene_host: HostSession, program_host: HostSession) -> Callable[[ToHost], None]:
-    """Return a function that sends a message to the host of the scene and to that of the program."""
-
-    def send(message: ToHost) -> None:
-        scene_host.send(message)
-        program_host.send(message)
-
-    return send
-
-
-def connect_devices(
-    devices: Devices, scene_host: HostSession, program_host: HostSession, online: OnlineScene, execution: Execution
-) -> None:
-    """Connect the device cards to the reports of the hosts, and count the actions of devices."""
-    for host, what in ((scene_host, "scene"), (program_host, "program")):
-        devices.watch(host.board, what)
-    online.on_device_action.append(devices.acted)
-    execution.on_device_action.append(devices.acted)
-
-
-def connect_production(recipes: Recipes, units: Units, cell_time: CellTime, execution: Execution) -> None:
-    """Let recipes decide what runs, and let the records of units and the times of the cell follow the program."""
-    execution.before_run.append(recipes.prepare_run)
-    execution.before_replacing.append(recipes.require_unused)
-    execution.on_begin.append(units.begin_run)
-    execution.on_part_step.append(units.concern)
-    execution.on_action_end.append(units.action_ended)
-    execution.parts.on_change.append(units.follow)
-    execution.on_state.append(cell_time.changed)
-
-
-def connect_edits(edits: EditNotifications, previews: Previews, breakpoints: SharedBreakpoints) -> None:
-    """Subscribe the previews and breakpoints to edits: previews of edited items end, and so do unused breakpoints."""
-    edits.on_edit.append(lambda changes: previews.changed({change.id for change in changes}))
-    edits.on_pause.append(lambda _: previews.end_changed())
-    edits.on_pause.append(breakpoints.changed)

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from arcor2_hw.data.project import Project, ProjectParameter
 from arcor2_hw.data.role import Role
 from arcor2_server.app.adapters import request_handlers
-from arcor2_server.app.parts import connect_production
+from arcor2_server.app.wiring import connect_production
 from arcor2_server.collaboration.persons import Persons
 from arcor2_server.collaboration.pins import CardHashes
 from arcor2_server.production.cell_time import CellTime, activity_of

@@ -19,7 +19,7 @@ from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import RPCS
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error, InvalidData
-from arcor2_server.app.parts import connect_devices
+from arcor2_server.app.wiring import connect_devices
 from arcor2_server.audit import changes as audit
 from arcor2_server.errors import RequestRefused
 from arcor2_server.maintenance.devices import Devices

@@ -31,7 +31,7 @@ from arcor2_hw.exceptions import NotFound
 from arcor2_server.access.admission import Access
 from arcor2_server.app import Server
 from arcor2_server.app.application import endpoints
-from arcor2_server.app.parts import connect_edits, stored_name
+from arcor2_server.app.wiring import connect_edits, stored_name
 from arcor2_server.audit.trail import AuditTrail
 from arcor2_server.build.script_editing import ScriptEditing
 from arcor2_server.collaboration.lock_takeover import LockTakeover
