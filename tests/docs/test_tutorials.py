@@ -128,7 +128,7 @@ def test_the_how_to_states_the_length_of_its_example() -> None:
         for _, info, block in BLOCK.findall(text)
         if (title := re.search(r'title="([\w./-]+\.py)"', info))
     }
-    stated = re.search(r"The example has (\d+) lines of driver\s+and (\d+) lines of a fake", text)
+    stated = re.search(r"The example\s+has (\d+) lines of driver\s+and (\d+) lines of a fake", text)
     assert stated is not None
     assert written == {
         "sealer/sealer/sealer.py": int(stated.group(1)),
