@@ -359,7 +359,7 @@ async def test_action_is_renamed_and_duplicated(work: Work) -> None:
     name = work.panel.get_by_label("New name")
     await name.fill("scan")
     await name.press("Enter")
-    await expect(work.panel.get_by_role("alert")).to_contain_text("scan already")
+    await expect(work.panel.get_by_role("alert")).to_contain_text("already an action called scan")
     await name.fill("look_here")
     await name.press("Enter")
     renamed = await work.next_event("ActionChanged", lambda event: event.data.name == "look_here")

@@ -119,7 +119,7 @@ def test_power_cycle_and_faults(fake: Any, host: Any, wait_for: Callable[..., An
     host.close()
     host.connect()
     assert image(host)[1] == 0
-    with pytest.raises(Exception, match="numbers are 0 to 15"):
+    with pytest.raises(Exception, match="the numbers must be 0 to 15"):
         fake.control.do("set_input", number=16, on=True)
 
 
@@ -128,7 +128,7 @@ def test_the_world_switches_inputs_and_reads_outputs(fake: Any, host: Any) -> No
     assert image(host)[0] == 0b1000_0001
     fake.control.do("set_inputs", inputs={"0": False})
     assert image(host)[0] == 0b1000_0000
-    with pytest.raises(Exception, match="numbers are 0 to 15"):
+    with pytest.raises(Exception, match="the numbers must be 0 to 15"):
         fake.control.do("set_inputs", inputs={"1": True, "16": True})
     assert image(host)[0] == 0b1000_0000  # all or nothing
     host.write_coil(3, True, device_id=1)

@@ -104,6 +104,7 @@ def cell(tmp_path: Path, start_host: Callable[..., Any]) -> Cell:
 def cut(broker: Broker, host: CellHost) -> None:
     """A suspended broker delivers nothing, and later everything, as a cable that is cut and repaired."""
     os.kill(broker.process.pid, signal.SIGSTOP)
+    os.waitid(os.P_PID, broker.process.pid, os.WSTOPPED | os.WNOWAIT)  # until all its threads stand
 
 
 def kill_relay(broker: Broker, host: CellHost) -> None:

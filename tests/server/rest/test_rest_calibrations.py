@@ -164,7 +164,7 @@ async def test_touched_points_are_stored_with_their_result(http: httpx.AsyncClie
     axes = msgspec.to_builtins({"origin": Position(), "on_x": Position(1), "in_plane": [Position(0, 1)]})
     found = granted(await http.put("/api/calibration/touch/frame-by-axes", json=axes))
     assert found["checked"] is False
-    refused(await http.put("/api/calibration/touch/tip", json={"flanges": [{}] * 4}), 409, "Invalid", "alike")
+    refused(await http.put("/api/calibration/touch/tip", json={"flanges": [{}] * 4}), 409, "Invalid", "too similar")
     refused(await http.put("/api/calibration/touch/tip", json={"flanges": [{}]}), 400, "Argument")
     found = granted(await http.put("/api/calibration/touch/orientation-by-alignment", json={"flanges": [{}, {}]}))
     assert msgspec.convert(found["orientation"], Orientation).angle_to(Orientation()) < 1e-9

@@ -107,5 +107,5 @@ async def test_invalid_interlocks_are_refused(
 async def test_names_are_unique_and_ranges_are_accepted(work: Work, alice: Person) -> None:
     ranged = {"object_id": work.object("scale"), "observation": "weight", "operator": "[)", "value": "0", "upper": "2"}
     await alice.ask("PutInterlock", interlock=zone(work, needs=[ranged]))
-    with pytest.raises(Refused, match="There is an interlock called Door already"):
+    with pytest.raises(Refused, match="There is already an interlock called Door"):
         await alice.ask("PutInterlock", interlock=zone(work))

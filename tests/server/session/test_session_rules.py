@@ -413,7 +413,7 @@ poses = st.builds(Pose, st.builds(Position, lengths, lengths, lengths), orientat
 
 
 def same(one: Pose, other: Pose) -> bool:
-    return one.position.distance_to(other.position) < 1e-9 and one.orientation.angle_to(other.orientation) < 1e-7
+    return one.position.distance_to(other.position) < 1e-8 and one.orientation.angle_to(other.orientation) < 1e-7
 
 
 @settings(max_examples=60, deadline=None)
