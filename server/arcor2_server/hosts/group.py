@@ -26,7 +26,6 @@ log = structlog.get_logger(__name__)
 
 CLOSED_WITHIN: Final = 3.0
 """Time limit for the other hosts to close their devices after the end of a program, s; a host allows 1.2 s."""
-_STOPS: Final = (m.StopAll, m.StopMotion, m.StopProgram)
 
 
 class GroupUser(Protocol):
