@@ -19,7 +19,7 @@ from .pendant import Pendant
 from .program import Tool
 from .session import ControlSession
 from .states import MAY_MOVE, MODE_NAMES, MODE_RUNNING, REMEDIES, Runtime, program_plays, safety_of
-from .timing import TAKE_TIMEOUT
+from .timing import GUARD_PERIOD, PROGRAM_ENDS, TAKE_TIMEOUT
 
 LOWER_ONLY: Final = ((5, 23), (10, 0))
 """Versions from which on ur_rtde 1.6.5 uses the lower registers itself although its program uses the upper ones."""
@@ -83,7 +83,7 @@ class Control:
             raise NotInControl(
                 "{name} is in local control. Select remote control at the pendant.", observer.address, name=name
             )
-        if program_plays(sample.runtime):
+        if program_plays(sample.runtime) and not self._program_ends():
             program = self._pendant.program()
             raise NotInControl(
                 "{program} plays on {name}. Stop it before taking control.",
@@ -109,6 +109,10 @@ class Control:
         self.teaching = self._retake = False
         self.session = session
         observer.observing.settled()
+
+    def _program_ends(self) -> bool:
+        """Return whether the program that plays ends at once, as that of a client which has just disconnected."""
+        return once_within(lambda: not program_plays(self._observer.sample().runtime), PROGRAM_ENDS, GUARD_PERIOD)
 
     def release(self) -> None:
         """Stop the arm and release control, if we have it."""

@@ -36,6 +36,8 @@ LAST_STOP: Final = 0.3
 PROGRAM_GONE: Final = 0.1
 """Time for which our program may be reported as not playing before the session ends, s of the controller's clock: two
 streams report it at different times."""
+PROGRAM_ENDS: Final = 0.3
+"""Time for which taking control waits for the end of another program, s."""
 PROCESS_ENDS: Final = 0.6
 """Time for the control process to report why our program is not playing, and to end after it was killed, s. The guard
 does not signal during this time, so it is below the 0.8 s after which the cell host counts as frozen."""

@@ -81,6 +81,23 @@ def test_the_pose_is_that_of_our_tool_before_control_is_taken(fake: FakeUr) -> N
     assert before.orientation.angle_to(after.orientation) < 1e-3
 
 
+def test_control_is_taken_from_a_program_that_ends_meanwhile(
+    robot: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fake.do("foreign_program", on=True)
+    wait_for(lambda: robot.state().program is ProgramState.FOREIGN)
+    pendant = robot._control._pendant
+    state = pendant.state
+
+    def ending(**options: Any) -> Any:
+        fake.do("foreign_program", on=False)  # after the sample that shows it
+        return state(**options)
+
+    monkeypatch.setattr(pendant, "state", ending)
+    robot.take_control()
+    assert robot.control_owner() == "us"
+
+
 def test_control_is_taken_and_released(robot: UR5e, fake: FakeUr) -> None:
     with pytest.raises(NotInControl, match="not taken"):
         robot.move_to_joints(robot.robot_joints(), 0.5)
