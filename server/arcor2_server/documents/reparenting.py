@@ -12,7 +12,7 @@ from arcor2_hw.exceptions import InvalidData, NotFound
 from arcor2_server.documents.changes import Change, Kind
 from arcor2_server.documents.document import Document
 
-SAME_ROTATION: Final = 1e-9
+SAME_ROTATION: Final = 1e-12
 """Angle below which the orientations of two frames count as equal, so that descendants need no update, rad."""
 
 
