@@ -129,7 +129,7 @@ function Row({ interlock, state, why, onEdit, onDelete }: RowProps) {
       {state?.text && <span className="small error">{state.text}</span>}
       {owner && <span className="small">{t`In use by ${owner}.`}</span>}
       {waiting && <span className="small">{t`Waiting: ${waiting}`}</span>}
-      <div className="tool-actions">
+      <div className="actions start">
         <Button why={why} onPress={onEdit} aria-label={t`Change ${interlock.name}`}>
           {t`Change`}
         </Button>

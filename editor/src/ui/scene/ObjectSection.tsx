@@ -43,7 +43,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
         why={cannotRename}
         onRename={(name) => renameObject(id, name)}
       />
-      <div className="tool-actions">
+      <div className="actions start">
         <Button icon="plus" why={cannotCopy} onPress={() => void duplicateObject(object)}>
           {t`Duplicate`}
         </Button>

@@ -30,7 +30,7 @@ export function Placing({ id }: { id: string }) {
   };
   return (
     <>
-      <div className="tool-actions">
+      <div className="actions start">
         <Button icon="point" why={why} onPress={place}>
           {t`Move to the view center`}
         </Button>

@@ -134,7 +134,7 @@ function Placing({ selection, target }: { selection: Selection; target: Target }
           onChange={(value) => keep({ snap: value as Snap })}
         />
       </div>
-      <div className="tool-actions">
+      <div className="actions start">
         <Button
           icon="undo"
           isDisabled={!changed || why !== ""}
