@@ -33,7 +33,7 @@ async def main():
 asyncio.run(main())
 """
 """Starts a cell host on the node, with all that its unit does not permit."""
-RESTARTED_WITHIN = 10.0
+RESTART_TIMEOUT = 10.0
 """Time until a service that hangs or was killed runs again, s."""
 DATA = "/var/lib/arcor2-hw"
 SERVE = "arcor2_server/cli/serve.py"
@@ -77,7 +77,7 @@ class Machine:
 
     def restarted(self, former: str, unit: str = "arcor2-hw") -> float:
         """Wait until the service has another process, and return how long it took, s."""
-        return wait(lambda: self.server(unit) not in ("", former), RESTARTED_WITHIN, f"restart of {unit}")
+        return wait(lambda: self.server(unit) not in ("", former), RESTART_TIMEOUT, f"restart of {unit}")
 
 
 @contextlib.contextmanager

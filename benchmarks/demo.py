@@ -14,7 +14,7 @@ BUSY: Final = 8
 """Number of processes that compute continuously."""
 RUNS, LONG_RUNS = 1, 5
 BOARDS: Final = 5
-ENDS_WITHIN: Final = 400.0
+END_TIMEOUT: Final = 400.0
 _PR_CAPBSET_DROP, _CAP_SYS_NICE = 24, 23
 
 
@@ -34,11 +34,11 @@ async def _demo(folder: Path) -> str:
         preexec_fn=_without_priority,
     )
     try:
-        output, _ = await asyncio.wait_for(process.communicate(), ENDS_WITHIN)
+        output, _ = await asyncio.wait_for(process.communicate(), END_TIMEOUT)
     except TimeoutError:
         process.terminate()
         await process.wait()
-        return f"did not end within {ENDS_WITHIN:g} s"
+        return f"did not end within {END_TIMEOUT:g} s"
     return "" if process.returncode == 0 else " ".join(output.decode().split()[-40:])
 
 

@@ -13,7 +13,7 @@ from arcor2_hw.data.alarms import AlarmCategory, AlarmRecord, Priority
 from arcor2_hw.data.recipes import RecipeState, UsedRecipe
 from arcor2_hw.data.units import UnitRecord, UnitState
 from arcor2_server.fleet.columns import columns_of
-from arcor2_server.fleet.file import FILE, MOST_RESULTS, FleetFile, ReceivedResult
+from arcor2_server.fleet.file import FILE, MAX_RESULTS, FleetFile, ReceivedResult
 from arcor2_server.fleet.reports import FleetReports, Period
 from benchmarks.fleet_cells import PROGRAMS, name_of
 from benchmarks.metrics import Metric, Report, percentile
@@ -27,7 +27,7 @@ REPEATED: Final = 9
 _BATCH: Final = 20_000
 
 
-def fill(path: Path, units: int = MOST_RESULTS - ALARMS, alarms: int = ALARMS) -> None:
+def fill(path: Path, units: int = MAX_RESULTS - ALARMS, alarms: int = ALARMS) -> None:
     """Store units and alarms of the last 7 days. Some 3 % of the units are bad."""
     file, chance, end = FleetFile(path), random.Random(1), time.time()
     total = units + alarms

@@ -11,7 +11,7 @@ from benchmarks.metrics import Metric, Report
 BOARDS: Final = 4
 WINDOW: Final = 30.0
 """The last seconds of the program, which are measured, s."""
-ENDS_WITHIN: Final = 400.0
+END_TIMEOUT: Final = 400.0
 MEASURED_HOST: Final = ("-P", str(Path(__file__).with_name("recorder_host.py")))
 
 
@@ -27,7 +27,7 @@ async def run(report: Report, folder: Path) -> None:
         stdout=asyncio.subprocess.DEVNULL,
     )
     try:
-        async with asyncio.timeout(ENDS_WITHIN):
+        async with asyncio.timeout(END_TIMEOUT):
             await process.wait()
     finally:
         if process.returncode is None:

@@ -35,7 +35,7 @@ LONG_CYCLES: Final = 50
 OUTAGES: Final = (0.5, 5.0)
 """Durations of an interruption, s. Every driver notices the longer one, some the shorter one."""
 CASES: Final = tuple((kind, seconds) for kind in KINDS for seconds in OUTAGES)
-CONNECTS_WITHIN: Final = 20.0
+CONNECT_TIMEOUT: Final = 20.0
 """Time limit of connecting, s; the camera's first picture loads Open3D."""
 GIVES_UP_AFTER: Final = 20.0
 """Time after which a driver counts as not recovered, s; used as its sample."""
@@ -114,7 +114,7 @@ class Trial:
         self.never_recovered: list[str] = []
         self._marks = 0
         for each in link.objects:
-            each.connect(CONNECTS_WITHIN)
+            each.connect(CONNECT_TIMEOUT)
         self.reader = Reader(link)
         if not self._recovers():
             raise RuntimeError(f"{link.name} returned no fresh reading before the first interruption.")
@@ -153,7 +153,7 @@ class Trial:
             for each in reversed(self.link.objects):
                 each.disconnect()
             for each in self.link.objects:
-                each.connect(CONNECTS_WITHIN)
+                each.connect(CONNECT_TIMEOUT)
         if not self._recovers():
             raise RuntimeError(f"{self.link.name} did not recover after reconnecting.")
 

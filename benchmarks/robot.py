@@ -21,7 +21,7 @@ from benchmarks.metrics import Metric, Report, median, percentile
 from benchmarks.operation import scene_state
 
 STREAM_SECONDS = 60.0
-BEGINS_WITHIN = 3.0
+START_TIMEOUT = 3.0
 """Time limit for the start of a motion, including taking control, s."""
 
 
@@ -72,7 +72,7 @@ async def stop_latency(report: Report, directory: Path, host: str, control: str,
             await client.call("MoveToJoints", rpc.MoveToJointsArgs(robot, 0.5, target))
             await client.next_event("RobotMoveToJoints")
             # Wait for motion, because control may have to be taken again and a stop before motion is not sent.
-            until = time.monotonic() + BEGINS_WITHIN
+            until = time.monotonic() + START_TIMEOUT
             while not (await ask(control, "truth"))["moving"] and time.monotonic() < until:  # noqa: ASYNC110
                 await asyncio.sleep(0.005)
             await asyncio.sleep(random.random() * 0.25)

@@ -13,7 +13,7 @@ from benchmarks.metrics import Metric, Report, median
 from tests.editor import texts
 from tests.editor.screen import Screen
 
-MOST_CANDIDATES: Final = 8
+MAX_CANDIDATES: Final = 8
 """Largest number of candidates at the crosshair."""
 SELECTED: Final = 12
 """Number of items selected with each method."""
@@ -47,7 +47,7 @@ async def selecting(report: Report, screen: Screen) -> None:
         nonlocal nexts
         await bar.get_by_role("button", name=re.compile("^Select ")).wait_for()
         wanted = bar.get_by_role("button", name=f"Select {name}", exact=True)
-        for _ in range(MOST_CANDIDATES):
+        for _ in range(MAX_CANDIDATES):
             if await wanted.count():
                 break
             await bar.get_by_role("button", name=re.compile("^Next ")).click()

@@ -37,9 +37,9 @@ LOCK_PAUSE: Final = 0.6
 """Time until it holds the lock again, s."""
 PHASES: Final = 0.3
 """Maximum time from the start of a motion to its stop, s."""
-BEGINS_WITHIN: Final = 10.0
-ENDS_WITHIN: Final = 5.0
-ARRIVES_WITHIN: Final = 2.0
+START_TIMEOUT: Final = 10.0
+END_TIMEOUT: Final = 5.0
+ARRIVAL_TIMEOUT: Final = 2.0
 
 MOVING_ARM: Final = "left"
 """Arm of the YuMi that `run_long` moves; the stationary arm reads a stop earlier."""
@@ -101,14 +101,14 @@ class Motion:
             self._error = error
 
     def wait_until_moving(self) -> None:
-        until = time.monotonic() + BEGINS_WITHIN
+        until = time.monotonic() + START_TIMEOUT
         while not self._bench.running():
             if not self._thread.is_alive() or time.monotonic() > until:
                 raise RuntimeError(f"{self._bench.name()} does not move: {self._error!r}")
             time.sleep(0.005)
 
     def wait_until_stopped(self) -> None:
-        self._thread.join(ENDS_WITHIN)
+        self._thread.join(END_TIMEOUT)
         if self._thread.is_alive() or not isinstance(self._error, Cancelled):
             raise RuntimeError(f"A stopped motion of {self._bench.name()} did not raise Cancelled: {self._error!r}")
 
@@ -120,7 +120,7 @@ def one_stop(bench: Bench, device: Any, stamps: Callable[[], Iterable[float]]) -
     time.sleep(PHASES * random.random())
     called = time.monotonic()
     device.stop()
-    until = time.monotonic() + ARRIVES_WITHIN
+    until = time.monotonic() + ARRIVAL_TIMEOUT
     while not (arrived := [stamp for stamp in stamps() if stamp >= called]):
         if time.monotonic() > until:
             raise RuntimeError(f"A stop of {bench.name()} did not arrive.")

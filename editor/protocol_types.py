@@ -152,7 +152,7 @@ def typescript() -> str:
         "/** Roles. Each includes the permissions of the lower ones. */\n"
         f"export const ROLES = {{\n{roles}}} as const;\n\n"
         "/** Lowest role that may send each request. */\n"
-        f"export const LEAST_ROLE: Record<keyof Requests, number> = {{\n{''.join(roles_of_requests)}}};\n\n"
+        f"export const MIN_ROLE: Record<keyof Requests, number> = {{\n{''.join(roles_of_requests)}}};\n\n"
         "/** Additional events, sent only to clients that subscribed to them. */\n"
         f"export const ADDITIONAL_EVENTS = [\n{''.join(additional)}] as const satisfies (keyof Events)[];\n"
     )

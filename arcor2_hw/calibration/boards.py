@@ -21,9 +21,9 @@ _MARGIN: Final = 8
 """Margin around a board that is processed, px."""
 _EDGE_FLOOR: Final = 0.03
 """Standard deviation of a corner of a board in addition to the scatter of its edges, px."""
-LARGEST_BOARD: Final = 64
+MAX_BOARD: Final = 64
 """Maximum number of columns and rows."""
-FEWEST_CORNERS: Final = 6
+MIN_CORNERS: Final = 6
 """Number of corners below which a board counts as not detected."""
 
 
@@ -33,12 +33,12 @@ def board_of(board: CharucoBoard) -> cv2.aruco.CharucoBoard:
     Raises:
         InvalidData: The description is invalid.
     """
-    if not (2 <= board.columns <= LARGEST_BOARD and 2 <= board.rows <= LARGEST_BOARD):
+    if not (2 <= board.columns <= MAX_BOARD and 2 <= board.rows <= MAX_BOARD):
         raise InvalidData(
             "a board of {columns} × {rows} squares: columns and rows must be 2 to {largest_board}",
             columns=board.columns,
             rows=board.rows,
-            largest_board=LARGEST_BOARD,
+            largest_board=MAX_BOARD,
         )
     if board.columns * board.rows < 6:
         raise InvalidData(
@@ -89,7 +89,7 @@ def seen_of_board(
     detector = cv2.aruco.CharucoDetector(made)
     result: Any = detector.detectBoard(grey, markerCorners=corners, markerIds=numbers)
     pixels, ids = result[0], result[1]
-    if ids is None or len(ids) < FEWEST_CORNERS:
+    if ids is None or len(ids) < MIN_CORNERS:
         return nothing
     points = board_points(board, made)[np.ravel(ids)]
     # Corners on one line do not determine a rotation.

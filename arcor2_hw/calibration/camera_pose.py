@@ -27,7 +27,7 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.messages import Message
 
-MOST_PICTURES: Final = 100
+MAX_PICTURES: Final = 100
 _GOOD: Final = 0.002
 """Standard deviation of the position up to which a result is good, m."""
 _STOOD_STILL: Final = 0.5
@@ -94,9 +94,9 @@ def _detected(
 ) -> tuple[Hints, Lens, Detection]:
     """Return prior knowledge, the lens, and the targets detected in images."""
     hints = _hints(options)
-    if not 1 <= len(pictures) <= MOST_PICTURES:
+    if not 1 <= len(pictures) <= MAX_PICTURES:
         raise InvalidData(
-            "1 to {most_pictures} images are needed, not {count}", most_pictures=MOST_PICTURES, count=len(pictures)
+            "1 to {most_pictures} images are needed, not {count}", most_pictures=MAX_PICTURES, count=len(pictures)
         )
     greys = list(one_by_one(pictures)) if len(pictures) > 1 else [grey_of(pictures[0])]
     lens = Lens(parameters, greys[0].shape[1], greys[0].shape[0])

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from arcor2_hw.calibration.pictures import LARGEST_BYTES, LARGEST_PIXELS, InvalidPicture
+from arcor2_hw.calibration.pictures import MAX_BYTES, MAX_PIXELS, InvalidPicture
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.exceptions import InvalidData
@@ -20,7 +20,7 @@ RANGE: Final = (0.15, 8.0)
 """Range of valid depths, m."""
 JUMP: Final = 0.02
 """Relative difference between neighbouring depths that counts as an edge, where sensors return values in between."""
-LEAST_POINTS: Final = 500
+MIN_POINTS: Final = 500
 SAMPLE: Final = 2_000
 TRIALS: Final = 150
 """Number of random planes through three points that are tried."""
@@ -32,23 +32,23 @@ def read_depth(picture: bytes) -> DepthPictures:
     """Read a PNG file of 16-bit depth in mm.
 
     Raises:
-        InvalidPicture: It is not a PNG file, damaged, in colour, 8 bit, or larger than LARGEST_PIXELS or LARGEST_BYTES.
+        InvalidPicture: It is not a PNG file, damaged, in colour, 8 bit, or larger than MAX_PIXELS or MAX_BYTES.
     """
-    if len(picture) > LARGEST_BYTES:
+    if len(picture) > MAX_BYTES:
         raise InvalidPicture(
             "The depth image has {count} bytes; the maximum is {largest_bytes}.",
             count=len(picture),
-            largest_bytes=LARGEST_BYTES,
+            largest_bytes=MAX_BYTES,
         )
     if picture[:8] != _PNG or len(picture) < _IHDR + 17:
         raise InvalidPicture("The depth image is not a PNG file.")
     width, height = (int.from_bytes(picture[_IHDR + 4 * i : _IHDR + 4 * i + 4], "big") for i in range(2))
-    if not 0 < width * height <= LARGEST_PIXELS:
+    if not 0 < width * height <= MAX_PIXELS:
         raise InvalidPicture(
             "The depth image has {width} × {height} pixels; the maximum is {largest_pixels}.",
             width=width,
             height=height,
-            largest_pixels=LARGEST_PIXELS,
+            largest_pixels=MAX_PIXELS,
         )
     bits, kind = picture[_IHDR + 8], picture[_IHDR + 9]
     if (bits, kind) != (16, 0):
@@ -117,20 +117,20 @@ def depth_view(pictures: DepthPictures, parameters: CameraParameters) -> DepthVi
 
     Raises:
         InvalidData: An image is invalid, or its size does not match the parameters of the lens.
-        CalibrationRefused: Fewer than LEAST_POINTS pixels are usable.
+        CalibrationRefused: Fewer than MIN_POINTS pixels are usable.
     """
     seen = mean_depth(pictures)
     rays = pixel_rays(seen.shape[1], seen.shape[0], parameters)
     seen = np.where((seen >= RANGE[0]) & (seen <= RANGE[1]), seen, 0.0)
     depth = _without_edges(seen)
-    if (count := int(np.count_nonzero(depth))) < LEAST_POINTS:
+    if (count := int(np.count_nonzero(depth))) < MIN_POINTS:
         raise CalibrationRefused(
             "The depth image has {count} usable points, but at least {least_points} are needed. Check that "
             "the camera is not covered or too near, and that the scene has texture and light.",
             f"{int(np.count_nonzero(seen))} of {seen.size} pixels have a depth",
             Reason.TOO_FEW_POINTS,
             count=count,
-            least_points=LEAST_POINTS,
+            least_points=MIN_POINTS,
         )
     return DepthView(depth, seen, rays)
 
@@ -146,12 +146,12 @@ def pixel_rays(width: int, height: int, parameters: CameraParameters) -> Floats:
         raise InvalidData(
             "fx and fy of a camera must be positive and all parameters finite, not {values}.", values=values
         )
-    if width * height > LARGEST_PIXELS:
+    if width * height > MAX_PIXELS:
         raise InvalidData(
             "The depth image has {width} × {height} pixels; the maximum is {largest_pixels}.",
             width=width,
             height=height,
-            largest_pixels=LARGEST_PIXELS,
+            largest_pixels=MAX_PIXELS,
         )
     if not (0.25 * width < parameters.cx < 0.75 * width and 0.25 * height < parameters.cy < 0.75 * height):
         raise InvalidData(

@@ -25,9 +25,9 @@ _UNIT: Final = np.linspace(-1.0, 1.0, 17)
 _WEIGHTS: Final = np.where(np.abs(_UNIT) == 1.0, 0.5, 1.0) * (_UNIT[1] - _UNIT[0])
 _CLEAR: Final = 1.8
 """Minimum distance of a place from the end of its edge, as a multiple of the blur."""
-_LEAST_SHARE: Final = 0.8
+_MIN_SHARE: Final = 0.8
 """Minimum share of places with a step from dark to light; with fewer it is another marker, or none."""
-_LEAST_CONTRAST: Final = 0.02
+_MIN_CONTRAST: Final = 0.02
 """Minimum contrast as a fraction of the grey range."""
 _WIDEST: Final = 4.0
 """Maximum search distance on each side of an edge along its normal, px; larger in a blurred image."""
@@ -273,10 +273,10 @@ def _crossings(
     )
     difference = light - dark
     contrast = _median(difference[valid])
-    if contrast <= _LEAST_CONTRAST:
+    if contrast <= _MIN_CONTRAST:
         return None
     valid &= difference > 0.35 * contrast
-    if np.count_nonzero(valid) < _LEAST_SHARE * places:
+    if np.count_nonzero(valid) < _MIN_SHARE * places:
         return None
     parts = (values - dark[:, None]) / np.where(valid, difference, 1.0)[:, None]
     offsets = reach * (1.0 - parts @ _WEIGHTS) * view.slant

@@ -35,12 +35,12 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.messages import Message
 
 FEWEST: Final = 3
-MOST_SAMPLES: Final = 300
+MAX_SAMPLES: Final = 300
 _TARGET_DEVIATION: Final = 0.03
 """Standard deviation of the position from one image above which the image is not used, m."""
 _OUTLIER: Final = 4.0
 """Ratio of a sample's error to the median error above which the sample is not used."""
-_LEAST_OUTLIER: Final = 1.0
+_MIN_OUTLIER: Final = 1.0
 """Error up to which a sample is always used, px."""
 _GOOD: Final = 0.001
 """Standard deviation of the position up to which a result is good, m."""
@@ -71,11 +71,11 @@ def find_hand_eye(
             implausible (flange poses do not match the images); unobservable (too uncertain).
     """
     options = options or HandEyeOptions()
-    if not FEWEST <= len(samples) <= MOST_SAMPLES:
+    if not FEWEST <= len(samples) <= MAX_SAMPLES:
         raise InvalidData(
             "{fewest} to {most_samples} samples are needed, not {count}",
             fewest=FEWEST,
-            most_samples=MOST_SAMPLES,
+            most_samples=MAX_SAMPLES,
             count=len(samples),
         )
     for index, each in enumerate(samples):
@@ -210,7 +210,7 @@ def _outlier(mount: Mount) -> int | None:
     """Return the sample that fits far worse than the others."""
     residuals = [_root_mean_square(each) for each in mount.errors]
     worst = int(np.argmax(residuals))
-    return worst if residuals[worst] > max(_OUTLIER * float(np.median(residuals)), _LEAST_OUTLIER) else None
+    return worst if residuals[worst] > max(_OUTLIER * float(np.median(residuals)), _MIN_OUTLIER) else None
 
 
 def _result(

@@ -13,7 +13,7 @@ from arcor2_hw.calibration.rigid import Array, crossed, rotation_vector
 
 Method = Callable[[Sequence[Array], Sequence[Array], Sequence[Array], Sequence[Array], float], tuple[Array, Array]]
 
-_MOST_PAIRS: Final = 4000
+_MAX_PAIRS: Final = 4000
 
 
 def park(
@@ -91,7 +91,7 @@ def _motions(
     count = len(hand)
     pairs = [(i, j) for i in range(count) for j in range(i + 1, count)]
     pairs = [(i, j) for i, j in pairs if np.linalg.norm(rotation_vector(hand[j].T @ hand[i])) >= smallest]
-    pairs = pairs[:: max(1, len(pairs) // _MOST_PAIRS)]
+    pairs = pairs[:: max(1, len(pairs) // _MAX_PAIRS)]
     if not pairs:
         raise ValueError("the orientation is the same at all stations")
     a = np.stack([hand[j].T @ hand[i] for i, j in pairs])

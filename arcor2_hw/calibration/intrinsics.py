@@ -21,7 +21,7 @@ from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.messages import Message
 
-MOST_PICTURES: Final = 300
+MAX_PICTURES: Final = 300
 _FLAGS: Final = {
     4: cv2.CALIB_FIX_K3,
     5: 0,
@@ -32,7 +32,7 @@ _FIELDS: Final = (8, 6)
 """Columns and rows of the fields in which corners are counted."""
 _OUTLIER: Final = 3.0
 """Ratio of a view's error to the median error above which the view is not used."""
-_LEAST_OUTLIER: Final = 0.5
+_MIN_OUTLIER: Final = 0.5
 """Error up to which a view is always used, px."""
 _GOOD: Final = 0.0007
 """Standard deviation of the focal length, as a fraction, up to which a calibration is good."""
@@ -71,14 +71,14 @@ def find_intrinsics(
 
     Raises:
         InvalidPicture: As in `find_camera_pose`; also images of different sizes.
-        InvalidData: The board is invalid, or there are no images or more than MOST_PICTURES.
+        InvalidData: The board is invalid, or there are no images or more than MAX_PICTURES.
         CalibrationRefused: Too few images or too little coverage; degenerate (the board is seen from one direction
             only); implausible (errors are large: another board, or a bent one).
     """
     options = options or IntrinsicsOptions()
-    if not 1 <= len(pictures) <= MOST_PICTURES:
+    if not 1 <= len(pictures) <= MAX_PICTURES:
         raise InvalidData(
-            "1 to {most_pictures} images are needed, not {count}", most_pictures=MOST_PICTURES, count=len(pictures)
+            "1 to {most_pictures} images are needed, not {count}", most_pictures=MAX_PICTURES, count=len(pictures)
         )
     made = board_of(board)
     size = (0, 0)
@@ -186,7 +186,7 @@ def _outlier(solved: _Solved) -> int | None:
     """Return the view that fits far worse than the others."""
     residuals = [_root_mean_square(each) for each in solved.errors]
     worst = int(np.argmax(residuals))
-    return worst if residuals[worst] > max(_OUTLIER * float(np.median(residuals)), _LEAST_OUTLIER) else None
+    return worst if residuals[worst] > max(_OUTLIER * float(np.median(residuals)), _MIN_OUTLIER) else None
 
 
 def _root_mean_square(errors: Array) -> float:

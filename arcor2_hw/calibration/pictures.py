@@ -16,8 +16,8 @@ Grey = npt.NDArray[np.uint8]
 Picture = bytes | Grey
 """A PNG, JPEG, BMP, TIFF or WebP file, or grey values (rows, columns)."""
 
-LARGEST_PIXELS: Final = 64_000_000
-LARGEST_BYTES: Final = 64 * 1024 * 1024
+MAX_PIXELS: Final = 64_000_000
+MAX_BYTES: Final = 64 * 1024 * 1024
 SMALLEST: Final = 64
 """Minimum width and height, px."""
 
@@ -38,7 +38,7 @@ def grey_of(picture: Picture, name: str = "the picture") -> Grey:
 
     Raises:
         InvalidPicture: It is not an image, is damaged, in colour where grey values are expected, smaller than SMALLEST,
-            or larger than LARGEST_PIXELS or LARGEST_BYTES.
+            or larger than MAX_PIXELS or MAX_BYTES.
     """
     if isinstance(picture, np.ndarray):
         if picture.ndim != 2 or picture.dtype != np.uint8:
@@ -52,12 +52,12 @@ def grey_of(picture: Picture, name: str = "the picture") -> Grey:
         return np.ascontiguousarray(picture)
     if not picture:
         raise InvalidPicture("{name} is empty", name=name)
-    if len(picture) > LARGEST_BYTES:
+    if len(picture) > MAX_BYTES:
         raise InvalidPicture(
             "{name} is too large: {count:.0f} MiB, maximum {largest_bytes} MiB",
             name=name,
             count=len(picture) / 2**20,
-            largest_bytes=LARGEST_BYTES >> 20,
+            largest_bytes=MAX_BYTES >> 20,
         )
     try:
         with warnings.catch_warnings():
@@ -119,13 +119,13 @@ def _check_size(width: int, height: int, name: str) -> None:
     Raises:
         InvalidPicture: The image is too large or too small.
     """
-    if width * height > LARGEST_PIXELS:
+    if width * height > MAX_PIXELS:
         raise InvalidPicture(
             "{name} is too large: {width} × {height}, maximum {largest_pixels} million pixels",
             name=name,
             width=width,
             height=height,
-            largest_pixels=LARGEST_PIXELS // 10**6,
+            largest_pixels=MAX_PIXELS // 10**6,
         )
     if min(width, height) < SMALLEST:
         raise InvalidPicture(

@@ -15,7 +15,7 @@ from arcor2_hw.calibration.surface import RobotSurface
 
 Floats = npt.NDArray[np.float64]
 
-LEAST_SEEN: Final = 60
+MIN_SEEN: Final = 60
 """Minimum number of points for a step."""
 COARSE: Final = 5e-4
 FINE: Final = 1e-5
@@ -169,13 +169,13 @@ def approach(model: Model, cloud: Floats, rays: Floats, start: Floats, stages: t
         for _ in range(stage.steps):
             seen = model.render(pose, rays)
             there = np.isfinite(seen.depth)
-            if np.count_nonzero(there) < LEAST_SEEN:
+            if np.count_nonzero(there) < MIN_SEEN:
                 return None
             surface = rays[there] * seen.depth[there][:, None] @ pose[:3, :3].T + pose[:3, 3]
             points = cloud @ pose[:3, :3].T + pose[:3, 3]
             gaps, index = cKDTree(surface).query(points, distance_upper_bound=stage.reach)
             near = np.isfinite(gaps)
-            if np.count_nonzero(near) < LEAST_SEEN:
+            if np.count_nonzero(near) < MIN_SEEN:
                 return None
             fit, pose = _fit(
                 pose,
@@ -207,7 +207,7 @@ def refine(model: Model, cloud: Floats, start: Floats, stages: tuple[Stage, ...]
             slope = np.abs(np.einsum("ij,ij->i", normals, rays)) / np.linalg.norm(rays, axis=1)
             gaps = np.linalg.norm(targets - points, axis=1)
             near = (slope > GRAZING) & (gaps < stage.reach)
-            if np.count_nonzero(near) < LEAST_SEEN:
+            if np.count_nonzero(near) < MIN_SEEN:
                 return None
             fit, pose = _fit(pose, points[near], kept[near], targets[near], normals[near], stage.reach)
             kept = kept[gaps < COMES_NEAR * stage.reach]  # nearest-point queries take longest for far points

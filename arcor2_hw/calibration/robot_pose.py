@@ -31,7 +31,7 @@ ALIKE: Final = 0.93
 """Fraction of the best score from which another result counts as equally good."""
 UNEVEN: Final = (0.0015, 0.012)
 """Unevenness up to which a result is good, and from which it is refused, m."""
-LEAST_KNOWN: Final = 0.05
+MIN_VISIBILITY: Final = 0.05
 """Minimum visibility of a motion in the worst direction, see `Fit.least_known`."""
 FLOOR: Final = (4e-4, math.radians(0.05))
 """Minimum standard deviations, m and rad.
@@ -117,7 +117,7 @@ def find_robot_pose(
         float(np.sqrt(np.linalg.eigvalsh(part)[-1])) for part in (covariance[:3, :3], covariance[3:, 3:])
     )
     known = best.least_known()
-    if known < LEAST_KNOWN or deviations[0] > limits.most_deviation or deviations[1] > limits.most_angle_deviation:
+    if known < MIN_VISIBILITY or deviations[0] > limits.most_deviation or deviations[1] > limits.most_angle_deviation:
         raise CalibrationRefused(
             "The view of the camera leaves a motion of {name} undetermined. Move the robot or the "
             "camera so that more of it is visible.",

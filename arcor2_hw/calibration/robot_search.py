@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from arcor2_hw.calibration.depth import LEAST_POINTS, DepthView, plane_thickness, planes
+from arcor2_hw.calibration.depth import MIN_POINTS, DepthView, plane_thickness, planes
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.registration import GRAZING, Fit, Model, Stage, approach, refine, rotation
 from arcor2_hw.calibration.surface import RobotSurface
@@ -21,7 +21,7 @@ FITTING: Final = 3.0
 REACH: Final = (0.004, 0.012)
 FEW_POINTS: Final = 1_500
 """Number of points of the cloud used in the search."""
-MOST_POINTS: Final = 20_000
+MAX_POINTS: Final = 20_000
 """Number of points of the cloud used for the result."""
 ENOUGH: Final = 7
 """Number of starts after which the search ends when all of them, along and about each axis, ended at one pose."""
@@ -83,16 +83,16 @@ class Search:
         for normal, offset in planes(cloud[~near], self._random):  # robots are mounted on tables or walls
             near &= np.abs(cloud @ normal - offset) > plane_thickness(cloud)
         chosen = np.flatnonzero(near)
-        if len(chosen) < LEAST_POINTS:
+        if len(chosen) < MIN_POINTS:
             raise CalibrationRefused(
                 "The camera sees hardly anything at the expected place of {name}. Check where the "
                 "camera looks, and whether its pose and that of the robot are correct to a few centimetres.",
-                f"{len(chosen)} of {len(cloud)} points are near the model; at least {LEAST_POINTS} are needed",
+                f"{len(chosen)} of {len(cloud)} points are near the model; at least {MIN_POINTS} are needed",
                 Reason.NO_OVERLAP,
                 name=surface.name,
             )
-        if len(chosen) > MOST_POINTS:
-            chosen = self._random.choice(chosen, MOST_POINTS, replace=False)
+        if len(chosen) > MAX_POINTS:
+            chosen = self._random.choice(chosen, MAX_POINTS, replace=False)
         self._cloud = cloud[chosen]
         self._tile = max(1, view.depth.shape[1] // TILES)
         self.tiles = (rows[chosen] // self._tile) * (TILES + 2) + columns[chosen] // self._tile

@@ -29,7 +29,7 @@ Floats = npt.NDArray[np.float64]
 
 ENOUGH_STATES: Final = 3
 """Number of joint states from which a result can be good."""
-MOST_STATES: Final = 20
+MAX_STATES: Final = 20
 FARTHEST: Final = (0.005, math.radians(0.7))
 """Distances of a state's pose from the mean above which a result is refused, m and rad."""
 
@@ -61,14 +61,14 @@ def find_robot_pose_of_states(
         options: As in `find_robot_pose`.
 
     Raises:
-        InvalidData: As in `find_robot_pose`; also no state, or more than MOST_STATES.
+        InvalidData: As in `find_robot_pose`; also no state, or more than MAX_STATES.
         CalibrationRefused: As in `find_robot_pose`; also implausible (the states contradict each other).
 
     Source: R. Birge, "The calculation of errors by the method of least squares", Physical Review 40 (1932), for the
     comparison of results with stated deviations.
     """
-    if not 1 <= len(states) <= MOST_STATES:
-        raise InvalidData("1 to {most} joint states are needed, not {count}.", most=MOST_STATES, count=len(states))
+    if not 1 <= len(states) <= MAX_STATES:
+        raise InvalidData("1 to {most} joint states are needed, not {count}.", most=MAX_STATES, count=len(states))
     found = [find_robot_pose(each.surface, each.depth, parameters, camera_pose, assumed, options) for each in states]
     if len(found) == 1:
         return found[0]

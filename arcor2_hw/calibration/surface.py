@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
-MOST_TRIANGLES: Final = 2_000_000
+MAX_TRIANGLES: Final = 2_000_000
 _SIDES: Final = 96
 
 
@@ -26,7 +26,7 @@ class RobotSurface:
     """Triangles of all links: vertices (n, 3) in m in the robot's base frame, and triangles (m, 3) of indices.
 
     Raises:
-        InvalidData: There are no triangles or more than MOST_TRIANGLES, or numbers or indices are invalid.
+        InvalidData: There are no triangles or more than MAX_TRIANGLES, or numbers or indices are invalid.
     """
 
     vertices: Floats
@@ -38,12 +38,12 @@ class RobotSurface:
             raise InvalidData("The model of {name} has no vertices with three coordinates.", name=self.name)
         if self.triangles.ndim != 2 or self.triangles.shape[1] != 3 or not len(self.triangles):
             raise InvalidData("The model of {name} has no triangles, so it is invisible.", name=self.name)
-        if len(self.triangles) > MOST_TRIANGLES:
+        if len(self.triangles) > MAX_TRIANGLES:
             raise InvalidData(
                 "The model of {name} has {count} triangles; the maximum is {most_triangles}.",
                 name=self.name,
                 count=len(self.triangles),
-                most_triangles=MOST_TRIANGLES,
+                most_triangles=MAX_TRIANGLES,
             )
         if not np.isfinite(self.vertices).all():
             raise InvalidData("The model of {name} has vertices that are not finite.", name=self.name)

@@ -17,7 +17,7 @@ Floats = npt.NDArray[np.float64]
 
 SHORTEST: Final = 0.01
 """Minimum distance between points, m; below it, half a millimetre of error rotates the frame by 3°."""
-LEAST_SINE: Final = math.sin(math.radians(10.0))
+MIN_SINE: Final = math.sin(math.radians(10.0))
 """Minimum sine of the angle that three points must form."""
 FITS: Final = 0.001
 """Root mean square residual up to which touched points agree well, m."""
@@ -64,7 +64,7 @@ def frame_by_axes(origin: Position, on_x: Position, in_plane: Sequence[Position]
     upward = np.cross(along, aside)
     if np.linalg.norm(aside) < SHORTEST:
         raise _too_near("plane")
-    if np.linalg.norm(upward) < LEAST_SINE * np.linalg.norm(along) * np.linalg.norm(aside):
+    if np.linalg.norm(upward) < MIN_SINE * np.linalg.norm(along) * np.linalg.norm(aside):
         raise _on_one_line()
     checked = len(points) > 3
     middle = points.mean(axis=0)
@@ -114,7 +114,7 @@ def frame_by_points(known: Sequence[Position], touched: Sequence[Position]) -> T
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         if spread[0] < SHORTEST:
             raise _too_near()
-        if spread[1] < LEAST_SINE * spread[0]:
+        if spread[1] < MIN_SINE * spread[0]:
             raise _on_one_line()
     a, b = ours - ours.mean(axis=0), theirs - theirs.mean(axis=0)
     u, _, vt = np.linalg.svd(b.T @ a)
@@ -270,7 +270,7 @@ def orientation_by_points(flange: Orientation, tip: Position, along_z: Position,
         raise _too_near()
     z, x = z / np.linalg.norm(z), x / np.linalg.norm(x)
     off = abs(math.asin(float(np.clip(x @ z, -1.0, 1.0))))
-    if math.cos(off) < LEAST_SINE:
+    if math.cos(off) < MIN_SINE:
         raise _on_one_line()
     x -= (x @ z) * z
     x /= np.linalg.norm(x)

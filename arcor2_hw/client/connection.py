@@ -24,7 +24,7 @@ __all__ = ["Client", "RequestFailed"]
 
 ANSWER_TIMEOUT: Final = 30.0
 """Time to wait for an answer, s, as in existing clients."""
-FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
+FIRST_PAUSE, MAX_PAUSE = 0.1, 5.0
 """Pauses between attempts to reconnect, s: doubled each time, and randomized so that clients reconnect one by one."""
 READING: Final = frozenset(
     {
@@ -142,7 +142,7 @@ class Client(Requests):
                 )
                 raise
             await asyncio.sleep(pause)
-            pause = min(2 * pause, LONGEST_PAUSE)
+            pause = min(2 * pause, MAX_PAUSE)
         self._joined.set()
         self._keeper = asyncio.create_task(self._keep(), name="client keeper")
 
@@ -254,7 +254,7 @@ class Client(Requests):
                     return
                 except (ConnectionLost, DeviceTimeout, RequestFailed):
                     # Refused: the server may still hold the old connection and the user name for a while.
-                    pause = min(2 * pause, LONGEST_PAUSE)
+                    pause = min(2 * pause, MAX_PAUSE)
                 else:
                     break
             self._joined.set()

@@ -21,7 +21,7 @@ Overlaps of less than half of it can be missed. None is missed when the margin o
 """
 FARTHEST: Final = 0.08
 """Maximum travel covered by one check with an enlarged margin, m."""
-MOST_CHECKS: Final = 200_000
+MAX_CHECKS: Final = 200_000
 """Maximum number of checks of one motion."""
 
 
@@ -171,12 +171,12 @@ class Sweep:
 
     def _count(self, a: Array, b: Array, resolution: float) -> int:
         count = max(1, math.ceil(self.travel(a, b) / resolution - 1e-9))
-        if count > MOST_CHECKS:
+        if count > MAX_CHECKS:
             raise InvalidData(
                 "A motion of {name} needs {count} collision checks, but at most {most_checks} are allowed.",
                 name=self.arm.model.name,
                 count=count,
-                most_checks=MOST_CHECKS,
+                most_checks=MAX_CHECKS,
             )
         return count
 

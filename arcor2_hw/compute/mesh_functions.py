@@ -13,7 +13,7 @@ from arcor2_hw.kinematics.xml_parser import parse_xml
 MAX_SHOWN: Final = 256 * 1024 * 1024
 """Maximum size of a mesh file for display, bytes; larger than that of a collision mesh."""
 MAX_TRIANGLES: Final = 3_000_000
-MOST_OF_ROBOT: Final = 40_000
+MAX_TRIANGLES_OF_ROBOT: Final = 40_000
 """Maximum number of triangles of all meshes of a robot."""
 
 
@@ -102,7 +102,7 @@ def _drawn(surfaces: dict[str, Any], state: WorkerState) -> tuple[dict[str, Any]
     from arcor2_hw.compute import simplification
 
     budgets = {path: min(simplification.budget(one.vertices), len(one.triangles)) for path, one in surfaces.items()}
-    share = min(1.0, MOST_OF_ROBOT / max(1, sum(budgets.values())))
+    share = min(1.0, MAX_TRIANGLES_OF_ROBOT / max(1, sum(budgets.values())))
     drawn: dict[str, Any] = {}
     before = after = 0
     for number, (path, surface) in enumerate(surfaces.items()):

@@ -17,7 +17,7 @@ from arcor2_hw.exceptions import InvalidData, NotFound
 
 MAX_SIZE: Final = 1 << 20
 """Maximum size, bytes; a cell of hundreds of devices has some ten thousand."""
-LARGEST_BAND: Final = 1e12
+MAX_DEAD_BAND: Final = 1e12
 """Maximum dead band."""
 BROKER_URL: Final = "ARCOR2_HW_NATS_URL"
 """The variable with the address of the broker between a server and its nodes. It may contain a password."""
@@ -46,7 +46,7 @@ class CellDevice(Data, frozen=True, forbid_unknown_fields=True):
     wire: list[str | int] | Unset = UNSET
     real: bool | Unset = UNSET
     node: NodeName | Unset = UNSET
-    dead_bands: dict[str, Annotated[float, Meta(ge=0, le=LARGEST_BAND)]] | Unset = UNSET
+    dead_bands: dict[str, Annotated[float, Meta(ge=0, le=MAX_DEAD_BAND)]] | Unset = UNSET
 
     def __post_init__(self) -> None:
         if not is_valid_name(self.name):

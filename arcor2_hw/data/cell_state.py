@@ -7,7 +7,7 @@ from msgspec import Meta
 
 from arcor2_hw.data.base import UNSET, Data, Unset
 
-MOST_JOBS: Final = 500
+MAX_JOBS: Final = 500
 """Maximum number of jobs."""
 
 

@@ -8,9 +8,9 @@ from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 from arcor2_hw.data.editor import RunEnd
 from arcor2_hw.data.points import PointQuality, PointUse
 
-MOST_BUCKETS: Final = 2000
+MAX_BUCKETS: Final = 2000
 """Maximum number of buckets in an answer."""
-MOST_VALUES: Final = 100_000
+MAX_VALUES: Final = 100_000
 """Maximum number of values or runs in an answer."""
 
 
@@ -24,8 +24,8 @@ class HistoryQuery(Data, frozen=True):
     point: int
     since: Timestamp | Unset = UNSET
     until: Timestamp | Unset = UNSET
-    buckets: Annotated[int, Meta(ge=1, le=MOST_BUCKETS)] = 400
-    limit: Annotated[int, Meta(ge=1, le=MOST_VALUES)] = 10_000
+    buckets: Annotated[int, Meta(ge=1, le=MAX_BUCKETS)] = 400
+    limit: Annotated[int, Meta(ge=1, le=MAX_VALUES)] = 10_000
 
 
 class HistoryPointQuery(Data, frozen=True):
@@ -40,7 +40,7 @@ class HistoryRunQuery(Data, frozen=True):
     since: Timestamp | Unset = UNSET
     until: Timestamp | Unset = UNSET
     package_id: str | Unset = UNSET
-    limit: Annotated[int, Meta(ge=1, le=MOST_VALUES)] = 100
+    limit: Annotated[int, Meta(ge=1, le=MAX_VALUES)] = 100
 
 
 class HistoryPoint(Data, frozen=True):

@@ -9,7 +9,7 @@ from arcor2_hw.data.base import UNSET, Data, TranslatableData, Unset
 from arcor2_hw.data.geometry import Position
 from arcor2_hw.data.operator import Operator
 
-LONGEST_WAIT: Final = 3600.0
+MAX_WAIT: Final = 3600.0
 """Longest time for which an action waits for its conditions, s."""
 
 
@@ -57,7 +57,7 @@ class Interlock(Data, frozen=True):
     actions: list[str] = field(default_factory=list)
     needs: list[Need] = field(default_factory=list)
     during: bool = False
-    within: Annotated[float, Meta(ge=0.0, le=LONGEST_WAIT)] = 30.0
+    within: Annotated[float, Meta(ge=0.0, le=MAX_WAIT)] = 30.0
     otherwise: Unmet = field(name="else", default=Unmet.WAIT)
     id: str = ""
     retract: list[Position] = field(default_factory=list)

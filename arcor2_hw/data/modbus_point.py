@@ -33,7 +33,7 @@ LARGEST: Final = {"float32": 3.4028234663852886e38, "float64": sys.float_info.ma
 """Greatest number by type."""
 LAST_ADDRESS: Final = 0xFFFF
 WORD_BITS: Final = 16
-LONGEST_DEBOUNCE: Final = 10.0
+MAX_DEBOUNCE_TIME: Final = 10.0
 """Longest debounce time, s."""
 
 
@@ -95,7 +95,7 @@ class Point(Data, frozen=True, forbid_unknown_fields=True):
             (not self.values or not self.unit, "an enumeration has no unit"),
             (not self.values or {self.minimum, self.maximum} == {UNSET}, "an enumeration has no limits"),
             (
-                0.0 <= self.debounce <= LONGEST_DEBOUNCE,
+                0.0 <= self.debounce <= MAX_DEBOUNCE_TIME,
                 f"debounce must be 0 to 10 s, not {self.debounce:g}",
             ),
             (not self.debounce or self.kind is bool, "only a coil, a discrete input or a bit is debounced"),

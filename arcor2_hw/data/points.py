@@ -7,8 +7,8 @@ from msgspec import field
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, TranslatableData, Unset
 
-SHORTEST_FORCE_MS: Final = 500
-LONGEST_FORCE_MS: Final = 10_000
+MIN_FORCE_MS: Final = 500
+MAX_FORCE_MS: Final = 10_000
 """Limits of the time after which a force that is not renewed ends, ms."""
 
 PointValue = bool | float | str | None

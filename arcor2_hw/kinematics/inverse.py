@@ -33,8 +33,8 @@ EXACT: Final = 1e-8
 SAME: Final = 1e-3
 """Minimum difference of some joint between two distinct solutions, rad or m."""
 _FEW: Final = 2
-_MOST_DAMPING: Final = 1e-4
-_LEAST_DAMPING: Final = 1e-14
+_MAX_DAMPING: Final = 1e-4
+_MIN_DAMPING: Final = 1e-14
 _SLACK: Final = 1e-6
 """Rounding error beyond a limit that is clipped, rad or m."""
 _PATIENCE: Final = 8
@@ -241,7 +241,7 @@ class InverseKinematics:
         """Refine joint values near `q` until they reach the goal; None when the iteration does not converge."""
         arm = self.arm
         error, size = self._error(goal, q)
-        damping = min(max(size * size, _LEAST_DAMPING), _MOST_DAMPING)
+        damping = min(max(size * size, _MIN_DAMPING), _MAX_DAMPING)
         jacobian: Array | None = None
         before = np.inf
         for number in range(rounds):
@@ -262,10 +262,10 @@ class InverseKinematics:
                 trial = np.clip(trial, arm.lower, arm.upper)
             after, smaller = self._error(goal, trial)
             if smaller < size:
-                if size - smaller < 1e-6 * size and damping <= _LEAST_DAMPING:
+                if size - smaller < 1e-6 * size and damping <= _MIN_DAMPING:
                     break
                 q, error, size, jacobian = trial, after, smaller, None
-                damping = min(max(damping * 0.1, _LEAST_DAMPING), max(size * size, _LEAST_DAMPING))
+                damping = min(max(damping * 0.1, _MIN_DAMPING), max(size * size, _MIN_DAMPING))
             else:
                 damping *= 10.0
                 if damping > 1e2:

@@ -23,15 +23,15 @@ from arcor2_hw.mqtt.messages import Dropped, Setup
 from arcor2_hw.mqtt.payload import Kind, Metric, Value
 
 NAMESPACE: Final = "spBv1.0"
-MOST_WAITING: Final = 50_000
+MAX_WAITING: Final = 50_000
 """Maximum number of values that wait for the broker or the host. Then the oldest of the longest queue is dropped."""
-MOST_IN_MESSAGE: Final = 500
+MAX_IN_MESSAGE: Final = 500
 """Maximum number of values in a message."""
 REBIRTH_PERIOD: Final = 1.0
 """Shortest time between two births that hosts request, s."""
 DEATH_TIMEOUT: Final = 1.0
 """Time limit for publishing the death certificate, s."""
-LONGEST_COMMAND: Final = 64 * 1024
+MAX_COMMAND: Final = 64 * 1024
 """Maximum size of a received message, bytes. Longer ones are ignored."""
 SESSION_FILE: Final = "mqtt-session"
 """File with the number of the last session, so that a host never confuses sessions before and after a restart."""
@@ -93,7 +93,7 @@ class ValueQueue:
         values = self._values.get(owner)
         if not values:
             return []
-        taken = [values.popleft() for _ in range(min(len(values), MOST_IN_MESSAGE))]
+        taken = [values.popleft() for _ in range(min(len(values), MAX_IN_MESSAGE))]
         self._count -= len(taken)
         return taken
 
@@ -138,7 +138,7 @@ class EdgeNode:
         self._setup, self._names, self._cell, self._report = setup, setup.sparkplug, cell, report
         self._file = Path(setup.folder) / SESSION_FILE
         self._session = self._last_session()
-        self._queue = ValueQueue(MOST_WAITING)
+        self._queue = ValueQueue(MAX_WAITING)
         self._aliases: dict[tuple[str, str], int] = {}
         self._owners = {_NODE: _Owner("", alive=True)}
         self._born: dict[str, int] = {}
@@ -304,7 +304,7 @@ class EdgeNode:
         """Handle the commands and states of hosts. Raise MqttError if the connection is lost."""
         async for message in connected.messages:
             content = message.payload
-            if not isinstance(content, bytes) or len(content) > LONGEST_COMMAND:
+            if not isinstance(content, bytes) or len(content) > MAX_COMMAND:
                 continue
             if message.topic.value == self._topic("NCMD"):
                 self._rebirth |= payload.requests_rebirth(content)

@@ -12,14 +12,14 @@ from aiomqtt import Client, MqttError, Will
 from arcor2_hw.mqtt.messages import Broker, LinkChanged
 
 FIRST_PAUSE: Final = 1.0
-LONGEST_PAUSE: Final = 30.0
+MAX_PAUSE: Final = 30.0
 """Shortest and longest time between two attempts to connect, s. It doubles until a connection lasts longer than it."""
 KEEP_ALIVE: Final = 10
 """Time without a message after which the broker is asked for a sign of life, s. It publishes the will after 1.5 times
 this time without one of ours."""
 TIMEOUT: Final = 10.0
 """Time limit for an answer of the broker, s."""
-MOST_INCOMING: Final = 100
+MAX_INCOMING: Final = 100
 """Maximum number of received messages that wait. Further ones are dropped."""
 
 
@@ -52,7 +52,7 @@ async def connection(broker: Broker, identifier: str, will: Will) -> AsyncIterat
         keepalive=KEEP_ALIVE,
         timeout=TIMEOUT,
         tls_context=context,
-        max_queued_incoming_messages=MOST_INCOMING,
+        max_queued_incoming_messages=MAX_INCOMING,
     )
     try:
         async with client:
@@ -94,7 +94,7 @@ class Link:
             except (MqttError, OSError) as error:
                 self._down(str(error))
             end_if_cancelled()
-            pause = FIRST_PAUSE if time.monotonic() - started > pause else min(2.0 * pause, LONGEST_PAUSE)
+            pause = FIRST_PAUSE if time.monotonic() - started > pause else min(2.0 * pause, MAX_PAUSE)
             await asyncio.sleep(pause)
 
     def up(self) -> None:

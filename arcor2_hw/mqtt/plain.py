@@ -27,7 +27,7 @@ from arcor2_hw.mqtt.messages import Dropped, Setup
 
 POINTS_PERIOD: Final = 1.0
 """Shortest time between two messages with the points of a device, s."""
-MOST_EVENTS: Final = 10_000
+MAX_EVENTS: Final = 10_000
 """Maximum number of changes of alarms and units that left the cell that wait for the broker; the oldest are dropped."""
 DEATH_TIMEOUT: Final = 1.0
 """Time limit for publishing that the cell is offline, s."""
@@ -142,7 +142,7 @@ class PlainJson:
 
     def _put_event(self, topic: str, content: bytes) -> None:
         self._events.append((topic, content))
-        if len(self._events) > MOST_EVENTS:
+        if len(self._events) > MAX_EVENTS:
             self._events.popleft()
             self._dropped += 1
 

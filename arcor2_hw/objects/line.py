@@ -21,7 +21,7 @@ WRITE_TIMEOUT: Final = 0.5
 """Time limit of a write, s. A line that accepts no bytes for that long counts as blocked."""
 CHUNK: Final = 4096
 """Maximum number of bytes of one read from a socket."""
-LONGEST_ANSWER: Final = 65536
+MAX_ANSWER: Final = 65536
 """Maximum length of an answer, bytes. Only the end of a longer one is evaluated."""
 
 
@@ -169,7 +169,7 @@ class Line:
             while not late:
                 late = clock() >= limit  # then read once more: this process may have been suspended
                 if data := self.receive():
-                    received = (received + data)[-LONGEST_ANSWER:]
+                    received = (received + data)[-MAX_ANSWER:]
                     if (found := answer(received)) is not None:
                         return found
         text = (

@@ -30,7 +30,7 @@ Wait: TypeAlias = tuple[Values, float]
 """The values that are awaited, and the time limit, s."""
 Block: TypeAlias = tuple[Table, int, int, list[str]]
 """A request that reads adjacent points: table, first address, number of items, names of the points."""
-LONGEST_READ: Final[Mapping[Table, int]] = {
+MAX_READ_COUNT: Final[Mapping[Table, int]] = {
     "coil": 2000,
     "discrete_input": 2000,
     "holding_register": 125,
@@ -328,7 +328,7 @@ def blocks(points: Mapping[str, Point]) -> list[Block]:
     for table, address, name in sorted(readable):
         end = address + points[name].size
         before, first, count, names = found[-1] if found else ("", 0, 0, [])
-        if before == table and address <= first + count and end - first <= LONGEST_READ[table]:
+        if before == table and address <= first + count and end - first <= MAX_READ_COUNT[table]:
             found[-1] = (table, first, max(count, end - first), [*names, name])
         else:
             found.append((table, address, end - address, [name]))

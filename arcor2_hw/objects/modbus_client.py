@@ -17,7 +17,7 @@ from pymodbus.pdu.register_message import ReadHoldingRegistersResponse
 
 __all__ = ["Client", "ConnectionException", "ModbusException", "ModbusPDU", "SerialClient", "TcpClient"]
 
-LONGEST_FRAME: Final = 4096
+MAX_FRAME: Final = 4096
 """Maximum number of bytes of one read. A frame has at most 260."""
 GRAIN: Final = 0.002
 """Tolerance of the time limit of a TCP answer, s. The socket option is set again only for a larger difference."""
@@ -27,7 +27,7 @@ BITS_PER_CHARACTER: Final = 11
 """Start bit, eight data bits, parity or second stop bit, stop bit (Modbus over serial line 1.02, 2.5.1)."""
 SILENCE: Final = 3.5
 """Silence between two frames, characters (Modbus over serial line 1.02, 2.5.1.1)."""
-SHORTEST_SILENCE: Final = 0.00175
+MIN_SILENCE: Final = 0.00175
 """Silence between two frames above 19200 bit/s, s (Modbus over serial line 1.02, 2.5.1.1)."""
 
 # pymodbus logs every failure as an error. Callers get typed errors, and a device that is off would fill the log.
@@ -118,7 +118,7 @@ class TcpClient(_Exchange, ModbusTcpClient):
             self._armed = left + GRAIN
             socket.setsockopt(sockets.SOL_SOCKET, sockets.SO_RCVTIMEO, _timeval(self._armed))
         try:
-            data = socket.recv(size or LONGEST_FRAME)
+            data = socket.recv(size or MAX_FRAME)
         except BlockingIOError:
             return b""
         if not data:
@@ -139,7 +139,7 @@ class SerialClient(_Exchange, ModbusSerialClient):
         super().__init__(
             port, framer=FramerType.RTU, baudrate=baudrate, parity=parity, stopbits=stopbits, timeout=timeout, retries=0
         )
-        self._silence = max(SILENCE * BITS_PER_CHARACTER / baudrate, SHORTEST_SILENCE)
+        self._silence = max(SILENCE * BITS_PER_CHARACTER / baudrate, MIN_SILENCE)
         self._last_byte = 0.0
         self._ended = False
         self.register_answers()

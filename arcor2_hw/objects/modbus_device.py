@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 REQUESTS_TO_OPEN: Final = 4
 """Number of requests within the time limit of connecting: two readings, each repeated once."""
-SHORTEST_REQUEST: Final = 0.02
+MIN_REQUEST_TIMEOUT: Final = 0.02
 """Shortest time limit of a request, s."""
 LAST_REQUEST: Final = 0.3
 """Time limit of a request that releases control during disconnecting, s, which may take 1 s."""
@@ -31,7 +31,7 @@ class ModbusDevice(PolledControl[T]):
         deadline = time.monotonic() + timeout
         self.link.open(timeout)
         left = (deadline - time.monotonic()) / REQUESTS_TO_OPEN
-        with self.link.limited(max(left, SHORTEST_REQUEST)):
+        with self.link.limited(max(left, MIN_REQUEST_TIMEOUT)):
             return self.snapshot()
 
     def identify(self) -> Identity:

@@ -18,13 +18,13 @@ ATTEMPT_TIMEOUT: Final = 2.0
 """Time limit of an attempt to reconnect, s. A device on a local network answers within 1 s."""
 FIRST_PAUSE: Final = 0.1
 """Pause before the first attempt, s. A device that reset a connection accepts the next one at once."""
-LONGEST_PAUSE: Final = 2.0
+MAX_PAUSE: Final = 2.0
 """Longest pause between attempts, s, so that a device is online soon after it was switched on."""
 STABLE_AFTER: Final = 0.5
 """Time after which a connection counts as stable, s. The next pause then starts from FIRST_PAUSE again."""
 WATCH_PAUSE: Final = 0.005
 """Pause between two calls of a `watch` that returns, s."""
-STOP_WITHIN: Final = 0.9
+STOP_TIMEOUT: Final = 0.9
 """Time that `stop` waits for the thread, s, because `disconnect` must return within 1 s."""
 
 log = logging.getLogger(__name__)
@@ -185,7 +185,7 @@ class Observing:
             thread, self._thread = self._thread, None
             self._stopping.set()
             if thread is not None and thread is not threading.current_thread():
-                thread.join(STOP_WITHIN)
+                thread.join(STOP_TIMEOUT)
                 self._ending = thread if thread.is_alive() else None
             self._enter(Connection.OFFLINE)
 
@@ -250,7 +250,7 @@ class Observing:
             self._close()
             if stopping.wait(self._pause):
                 return
-            self._pause = min(2.0 * self._pause, LONGEST_PAUSE)
+            self._pause = min(2.0 * self._pause, MAX_PAUSE)
             if (error := self._attempt(lambda: self._open(ATTEMPT_TIMEOUT))) is not None:
                 self._reason = error
                 continue

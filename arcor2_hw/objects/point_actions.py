@@ -13,7 +13,7 @@ from arcor2_hw.objects.edges import Edge, EdgeListeners
 from arcor2_hw.objects.settings import within
 from arcor2_hw.objects.small import IOPoint, PointDirection, PointKind, live_point
 
-LONGEST_WAIT: Final = 600.0
+MAX_WAIT: Final = 600.0
 """Longest time a program may wait for a point in one call, s."""
 MARGIN: Final = 20.0
 """Additional time of the action for repeated requests after another request, s."""
@@ -212,7 +212,7 @@ class PointActions(abc.ABC):
         self.require_point(name, PointKind.ANALOG)
         self.write(name, value)
 
-    @action(deadline=LONGEST_WAIT + MARGIN, again="safe")
+    @action(deadline=MAX_WAIT + MARGIN, again="safe")
     def wait_for(self, name: str, value: bool, timeout: float, *, an: str | None = None) -> None:
         """Wait until a digital point has the value.
 
@@ -222,6 +222,6 @@ class PointActions(abc.ABC):
         """
         assert 0.0 <= timeout <= 600.0
 
-        within(f"{self.who}: timeout", timeout, 0.0, LONGEST_WAIT, "s")
+        within(f"{self.who}: timeout", timeout, 0.0, MAX_WAIT, "s")
         self.require_point(name, PointKind.DIGITAL)
         self.await_point(name, value, timeout)

@@ -11,7 +11,7 @@ from arcor2_hw.objects.small import IOPoint, OnLoss, PointDirection, PointKind
 
 OPTIONS: Final = {"DI": ("debounce",), "DO": ("on_loss",), "AI": ("scale", "unit"), "AO": ("scale", "unit", "on_loss")}
 """Options by kind of point: digital or analogue, input or output."""
-LONGEST_DEBOUNCE: Final = 10.0
+MAX_DEBOUNCE_TIME: Final = 10.0
 """Longest debounce time, s."""
 
 
@@ -94,12 +94,12 @@ def io_point(
     )
     if point.scale == 0.0:
         raise OutOfRange("{parameter} must not set scale of {name} to 0", parameter=parameter, name=name)
-    if not 0.0 <= point.debounce <= LONGEST_DEBOUNCE:
+    if not 0.0 <= point.debounce <= MAX_DEBOUNCE_TIME:
         raise OutOfRange(
             "{parameter} must set debounce of {name} to a value from 0 to {longest_debounce:g} s",
             parameter=parameter,
             name=name,
-            longest_debounce=LONGEST_DEBOUNCE,
+            longest_debounce=MAX_DEBOUNCE_TIME,
         )
     return point
 

@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 US: Final = "us"
 NOBODY: Final = Phrase.of("nobody has control")
-STANDS_WITHIN: Final = 1.0
+STANDSTILL_TIMEOUT: Final = 1.0
 """Time limit from a stop to standstill, s."""
 
 
@@ -50,7 +50,7 @@ class PolledControl(Connected, typing.Generic[T]):
     fresh_for: float = 0.5
     answers_within: float = 3.0
     """See StateObserver."""
-    stands_within: float = STANDS_WITHIN
+    stands_within: float = STANDSTILL_TIMEOUT
     """Time limit from a stop to standstill, s."""
     in_control: bool = False
     why_not: str = NOBODY

@@ -26,7 +26,7 @@ RESOLUTION: Final = 0.01
 """Maximum travel of any point of the robot between two checked configurations, m."""
 WITHIN: Final = 2.0
 """Time limit of planning, s."""
-MOST_TIME: Final = 4
+MAX_TIME: Final = 4
 """Maximum factor of the time limit after repeated failures."""
 FAILURES: Final = 100
 """Maximum number of goals whose failures are remembered; the oldest is dropped."""
@@ -40,7 +40,7 @@ Way = MotionPath  # object types in older packages use this name
 class SafeMoves(RobotKinematics):
     """Safe moves of one robot, and its kinematics: plan paths that are free of obstacles, and monitor them.
 
-    If no path to a goal is found within WITHIN, each repeat searches twice as long, at most MOST_TIME times WITHIN, and
+    If no path to a goal is found within WITHIN, each repeat searches twice as long, at most MAX_TIME times WITHIN, and
     with another seed.
     """
 
@@ -200,7 +200,7 @@ class SafeMoves(RobotKinematics):
 
         key = (arm.end_effector.link, goal.tobytes())
         failures = self._failures.get(key, 0)
-        within = WITHIN * min(2**failures, MOST_TIME)
+        within = WITHIN * min(2**failures, MAX_TIME)
         try:
             return search(start, goal, within=within, seed=failures, stopped=stopped)
         except NoPath:

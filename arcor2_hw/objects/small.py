@@ -24,7 +24,7 @@ from arcor2_hw.messages import translatable
 from arcor2_hw.objects.generic import Generic
 from arcor2_hw.objects.gripping import HoldsParts
 
-MOST_POINTS: Final = 32
+MAX_POINTS: Final = 32
 """Maximum number of points of an IOBlock among its observations."""
 
 
@@ -233,8 +233,8 @@ class IOBlock(Generic):
         """Read a point."""
 
     def observations(self) -> list[Observation]:
-        """Return the first MOST_POINTS points. A point that cannot be read has bad quality."""
-        return [self._observation(point) for point in self.points()[:MOST_POINTS]]
+        """Return the first MAX_POINTS points. A point that cannot be read has bad quality."""
+        return [self._observation(point) for point in self.points()[:MAX_POINTS]]
 
     def newest_value(self, name: str) -> Reading[bool | float]:
         """Return the newest value of a point without asking the device, if that is possible. Raises like `read`."""

@@ -23,12 +23,12 @@ from arcor2_hw.opcua.space import node_id
 
 MIB: Final = 1024 * 1024
 CHUNK: Final = 65535
-MOST_CONNECTIONS: Final = 32
-MOST_SUBSCRIPTIONS: Final = 128
-MOST_QUEUED: Final = 1000
+MAX_CONNECTIONS: Final = 32
+MAX_SUBSCRIPTIONS: Final = 128
+MAX_QUEUED: Final = 1000
 """Maximum queue of a monitored item."""
-LONGEST_MESSAGE: Final = 4 * MIB
-LIMITS: Final = TransportLimits(CHUNK, CHUNK, LONGEST_MESSAGE // CHUNK + 1, LONGEST_MESSAGE)
+MAX_MESSAGE: Final = 4 * MIB
+LIMITS: Final = TransportLimits(CHUNK, CHUNK, MAX_MESSAGE // CHUNK + 1, MAX_MESSAGE)
 _ACTIVATE: Final = node_id(ua.ObjectIds.ActivateSessionRequest_Encoding_DefaultBinary)
 _CREATE: Final = node_id(ua.ObjectIds.CreateSessionRequest_Encoding_DefaultBinary)
 _ACKNOWLEDGE: Final = node_id(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge)
@@ -145,9 +145,9 @@ class Internal(InternalServer):
         self.trusted, self.check, self.unencrypted = trusted, check, unencrypted
         self.acknowledge: AcknowledgeCondition
         self.interest: Interest
-        self.max_connections = MOST_CONNECTIONS
-        self.max_subscriptions = MOST_SUBSCRIPTIONS
-        self.max_monitored_item_queue_size = MOST_QUEUED
+        self.max_connections = MAX_CONNECTIONS
+        self.max_subscriptions = MAX_SUBSCRIPTIONS
+        self.max_monitored_item_queue_size = MAX_QUEUED
         self.bind_condition_methods = 1
         tokens = (ua.UserNameIdentityToken, ua.AnonymousIdentityToken)
         self.supported_tokens = tokens if anonymous else tokens[:1]  # type: ignore[assignment]

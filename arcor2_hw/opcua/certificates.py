@@ -23,7 +23,7 @@ REJECTED: Final = "opcua-rejected"
 VALID_DAYS: Final = 3650
 RENEW_DAYS: Final = 30
 """Remaining validity below which the certificate is renewed at the start, days."""
-MOST_REJECTED: Final = 50
+MAX_REJECTED: Final = 50
 """Maximum number of stored certificates that were rejected."""
 Issuer = tuple[x509.Certificate, ec.EllipticCurvePrivateKey]
 """An authority: its certificate and its key."""
@@ -168,7 +168,7 @@ class TrustedClients:
 
     def _store(self, certificate: bytes, client: x509.Certificate) -> None:
         file = self._rejected / f"{client.fingerprint(hashes.SHA256()).hex()}.der"
-        if not file.exists() and sum(1 for _ in self._rejected.iterdir()) < MOST_REJECTED:
+        if not file.exists() and sum(1 for _ in self._rejected.iterdir()) < MAX_REJECTED:
             file.write_bytes(certificate)
 
 

@@ -31,7 +31,7 @@ from arcor2_hw.plant.streams import decode_stream
 PATH: Final = "/arcor2hw/"
 ANSWER_TIMEOUT: Final = 10.0
 """Time limit for an answer of the server, s."""
-MOST_WAITING: Final = 4
+MAX_WAITING: Final = 4
 """Maximum number of updates that wait. Then nothing is read, and the server merges further changes."""
 
 
@@ -63,7 +63,7 @@ class Process:
         setup = await self._link.read()
         await self._start(setup)
         watch = asyncio.create_task(self._watch())
-        updates: asyncio.Queue[Update] = asyncio.Queue(MOST_WAITING)
+        updates: asyncio.Queue[Update] = asyncio.Queue(MAX_WAITING)
         apply = asyncio.create_task(self._apply_all(updates))
         try:
             while True:

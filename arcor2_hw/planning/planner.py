@@ -27,7 +27,7 @@ STEP: Final = 1.5
 """Maximum step of a tree, in joint values times their levers, m."""
 SEARCH_RANGE: Final = np.pi
 """Range of joint values beyond start and goals that is searched first, rad; longer detours are rarely useful."""
-MOST_GOALS: Final = 8
+MAX_GOALS: Final = 8
 SHORTCUTS: Final = 60
 IDLE: Final = 15
 """Number of failed shortcuts in a row after which shortening ends."""
@@ -128,7 +128,7 @@ class Planner:
         self._check_start(start)
         if hit := self.sweep.hit(start):
             raise StartInCollision("{name} is in collision at the start: {hit}.", name=self.name, hit=hit)
-        goals = sorted(goals, key=lambda q: self._length([start, q]))[:MOST_GOALS]
+        goals = sorted(goals, key=lambda q: self._length([start, q]))[:MAX_GOALS]
         for goal in goals:
             if self.sweep.is_free_between(start, goal):
                 return [start, goal]

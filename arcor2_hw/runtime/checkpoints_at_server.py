@@ -9,7 +9,7 @@ from arcor2_hw.data.parts import PartBooks
 from arcor2_hw.exceptions import StorageError
 from arcor2_hw.runtime import messages as m
 
-ANSWER_WITHIN: Final = 5.0
+ANSWER_TIMEOUT: Final = 5.0
 """Time limit for the server to store a checkpoint, s; its disk may be busy."""
 
 
@@ -42,7 +42,7 @@ class CheckpointsAtServer:
     def _request(self, message: Callable[[int], m.ToServer]) -> m.CheckpointAnswer:
         self._number += 1
         self._post(message(self._number))
-        limit = time.monotonic() + ANSWER_WITHIN
+        limit = time.monotonic() + ANSWER_TIMEOUT
         while not self._lost:
             try:
                 answer = self._answers.get(timeout=max(0.0, limit - time.monotonic()))

@@ -29,7 +29,7 @@ from arcor2_hw.runtime.identification import Identification
 from arcor2_hw.runtime.lane import Job, Lane
 from arcor2_hw.runtime.methods import OBSERVING, STOP_RACE_TIME, overrides, stop_of
 from arcor2_hw.runtime.own_process.process import START_TIMEOUT, DeviceProcess
-from arcor2_hw.runtime.remote_objects import CONNECT_WITHIN
+from arcor2_hw.runtime.remote_objects import CONNECT_TIMEOUT
 from arcor2_hw.runtime.values import decode_arguments
 
 CONSTRUCTION_DEADLINE: Final = 10.0
@@ -105,7 +105,7 @@ class Device:
         cls = self.recipe.cls
         deadline = connect_timeout(cls) + (1.0 if overrides(cls, "connect") else CONSTRUCTION_DEADLINE)
         if self.remote:
-            deadline += CONNECT_WITHIN
+            deadline += CONNECT_TIMEOUT
         elif cls.own_process:
             deadline += START_TIMEOUT
         job = self._opening = Job("connect", self._open, notify=notify)

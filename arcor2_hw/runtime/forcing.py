@@ -25,7 +25,7 @@ from arcor2_hw.runtime.lane import Job
 
 CHECK_PERIOD: Final = 0.25
 """Period at which the connection and the control of devices with forced outputs are checked, s."""
-READ_WITHIN: Final = 1.0
+READ_TIMEOUT: Final = 1.0
 """Time for reading the value of an output before it is forced, s."""
 READ_POLL: Final = 0.01
 WRITTEN_WITHIN: Final = 2.0
@@ -242,6 +242,6 @@ def _present(force: _Force, instance: Generic) -> LivePoint:
         read_at = 0.0 if isinstance(point.age, Unset) else time.monotonic() - point.age
         if point.value is not None and read_at >= began:
             return point
-        if time.monotonic() > began + READ_WITHIN:
+        if time.monotonic() > began + READ_TIMEOUT:
             raise Refused("{device}: the present value of {point} is not known", **force.names)
         time.sleep(READ_POLL)

@@ -60,7 +60,7 @@ SCRIPT_END_TIMEOUT: Final = 5.0
 """Time that a script has to end after the connection of a device is lost, s."""
 EVENT_WAIT: Final = 1.0
 """Longest time that an event of the program waits for a slow server, s."""
-FORCES_END_WITHIN: Final = 0.5
+FORCES_END_TIMEOUT: Final = 0.5
 """Time to switch forced outputs back before their devices are disconnected, s."""
 NICENESS: Final = -5
 """Niceness of this process: devices have priority over user interfaces."""
@@ -179,7 +179,7 @@ class Host:
             or any(device.lane.busy_with or device.moving for device in self._cell)
         )
         self._interlocks.close()
-        self._forces.end_all(FORCES_END_WITHIN)
+        self._forces.end_all(FORCES_END_TIMEOUT)
         stopped = wait_stopped(self._cell.stop_all(), 0.5) if active else None
         problem = self._cell.close() or stopped
         self.link.post(m.SceneClosed(None if problem is None else error_data(problem)))

@@ -15,7 +15,7 @@ from typing import Final
 from arcor2_hw.data.discovery import Found
 from arcor2_hw.exceptions import InvalidData
 
-MOST_ADDRESSES: Final = 256
+MAX_ADDRESSES: Final = 256
 """Maximum number of addresses of one search."""
 ANSWER_TIME: Final = 1.0
 """Time in which a device at one address accepts a connection and answers, s."""
@@ -39,7 +39,7 @@ def addresses_of(text: str) -> list[str]:
     """Return the addresses in a text of addresses and networks, separated by commas or spaces, each once.
 
     Raises:
-        InvalidData: There is none, one is not valid or not private, or there are more than MOST_ADDRESSES.
+        InvalidData: There is none, one is not valid or not private, or there are more than MAX_ADDRESSES.
     """
     found: dict[str, None] = {}
     for word in text.replace(",", " ").split():
@@ -52,9 +52,9 @@ def addresses_of(text: str) -> list[str]:
         if not network.is_private:
             raise InvalidData("{address} is outside of private networks and is not searched.", address=word)
         hosts = [network.network_address] if network.num_addresses == 1 else network.hosts()
-        found |= dict.fromkeys(map(str, itertools.islice(hosts, MOST_ADDRESSES + 1)))
-        if len(found) > MOST_ADDRESSES:
-            raise InvalidData("At most {most} addresses are searched at once.", most=MOST_ADDRESSES)
+        found |= dict.fromkeys(map(str, itertools.islice(hosts, MAX_ADDRESSES + 1)))
+        if len(found) > MAX_ADDRESSES:
+            raise InvalidData("At most {most} addresses are searched at once.", most=MAX_ADDRESSES)
     if not found:
         raise InvalidData("Enter the addresses to be searched.")
     return list(found)

@@ -25,9 +25,9 @@ from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.part_tracking import PartTracking, Step
 from arcor2_hw.runtime.values import results
 
-LONGEST_RESULT: Final = 10_000
+MAX_RESULT: Final = 10_000
 """Length of results that are stored in checkpoints, characters. Longer ones are not stored."""
-MOST_DONE: Final = 300
+MAX_STORED_ACTIONS: Final = 300
 """Number of actions of a cycle that are stored. A program whose cycle has more cannot continue."""
 _STORED: Final = (bool, int, float, str, enum.Enum, Pose, Position, Orientation)
 """Types of results that are stored in checkpoints."""
@@ -80,7 +80,7 @@ class RunRecord:
         """Actions that have failed, about which a person has to decide, by branch and id."""
         self._interrupted = False
         self._done: list[DoneAction] = []
-        """What the present cycle has done; at most MOST_DONE actions."""
+        """What the present cycle has done; at most MAX_STORED_ACTIONS actions."""
         self._cycle_call = 0
         """Number of the call with which the present cycle has started; 0 if it started with an action."""
         self.continues, self._continue_at = continues, continue_at
@@ -270,7 +270,7 @@ class RunRecord:
 
     def _append(self, done: DoneAction) -> None:
         self._held.pop((done.branch, done.action_id), None)
-        if len(self._done) < MOST_DONE:
+        if len(self._done) < MAX_STORED_ACTIONS:
             self._done.append(done)
         else:
             self._run = replace(self._run, complete=False)
@@ -361,4 +361,4 @@ def _stored(value: Any) -> list[str]:
     if not all(isinstance(member, _STORED) for member in members):
         return []
     found = results(value)
-    return found if sum(map(len, found)) <= LONGEST_RESULT else []
+    return found if sum(map(len, found)) <= MAX_RESULT else []

@@ -34,7 +34,7 @@ READ_PERIOD: Final = 0.05
 """Least time between two conversions of the state of a device to points, s."""
 JOINT_DIGITS: Final = 4
 """Decimal places of recorded joints, rad or m: noise of a robot at standstill is not recorded."""
-LONGEST_EVENT: Final = 4096
+MAX_EVENT: Final = 4096
 """Length of the events whose results are recorded, bytes."""
 SHOWN_BINARY: Final = frozenset({"gripped", "red", "amber", "green", "blue", "white"})
 """Names of shown values (`Generic.shown_values`) that are on or off."""
@@ -169,7 +169,7 @@ class Recorder:
         """Record the end of an action. event: the encoded ActionStateAfter."""
         if self._ring is None:
             return
-        record = ActionEnded(time.monotonic(), number, waited, error, event if len(event) <= LONGEST_EVENT else b"")
+        record = ActionEnded(time.monotonic(), number, waited, error, event if len(event) <= MAX_EVENT else b"")
         with self._lock:
             if self._running.pop(number, None) is not None:
                 self._append(record)

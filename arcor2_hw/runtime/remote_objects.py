@@ -35,9 +35,9 @@ from arcor2_hw.runtime.methods import stop_name
 from arcor2_hw.runtime.own_process.stubs import object_stub, stub_class
 from arcor2_hw.runtime.values import decode_result
 
-CONNECT_WITHIN: Final = 40.0
+CONNECT_TIMEOUT: Final = 40.0
 """Time limit for another host to load the type of an object and to connect it, s; that host has shorter ones."""
-ANSWER_WITHIN: Final = 10.0
+ANSWER_TIMEOUT: Final = 10.0
 """Time after the deadline of a call at which the wait for its answer ends, s. The server answers earlier."""
 _CONNECTED: Final = (Connection.ONLINE, Connection.BACK)
 
@@ -145,7 +145,7 @@ class RemoteObjects:
         if self._over:
             raise ConnectionLost("The connection to the server was lost.")
         self._post(m.RemoteCall(number, object_id, method, arguments, kind, deadline, self._stops))
-        if not waiting.ended.wait(None if deadline is None else deadline + ANSWER_WITHIN):
+        if not waiting.ended.wait(None if deadline is None else deadline + ANSWER_TIMEOUT):
             self._calls.pop(number, None)
             raise DeviceTimeout("{method} was not answered within {deadline:g} s", method=method, deadline=deadline)
         answer = waiting.answer
@@ -233,7 +233,7 @@ class RemoteObject:
         """Wait until the other host has connected the object. Raises NotConnected with the reason if it cannot."""
         ended = (*_CONNECTED, Connection.FAILED)
         with self._news:
-            self._news.wait_for(lambda: self._state.connection in ended or self._remotes.over, CONNECT_WITHIN)
+            self._news.wait_for(lambda: self._state.connection in ended or self._remotes.over, CONNECT_TIMEOUT)
             state = self._state
         if state.connection not in _CONNECTED:
             if state.reason is not None:

@@ -24,7 +24,7 @@ TOLERANCE: Final = 0.003
 """Distance by which a robot may move back while it leaves, m: noise of its readings."""
 STEP: Final = 0.01
 """Length of the motion for which the progress of a velocity is computed, m."""
-LEAST_PROGRESS: Final = 0.3
+MIN_PROGRESS: Final = 0.3
 """Smallest part of a motion that has to lead out of each zone."""
 REACHED: Final = 0.005
 """Distance to a point of the path at which it counts as reached, m."""
@@ -135,7 +135,7 @@ class Leaving:
             return lease, 1.0
         step = Position(*(STEP * each / speed for each in lease.twist[:3]))
         for zone, way in self._ways.items():
-            if way.remaining(tips) - way.remaining([tip + step for tip in tips]) < LEAST_PROGRESS * STEP:
+            if way.remaining(tips) - way.remaining([tip + step for tip in tips]) < MIN_PROGRESS * STEP:
                 raise Interlocked(
                     "{device} may only move out of the zone {zone}, not deeper.", device=self._device, zone=zone
                 )

@@ -24,7 +24,7 @@ OUTCOMES: pytest.StashKey[Outcomes] = pytest.StashKey()
 STATUS: pytest.StashKey[int] = pytest.StashKey()
 HANGING: list[Bench] = []
 """Benches on which a call did not return."""
-RELEASE_WITHIN = 10.0
+RELEASE_TIMEOUT = 10.0
 """Time in which the objects of a case are disconnected, s."""
 COLLECTED: pytest.StashKey[Mapping[str, frozenset[str]]] = pytest.StashKey()
 """Names of collected tests by path of their file."""
@@ -245,7 +245,7 @@ def arcor2_identity(request: pytest.FixtureRequest, arcor2_running_bench: Bench)
     except Arcor2Error:
         return {}
     finally:
-        _within(bench, RELEASE_WITHIN, bench.release, "disconnecting after reading the identity")
+        _within(bench, RELEASE_TIMEOUT, bench.release, "disconnecting after reading the identity")
     return {"vendor": who.vendor, "model": who.model, "serial": who.serial, "firmware": who.firmware}
 
 
@@ -258,7 +258,7 @@ def arcor2_bench(
     values = _values(request.node)
     values |= {"address": bench.address, "identity": arcor2_identity, "folder": str(bench.quality_file().parent)}
     case = values["case"]
-    if bench.hanging is not None and not bench.hanging.returned(RELEASE_WITHIN):
+    if bench.hanging is not None and not bench.hanging.returned(RELEASE_TIMEOUT):
         pytest.fail(f"{bench.name()}: {case} was not run, because of a call that hangs: {bench.hanging}", pytrace=False)
     _check_hooks(request, bench, values)
     try:
@@ -266,7 +266,7 @@ def arcor2_bench(
         yield bench
     finally:
         try:
-            _within(bench, RELEASE_WITHIN, bench.release, f"disconnecting after the case {case}")
+            _within(bench, RELEASE_TIMEOUT, bench.release, f"disconnecting after the case {case}")
         finally:
             _within(bench, bench.case_within, bench.reset, f"the reset after the case {case}")
 

@@ -22,9 +22,9 @@ from benchmarks.books.faults import Faults
 from benchmarks.books.places import NAMES, PICKS, PLACES, REPORTS
 from tests.e2e.harness import until
 
-DELIVERED_WITHIN: Final = 60.0
+DELIVERY_TIMEOUT: Final = 60.0
 """Time within which the planning service receives stored results, s."""
-DECIDED_WITHIN: Final = 40.0
+DECISION_TIMEOUT: Final = 40.0
 """Time within which a decision is accepted: a device reconnects, a controller restarts, s."""
 TRIES: Final = 6
 """Attempts of one action after which the operator ends the program."""
@@ -62,7 +62,7 @@ class Operator:
             held = shown  # with fewer choices after the confirmation
         choice, results = await self._choose(client, held, tries)
         await self._checks.still(still, f"while held at {held.action_name}")
-        deadline = time.monotonic() + DECIDED_WITHIN
+        deadline = time.monotonic() + DECISION_TIMEOUT
         while not self._faults.killed.is_set():
             await self._acknowledge(client, held)
             try:
@@ -76,7 +76,7 @@ class Operator:
                         self._checks.result.unresolved, f"{held.action_name}: {choice} is refused: {error}"
                     )
                     choice, results = HoldChoice.END, []
-                    deadline += DECIDED_WITHIN
+                    deadline += DECISION_TIMEOUT
                 await asyncio.sleep(0.2)
                 await self._faults.cure(device)
             else:
@@ -127,7 +127,7 @@ class Operator:
     async def _is_reported(self, name: str, boards: list[dict[str, Any]]) -> bool:
         """Return whether the planning service has the result of the newest board in a box, or receives it soon."""
         await self._faults.cure("erp")  # the sender of the held program delivers results that are stored
-        await until(lambda: not self._cell.waiting_results(), "the results to be delivered", DELIVERED_WITHIN)
+        await until(lambda: not self._cell.waiting_results(), "the results to be delivered", DELIVERY_TIMEOUT)
         results = (await self._cell.command("erp", "truth"))["results"]
         boxed = [board for board in boards if board["place"] in ("good", "bad")]
         if name == "report_unread":
@@ -154,7 +154,7 @@ class Operator:
 
     async def _send_confirmation(self, client: Client, scene_id: str, found: list[ConfirmedPart]) -> None:
         """Confirm parts. Actions of other branches may still run; the server refuses it until they have ended."""
-        deadline = time.monotonic() + DECIDED_WITHIN
+        deadline = time.monotonic() + DECISION_TIMEOUT
         while True:
             try:
                 await client.confirm_parts(scene_id=scene_id, parts=found)

@@ -17,7 +17,7 @@ from arcor2_hw.exceptions import Arcor2Error
 from benchmarks.books.cell import Cell, waiting
 from benchmarks.books.checks import Checks, Result
 from benchmarks.books.faults import Faults
-from benchmarks.books.operator import DECIDED_WITHIN, DELIVERED_WITHIN, Operator
+from benchmarks.books.operator import DECISION_TIMEOUT, DELIVERY_TIMEOUT, Operator
 from tests.e2e.harness import until
 
 SILENT_AFTER: Final = 60.0
@@ -79,7 +79,7 @@ class Trial:
             await self._checks.still(still, "after an interruption")
 
     async def _start(self, client: Client) -> None:
-        deadline = time.monotonic() + DECIDED_WITHIN
+        deadline = time.monotonic() + DECISION_TIMEOUT
         while True:
             try:
                 runs = [books.run for books in await client.get_parts()]
@@ -148,7 +148,7 @@ class Trial:
         async with Client(self._cell.url, "operator", reconnect=False) as client:
             await self._operator.confirm(client)
             await self._start(client)
-            await until(lambda: not self._cell.waiting_results(), "the results to be delivered", DELIVERED_WITHIN)
+            await until(lambda: not self._cell.waiting_results(), "the results to be delivered", DELIVERY_TIMEOUT)
 
             async def stopped() -> bool:
                 with contextlib.suppress(RequestFailed):  # while it starts
@@ -156,4 +156,4 @@ class Trial:
                     return True
                 return False
 
-            await until(stopped, "the program to be stopped", DECIDED_WITHIN)
+            await until(stopped, "the program to be stopped", DECISION_TIMEOUT)

@@ -6,8 +6,8 @@ import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
 import { expect, test } from "vitest";
 
-const LONGEST_LINE = 120;
-const LONGEST_FILE = 400;
+const MAX_LINE = 120;
+const MAX_FILE = 400;
 
 const FILES = readdirSync(import.meta.dirname, { recursive: true, encoding: "utf8" })
   .filter((name) => /\.tsx?$/.test(name) && !name.endsWith("protocol/types.ts"))
@@ -20,13 +20,13 @@ const FILES = readdirSync(import.meta.dirname, { recursive: true, encoding: "utf
 
 test("lines are short", () => {
   const long = FILES.flatMap(({ name, lines }) =>
-    lines.flatMap((line, n) => (line.length > LONGEST_LINE ? [`${name}:${n + 1}`] : [])),
+    lines.flatMap((line, n) => (line.length > MAX_LINE ? [`${name}:${n + 1}`] : [])),
   );
   expect(long).toEqual([]);
 });
 
 test("files are short", () => {
-  const long = FILES.filter(({ lines }) => lines.length > LONGEST_FILE).map(({ name }) => name);
+  const long = FILES.filter(({ lines }) => lines.length > MAX_FILE).map(({ name }) => name);
   expect(long).toEqual([]);
 });
 

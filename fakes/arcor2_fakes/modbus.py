@@ -16,11 +16,11 @@ from arcor2_fakes.wire import Connection, TcpWire
 
 SILENCE: Final = 0.05
 """Silence that ends an RTU frame, s. On a real line it is 3.5 characters; the host of a pty may be scheduled late."""
-_LONGEST_RTU_FRAME: Final = 256
+_MAX_RTU_FRAME: Final = 256
 _BROADCAST: Final = 0
 _TCP_UNITS: Final = (0, 255)
 """Unit ids with which a TCP host addresses the device at this IP address, besides the device's own."""
-_MOST_BITS_READ, _MOST_BITS_WRITTEN, _MOST_READ, _MOST_WRITTEN, _MOST_WRITTEN_WITH_READ = 2000, 1968, 125, 123, 121
+_MAX_BITS_READ, _MAX_BITS_WRITTEN, _MAX_READ, _MAX_WRITTEN, _MAX_WRITTEN_WITH_READ = 2000, 1968, 125, 123, 121
 _COIL_ON: Final = 0xFF00
 _READ_IDENTIFICATION: Final = 0x0E
 _CONFORMITY: Final = 0x82
@@ -135,7 +135,7 @@ class ModbusTables:
     def _execute(self, function: int, data: bytes) -> bytes:
         match function:
             case 1 | 2:
-                first, count = self._checked(function, _MOST_BITS_READ, *struct.unpack(">HH", data))
+                first, count = self._checked(function, _MAX_BITS_READ, *struct.unpack(">HH", data))
                 bits = self.read_coils() if function == 1 else self.read_discrete_inputs()
                 return _with_length(_packed(bits[first : first + count]))
             case 3 | 4:
@@ -152,12 +152,12 @@ class ModbusTables:
             case 15:
                 address, count, size = struct.unpack_from(">HHB", data)
                 _check(size == (count + 7) // 8 == len(data) - 5)
-                self._checked(function, _MOST_BITS_WRITTEN, address, count)
+                self._checked(function, _MAX_BITS_WRITTEN, address, count)
                 packed = int.from_bytes(data[5:], "little")
                 self.write_coils(address, [bool(packed >> place & 1) for place in range(count)])
                 return data[:4]
             case 16:
-                self._write_registers(function, data, _MOST_WRITTEN)
+                self._write_registers(function, data, _MAX_WRITTEN)
                 return data[:4]
             case 22:
                 address, kept, set_ = struct.unpack(">HHH", data)
@@ -166,9 +166,9 @@ class ModbusTables:
                 self.write_holding_registers(address, [value & kept | set_ & ~kept & 0xFFFF])
             case 23:
                 first, count, _, written, size = struct.unpack_from(">HHHHB", data)
-                _check(1 <= written <= _MOST_WRITTEN_WITH_READ and size == 2 * written)
-                self._checked(function, _MOST_READ, first, count)
-                self._write_registers(function, data[4:], _MOST_WRITTEN_WITH_READ)
+                _check(1 <= written <= _MAX_WRITTEN_WITH_READ and size == 2 * written)
+                self._checked(function, _MAX_READ, first, count)
+                self._write_registers(function, data[4:], _MAX_WRITTEN_WITH_READ)
                 return self._read_registers(function, first, count)
             case _:
                 return self._identification(data)
@@ -182,7 +182,7 @@ class ModbusTables:
         return address, count
 
     def _read_registers(self, function: int, address: int, count: int) -> bytes:
-        self._checked(function, _MOST_READ, address, count)
+        self._checked(function, _MAX_READ, address, count)
         words = self.read_registers(function, address, count)
         return _with_length(b"".join((word & 0xFFFF).to_bytes(2) for word in words))
 
@@ -289,7 +289,7 @@ class RtuFrames:
             frame = bytes(self._buffer[:length])
             del self._buffer[:length]
             self._execute(frame)
-        del self._buffer[_LONGEST_RTU_FRAME + 1 :]
+        del self._buffer[_MAX_RTU_FRAME + 1 :]
         self._timer = self._loop.call_later(SILENCE, self._silent) if self._buffer else None
 
     def _silent(self) -> None:

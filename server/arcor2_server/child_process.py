@@ -16,7 +16,7 @@ from typing import Final
 
 from arcor2_hw.messages import Message
 
-LONGEST_LINE: Final = 64 * 1024
+MAX_LINE: Final = 64 * 1024
 """Maximum length of a line of output, bytes; the rest of a longer line is dropped."""
 _CHUNK: Final = 65536
 _PREFIX: Final = "arcor2-hw-child-"
@@ -150,7 +150,7 @@ class ChildProcess:
             await self.wait()
             raise
 
-    async def output(self, longest: int = LONGEST_LINE) -> AsyncIterator[str]:
+    async def output(self, longest: int = MAX_LINE) -> AsyncIterator[str]:
         """Yield the lines that the process prints, each cut at `longest` bytes, until it closes its output."""
         stream = self._process.stdout
         assert stream is not None

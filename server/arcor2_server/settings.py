@@ -22,7 +22,7 @@ API_VERSION: Final = "1.1.0"
 MIB: Final = 1024 * 1024
 CELL_NAME: Final = re.compile(r"[a-z0-9][a-z0-9_-]{0,62}")
 """A name of a cell. It is part of subjects of the broker, in which dots, spaces and wildcards have a meaning."""
-LONGEST_LIFE_TIMEOUT: Final = 60.0
+MAX_LIFE_TIMEOUT: Final = 60.0
 """Longest time limit of the PLC's life counter, s."""
 DATABASE_URL: Final = "ARCOR2_HW_DATABASE_URL"
 """The variable with the address of the database."""
@@ -338,9 +338,9 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
             except msgspec.ValidationError as error:
                 raise InvalidData("{variable}={text!r}: {reason}", variable=variable, text=text, reason=error) from None
         values.update((name, value) for name, value in given.items() if value is not None)
-        if not 0 < values.get("plc_life_timeout", 1) <= LONGEST_LIFE_TIMEOUT:
+        if not 0 < values.get("plc_life_timeout", 1) <= MAX_LIFE_TIMEOUT:
             raise InvalidData(
-                "ARCOR2_HW_PLC_LIFE_TIMEOUT is not in the range above 0 to {longest} s.", longest=LONGEST_LIFE_TIMEOUT
+                "ARCOR2_HW_PLC_LIFE_TIMEOUT is not in the range above 0 to {longest} s.", longest=MAX_LIFE_TIMEOUT
             )
         for name, least in _LEAST.items():
             if values.get(name, least) < least:

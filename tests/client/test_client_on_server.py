@@ -31,7 +31,7 @@ from arcor2_hw.data.role import Role
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Conflict, ConnectionLost, NotFound
 from arcor2_server.access.tokens import TokenFile
-from tests.server.core.serving import COMMAND, READY_WITHIN, ServerProcess, running
+from tests.server.core.serving import COMMAND, READY_TIMEOUT, ServerProcess, running
 
 
 @pytest.fixture
@@ -196,7 +196,7 @@ class Killed:
             stderr=asyncio.subprocess.DEVNULL,
         )
         assert self.process.stdout is not None
-        async with asyncio.timeout(READY_WITHIN):
+        async with asyncio.timeout(READY_TIMEOUT):
             url = (await self.process.stdout.readline()).decode().split()[1]
         self.port = url.rpartition(":")[2]
         return url

@@ -24,7 +24,7 @@ _TYPES = {5120: "i1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _SIZES = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 BALL = trimesh.creation.icosphere(subdivisions=5, radius=0.05)
 TRIANGLES_OF_BALL = 20_480
-MOST_OF_BALL = 13_856
+MAX_OF_BALL = 13_856
 """For the 0.173 m from corner to corner of the box around it."""
 
 
@@ -74,7 +74,7 @@ def exported(mesh: trimesh.Trimesh, kind: str) -> bytes:
 @pytest.mark.parametrize("kind", ["stl", "obj", "ply", "off", "dae", "glb"])
 def test_a_fine_sphere_is_simplified_in_every_file_format(kind: str, tmp_path: Path) -> None:
     made, steps = prepare(tmp_path, exported(BALL, kind), f"ball.{kind}")
-    assert (made.before, made.triangles) == (TRIANGLES_OF_BALL, MOST_OF_BALL)
+    assert (made.before, made.triangles) == (TRIANGLES_OF_BALL, MAX_OF_BALL)
     ball = Glb(made.content).meshes["mesh"]
     assert len(ball["indices"]) == 3 * made.triangles
     radii = np.linalg.norm(ball["POSITION"], axis=1)
@@ -138,7 +138,7 @@ def test_simplification_keeps_face_colours_in_place(tmp_path: Path) -> None:
     content = exported(painted(), "ply")
     made, _ = prepare(tmp_path, content, "ball.ply")
     ball = Glb(made.content).meshes["mesh"]
-    assert made.triangles <= MOST_OF_BALL
+    assert made.triangles <= MAX_OF_BALL
     red, grey = linear_of((np.array(((200, 30, 30), (128, 128, 128))) / 255).astype(np.float32))
     height = ball["POSITION"][:, 2]
     assert np.allclose(ball["COLOR_0"][height > 0.004, :3], red, atol=1e-3)
@@ -227,7 +227,7 @@ def test_a_robot_has_a_description_and_one_mesh_per_visual_file(tmp_path: Path) 
 
 
 def test_the_meshes_of_a_robot_share_one_triangle_budget(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mesh_functions, "MOST_OF_ROBOT", 20_000)
+    monkeypatch.setattr(mesh_functions, "MAX_TRIANGLES_OF_ROBOT", 20_000)
     names = [f"m{number}" for number in range(4)]
     links = "".join(
         f'<link name="{name}"><visual><geometry><mesh filename="{name}.stl"/></geometry></visual></link>'

@@ -18,8 +18,8 @@ SETUP = m.Setup(m.Broker("localhost", 1883), m.Sparkplug("group", "node"), "pref
 
 def test_the_page_states_the_limits() -> None:
     numbers = {
-        r"up to (\d+) values are stored": edge_node.MOST_WAITING,
-        r"up to (\d+) results and changes": plain.MOST_EVENTS,
+        r"up to (\d+) values are stored": edge_node.MAX_WAITING,
+        r"up to (\d+) results and changes": plain.MAX_EVENTS,
         r"no new value for (\d+) s": STALE_AFTER,
         r"does not answer for (\d+) s": STALE_AFTER,
         r"tried again after (\d+) s": link.FIRST_PAUSE,
@@ -30,7 +30,7 @@ def test_the_page_states_the_limits() -> None:
     for pattern, number in numbers.items():
         (found,) = re.findall(pattern.replace(" ", r"\s+"), PAGE)
         assert float(found) == number, pattern
-    assert re.findall(r"later after up to (\d+) s", PAGE) == [f"{link.LONGEST_PAUSE:.0f}"] * 2
+    assert re.findall(r"later after up to (\d+) s", PAGE) == [f"{link.MAX_PAUSE:.0f}"] * 2
     named = re.findall(r"characters `([^`]*)`", PAGE)[0].split()
     assert set(named) == _NOT_ALLOWED - {"\0"}
 

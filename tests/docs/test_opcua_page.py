@@ -15,12 +15,12 @@ PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "opcua.md").read_text()
 
 def test_the_page_states_the_limits_of_the_server() -> None:
     numbers = {
-        r"at most (\d+) connections": access.MOST_CONNECTIONS,
-        r"and (\d+) subscriptions": access.MOST_SUBSCRIPTIONS,
-        r"text of at most (\d+) characters": requests.LONGEST_REQUEST_ID,
-        r"The last (\d+) are stored": plc.MOST_PLANT_REQUESTS,
+        r"at most (\d+) connections": access.MAX_CONNECTIONS,
+        r"and (\d+) subscriptions": access.MAX_SUBSCRIPTIONS,
+        r"text of at most (\d+) characters": requests.MAX_REQUEST_ID,
+        r"The last (\d+) are stored": plc.MAX_PLANT_REQUESTS,
         r"does not answer for (\d+) s": messages.STALE_AFTER,
-        r"later after up to (\d+) s": plant.LONGEST_PAUSE,
+        r"later after up to (\d+) s": plant.MAX_PAUSE,
     }
     for pattern, number in numbers.items():
         (found,) = re.findall(pattern, PAGE)

@@ -15,7 +15,7 @@ from tests.editor.screen import Screen, screen_of
 
 pytestmark = [pytest.mark.asyncio(loop_scope="session"), pytest.mark.timeout(400)]
 
-MOST_TAPS: Final = 60
+MAX_TAPS: Final = 60
 """Before the devices were added in one form and actions connected themselves, the task took 141."""
 
 
@@ -169,7 +169,7 @@ async def test_from_an_empty_server_to_a_stepped_program(cell: Cell, browser: Br
         await expect(trace).not_to_have_count(before)
         await expect(bar).to_contain_text("Paused")
         await screen.picture("first hour paused")
-        assert user.taps <= MOST_TAPS
+        assert user.taps <= MAX_TAPS
 
         # Undo survives saving and running; an action and its connections are one step.
         await bar.get_by_role("button", name=texts.STOP, exact=True).click()

@@ -16,8 +16,8 @@ from arcor2_fakes.control import BlockingControlClient
 from tests import waiting
 from tests.forking import Forked, Forker
 
-READY_WITHIN = 60.0  # s; imports take long on a busy machine, above all OPC UA
-ENDS_WITHIN = 30.0  # s
+READY_TIMEOUT = 60.0  # s; imports take long on a busy machine, above all OPC UA
+END_TIMEOUT = 30.0  # s
 
 
 _forker = Forker()
@@ -50,7 +50,7 @@ class FakeProcess:
 
     def _first_line(self) -> bytes:
         assert self.process.stdout is not None
-        readable, _, _ = select.select([self.process.stdout], [], [], READY_WITHIN)
+        readable, _, _ = select.select([self.process.stdout], [], [], READY_TIMEOUT)
         return self.process.stdout.readline() if readable else b""
 
     @property
@@ -67,7 +67,7 @@ class FakeProcess:
     def terminate(self) -> int:
         """End it like an operator; return the exit status."""
         self.process.terminate()
-        return self.process.wait(ENDS_WITHIN)
+        return self.process.wait(END_TIMEOUT)
 
     def __enter__(self) -> Self:
         """Open the control channel, so that it stays open for all tests that share the fake."""

@@ -10,7 +10,7 @@ import pytest
 from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.runtime.network_search import (
     ANSWER_TIME,
-    MOST_ADDRESSES,
+    MAX_ADDRESSES,
     addresses_of,
     modbus_device,
     search,
@@ -43,8 +43,8 @@ def test_addresses_and_networks_are_listed(text: str, addresses: list[str]) -> N
         ("192.168.1.300", "not an address"),
         ("8.8.8.8", "outside of private networks"),
         ("0.0.0.0/0", "outside of private networks|At most"),
-        ("10.0.0.0/8", f"At most {MOST_ADDRESSES} addresses"),
-        ("192.168.0.0/24, 192.168.1.0/24", f"At most {MOST_ADDRESSES} addresses"),
+        ("10.0.0.0/8", f"At most {MAX_ADDRESSES} addresses"),
+        ("192.168.0.0/24, 192.168.1.0/24", f"At most {MAX_ADDRESSES} addresses"),
     ],
 )
 def test_other_texts_and_too_many_addresses_are_refused(text: str, reason: str) -> None:

@@ -9,7 +9,7 @@ from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc.envelope import Rpc
 
-LONGEST_SHELVING: Final = 28_800.0
+MAX_SHELVING_TIME: Final = 28_800.0
 """Longest time for which an alarm can be shelved, s: one shift."""
 Note = Annotated[str, Meta(max_length=500)]
 
@@ -41,7 +41,7 @@ class ShelveAlarmArgs(Data, frozen=True):
     """Arguments of ShelveAlarm: number of the record, time in s (0 ends the shelving), and a note."""
 
     number: int
-    seconds: Annotated[float, Meta(ge=0.0, le=LONGEST_SHELVING)]
+    seconds: Annotated[float, Meta(ge=0.0, le=MAX_SHELVING_TIME)]
     note: Note = ""
 
 

@@ -5,7 +5,7 @@ from typing import Annotated, Final
 from msgspec import Meta
 
 from arcor2_hw.data.base import Data
-from arcor2_hw.data.cell_state import MOST_JOBS, CellAuthority, CellJob, CellMode, CellStatus
+from arcor2_hw.data.cell_state import MAX_JOBS, CellAuthority, CellJob, CellMode, CellStatus
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc.envelope import Rpc
 
@@ -25,7 +25,7 @@ class SetCellAuthorityArgs(Data, frozen=True):
 class SetCellJobsArgs(Data, frozen=True):
     """Arguments of SetCellJobs: all jobs."""
 
-    jobs: Annotated[list[CellJob], Meta(max_length=MOST_JOBS)]
+    jobs: Annotated[list[CellJob], Meta(max_length=MAX_JOBS)]
 
 
 CELL_RPCS: Final = (

@@ -10,7 +10,7 @@ from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc.envelope import Rpc
 from arcor2_hw.data.rpc.robots import RobotEventKind
 
-LONGEST_LEASE_MS: Final = 300
+MAX_LEASE_MS: Final = 300
 """Maximum time after which a hold that is not renewed ends, ms."""
 FASTEST_STREAM: Final = 30
 """Maximum rate of a stream, Hz."""

@@ -5,16 +5,16 @@ from typing import Annotated, Final
 from msgspec import Meta
 
 from arcor2_hw.data.base import Data
-from arcor2_hw.data.points import LONGEST_FORCE_MS, SHORTEST_FORCE_MS
+from arcor2_hw.data.points import MAX_FORCE_MS, MIN_FORCE_MS
 from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc.envelope import Rpc
 
 FASTEST_POINTS: Final = 5.0
 """Maximum rate of points, Hz."""
-MOST_RENEWED: Final = 500
+MAX_RENEWED: Final = 500
 """Maximum number of forces that one request renews."""
 
-ForceTime = Annotated[int, Meta(ge=SHORTEST_FORCE_MS, le=LONGEST_FORCE_MS)]
+ForceTime = Annotated[int, Meta(ge=MIN_FORCE_MS, le=MAX_FORCE_MS)]
 
 
 class StreamPointsArgs(Data, frozen=True):
@@ -47,7 +47,7 @@ class ForcePointData(Data, frozen=True):
 class RenewForcesArgs(Data, frozen=True):
     """Arguments of RenewForces: forces of this client, and their duration from now unless they are renewed again."""
 
-    ids: Annotated[list[str], Meta(max_length=MOST_RENEWED)]
+    ids: Annotated[list[str], Meta(max_length=MAX_RENEWED)]
     valid_ms: ForceTime
 
 

@@ -47,7 +47,7 @@ PULLED_WITHIN: Final = 120.0
 """Time in which the person pulls the cable, s."""
 ORPHANS: Final = 2
 """Number of processes that are started to be killed in one case."""
-STOP_WITHIN: Final = 5.0
+STOP_TIMEOUT: Final = 5.0
 """Time limit of the stop after Ctrl-C, s."""
 AT_STANDSTILL: Final = 1e-3
 """Velocity of an axis that counts as standstill, m/s or rad/s."""
@@ -115,11 +115,11 @@ class RealBench(CellBench):
         self.stop_all()
 
     def stop_all(self) -> None:
-        """Stop the objects that may have started something, each within STOP_WITHIN s."""
+        """Stop the objects that may have started something, each within STOP_TIMEOUT s."""
         threads = [threading.Thread(target=_stop, args=(each,), daemon=True) for each in self._made]
         for thread in threads:
             thread.start()
-        until = time.monotonic() + STOP_WITHIN
+        until = time.monotonic() + STOP_TIMEOUT
         for thread in threads:
             thread.join(max(0.0, until - time.monotonic()))
 

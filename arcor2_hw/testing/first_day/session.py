@@ -30,7 +30,7 @@ from arcor2_hw.testing.report import EVIDENCE, CaseResult, DeviceRun
 from arcor2_hw.testing.time_limit import CallHangs, within
 
 REPORT: Final = "report.json"
-RELEASE_WITHIN: Final = 15.0
+RELEASE_TIMEOUT: Final = 15.0
 """Time in which the objects of a case are disconnected, s."""
 BEFORE: Final = (
     "This program and its stops are not safety functions. They do not replace a risk assessment, guards or an enabling "
@@ -106,7 +106,7 @@ class Session:
         if not person.confirm("Is all of this done?"):
             raise Ended("Nothing was connected. Start again when all of it is done.")
         try:
-            within(RELEASE_WITHIN, self.bench.start, "the start of the wire")
+            within(RELEASE_TIMEOUT, self.bench.start, "the start of the wire")
         except OSError as error:
             raise NotConnected(
                 "{name}: {address} cannot be opened: {reason}. Check cable and power.",
@@ -135,7 +135,7 @@ class Session:
         if self.bench.wire is not None:
             self._recorder.add(self._current, self.bench.wire.record())
         with contextlib.suppress(CallHangs):
-            within(RELEASE_WITHIN, self.bench.release, "disconnecting")
+            within(RELEASE_TIMEOUT, self.bench.release, "disconnecting")
         if self._current in plan.ALL:
             self._cases.setdefault(self._current, CaseResult(Kind.NOT_RUN, INTERRUPTED))
 
@@ -143,7 +143,7 @@ class Session:
         for case in plan.ALL:
             self._cases.setdefault(case, CaseResult(Kind.NOT_RUN, ENDED))
         with contextlib.suppress(CallHangs, Arcor2Error):
-            within(RELEASE_WITHIN, self.bench.end, "removing the wire")
+            within(RELEASE_TIMEOUT, self.bench.end, "removing the wire")
         self._write()
         person = self.person
         person.say("Report", "heading")
@@ -308,7 +308,7 @@ class Session:
         """Record the traffic of a case, disconnect its objects and heal the wire."""
         if self.bench.wire is not None:
             self._recorder.add(case, self.bench.wire.record())
-        within(RELEASE_WITHIN, self.bench.release, f"disconnecting after {case}")
+        within(RELEASE_TIMEOUT, self.bench.release, f"disconnecting after {case}")
         within(self.bench.case_within, self.bench.reset, f"the reset after {case}")
         self._write()
 

@@ -17,7 +17,7 @@ from arcor2_hw.objects.settings import within
 from . import lines
 from .settings import BarcodeReaderSettings
 
-LONGEST_SCAN: Final = 60.0
+MAX_SCAN_TIME: Final = 60.0
 """Longest time a program may wait for a code in one call, s."""
 MARGIN: Final = 30.0
 """Time beyond it for resetting the reader before and after, each with the longest time-out a setting allows, s."""
@@ -89,7 +89,7 @@ class BarcodeReader(LineDevice, Reader):
 
         Raises ConnectionLost, which names the port, DeviceTimeout when the reader does not answer, Cancelled by `stop`.
         """
-        within(f"{self.who}: timeout", timeout, 0.05, LONGEST_SCAN, "s")
+        within(f"{self.who}: timeout", timeout, 0.05, MAX_SCAN_TIME, "s")
         self.check()
         go_on = self.begin("reading")
         if not self._reading.acquire(blocking=False):
@@ -163,7 +163,7 @@ class BarcodeReader(LineDevice, Reader):
         return self.ask(command.encode("ascii") + lines.CR, found, command, timeout)
 
     # -------------------------------------------------------------------------------- actions
-    @action(deadline=LONGEST_SCAN + MARGIN, again="safe", identifies=True)
+    @action(deadline=MAX_SCAN_TIME + MARGIN, again="safe", identifies=True)
     def scan(self, timeout: float = 2.0, *, an: str | None = None) -> str:
         """Read the code in front of the reader; it is an error if there is none.
 
@@ -181,7 +181,7 @@ class BarcodeReader(LineDevice, Reader):
             )
         return code.text
 
-    @action(deadline=LONGEST_SCAN + MARGIN, again="safe")
+    @action(deadline=MAX_SCAN_TIME + MARGIN, again="safe")
     def code_present(self, timeout: float = 1.0, *, an: str | None = None) -> bool:
         """Return whether a code is in front of the reader; last_code then returns it, once.
 

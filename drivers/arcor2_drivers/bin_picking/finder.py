@@ -18,15 +18,15 @@ from .segmentation import Crate, Pixels, clusters, segment, surfaces
 
 Floats = npt.NDArray[np.float64]
 
-LEAST_AREA: Final = 0.25
+MIN_AREA: Final = 0.25
 """Smallest visible area of an object, relative to the smallest side of the part."""
 TOO_LARGE: Final = 1.3
 """Ratio of visible area to that of one part above which it is more than one part."""
 COVERED: Final = 0.8
 """Fraction of a part that must be visible to conclude that there is more than this part."""
-LEAST_SEEN: Final = 0.3
+MIN_SEEN: Final = 0.3
 """Fraction of the crate that must be visible."""
-MOST_CANDIDATES: Final = 12
+MAX_CANDIDATES: Final = 12
 """Largest number of clusters, and of pieces of a cluster, that are registered."""
 
 
@@ -60,7 +60,7 @@ def see(view: View, crate: EmptyCrate, tolerance: float) -> Crate:
     points = points @ view.camera[:3, :3].T.astype(np.float32) + view.camera[:3, 3].astype(np.float32)
     seen = segment(points, crate.length, crate.width, crate.height, tolerance)
     expected = _pixels_of(view, crate)
-    if expected < 100 or seen.inside.sum() < LEAST_SEEN * expected:
+    if expected < 100 or seen.inside.sum() < MIN_SEEN * expected:
         raise NoDepth(
             "{crate} is not visible. Check the view of the camera and the poses of camera and crate.",
             f"{int(seen.inside.sum())} of {expected:.0f} points",
@@ -79,7 +79,7 @@ def _pixels_of(view: View, crate: EmptyCrate) -> float:
 
 
 def _objects(seen: Crate, view: View, model: Model, tolerance: float) -> list[Pixels]:
-    return [each for each in clusters(seen, tolerance) if _area(each, view) > LEAST_AREA * model.faces[0]]
+    return [each for each in clusters(seen, tolerance) if _area(each, view) > MIN_AREA * model.faces[0]]
 
 
 def has_parts(view: View, crate: EmptyCrate, model: Model, tolerance: float) -> bool:
@@ -119,12 +119,12 @@ def find(
     smallest, largest = model.faces
     best: Fit | None = None
     too_large = False
-    for pixels in sorted(objects, key=lambda each: -_top(seen, each))[:MOST_CANDIDATES]:
+    for pixels in sorted(objects, key=lambda each: -_top(seen, each))[:MAX_CANDIDATES]:
         go_on()
         fit = register(seen, pixels, model, view.camera, beams, tolerance)
         if fit.quality < min_quality:
-            pieces = [each for each in surfaces(seen, pixels) if _area(each, view) > LEAST_AREA * smallest]
-            for piece in sorted(pieces, key=lambda each: -_top(seen, each))[:MOST_CANDIDATES]:
+            pieces = [each for each in surfaces(seen, pixels) if _area(each, view) > MIN_AREA * smallest]
+            for piece in sorted(pieces, key=lambda each: -_top(seen, each))[:MAX_CANDIDATES]:
                 go_on()
                 if piece.sum() < pixels.sum() and _area(piece, view) <= TOO_LARGE * largest:
                     fit = max(fit, register(seen, piece, model, view.camera, beams, tolerance), key=_quality)

@@ -7,12 +7,12 @@ import numpy as np
 import numpy.typing as npt
 import open3d as o3d
 
-from .settings import LARGEST_PART, BinSettings
+from .settings import MAX_PART, BinSettings
 
 Floats = npt.NDArray[np.float64]
-LARGEST_FILE: Final = 20_000_000
-MOST_TRIANGLES: Final = 200_000
-SMALLEST_PART: Final = 0.003
+MAX_FILE: Final = 20_000_000
+MAX_TRIANGLES: Final = 200_000
+MIN_PART: Final = 0.003
 """Smallest of the two longer sides of a part, m."""
 SAMPLES: Final = 4000
 """Number of points sampled from the surface."""
@@ -72,8 +72,8 @@ def _read(path: Path) -> Any:
         size = path.stat().st_size
     except OSError as error:
         raise BadModel(f"part_mesh {path} cannot be read: {error.strerror}") from error
-    if size > LARGEST_FILE:
-        raise BadModel(f"part_mesh {path.name} has {size} bytes, at most {LARGEST_FILE} are allowed")
+    if size > MAX_FILE:
+        raise BadModel(f"part_mesh {path.name} has {size} bytes, at most {MAX_FILE} are allowed")
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
         return o3d.io.read_triangle_mesh(path)
 
@@ -84,19 +84,17 @@ def of_mesh(mesh: Any, box: bool) -> Model:
     triangles = np.asarray(mesh.triangles)
     if not len(triangles):
         raise BadModel("part_mesh has no triangles")
-    if len(triangles) > MOST_TRIANGLES:
-        raise BadModel(f"part_mesh has {len(triangles)} triangles, at most {MOST_TRIANGLES} are allowed. Simplify it.")
+    if len(triangles) > MAX_TRIANGLES:
+        raise BadModel(f"part_mesh has {len(triangles)} triangles, at most {MAX_TRIANGLES} are allowed. Simplify it.")
     if not np.isfinite(vertices).all():
         raise BadModel("part_mesh has vertices that are not finite")
     used = vertices[np.unique(triangles)]
     low, high = used.min(axis=0), used.max(axis=0)
     longest = float((high - low).max())
-    if longest > LARGEST_PART:
-        raise BadModel(
-            f"part_mesh is {longest:g} m long, at most {LARGEST_PART:g} m are allowed: is it in millimetres?"
-        )
-    if longest < SMALLEST_PART or float(np.sort(high - low)[1]) < SMALLEST_PART:
-        raise BadModel(f"part_mesh is {longest:g} m long; two sides must be at least {SMALLEST_PART:g} m")
+    if longest > MAX_PART:
+        raise BadModel(f"part_mesh is {longest:g} m long, at most {MAX_PART:g} m are allowed: is it in millimetres?")
+    if longest < MIN_PART or float(np.sort(high - low)[1]) < MIN_PART:
+        raise BadModel(f"part_mesh is {longest:g} m long; two sides must be at least {MIN_PART:g} m")
     mesh.compute_triangle_normals()
     o3d.utility.random.seed(1)
     cloud = mesh.sample_points_uniformly(SAMPLES, use_triangle_normal=True)

@@ -17,7 +17,7 @@ from .segmentation import Crate, Pixels
 
 Floats = npt.NDArray[np.float64]
 
-MOST_POINTS: Final = 3000
+MAX_POINTS: Final = 3000
 """Largest number of points that are registered."""
 REFINED: Final = 4
 """Number of hypotheses, best first, that are refined."""
@@ -31,13 +31,13 @@ STEPS: Final = (0.001, 0.0005, 0.00025)
 """Step lengths, m."""
 TURN_PER_STEP: Final = 12.0
 """Rotation per step length, rad/m: 0.7° per mm."""
-MOST_STEPS: Final = 4
+MAX_STEPS: Final = 4
 """Largest number of steps of one length."""
 MARGIN: Final = 6
 """Width of the margin around a cluster that is compared with the model, pixels."""
 NEAREST: Final = 0.01
 """Smallest distance of a point from the camera, m."""
-LEAST_SEEN: Final = 0.5
+MIN_SEEN: Final = 0.5
 """Smallest fraction of valid depth among the pixels in which the model is expected."""
 
 
@@ -73,8 +73,8 @@ def register(crate: Crate, pixels: Pixels, model: Model, camera: Floats, rays: A
         tolerance: Largest distance of a point from the surface of its part, m.
     """
     points = crate.points[pixels].astype(np.float64)
-    if len(points) > MOST_POINTS:
-        points = points[np.linspace(0, len(points) - 1, MOST_POINTS).astype(int)]
+    if len(points) > MAX_POINTS:
+        points = points[np.linspace(0, len(points) - 1, MAX_POINTS).astype(int)]
     sparse = points[:: max(1, len(points) // 400)]
     tree = o3d.core.nns.NearestNeighborSearch(
         o3d.core.Tensor.from_numpy(np.asarray(model.cloud.points).astype(np.float32))
@@ -103,7 +103,7 @@ def _polished(fit: Fit, judge: Callable[[Floats], Fit], points: Floats) -> Fit:
     """
     middle = np.median(points, axis=0)
     for step in STEPS:
-        for _ in range(MOST_STEPS):
+        for _ in range(MAX_STEPS):
             tried = [judge(_shifted(fit.pose, middle, move)) for move in _moves(step)]
             better = max(tried, key=lambda each: each.quality)
             if better.quality <= fit.quality:
@@ -216,7 +216,7 @@ class _Evaluator:
             on = difference < self._tolerance
         seen, agreed = int(measured.sum()), int(on.sum())
         explained = int((on & self._pixels[where]).sum()) / self._count
-        covered = agreed / max(seen, 1) if seen >= LEAST_SEEN * int(expected.sum()) else 0.0
+        covered = agreed / max(seen, 1) if seen >= MIN_SEEN * int(expected.sum()) else 0.0
         error = float(difference[on].mean()) if agreed else float("inf")
         return Fit(pose, explained * covered, explained, covered, self._count / max(seen, 1), error)
 

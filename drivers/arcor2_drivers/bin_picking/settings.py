@@ -7,9 +7,9 @@ from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
 from arcor2_hw.objects.settings import Range, device_file, within
 
-LARGEST_PART = 1.0
+MAX_PART = 1.0
 """Largest edge of a part, m."""
-MOST_PLACES = 10_000
+MAX_PLACES = 10_000
 
 
 @dataclasses.dataclass
@@ -38,7 +38,7 @@ class BinSettings(Settings):
     part_mesh: str = ""
     min_quality: Annotated[float, Range(0.3, 1.0)] = 0.9
     tolerance: Annotated[float, Range(0.0005, 0.02, "m")] = 0.004
-    grip_depth: Annotated[float, Range(0.0, LARGEST_PART, "m")] = 0.0
+    grip_depth: Annotated[float, Range(0.0, MAX_PART, "m")] = 0.0
     max_age: Annotated[float, Range(0.1, 3600.0, "s")] = 10.0
 
     def __post_init__(self) -> None:
@@ -50,7 +50,7 @@ class BinSettings(Settings):
                 raise OutOfRange("part_mesh must be empty for a part that is a box")
         else:
             for name, size in sizes.items():
-                within(name, size, 0.003, LARGEST_PART)
+                within(name, size, 0.003, MAX_PART)
 
 
 @dataclasses.dataclass
@@ -70,8 +70,8 @@ class BlisterSettings(Settings):
     :param state_file: path of a file that stores the state over a restart; empty: the state is not stored
     """
 
-    rows: Annotated[int, Range(1, MOST_PLACES)]
-    columns: Annotated[int, Range(1, MOST_PLACES)]
+    rows: Annotated[int, Range(1, MAX_PLACES)]
+    columns: Annotated[int, Range(1, MAX_PLACES)]
     row_pitch: float
     column_pitch: float
     origin_x: Annotated[float, Range(-5.0, 5.0, "m")] = 0.0
@@ -84,8 +84,8 @@ class BlisterSettings(Settings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.rows * self.columns > MOST_PLACES:
-            raise OutOfRange("rows times columns must be at most {most_places}", most_places=MOST_PLACES)
+        if self.rows * self.columns > MAX_PLACES:
+            raise OutOfRange("rows times columns must be at most {most_places}", most_places=MAX_PLACES)
         for name, count in (("row_pitch", self.rows), ("column_pitch", self.columns)):
             within(name, getattr(self, name), 0.0 if count == 1 else 0.0005, 2.0)
         self.state_file = device_file("state_file", self.state_file)

@@ -18,10 +18,10 @@ from .motion import Motion
 from .observer import Observer
 from .packml import STATES, Unit
 from .parameters import dump, restore
-from .settings import LONGEST_HEARTBEAT, LONGEST_MOVE, LONGEST_RAMP, ConveyorSettings
+from .settings import MAX_HEARTBEAT_TIME, MAX_MOVE_TIME, MAX_RAMP_TIME, ConveyorSettings
 
 MARGIN: Final = 30.0
-"""Time a move may take beyond LONGEST_MOVE, s: enabling, handshake and stop, including timeouts."""
+"""Time a move may take beyond MAX_MOVE_TIME, s: enabling, handshake and stop, including timeouts."""
 NOTICES: Final = 0.1
 """Time from the heartbeat timeout until the drive decelerates, s."""
 
@@ -33,7 +33,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
     display_name = "Conveyor"
     states: ClassVar[frozenset[MachineState]] = STATES
     loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(
-        LONGEST_HEARTBEAT / 1000.0 + NOTICES + LONGEST_RAMP
+        MAX_HEARTBEAT_TIME / 1000.0 + NOTICES + MAX_RAMP_TIME
     )
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {
         "home": "halt",
@@ -157,7 +157,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
         master, limit = self._observer.consumer >> 16 & 0x7F, self._observer.consumer & 0xFFFF
         if limit and self._observer.received_heartbeat(master, limit / 1000.0):
             return Phrase.of("node {node}, whose heartbeat the drive monitors,", node=master)
-        if self._observer.received_heartbeat(self._units.master_id, LONGEST_HEARTBEAT / 1000.0):
+        if self._observer.received_heartbeat(self._units.master_id, MAX_HEARTBEAT_TIME / 1000.0):
             return Phrase.of("another host, which sends heartbeats as node {node} too,", node=self._units.master_id)
         other = Phrase.of("another client, which enabled the drive,")
         return other if state.power is Power.ENABLED else None
@@ -270,13 +270,13 @@ class Conveyor(PolledControl[State], Machine, Axis):
                 what=what,
                 max_speed=s.max_speed,
             )
-        longest = LONGEST_MOVE * speed
+        longest = MAX_MOVE_TIME * speed
         if abs(position - s.metres(self.current().position)) > longest:
             raise OutOfRange(
                 "{device}: {what} would take longer than {longest_move:g} s at {speed:g} m/s",
                 device=self.who,
                 what=what,
-                longest_move=LONGEST_MOVE,
+                longest_move=MAX_MOVE_TIME,
                 speed=speed,
             )
 
@@ -348,7 +348,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
         """Clear a fault or an abort after its cause was removed; the belt is stopped then."""
         self.command(MachineCommand.CLEAR)
 
-    @action(deadline=LONGEST_MOVE + MARGIN)
+    @action(deadline=MAX_MOVE_TIME + MARGIN)
     def home(self, *, an: str | None = None) -> None:
         """Home the belt: find its zero."""
         _, go_on = self._begin("home")
@@ -361,7 +361,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
             self._homed = False
             raise ConnectionLost("{device}: the connection was lost while homing ended", device=self.who)
 
-    @action(deadline=LONGEST_MOVE + MARGIN)
+    @action(deadline=MAX_MOVE_TIME + MARGIN)
     def move_to(self, position: float, speed: float = 0.1, *, an: str | None = None) -> None:
         """Move the belt to a position; it has to be homed.
 
@@ -372,7 +372,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
 
         self.move_absolute(position, speed)
 
-    @action(deadline=LONGEST_MOVE + MARGIN)
+    @action(deadline=MAX_MOVE_TIME + MARGIN)
     def move_by(self, distance: float, speed: float = 0.1, *, an: str | None = None) -> None:
         """Move the belt by a distance.
 

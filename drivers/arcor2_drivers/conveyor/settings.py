@@ -10,11 +10,11 @@ from arcor2_hw.exceptions import OutOfRange
 from arcor2_hw.objects import Settings
 from arcor2_hw.objects.settings import Range, check_serial_port, check_url, one_of, within
 
-LONGEST_HEARTBEAT: Final = 1000
+MAX_HEARTBEAT_TIME: Final = 1000
 """Longest heartbeat time, ms; the type declares it in `loss_reaction`."""
-LONGEST_RAMP: Final = 0.5
+MAX_RAMP_TIME: Final = 0.5
 """Longest quick stop from the highest speed, s; part of the declared reaction to a loss."""
-LONGEST_MOVE: Final = 600.0
+MAX_MOVE_TIME: Final = 600.0
 """Longest move, s."""
 BITRATES: Final = (10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000, 1000000)
 """Bit rates of CiA 301, bit/s."""
@@ -69,9 +69,9 @@ class ConveyorSettings(Settings):
     max_position: float = 100.0
     homing_method: Annotated[int, Range(-128, 127)] = 37
     homing_speed: float = 0.1
-    homing_timeout: Annotated[float, Range(0.5, LONGEST_MOVE, "s")] = 30.0
+    homing_timeout: Annotated[float, Range(0.5, MAX_MOVE_TIME, "s")] = 30.0
     tolerance: float = 0.002
-    heartbeat_ms: Annotated[int, Range(200, LONGEST_HEARTBEAT, "ms")] = 800
+    heartbeat_ms: Annotated[int, Range(200, MAX_HEARTBEAT_TIME, "ms")] = 800
     sdo_timeout: float = 0.2
     pdo_period_ms: int = 10
     belt_speed: float = 0.2
@@ -83,7 +83,7 @@ class ConveyorSettings(Settings):
         if self.master_id == self.node_id:
             raise OutOfRange("master_id must not be the drive's node_id {node_id}", node_id=self.node_id)
         within("counts_per_metre", abs(self.counts_per_metre), 1.0, 1e8)
-        within("quick_stop_deceleration", self.quick_stop_deceleration, self.max_speed / LONGEST_RAMP, 1000.0)
+        within("quick_stop_deceleration", self.quick_stop_deceleration, self.max_speed / MAX_RAMP_TIME, 1000.0)
         farthest = _INT32 / abs(self.counts_per_metre) / 2.0  # a move may span the range
         within("min_position", self.min_position, -farthest, farthest)
         within("max_position", self.max_position, self.min_position, farthest)

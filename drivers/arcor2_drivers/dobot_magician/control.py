@@ -13,9 +13,9 @@ from .frames import Command
 from .observer import Observer
 from .settings import DobotMagicianSettings
 
-SEEN_AT_REST_WITHIN: Final = 1.0
+STANDSTILL_SEEN_TIMEOUT: Final = 1.0
 """Time in which the observer sees an arm that has just stopped at standstill, s: 0.1 s, more on a busy computer."""
-REST_WITHIN: Final = 2.0
+STANDSTILL_TIMEOUT: Final = 2.0
 """Time after which a stopped arm must be at standstill, s."""
 
 
@@ -49,7 +49,7 @@ class Control:
         if self.ours:
             return
         try:  # an arm counts as moving for a moment after it has stopped
-            self._observer.wait(lambda sample: not sample.moving, SEEN_AT_REST_WITHIN, "standstill")
+            self._observer.wait(lambda sample: not sample.moving, STANDSTILL_SEEN_TIMEOUT, "standstill")
         except DeviceTimeout as e:
             raise NotInControl(
                 "{device} is being moved by another client. Wait until it stops.", device=self.who
@@ -147,7 +147,7 @@ class Control:
 
     def wait_rest(self) -> None:
         """Wait for standstill. Raise DeviceTimeout."""
-        self._observer.wait(lambda sample: not sample.moving, REST_WITHIN, "standstill after a stop")
+        self._observer.wait(lambda sample: not sample.moving, STANDSTILL_TIMEOUT, "standstill after a stop")
 
     def drive_belt(self, speed: float) -> None:
         """Drive the conveyor belt, m/s. Hold `commands`."""

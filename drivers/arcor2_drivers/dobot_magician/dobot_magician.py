@@ -22,7 +22,7 @@ from .motion import JOINT_TO_POSE, JUMP, LINE_TO_POSE, Motion
 from .observer import Observer
 from .settings import DobotMagicianSettings
 
-LONGEST_HOMING: Final = 320.0
+MAX_HOMING_TIME: Final = 320.0
 """Deadline of homing, s: the longest home_timeout, and time for communication and the stop."""
 POLL: Final = 0.01
 
@@ -247,7 +247,7 @@ class DobotMagician(HoldsParts, SingleArm):
             raise self.KinematicsException(e.message, e.detail) from None
 
     # -------------------------------------------------------------------------------- actions
-    @action(deadline=LONGEST_HOMING)
+    @action(deadline=MAX_HOMING_TIME)
     def home(self, *, an: str | None = None) -> None:
         """Home the arm: move to its switches, then to the home position stored in the arm. Keep clear of it."""
         self._motion.home(self._control.stops.guard())

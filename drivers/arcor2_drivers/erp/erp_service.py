@@ -34,14 +34,14 @@ from .settings import ErpSettings
 
 STATUS_PERIOD: Final = 1.0
 """Time between two status requests, s."""
-SENDER_ENDS_WITHIN: Final = 0.05
+SENDER_END_TIMEOUT: Final = 0.05
 """Time that disconnecting waits for the sender, s. A request that is running may take longer and ends by itself."""
-LONGEST_WAIT: Final = 3600.0
+MAX_WAIT: Final = 3600.0
 """Longest time a program may wait in one call, s."""
 MARGIN: Final = 65.0
 """Time beyond it for two requests, s."""
-LONGEST_TEXT: Final = 200
-LARGEST_QUANTITY: Final = 1_000_000
+MAX_TEXT: Final = 200
+MAX_QUANTITY: Final = 1_000_000
 WAITING, REFUSED, NOT_AUTHORIZED = "results_wait", "results_refused", "not_let_in"
 """Codes of alarms."""
 
@@ -118,7 +118,7 @@ class ErpService(Connected, Generic):
                 sender.stop()
             self.observing.stop()
             if sender is not None:
-                self._ending_sender = None if sender.join(SENDER_ENDS_WITHIN) else sender
+                self._ending_sender = None if sender.join(SENDER_END_TIMEOUT) else sender
 
     def condition(self) -> Health:
         """Return check_function while there is an alarm."""
@@ -195,7 +195,7 @@ class ErpService(Connected, Generic):
             sender.notify()
 
     # -------------------------------------------------------------------------------- actions
-    @action(deadline=LONGEST_WAIT + MARGIN)
+    @action(deadline=MAX_WAIT + MARGIN)
     def next_order(self, wait: float = 0.0, *, an: str | None = None) -> tuple[bool, str, str, int, int]:
         """Return the order to work on: whether there is one, its id, product, quantity, and pieces left to report.
 
@@ -206,7 +206,7 @@ class ErpService(Connected, Generic):
         """
         assert 0.0 <= wait <= 3600.0
 
-        within(f"{self.who}: wait", wait, 0.0, LONGEST_WAIT, "s")
+        within(f"{self.who}: wait", wait, 0.0, MAX_WAIT, "s")
         stops, deadline = self._stops, time.monotonic() + wait
         if not self._requesting_order.acquire(blocking=False):
             raise Refused("{device} is busy with another call of next_order", device=self.who)
@@ -268,7 +268,7 @@ class ErpService(Connected, Generic):
         """Return how many results the service has not received yet."""
         return self.outbox().value.waiting
 
-    @action(deadline=LONGEST_WAIT + MARGIN)
+    @action(deadline=MAX_WAIT + MARGIN)
     def wait_until_sent(self, timeout: float, *, an: str | None = None) -> None:
         """Wait until the service has received every result.
 
@@ -276,7 +276,7 @@ class ErpService(Connected, Generic):
         """
         assert 0.0 <= timeout <= 3600.0
 
-        within(f"{self.who}: timeout", timeout, 0.0, LONGEST_WAIT, "s")
+        within(f"{self.who}: timeout", timeout, 0.0, MAX_WAIT, "s")
         stops, deadline = self._stops, time.monotonic() + timeout
         while (state := self.outbox().value).waiting:
             if stops != self._stops:
@@ -302,12 +302,12 @@ class ErpService(Connected, Generic):
 
     # -------------------------------------------------------------------------------- internals
     def _check_text(self, name: str, value: str, empty: bool = False) -> None:
-        if not (value.strip() or empty) or len(value) > LONGEST_TEXT or not value.isprintable():
+        if not (value.strip() or empty) or len(value) > MAX_TEXT or not value.isprintable():
             raise OutOfRange(
                 "{device}: {name} must be 1 to {longest_text} printable characters, not {value!r}",
                 device=self.who,
                 name=name,
-                longest_text=LONGEST_TEXT,
+                longest_text=MAX_TEXT,
                 value=value,
             )
 
@@ -351,7 +351,7 @@ class ErpService(Connected, Generic):
             )
         data = received.order
         order = None if data is None else Order(data.id, data.product, data.quantity)
-        if order is not None and not (order.id and order.product and 0 < order.quantity <= LARGEST_QUANTITY):
+        if order is not None and not (order.id and order.product and 0 < order.quantity <= MAX_QUANTITY):
             self._outbox.end_request(None)
             raise DeviceFault("{device} sent an invalid order", str(order), "order", device=self.who)
         self._outbox.end_request(order)

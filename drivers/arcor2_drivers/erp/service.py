@@ -19,15 +19,15 @@ from .settings import ErpSettings
 
 T = TypeVar("T")
 
-LONGEST_ANSWER: Final = 1 << 20
-LONGEST_TOKEN: Final = 8192
+MAX_ANSWER: Final = 1 << 20
+MAX_TOKEN: Final = 8192
 KEEP_ALIVE: Final = 4.0
 """Time after which an idle connection is not used again, s: many services close it after 5 s."""
 RETRIED: Final = (408, 425, 429)
 """HTTP statuses of the client errors that ask for another attempt."""
 UNAUTHORIZED: Final = (401, 403, 407)
 """HTTP statuses that reject our credentials."""
-LONGEST_RETRY_AFTER: Final = 600.0
+MAX_RETRY_AFTER: Final = 600.0
 """Longest pause that a service can ask for, s."""
 
 
@@ -98,7 +98,7 @@ class Access(NamedTuple):
         try:
             if settings.token_file:
                 token = Path(settings.token_file).read_text("ascii").strip()
-                if not token.isprintable() or not 0 < len(token) <= LONGEST_TOKEN or " " in token:
+                if not token.isprintable() or not 0 < len(token) <= MAX_TOKEN or " " in token:
                     raise ValueError("it contains no valid token")
                 headers["Authorization"] = f"Bearer {token}"
             if not settings.url.startswith("https"):
@@ -166,7 +166,7 @@ class Service:
                 data = b""
                 for part in response.iter_bytes():
                     data += part
-                    if len(data) > LONGEST_ANSWER:
+                    if len(data) > MAX_ANSWER:
                         raise ConnectionLost(
                             "{device}: the answer to {method} {path} is too long",
                             device=self._who,
@@ -252,4 +252,4 @@ def parse_retry_after(text: str) -> float:
         seconds = float(text) if text.isdigit() else email.utils.parsedate_to_datetime(text).timestamp() - time.time()
     except (ValueError, OverflowError):
         return 0.0
-    return min(max(seconds, 0.0), LONGEST_RETRY_AFTER)
+    return min(max(seconds, 0.0), MAX_RETRY_AFTER)

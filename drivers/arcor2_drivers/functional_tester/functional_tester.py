@@ -13,12 +13,12 @@ from arcor2_hw.messages import Phrase, translatable
 from arcor2_hw.objects import CollisionObject, Machine, MachineCommand, MachineState, UnitMode
 
 from .registers import DOOR_CLOSE, DOOR_OPEN, FALLEN, PASSING, STATES, Holding, Inputs, fault_of, title
-from .settings import LONGEST_TEST, LONGEST_WATCHDOG, FunctionalTesterSettings
+from .settings import MAX_TEST_TIME, MAX_WATCHDOG_TIMEOUT, FunctionalTesterSettings
 from .tester import TRANSITION, Tester
 
 MARGIN: Final = 20.0
 """Time beyond the longest test, s: the reset before it, handshakes, repeated requests, the stop."""
-ABORTS_WITHIN: Final = 0.2
+ABORT_TIMEOUT: Final = 0.2
 """Time from the decision to abort to the state Aborted, s."""
 
 S = MachineState
@@ -31,7 +31,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
     display_name = "Functional tester"
     place_kind = PlaceKind.HOLDER
     states: ClassVar[frozenset[MachineState]] = STATES
-    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(LONGEST_WATCHDOG / 1000.0 + ABORTS_WITHIN)
+    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(MAX_WATCHDOG_TIMEOUT / 1000.0 + ABORT_TIMEOUT)
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"test": "stop", "open_door": "stop", "close_door": "stop"}
 
     def __init__(
@@ -180,7 +180,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         self.require_command("close_door")
         self.move_door(DOOR_CLOSE, "close_door", lambda now: now.door_closed)
 
-    @action(deadline=LONGEST_TEST + MARGIN, verdict=True)
+    @action(deadline=MAX_TEST_TIME + MARGIN, verdict=True)
     def test(self, program: int = 1, *, an: str | None = None) -> bool:
         """Test the board in the fixture; return whether it passes.
 

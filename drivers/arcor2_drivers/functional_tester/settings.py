@@ -6,9 +6,9 @@ from typing import Annotated, Final
 from arcor2_hw.objects import Settings
 from arcor2_hw.objects.settings import Range, check_host, within
 
-LONGEST_WATCHDOG: Final = 2000
+MAX_WATCHDOG_TIMEOUT: Final = 2000
 """Longest host watchdog, ms; declared in `loss_reaction`."""
-LONGEST_TEST: Final = 600.0
+MAX_TEST_TIME: Final = 600.0
 """Longest test, s; the deadline of the action `test` allows for it."""
 
 
@@ -28,9 +28,9 @@ class FunctionalTesterSettings(Settings):
     host: str = dataclasses.field(metadata={"found_by": "modbus"})
     port: int = 502
     unit_id: Annotated[int, Range(0, 255)] = 1
-    watchdog_ms: Annotated[int, Range(200, LONGEST_WATCHDOG, "ms")] = 2000
+    watchdog_ms: Annotated[int, Range(200, MAX_WATCHDOG_TIMEOUT, "ms")] = 2000
     request_timeout: float = 0.5
-    test_timeout: Annotated[float, Range(1.0, LONGEST_TEST, "s")] = 60.0
+    test_timeout: Annotated[float, Range(1.0, MAX_TEST_TIME, "s")] = 60.0
     door_timeout: Annotated[float, Range(0.5, 60.0, "s")] = 5.0
 
     def __post_init__(self) -> None:

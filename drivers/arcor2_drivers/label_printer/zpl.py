@@ -8,8 +8,8 @@ import dataclasses
 import re
 from typing import Final
 
-LONGEST_LABEL: Final = 32768
-LONGEST_FIELD: Final = 200
+MAX_LABEL: Final = 32768
+MAX_FIELD: Final = 200
 HOST_STATUS: Final = b"~HS"
 IDENTIFY: Final = b"~HI"
 COUNTER: Final = "odometer.total_label_count"
@@ -113,8 +113,8 @@ def number(data: bytes) -> int | None:
 
 def field(text: str, barcode: bool = False) -> str:
     """Return ^FH^FD…^FS that prints exactly `text`: nothing in it acts as a command. Raises BadLabel."""
-    if len(text) > LONGEST_FIELD:
-        raise BadLabel(f"is longer than {LONGEST_FIELD} characters")
+    if len(text) > MAX_FIELD:
+        raise BadLabel(f"is longer than {MAX_FIELD} characters")
     if not text.isprintable():
         raise BadLabel("has characters that cannot be printed")
     if barcode:
@@ -155,8 +155,8 @@ def check_label(label: str) -> bytes:
     text = label.strip()
     if not (text.startswith("^XA") and text.endswith("^XZ") and len(text) > len("^XA^XZ")):
         raise BadLabel("must start with ^XA and end with ^XZ")
-    if len(text) > LONGEST_LABEL:
-        raise BadLabel(f"is longer than {LONGEST_LABEL} characters")
+    if len(text) > MAX_LABEL:
+        raise BadLabel(f"is longer than {MAX_LABEL} characters")
     if "~" in text:
         raise BadLabel("has a ~: a label may not contain control commands")
     if found := _FORBIDDEN.search(text, 3, len(text) - 3):

@@ -24,18 +24,18 @@ if TYPE_CHECKING:
 
     from .feed import Shot
 
-SHORTEST_EXPOSURE: Final = 0.00001
-LONGEST_EXPOSURE: Final = 0.033
+MIN_EXPOSURE_TIME: Final = 0.00001
+MAX_EXPOSURE_TIME: Final = 0.033
 """Longest exposure time of the colour sensor at 30 Hz, s."""
 WHITE: Final = 250
 """Smallest of R, G and B from which a pixel counts as white."""
 BLACK: Final = 10.0
 """Mean brightness below which an image counts as black."""
-LEAST_DEPTH: Final = 0.02
+MIN_DEPTH: Final = 0.02
 """Smallest fraction of pixels with valid depth."""
 SAMPLE_STEP: Final = 4
 """Step of rows and columns at which an image is checked."""
-MOST_AVERAGED: Final = 100
+MAX_AVERAGED: Final = 100
 
 
 class OakD(ImageStream, Camera):
@@ -98,12 +98,12 @@ class OakD(ImageStream, Camera):
 
     def set_exposure(self, exposure: float | None) -> None:
         """Set the exposure time, s; None: automatic. Raises OutOfRange, Refused, DeviceTimeout."""
-        if exposure is not None and not SHORTEST_EXPOSURE <= exposure <= LONGEST_EXPOSURE:
+        if exposure is not None and not MIN_EXPOSURE_TIME <= exposure <= MAX_EXPOSURE_TIME:
             raise OutOfRange(
                 "{device}: exposure must be {shortest_exposure:g} to {longest_exposure:g} s, not {exposure:g} s",
                 device=self.who,
-                shortest_exposure=SHORTEST_EXPOSURE,
-                longest_exposure=LONGEST_EXPOSURE,
+                shortest_exposure=MIN_EXPOSURE_TIME,
+                longest_exposure=MAX_EXPOSURE_TIME,
                 exposure=exposure,
             )
         self.feed.set_exposure(exposure, EXPOSURE_TIMEOUT)
@@ -132,9 +132,9 @@ class OakD(ImageStream, Camera):
         """
         from PIL import Image
 
-        if not 1 <= averaged_frames <= MOST_AVERAGED:
+        if not 1 <= averaged_frames <= MAX_AVERAGED:
             raise OutOfRange(
-                "{device}: averaged_frames must be 1 to {most_averaged}", device=self.who, most_averaged=MOST_AVERAGED
+                "{device}: averaged_frames must be 1 to {most_averaged}", device=self.who, most_averaged=MAX_AVERAGED
             )
         assert 1 <= averaged_frames <= 100
         shot = self._after_now()
@@ -162,7 +162,7 @@ class OakD(ImageStream, Camera):
         """Wait for an image whose exposure starts after this call."""
         began = time.monotonic()
         newest = self.newest(self._config.frame_timeout + self._config.max_age)
-        exposure = LONGEST_EXPOSURE if newest.exposure is None else newest.exposure
+        exposure = MAX_EXPOSURE_TIME if newest.exposure is None else newest.exposure
         return self.next_after(began + exposure, self._config.frame_timeout)
 
     def _note(self, shot: "Shot") -> PictureNote:
@@ -210,7 +210,7 @@ class OakD(ImageStream, Camera):
 
     def _check_depth(self, depth: "npt.NDArray[np.uint16]") -> None:
         valid = float((depth[::SAMPLE_STEP, ::SAMPLE_STEP] > 0).mean())
-        if valid < LEAST_DEPTH:
+        if valid < MIN_DEPTH:
             near, far = self.depth_range()
             raise NoDepth(
                 "{device}: only {valid:.1%} of the image has valid depth. Check that the lens is not covered, that "

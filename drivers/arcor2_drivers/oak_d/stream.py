@@ -15,8 +15,8 @@ MAGIC: Final = b"OAKS"
 VERSION: Final = 1
 PREFIX: Final = struct.Struct(">4sBBHII")
 _CHECKED: Final = struct.Struct(">4sBBHI")
-LONGEST_HEADER: Final = 4096
-LONGEST_PAYLOAD: Final = 64 << 20
+MAX_HEADER: Final = 4096
+MAX_PAYLOAD: Final = 64 << 20
 """Longest payload, bytes: a 12-megapixel image with its depth."""
 
 H = TypeVar("H", bound=msgspec.Struct)
@@ -103,7 +103,7 @@ def read_prefix(data: bytes | bytearray) -> Prefix:
         raise BadStream(f"not this protocol: a message starts with {bytes(magic)!r}")
     if version != VERSION:
         raise BadStream(f"version {version} of the protocol, not {VERSION}")
-    if header > LONGEST_HEADER or payload > LONGEST_PAYLOAD:
+    if header > MAX_HEADER or payload > MAX_PAYLOAD:
         raise BadStream(f"a message of {header} and {payload} bytes is too long")
     try:
         found = Kind(kind)

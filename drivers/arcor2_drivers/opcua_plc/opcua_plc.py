@@ -12,12 +12,12 @@ from arcor2_hw.messages import Message, translatable
 from arcor2_hw.objects import IOBlock
 from arcor2_hw.objects.connected import AlarmText
 from arcor2_hw.objects.edges import Edge
-from arcor2_hw.objects.point_actions import LONGEST_WAIT, MARGIN, PointActions
+from arcor2_hw.objects.point_actions import MARGIN, MAX_WAIT, PointActions
 from arcor2_hw.objects.settings import within
 
 from .link import status_name
 from .plc import Plc
-from .settings import LONGEST_PATIENCE, OpcUaPlcSettings
+from .settings import MAX_PATIENCE, OpcUaPlcSettings
 from .values import content, is_bad, quality, raw, stamp
 
 STOP_TIME: Final = 0.5
@@ -31,7 +31,7 @@ class OpcUaPlc(PointActions, Plc, IOBlock):
 
     _ABSTRACT = False
     display_name = "OPC UA PLC"
-    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(LONGEST_PATIENCE + STOP_TIME)
+    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(MAX_PATIENCE + STOP_TIME)
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"run_job": "stop", "wait_for": "stop"}
     ALARMS: ClassVar[Mapping[str, AlarmText]] = {
         PROGRAM_STOPPED: AlarmText("the life sign of the PLC program does not change", "start the program of the PLC")
@@ -141,7 +141,7 @@ class OpcUaPlc(PointActions, Plc, IOBlock):
             end()
 
     # -------------------------------------------------------------------------------- actions
-    @action(deadline=LONGEST_WAIT + MARGIN)
+    @action(deadline=MAX_WAIT + MARGIN)
     def run_job(self, number: int, timeout: float = 60.0, *, an: str | None = None) -> None:
         """Run a job of the PLC, and return when it is done.
 
@@ -150,5 +150,5 @@ class OpcUaPlc(PointActions, Plc, IOBlock):
         """
         assert 0.1 <= timeout <= 600.0
 
-        within(f"{self.who}: timeout", timeout, 0.1, LONGEST_WAIT)
+        within(f"{self.who}: timeout", timeout, 0.1, MAX_WAIT)
         self.do_job(number, timeout)

@@ -31,9 +31,9 @@ from .values import INTEGERS, content, fits, is_bad, stamp, type_of
 BEATS: Final = 5
 """Number of changes of our life sign within the shorter of both timeouts."""
 SERVER_STATE: Final = 2259
-IDLE_WITHIN: Final = 1.0
+IDLE_TIMEOUT: Final = 1.0
 """Time the PLC has to end the handshake of a former host, s."""
-ANSWERS_WITHIN: Final = 2.0
+ANSWER_TIMEOUT: Final = 2.0
 """Time the PLC has to answer a request by busy, done or error, and to become idle after its end, s."""
 LEAVING: Final = 0.3
 """Time limit for releasing control when the connection is closed, s."""
@@ -171,7 +171,7 @@ class Plc(PolledControl[Handshake]):
         if not self.in_control:
             super().take_control()
             with contextlib.suppress(DeviceTimeout):
-                self.wait(lambda hand: hand.idle, IDLE_WITHIN, "becoming idle")
+                self.wait(lambda hand: hand.idle, IDLE_TIMEOUT, "becoming idle")
 
     def arm(self) -> None:
         """Write our number and our life sign, and read the number back."""
@@ -271,7 +271,7 @@ class Plc(PolledControl[Handshake]):
             self.send(what, lambda: self.link.write(start), go_on)
             try:
                 self._await_job(
-                    lambda hand: not hand.idle, ANSWERS_WITHIN, Phrase.of("the start of {what}", what=what), go_on
+                    lambda hand: not hand.idle, ANSWER_TIMEOUT, Phrase.of("the start of {what}", what=what), go_on
                 )
                 end = self._await_job(lambda hand: not (hand.idle or hand.busy), timeout, what, go_on)
             finally:
@@ -299,7 +299,7 @@ class Plc(PolledControl[Handshake]):
         with contextlib.suppress(DeviceError):  # else the PLC stops the job because our life sign is missing
             if self.in_control:
                 self.send_stop()
-                self.wait(lambda hand: hand.idle, ANSWERS_WITHIN, "becoming idle")
+                self.wait(lambda hand: hand.idle, ANSWER_TIMEOUT, "becoming idle")
 
     def _checked(self, hand: Handshake) -> Handshake:
         if hand.bad:

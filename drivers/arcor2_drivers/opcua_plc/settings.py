@@ -10,7 +10,7 @@ from arcor2_hw.objects.settings import Range, check_url, device_file, secret_fil
 
 from .points import parse_handshake, parse_points
 
-LONGEST_PATIENCE: Final = 2.0
+MAX_PATIENCE: Final = 2.0
 """Longest plc_patience, s; declared in `loss_reaction`."""
 
 
@@ -51,7 +51,7 @@ class OpcUaPlcSettings(Settings):
     points: str
     handshake: str = ""
     host_number: Annotated[int, Range(1, 65535)] = 1
-    plc_patience: Annotated[float, Range(0.3, LONGEST_PATIENCE, "s")] = 1.0
+    plc_patience: Annotated[float, Range(0.3, MAX_PATIENCE, "s")] = 1.0
     life_timeout: Annotated[float, Range(0.3, 10.0, "s")] = 1.0
     request_timeout: float = 0.5
     user: str = ""

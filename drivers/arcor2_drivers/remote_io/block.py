@@ -21,7 +21,7 @@ from arcor2_hw.objects.state_observer import Snapshot
 from . import registers
 from .points import Point, arming
 from .registers import Image, WatchdogState
-from .settings import LONGEST_WATCHDOG, BlockSettings
+from .settings import MAX_WATCHDOG_TIMEOUT, BlockSettings
 
 WATCHDOG: Final = "watchdog"
 """Code of the fault of an expired watchdog."""
@@ -32,7 +32,7 @@ REFUSALS: Final = translatable({4: "an expired watchdog holds the output"})
 class Block(ModbusDevice[Image]):
     """A block that is read every 20 ms. While we have control, each reading also triggers its watchdog if it is due."""
 
-    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(LONGEST_WATCHDOG / 1000.0)
+    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(MAX_WATCHDOG_TIMEOUT / 1000.0)
     ALARMS: ClassVar[Mapping[str, AlarmText]] = {
         "supply_missing": AlarmText("the supply of the outputs is missing", "check fuse and cable of the outputs"),
         "overload": AlarmText("an output is overloaded", "check the loads at the outputs for a short circuit"),
@@ -157,7 +157,7 @@ class Block(ModbusDevice[Image]):
     def pulse_output(self, name: str, duration: float) -> None:
         """Switch a digital output on for `duration` s, timed by the block, and wait until it is off again."""
         who, channel, what = self.who, self.block_points[name].channel, f"the pulse of {name}"
-        within(f"{who}: duration", duration, 0.01, registers.LONGEST_PULSE, "s")
+        within(f"{who}: duration", duration, 0.01, registers.MAX_PULSE_TIME, "s")
         self.require_control(f"pulsing {name}")
         go_on = self.begin(what)
         with self._one_pulse:

@@ -11,7 +11,7 @@ BROKEN_WIRE: Final = -32768
 IMAGE_COUNT: Final = 17
 PULSE: Final = 16
 """Holding register of the pulse of DO0."""
-LONGEST_PULSE: Final = 60.0
+MAX_PULSE_TIME: Final = 60.0
 """Longest pulse of the block, s."""
 WATCHDOG_STATES: Final = 9
 """Input register of the state of watchdog 0."""

@@ -12,7 +12,7 @@ from arcor2_hw.objects.state_observer import Snapshot
 
 from .block import Block
 from .points import parse_points
-from .registers import BROKEN_WIRE, LONGEST_PULSE, Image
+from .registers import BROKEN_WIRE, MAX_PULSE_TIME, Image
 from .settings import RemoteIOSettings
 
 
@@ -98,7 +98,7 @@ class RemoteIO(PointActions, Block, IOBlock):
         if self.digital(name) != value:
             self.wait(lambda _: self.digital(name) == value, timeout, what, go_on)
 
-    @action(deadline=LONGEST_PULSE + MARGIN)
+    @action(deadline=MAX_PULSE_TIME + MARGIN)
     def pulse(self, name: str, duration: float, *, an: str | None = None) -> None:
         """Switch a digital output on for a time, and return when it is off again.
 

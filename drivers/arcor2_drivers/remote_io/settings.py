@@ -14,9 +14,9 @@ from arcor2_hw.objects.settings import Range, one_of, within
 from .points import Point, parse_address, parse_points
 from .registers import WATCHDOGS
 
-LONGEST_WATCHDOG: Final = 5000
+MAX_WATCHDOG_TIMEOUT: Final = 5000
 """Longest watchdog time, ms; declared in `loss_reaction`."""
-LONGEST_REQUEST: Final = 0.5
+MAX_REQUEST_TIMEOUT: Final = 0.5
 """Longest timeout of a request, s: disconnecting may have to wait for a request."""
 BAUDRATES: Final = (9600, 19200, 38400, 57600, 115200)
 DEFAULT_PATTERNS: Final = (
@@ -49,13 +49,13 @@ class BlockSettings(ModbusSettings):
     """
 
     watchdog: Annotated[int, Range(0, WATCHDOGS - 1)] = 0
-    watchdog_ms: Annotated[int, Range(200, LONGEST_WATCHDOG, "ms")] = 1000
+    watchdog_ms: Annotated[int, Range(200, MAX_WATCHDOG_TIMEOUT, "ms")] = 1000
 
     def __post_init__(self) -> None:
         super().__post_init__()
         one_of("baudrate", self.baudrate, BAUDRATES)
         # A repeated reading takes two timeouts, and one more to drain a serial line; the watchdog must not expire then.
-        within("request_timeout", self.request_timeout, 0.05, min(LONGEST_REQUEST, self.watchdog_ms / 4000.0), "s")
+        within("request_timeout", self.request_timeout, 0.05, min(MAX_REQUEST_TIMEOUT, self.watchdog_ms / 4000.0), "s")
 
 
 @dataclasses.dataclass

@@ -16,7 +16,7 @@ from arcor2_hw.objects.point_actions import MARGIN
 from arcor2_hw.objects.small import live_point
 
 from .block import Block
-from .registers import LONGEST_PULSE
+from .registers import MAX_PULSE_TIME
 from .settings import LampColor, Pattern, TowerLightSettings, parse_patterns
 
 
@@ -107,7 +107,7 @@ class TowerLight(Block, Generic):
         """Turn all lamps off."""
         self._show({}, "switching the lamps off")
 
-    @action(deadline=LONGEST_PULSE + MARGIN)
+    @action(deadline=MAX_PULSE_TIME + MARGIN)
     def buzz(self, duration: float, *, an: str | None = None) -> None:
         """Sound the buzzer for a time, and return when it is silent again.
 

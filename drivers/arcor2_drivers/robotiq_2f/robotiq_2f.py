@@ -23,11 +23,11 @@ from .status import FIRST_MAJOR, HELD, Activation, Command, Link, Object, Status
 
 MARGIN: Final = 2.0
 """Time a motion may take beyond stroke / speed, s: for acceleration, the force to build up, and a slow wire."""
-ACCEPTED_WITHIN: Final = 1.0
+ACCEPT_TIMEOUT: Final = 1.0
 """Time limit from a command to its echo in the status, s."""
-STANDS_WITHIN: Final = 2.0
+STANDSTILL_TIMEOUT: Final = 2.0
 """Time limit from a stop to standstill, s."""
-LONGEST_ACTION: Final = 300.0
+ACTION_DEADLINE: Final = 300.0
 """Deadline of an action, s: the whole stroke at the lowest speed takes less."""
 PAD_HEIGHT: Final = 0.022
 """Height of the pads of the fingers, m; the assumed height of a part of unknown size."""
@@ -244,7 +244,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
             before.append(status.position)
             return not status.go_to and len(before) > 1 and before[-2] == status.position
 
-        self.wait(at_standstill, STANDS_WITHIN, "coming to a standstill")
+        self.wait(at_standstill, STANDSTILL_TIMEOUT, "coming to a standstill")
 
     def _write(self, command: Command, what: str, go_on: GoOn) -> None:
         def write() -> None:
@@ -261,7 +261,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
         def done(status: Status) -> bool:
             return not status.act and status.activation is Activation.RESET and not status.fault
 
-        self.wait(done, ACCEPTED_WITHIN + self._s.request_timeout, "the reset")
+        self.wait(done, ACCEPT_TIMEOUT + self._s.request_timeout, "the reset")
 
     def _move(self, width: float, force: float, speed: float, what: str) -> Status:
         """Move the fingers to a width; return the status at standstill."""
@@ -291,14 +291,14 @@ class Robotiq2F(PolledControl[Status], Gripper):
                 return accepted and status.object is not Object.MOVING
 
             try:
-                return self.wait(at_standstill, self._s.stroke / speed + ACCEPTED_WITHIN + MARGIN, what, go_on)
+                return self.wait(at_standstill, self._s.stroke / speed + ACCEPT_TIMEOUT + MARGIN, what, go_on)
             except DeviceTimeout:
                 with contextlib.suppress(DeviceError):  # without it the gripper finishes the motion, then holds
                     self._write(Command(go_to=False), what, go_on)  # no caller waits for the motion any more
                 raise
 
     # -------------------------------------------------------------------------------- actions
-    @action(deadline=LONGEST_ACTION)
+    @action(deadline=ACTION_DEADLINE)
     def activate(self, *, an: str | None = None) -> None:
         """Activate the gripper: it opens and closes once unless it is active. It may drop a part that it holds."""
         what = "activate"
@@ -324,7 +324,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
             finally:
                 self._activating = False
 
-    @action(deadline=LONGEST_ACTION)
+    @action(deadline=ACTION_DEADLINE)
     def grip(
         self, width: float = 0.0, force: float = 40.0, speed: float = 0.1, *, an: str | None = None
     ) -> tuple[bool, float]:
@@ -344,7 +344,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
             self.detach_part()
         return GripResult(held, gripped)
 
-    @action(deadline=LONGEST_ACTION)
+    @action(deadline=ACTION_DEADLINE)
     def release(self, *, an: str | None = None) -> None:
         """Open completely; fail if the fingers are blocked."""
         try:

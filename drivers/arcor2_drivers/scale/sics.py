@@ -7,7 +7,7 @@ from typing import Final
 
 KILOGRAMS: Final = {"kg": Decimal(1), "g": Decimal("1e-3"), "mg": Decimal("1e-6")}
 ERRORS: Final = {"ES": "does not know the command", "ET": "received a damaged command", "EL": "refuses its parameter"}
-LONGEST_LINE: Final = 80
+MAX_LINE: Final = 80
 _VALUE: Final = re.compile(r"-?\d{1,9}(\.\d{1,6})?")
 PARAMETERS: Final = {
     "M01": "weighing mode (M01)",
@@ -39,7 +39,7 @@ class Answer:
 
 def answers(data: bytes) -> list[Answer]:
     """Return the valid lines among those that are complete, in order."""
-    lines = (raw.decode("ascii", "replace") for raw in data.split(b"\r\n")[:-1] if len(raw) <= LONGEST_LINE)
+    lines = (raw.decode("ascii", "replace") for raw in data.split(b"\r\n")[:-1] if len(raw) <= MAX_LINE)
     return [found for line in lines if (found := answer(line)) is not None]
 
 

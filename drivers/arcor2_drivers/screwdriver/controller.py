@@ -22,9 +22,9 @@ from .telegrams import AlarmReport, Mid, Result, Telegram
 R = TypeVar("R")
 S = TypeVar("S")
 
-MOST_RESULTS: Final = 200
+MAX_RESULTS: Final = 200
 """Number of results that are stored."""
-SHORTEST_REQUEST: Final = 0.01
+MIN_REQUEST_TIMEOUT: Final = 0.01
 """Shortest time limit of a request while connecting, s."""
 
 ACKNOWLEDGES: Final = {
@@ -47,7 +47,7 @@ class State(NamedTuple):
     total: int = 0
     """Number of results since the first connection."""
     results: tuple[Result, ...] = ()
-    """The latest results, at most MOST_RESULTS, in order."""
+    """The latest results, at most MAX_RESULTS, in order."""
     alarms: tuple[AlarmReport, ...] = ()
 
     @property
@@ -119,7 +119,7 @@ class Controller(StateObserver[State]):
         return self.request(mid, revision=revisions[-1], timeout=self._left(deadline))
 
     def _left(self, deadline: float) -> float:
-        return min(max(deadline - time.monotonic(), SHORTEST_REQUEST), self.line.answer_timeout)
+        return min(max(deadline - time.monotonic(), MIN_REQUEST_TIMEOUT), self.line.answer_timeout)
 
     def close(self) -> None:
         """Stop the communication and close the connection."""
@@ -258,7 +258,7 @@ class Controller(StateObserver[State]):
             case Mid.RESULT:
                 result = self._decoded(telegrams.result, telegram)
                 if result not in state.results:  # it is sent again when our acknowledgement was lost
-                    results = (*state.results, result)[-MOST_RESULTS:]
+                    results = (*state.results, result)[-MAX_RESULTS:]
                     self._change(arrived, total=state.total + 1, results=results)
             case Mid.ALARM | Mid.ALARM_STATUS:
                 alarm = self._decoded(telegrams.alarm, telegram)

@@ -17,7 +17,7 @@ from .controller import Controller, State, Unsupported
 from .settings import OpenProtocolScrewdriverSettings
 from .telegrams import Mid, Result
 
-LONGEST_TIGHTENING: Final = 3600.0
+MAX_TIGHTENING_TIME: Final = 3600.0
 """Longest time that a program may wait for results in one call, s."""
 MARGIN: Final = 15.0
 """Time beyond it for enabling and disabling the tool, s, each with the longest time limit that a setting allows."""
@@ -140,7 +140,7 @@ class OpenProtocolScrewdriver(PolledControl[State], Generic):
         """Disable the tool."""
         self.send("disable_tool", lambda: self._controller.enable(False))
 
-    @action(deadline=LONGEST_TIGHTENING + MARGIN)
+    @action(deadline=MAX_TIGHTENING_TIME + MARGIN)
     def tighten(self, count: int = 1, timeout: float = 60.0, *, an: str | None = None) -> tuple[bool, float, float]:
         """Enable the tool, wait for tightenings and disable it; return whether all are OK, and torque and angle.
 

@@ -20,9 +20,9 @@ from .observer import Observer, State
 from .settings import TwoAxisRobotSettings
 
 POLL: Final = 0.005
-REST_WITHIN: Final = 1.0
+STANDSTILL_TIMEOUT: Final = 1.0
 """Time after which stopped joints must be at standstill, s."""
-ANSWERS_WITHIN: Final = 2.0
+ANSWER_TIMEOUT: Final = 2.0
 """Time a servo may take to reboot, s."""
 ANSWERS_EVERY: Final = 0.05
 GOALS: Final = reg.PROFILE_ACCELERATION.address
@@ -162,7 +162,7 @@ class Control:
         if not self.ours or self.teaching:
             return
         self._observer.do(self.brake, urgent=True)
-        self.wait_rest(REST_WITHIN)
+        self.wait_rest(STANDSTILL_TIMEOUT)
 
     def brake(self, bus: Bus) -> None:
         """Set the goal of each moving servo to where it can stop soonest."""
@@ -243,7 +243,7 @@ class Control:
         def reboot(bus: Bus) -> None:
             for number in failed:
                 bus.reboot(number)
-            until = time.monotonic() + ANSWERS_WITHIN
+            until = time.monotonic() + ANSWER_TIMEOUT
             for number in failed:
                 while True:
                     time.sleep(ANSWERS_EVERY)
@@ -254,7 +254,7 @@ class Control:
                         if time.monotonic() > until:
                             raise
 
-        self._observer.do(reboot, timeout=2.0 * ANSWERS_WITHIN)
+        self._observer.do(reboot, timeout=2.0 * ANSWER_TIMEOUT)
         log.warning("%s: servos %s rebooted, confirmed by %s", self.name, failed, confirmed_by)
         self.check_faults(self._observer.fresh().value)
 

@@ -19,7 +19,7 @@ from arcor2_hw.objects.single_arm import MotionLog, move_around_obstacles
 
 from . import kinematics, registers as reg
 from .bus import Bus
-from .control import GOALS, POLL, REST_WITHIN, Control, goal_block
+from .control import GOALS, POLL, STANDSTILL_TIMEOUT, Control, goal_block
 from .observer import Observer, State
 from .registers import to_angle, to_ticks
 from .settings import TwoAxisRobotSettings
@@ -148,7 +148,7 @@ class Motion:
             self._check_valid("A move", guard)
             bus.sync_write(GOALS, blocks)
 
-        with self.log.recorded(speed, lambda: self._control.wait_rest(REST_WITHIN)) as recording:
+        with self.log.recorded(speed, lambda: self._control.wait_rest(STANDSTILL_TIMEOUT)) as recording:
             try:
                 self._observer.do(command)
                 self._check_accepted(goals, guard)

@@ -10,7 +10,7 @@ from arcor2_hw.objects.settings import Range, check_serial_port, one_of
 
 BAUD_RATES: Final = (9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000)
 QUARTER: Final = math.pi / 2.0
-LONGEST_WATCHDOG: Final = 0.6
+MAX_WATCHDOG_TIMEOUT: Final = 0.6
 """Longest watchdog, s, with which the servos stop within the time that the type declares (`loss_reaction`)."""
 
 
@@ -57,7 +57,7 @@ class TwoAxisRobotSettings(Settings):
     joint_acceleration: Annotated[float, Range(0.5, 100.0)] = 12.0
     stop_deceleration: Annotated[float, Range(10.0, 200.0)] = 30.0
     current_limit: Annotated[float, Range(0.05, 3.2)] = 1.0
-    watchdog: Annotated[float, Range(0.16, LONGEST_WATCHDOG)] = 0.4  # a shorter one would trip on a repeated request
+    watchdog: Annotated[float, Range(0.16, MAX_WATCHDOG_TIMEOUT)] = 0.4  # shorter: trips on a repeated request
 
     def __post_init__(self) -> None:
         super().__post_init__()

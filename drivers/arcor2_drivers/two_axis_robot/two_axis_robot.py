@@ -18,7 +18,7 @@ from .control import Control
 from .motion import JOINTS, Motion
 from .observer import Observer
 from .parameters import Parameters
-from .settings import LONGEST_WATCHDOG, TwoAxisRobotSettings
+from .settings import MAX_WATCHDOG_TIMEOUT, TwoAxisRobotSettings
 
 MODELS: Final = {1020: "XM430-W350", 1030: "XM430-W210", 1120: "XM540-W270", 1130: "XM540-W150"}
 
@@ -30,7 +30,7 @@ class TwoAxisRobot(SingleArm):
     display_name = "Two-axis robot"
     robot_type = RobotType.SCARA
     urdf_package_name = "two_axis_robot.zip"
-    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(FROZEN_AFTER + LONGEST_WATCHDOG + 0.1)
+    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(FROZEN_AFTER + MAX_WATCHDOG_TIMEOUT + 0.1)
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"move": "stop", "move_to": "stop"}
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: TwoAxisRobotSettings) -> None:

@@ -10,7 +10,7 @@ export type Border = readonly number[];
 const SHORTEST = 30;
 const LONGEST = 6000;
 /** Smallest distance between the two corners that are farthest from each other, and of others from a line, pixels. */
-const SHORTEST_SIDE = 10;
+const MIN_SIDE = 10;
 const THINNEST = 3;
 /** Smallest area, pixels². */
 const SMALLEST = 60;
@@ -66,7 +66,7 @@ export function quadOf(border: Border): Quad | null {
   // Each of these is a corner of a convex shape. The last one is opposite of the side of the triangle that it exceeds.
   const a = farthest(border, (p) => distance(p, pointOf(border, 0)));
   const b = farthest(border, (p) => distance(p, a));
-  if (distance(a, b) < SHORTEST_SIDE) return null;
+  if (distance(a, b) < MIN_SIDE) return null;
   const c = farthest(border, (p) => Math.abs(outside(p, a, b)));
   const triangle = outside(c, a, b) > 0 ? [a, c, b] : [a, b, c];
   const sides = triangle.map((p, k): [Point, Point] => [p, triangle[(k + 1) % 3] as Point]);

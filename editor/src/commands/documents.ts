@@ -34,12 +34,12 @@ export async function fromTemplate(kind: "scene" | "project", source: string, na
 }
 
 /** Time within which a list contains a new document, s. */
-const LISTED_WITHIN = 10;
+const LIST_TIMEOUT = 10;
 
 function listed(kind: "scene" | "project", name: string): Promise<string> {
   const find = ({ lists }: State) =>
     (kind === "scene" ? lists.scenes : lists.projects)?.find((each) => each.name === name)?.id;
-  return awaited(find, LISTED_WITHIN).catch(() => "");
+  return awaited(find, LIST_TIMEOUT).catch(() => "");
 }
 
 export async function save() {

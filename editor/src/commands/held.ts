@@ -9,7 +9,7 @@ import { refusal } from "./requests";
 export type Decision = Omit<DecideHeldArgs, "number">;
 
 /** Restarting the safety system of a controller takes 20 s. */
-const ACKNOWLEDGED_WITHIN = 40;
+const ACKNOWLEDGE_TIMEOUT = 40;
 
 /** Decide how the program continues. Return why it was refused; notify the user of it if `notifies`. */
 export async function decide(held: HeldData, decision: Decision, notifies = true): Promise<string> {
@@ -21,7 +21,7 @@ export async function decide(held: HeldData, decision: Decision, notifies = true
 /** Acknowledge a safety stop of a robot (without a code), or an alarm. Return why it was refused. */
 export async function acknowledge(object_id: string, code: string): Promise<string> {
   const why = await refusal(() =>
-    call("AcknowledgeStop", { object_id, ...(code ? { code } : {}) }, { deadline: ACKNOWLEDGED_WITHIN }),
+    call("AcknowledgeStop", { object_id, ...(code ? { code } : {}) }, { deadline: ACKNOWLEDGE_TIMEOUT }),
   );
   if (!why) notify("info", t`Acknowledged.`);
   return why;

@@ -13,14 +13,14 @@ export const goOffline = () => ask("StopScene");
 export const retryObject = (object_id: string) => ask("RetryObject", { object_id }, { deadline: 60 });
 
 /** Time limit of Stop, s. The server allows the devices three seconds. */
-const STOPPED_WITHIN = 5;
+const STOPPED_TIMEOUT = 5;
 
 /**
  * Stop the program, every robot and device, and the running action, and report what was not stopped. This is a
  * functional stop, not a safety function.
  */
 export async function stopMotion(): Promise<void> {
-  const answer = call("StopAll", undefined, { deadline: STOPPED_WITHIN });
+  const answer = call("StopAll", undefined, { deadline: STOPPED_TIMEOUT });
   endHolds();
   let reasons: string[];
   try {

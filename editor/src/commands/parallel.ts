@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import type { Slot } from "../program/chain";
-import { LEAST_BRANCHES, MOST_BRANCHES, whyNotAtOnce } from "../program/lanes";
+import { MIN_BRANCHES, MAX_BRANCHES, whyNotAtOnce } from "../program/lanes";
 import { calledBy, callMeta } from "../program/logic";
 import { actionNames, freeName } from "../program/naming";
 import { callsIn } from "../program/parallel";
@@ -22,7 +22,7 @@ export const parallelName = (): string => {
 /** Return why the selected actions cannot run at once; an empty string if they can. */
 export async function whyNotParallel(ids: readonly string[]): Promise<string> {
   const { doc } = now();
-  if (!doc || ids.length < LEAST_BRANCHES || ids.length > MOST_BRANCHES)
+  if (!doc || ids.length < MIN_BRANCHES || ids.length > MAX_BRANCHES)
     return t`Select two to four calls of functions.`;
   const calls = callsIn(doc, { branches: [...ids] });
   const other = calls.find((each) => !calledBy(doc, each));

@@ -10,7 +10,7 @@ import { notify, now } from "../store/store";
 import { ask, sentence } from "./requests";
 
 /** Time limit, s. A build copies the code of the drivers, which takes time on a busy computer. */
-const BUILT_WITHIN = 120;
+const BUILD_TIMEOUT = 120;
 
 /** Return why the open project cannot be run now; an empty string if it can. */
 export function notRunnable(state: State): string {
@@ -32,7 +32,7 @@ export async function run({ paused = false } = {}): Promise<boolean> {
     const shared = serves("SetBreakpoints")
       ? { shared_breakpoints: true }
       : { breakpoints: Object.keys(now().breakpoints) };
-    await call("TemporaryPackage", { start_paused: paused, ...shared, ...holding() }, { deadline: BUILT_WITHIN });
+    await call("TemporaryPackage", { start_paused: paused, ...shared, ...holding() }, { deadline: BUILD_TIMEOUT });
     return true;
   } catch (error) {
     notify("error", t`Not started. ${sentence(error)}`);
@@ -55,7 +55,7 @@ export const runPackage = (id: string, paused = false, continues = false, recipe
       ...(continues && { continues }),
       ...recipe,
     },
-    { deadline: BUILT_WITHIN },
+    { deadline: BUILD_TIMEOUT },
   );
 export const pause = () => ask("PausePackage");
 export const resume = () => ask("ResumePackage");
@@ -76,7 +76,7 @@ export async function build(name: string): Promise<boolean> {
   const built = await ask(
     "BuildProject",
     { project_id: doc.project.id, package_name: name },
-    { deadline: BUILT_WITHIN },
+    { deadline: BUILD_TIMEOUT },
   );
   if (built) notify("info", t`Package ${name} created.`);
   return built !== undefined;

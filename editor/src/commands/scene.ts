@@ -79,7 +79,7 @@ export function addObject(type: ObjectTypeMeta, name: string, parameters: Parame
 }
 
 /** Time limit of a connection check, s; the server has a shorter one. */
-const CHECKED_WITHIN = 45;
+const CHECK_TIMEOUT = 45;
 
 /** Connect a device without adding it, and return what it reports, or why it cannot be connected. */
 export async function checkConnection(
@@ -88,7 +88,7 @@ export async function checkConnection(
   id = "",
 ): Promise<{ found: CheckConnectionData } | { refused: string }> {
   try {
-    return { found: await call("CheckConnection", { type, parameters, id }, { deadline: CHECKED_WITHIN }) };
+    return { found: await call("CheckConnection", { type, parameters, id }, { deadline: CHECK_TIMEOUT }) };
   } catch (error) {
     return { refused: sentence(error) };
   }

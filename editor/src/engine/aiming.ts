@@ -9,7 +9,7 @@ import { meshesOf, type Thing } from "./thing";
 /** Radius of the search around the crosshair, pixels. */
 export const CONE = 56;
 /** Largest number of candidates. */
-export const MOST_CANDIDATES = 8;
+export const MAX_CANDIDATES = 8;
 /** Weights of size and distance relative to the distance from the crosshair. */
 const LARGE = 0.5;
 const FAR = 0.3;
@@ -60,7 +60,7 @@ export function aimed(targets: Iterable<Target>, ray: Ray, cone: number, before 
         (id === before ? 0.05 : 0),
     }))
     .sort((a, b) => a.score - b.score || a.distance - b.distance)
-    .slice(0, MOST_CANDIDATES);
+    .slice(0, MAX_CANDIDATES);
 }
 
 const inverse = new Matrix4();

@@ -4,9 +4,9 @@ import type { PerspectiveCamera } from "three";
 import { Vector3 } from "three";
 
 /** Largest number of labels. */
-export const MOST_LABELS = 8;
+export const MAX_LABELS = 8;
 /** Largest number of candidates; in crowded views most do not fit. */
-const MOST_TRIED = 24;
+const MAX_TRIED = 24;
 /** Distance between two labels, pixels. */
 const GAP = 3;
 
@@ -52,7 +52,7 @@ export class Labels {
     const tried = new Set<string>();
     const wanted = [...labels].sort((a, b) => b.weight - a.weight);
     for (const label of wanted) {
-      if (placed.length >= MOST_LABELS + taken.length || tried.size >= MOST_TRIED) break;
+      if (placed.length >= MAX_LABELS + taken.length || tried.size >= MAX_TRIED) break;
       label.anchor(at).project(camera);
       if (at.z > 1 || Math.abs(at.x) > 1 || Math.abs(at.y) > 1) continue;
       const x = ((at.x + 1) / 2) * width;

@@ -30,7 +30,7 @@ const DASHES: Record<PathState, readonly [number, number] | null> = {
   unknown: [0.02, 0.012],
   blocked: [0.008, 0.012],
 };
-const MOST_DASHES = 60;
+const MAX_DASHES = 60;
 const up = new Vector3(0, 1, 0);
 
 export class PathLine {
@@ -86,7 +86,7 @@ function same(a: StraightPath | null, b: StraightPath | null): boolean {
 function pieces(length: number, dash: readonly [number, number] | null): BufferGeometry {
   const found: BufferGeometry[] = [new SphereGeometry(RADIUS * 3, 12, 8).translate(0, length, 0)];
   const [on, off] = dash ?? [length, 0];
-  const step = Math.max(on + off, length / MOST_DASHES); // long paths have longer dashes, not more of them
+  const step = Math.max(on + off, length / MAX_DASHES); // long paths have longer dashes, not more of them
   for (let at = 0; at < length - 1e-6; at += step) {
     const piece = Math.min((step * on) / (on + off), length - at);
     found.push(new CylinderGeometry(RADIUS, RADIUS, piece, 6, 1, true).translate(0, at + piece / 2, 0));

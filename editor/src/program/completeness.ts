@@ -15,7 +15,7 @@ import { hasComparisons, isConditional, isErrorExit } from "./steps";
 type Value = boolean | number | string;
 type Values = Record<string, Value>;
 /** Maximum number of combinations of values for which conditions are tested, as on the server. */
-const MOST_CASES = 2000;
+const MAX_CASES = 2000;
 
 /** What conditions that are tested in order do for all values. */
 export interface Cases {
@@ -113,7 +113,7 @@ export function casesOf(doc: OpenDocument, types: State["types"], conditions: re
       .flatMap((one) => [decoded(one.value), decoded(one.upper)].filter((each) => each !== undefined) as Value[]);
     for (const [n, what] of group.entries()) {
       const values = samples(kinds[n] ?? "", constants, kinds);
-      if (cases.length * values.length > MOST_CASES) return { unused: [], known: false };
+      if (cases.length * values.length > MAX_CASES) return { unused: [], known: false };
       cases = cases.flatMap((each) => values.map((value) => ({ ...each, [what]: value })));
     }
   }

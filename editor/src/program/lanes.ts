@@ -8,8 +8,8 @@ import { calledBy } from "./operands";
 import { isParallel } from "./parallel";
 
 /** Smallest and largest number of calls that run at once. */
-export const LEAST_BRANCHES = 2;
-export const MOST_BRANCHES = 4;
+export const MIN_BRANCHES = 2;
+export const MAX_BRANCHES = 4;
 
 type Call = Pick<Action, "name" | "type">;
 

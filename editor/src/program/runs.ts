@@ -4,7 +4,7 @@ import type { OpenDocument } from "../store/state";
 import { branchKind, incoming, outgoing, placeOf } from "./steps";
 
 /** Fewest actions of a sequence that can be folded. */
-export const LEAST_FOLDED = 3;
+export const MIN_FOLDED = 3;
 
 /** Return sequences of actions without branches in or out; each in its order. */
 export function runsOf(doc: OpenDocument): string[][] {
@@ -22,7 +22,7 @@ export function runsOf(doc: OpenDocument): string[][] {
     if (before in doc.actions && onlyNext(before) === id) continue; // not the first action of a sequence
     const run = [id];
     for (let next = onlyNext(id); next !== undefined && next !== id; next = onlyNext(next)) run.push(next);
-    if (run.length >= LEAST_FOLDED) found.push(run);
+    if (run.length >= MIN_FOLDED) found.push(run);
   }
   return found;
 }

@@ -4463,7 +4463,7 @@ export const ROLES = {
 } as const;
 
 /** Lowest role that may send each request. */
-export const LEAST_ROLE: Record<keyof Requests, number> = {
+export const MIN_ROLE: Record<keyof Requests, number> = {
   AcknowledgeAlarm: 1,
   AcknowledgeStop: 1,
   ActionParamValues: 2,

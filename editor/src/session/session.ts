@@ -37,7 +37,7 @@ const TOKEN_REFUSED = 4401;
 /** Code of the error if a request needs a token. */
 const TOKEN_NEEDED = "token_needed";
 /** Time limit for releasing locks before this page leaves the cell, s; the server releases them later otherwise. */
-const GIVE_UP_WITHIN = 1;
+const GIVE_UP_TIMEOUT = 1;
 
 declare module "../store/runtime" {
   interface Runtime {
@@ -101,7 +101,7 @@ export class Session {
 
   /** Release the locks of this user, and leave. */
   async giveUp(): Promise<void> {
-    await Promise.race([releaseOwnLocks(), new Promise((resolve) => setTimeout(resolve, GIVE_UP_WITHIN * 1000))]);
+    await Promise.race([releaseOwnLocks(), new Promise((resolve) => setTimeout(resolve, GIVE_UP_TIMEOUT * 1000))]);
     this.leave();
   }
 

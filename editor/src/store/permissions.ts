@@ -1,12 +1,12 @@
 /** What the user may do, judged by the state alone. */
 
 import { t } from "@lingui/core/macro";
-import { LEAST_ROLE, type Requests } from "../protocol/types";
+import { MIN_ROLE, type Requests } from "../protocol/types";
 import type { State } from "./state";
 
 /** Return why the user cannot send a request now; an empty string if they can. */
 export function whyUnavailable(state: State, request: keyof Requests): string {
   if (state.connection.status !== "ready") return t`Not connected to the server.`;
-  if (state.connection.role < LEAST_ROLE[request]) return t`Your role does not allow this.`;
+  if (state.connection.role < MIN_ROLE[request]) return t`Your role does not allow this.`;
   return "";
 }

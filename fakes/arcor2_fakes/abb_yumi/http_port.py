@@ -16,10 +16,10 @@ import h11
 from arcor2_fakes.wire import Connection
 
 REALM: Final = "validusers@robapi.abb"
-MOST_SESSIONS: Final = 70
+MAX_SESSIONS: Final = 70
 SESSION_LASTS: Final = 300.0
 """Time after its last request at which a session ends and its mastership is released, s."""
-LONGEST_BODY: Final = 65536
+MAX_BODY: Final = 65536
 COOKIE: Final = "-http-session-"
 _FIELD: Final = re.compile(r'(\w+)=(?:"([^"]*)"|([^\s,]+))')
 
@@ -88,7 +88,7 @@ class HttpPort:
                         body.clear()
                     elif isinstance(event, h11.Data):
                         body.extend(event.data)
-                        if len(body) > LONGEST_BODY:
+                        if len(body) > MAX_BODY:
                             connection.close()
                             return
                     elif isinstance(event, h11.EndOfMessage):
@@ -139,7 +139,7 @@ class HttpPort:
                 f'Digest realm="{REALM}", domain="/", qop="auth", nonce="{nonce}", algorithm=MD5, opaque="arcor"'
             )
             answer, extra = Answer(401), [("WWW-Authenticate", challenge)]
-        elif len(self._sessions) > MOST_SESSIONS:
+        elif len(self._sessions) > MAX_SESSIONS:
             self._end(session)
             answer = Answer(503, error=(-1073442809, "too many sessions"))
         else:

@@ -41,7 +41,7 @@ from arcor2_fakes.wire import Connection, TcpWire
 
 TRAP_PERIOD: Final = 0.05
 """Time between two readings of the watch socket while the arm moves, s."""
-PARTNER_WITHIN: Final = 2.0
+PARTNER_TIMEOUT: Final = 2.0
 """Time to wait for the other arm of a synchronized motion, s."""
 WATCHDOG: Final = (0.1, 5.0)
 
@@ -236,7 +236,7 @@ class MotionServer:
             _ = self.staging.joints
             require(0.0 < values[1] <= 600.0)
             self._motion = sequence, code
-            self.meeting = Meeting(int(values[0]), values[1], time.monotonic() + PARTNER_WITHIN, sequence)
+            self.meeting = Meeting(int(values[0]), values[1], time.monotonic() + PARTNER_TIMEOUT, sequence)
             self._meet()
         elif code in (30, 32):
             require(0.0 < values[0] <= 600.0)

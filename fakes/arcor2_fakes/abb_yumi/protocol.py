@@ -13,7 +13,7 @@ from typing import Final
 from arcor2_fakes.wire import Connection
 
 VERSION: Final = 1
-LONGEST_LINE: Final = 79
+MAX_LINE: Final = 79
 
 DONE, ACCEPTED, STOPPED, WATCHDOG_STOPPED = 0, 1, 2, 3
 BAD_CHECK, BAD_CODE, BAD_COUNT, BAD_VALUE, UNREACHABLE, NO_SESSION, BY_HAND, NO_PARTNER = 10, 11, 12, 13, 14, 15, 16, 20
@@ -56,7 +56,7 @@ def framed(text: str) -> bytes:
 def parsed(line: str) -> tuple[int, int, list[float]]:
     """Return sequence number, code and arguments of a line. Raise Rejected."""
     text, star, number = line.rpartition("*")
-    if not star or len(line) > LONGEST_LINE or number != str(check(text)):
+    if not star or len(line) > MAX_LINE or number != str(check(text)):
         raise Rejected(BAD_CHECK)
     try:
         sequence, code, *arguments = text.split(" ")
@@ -90,5 +90,5 @@ class Lines:
 
     def _feed(self, data: bytes) -> None:
         *lines, self._rest = (self._rest + data).split(b"\n")
-        self._rest = self._rest[-2 * LONGEST_LINE :]
+        self._rest = self._rest[-2 * MAX_LINE :]
         self.waiting.extend(line.decode("latin-1") for line in lines)

@@ -9,7 +9,7 @@ from arcor2_fakes.abb_yumi.arm import Arm
 from arcor2_fakes.abb_yumi.kinematics import LIMITS, Array, Target, pose_of, quaternion
 from arcor2_fakes.abb_yumi.protocol import BAD_VALUE, Rejected, require
 
-MOST_WAYPOINTS: Final = 50
+MAX_WAYPOINTS: Final = 50
 
 
 class Staging:
@@ -43,7 +43,7 @@ class Staging:
         elif code == 23:
             self.waypoints = []
         else:
-            require(len(self.waypoints) < MOST_WAYPOINTS)
+            require(len(self.waypoints) < MAX_WAYPOINTS)
             self.waypoints.append(self.target())
 
     @property

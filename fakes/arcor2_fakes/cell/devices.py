@@ -15,7 +15,7 @@ from arcor2_fakes.cell.things import Inputs, Printed, Robot
 from arcor2_fakes.control import ControlClient, ControlError
 
 _RETRY_PERIOD = 0.1
-_CONNECT_WITHIN = 1.0
+_CONNECT_TIMEOUT = 1.0
 _MOTION_RATE = 100.0  # Hz; error of the position of a belt: 5 mm at 0.5 m/s
 _OUTPUT_RATE = 10.0  # Hz; lamps are only displayed
 
@@ -42,7 +42,7 @@ class Fake:
         deadline = asyncio.get_running_loop().time() + patience
         while True:
             try:
-                return cls(name, address, await ControlClient.connect(address, within=_CONNECT_WITHIN))
+                return cls(name, address, await ControlClient.connect(address, within=_CONNECT_TIMEOUT))
             except ControlError as e:
                 if asyncio.get_running_loop().time() >= deadline:
                     raise DeviceGone(f"the {name} can't be reached: {e}") from e

@@ -12,7 +12,7 @@ from arcor2_fakes.wire import Connection, TcpWire
 
 OK, BELL = b"\r", b"\a"
 _FRAMES_KEPT = 400
-_LONGEST_COMMAND = 64
+_MAX_COMMAND = 64
 _FIRST_PDO, _FIRST_SDO = 0x180, 0x580
 _DATA_FRAME = re.compile(rb"t([0-7][0-9A-Fa-f]{2})([0-8])((?:[0-9A-Fa-f]{2})*)")
 
@@ -44,7 +44,7 @@ class Adapter:
 
     def _received(self, data: bytes) -> None:
         *commands, self._buffer = (self._buffer + data).split(b"\r")
-        if len(self._buffer) > _LONGEST_COMMAND:
+        if len(self._buffer) > _MAX_COMMAND:
             self._buffer = b""
         for command in commands:
             if command:

@@ -11,8 +11,8 @@ from typing import Any, Final
 
 import msgspec
 
-LONGEST_HEAD: Final = 16384
-LONGEST_BODY: Final = 1 << 20
+MAX_HEAD: Final = 16384
+MAX_BODY: Final = 1 << 20
 REASONS: Final = {
     200: "OK",
     201: "Created",
@@ -64,7 +64,7 @@ class Requests:
     def _next(self) -> Request | None:
         head, found, rest = self._buffer.partition(b"\r\n\r\n")
         if not found:
-            if len(head) > LONGEST_HEAD:
+            if len(head) > MAX_HEAD:
                 raise BadRequest(400, "the head of the request is too long")
             return None
         try:
@@ -76,8 +76,8 @@ class Requests:
             raise BadRequest(400, "the head of the request cannot be read") from e
         if version != "HTTP/1.1" or "transfer-encoding" in headers or length < 0:
             raise BadRequest(400, "HTTP/1.1 with a Content-Length is served")
-        if length > LONGEST_BODY:
-            raise BadRequest(413, f"a body has at most {LONGEST_BODY} bytes")
+        if length > MAX_BODY:
+            raise BadRequest(413, f"a body has at most {MAX_BODY} bytes")
         if len(rest) < length:
             return None
         self._buffer = rest[length:]

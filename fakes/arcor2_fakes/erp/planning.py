@@ -12,7 +12,7 @@ from arcor2_fakes.erp.http import Request
 
 NAME: Final = "Fake planning"
 VERSION: Final = "1.4.0"
-LONGEST_KEY: Final = 200
+MAX_KEY: Final = 200
 
 
 class Problem(Exception):
@@ -117,7 +117,7 @@ class Planning:
             raise Problem(404, f"path {request.path} does not exist")
         self._method(request, "POST")
         key = request.headers.get("idempotency-key", "")
-        if not 0 < len(key) <= LONGEST_KEY:
+        if not 0 < len(key) <= MAX_KEY:
             raise Problem(400, "Idempotency-Key is missing")
         try:
             body = request.body.decode()

@@ -14,7 +14,7 @@ from arcor2_fakes.erp.http import REASONS, BadRequest, Request, Requests, answer
 from arcor2_fakes.erp.planning import Planning, Problem
 from arcor2_fakes.wire import Connection, TcpWire
 
-LONGEST_OFF: Final = 60.0
+MAX_OFF_TIME: Final = 60.0
 """Longest power cycle, s."""
 
 
@@ -84,8 +84,8 @@ class Port:
 
     def power_cycle(self, seconds: float = 1.0) -> None:
         """Switch off for `seconds`: connections are reset and the port is closed; stored data survive."""
-        if not 0.0 <= seconds <= LONGEST_OFF:
-            raise ValueError(f"seconds must be 0 to {LONGEST_OFF:g}")
+        if not 0.0 <= seconds <= MAX_OFF_TIME:
+            raise ValueError(f"seconds must be 0 to {MAX_OFF_TIME:g}")
         self.wire.refuse()
         self.wire.reset()
         self.heal()

@@ -10,7 +10,7 @@ from typing import Final
 
 import msgspec
 
-LONGEST_FORMAT: Final = 65536
+MAX_FORMAT: Final = 65536
 _COMMAND: Final = re.compile(r"\^(A[0-9@A-Z]|[A-Z][A-Z0-9])([^\^]*)")
 _GETVAR: Final = re.compile(rb'! U1 getvar "([a-z0-9._]{1,64})"\r\n')
 _SETVAR: Final = re.compile(rb'! U1 setvar "([a-z0-9._]{1,64})" "([\x20-\x21\x23-\x7e]{1,80})"\r\n')
@@ -84,7 +84,7 @@ class Stream:
             text = bytes(rest[:-3])
             self.clear()
             return parse(text)
-        elif len(rest) > LONGEST_FORMAT:
+        elif len(rest) > MAX_FORMAT:
             self.clear()
         return None
 

@@ -24,7 +24,7 @@ AMBIENT: Final = 0.45
 PIXELS_PER_MODULE: Final = 24
 SIDES: Final = 48
 RINGS: Final = 8
-MOST_SOLIDS: Final = 500
+MAX_SOLIDS: Final = 500
 
 
 class View(NamedTuple):
@@ -156,7 +156,7 @@ class Renderer:
     def _solid(self, thing: Thing) -> Solid:
         key = (thing.size, thing.mesh, thing.cylinder, thing.capsule, thing.marker, thing.charuco)
         if key not in self._solids:
-            if len(self._solids) > MOST_SOLIDS:
+            if len(self._solids) > MAX_SOLIDS:
                 self._solids.clear()
             self._solids[key] = solid_of(thing)
         return self._solids[key]

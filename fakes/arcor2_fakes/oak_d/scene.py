@@ -19,8 +19,8 @@ Matrix = npt.NDArray[np.float64]
 
 Length = Annotated[float, Meta(gt=0.0, le=5.0)]
 Channel = Annotated[int, Meta(ge=0, le=255)]
-LARGEST_MESH: Final = 20_000_000
-MOST_THINGS: Final = 200
+MAX_MESH: Final = 20_000_000
+MAX_THINGS: Final = 200
 
 
 class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -85,8 +85,8 @@ class Thing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"{self.name}: either size, mesh, cylinder or capsule")
         if self.size is None and (self.marker or self.charuco):
             raise ValueError(f"{self.name}: only a box can have a marker")
-        if self.mesh is not None and not (Path(self.mesh).is_file() and Path(self.mesh).stat().st_size <= LARGEST_MESH):
-            raise ValueError(f"{self.name}: mesh {self.mesh} must be a file of at most {LARGEST_MESH} bytes")
+        if self.mesh is not None and not (Path(self.mesh).is_file() and Path(self.mesh).stat().st_size <= MAX_MESH):
+            raise ValueError(f"{self.name}: mesh {self.mesh} must be a file of at most {MAX_MESH} bytes")
 
 
 class Scene:
@@ -108,8 +108,8 @@ class Scene:
         """Replace all objects. Raises ValueError for an invalid one."""
         new = [msgspec.convert(each, Thing) for each in things]
         by_name = {each.name: each for each in new}
-        if len(by_name) < len(new) or len(new) > MOST_THINGS:
-            raise ValueError(f"at most {MOST_THINGS} objects with unique names are allowed")
+        if len(by_name) < len(new) or len(new) > MAX_THINGS:
+            raise ValueError(f"at most {MAX_THINGS} objects with unique names are allowed")
         if table_height is not None:
             self.table_height = float(table_height)
         self._things = by_name
@@ -118,8 +118,8 @@ class Scene:
     def place(self, thing: Any) -> None:
         """Add an object, or replace the one with its name."""
         found = msgspec.convert(thing, Thing)
-        if len(self._things) >= MOST_THINGS and found.name not in self._things:
-            raise ValueError(f"at most {MOST_THINGS} objects are allowed")
+        if len(self._things) >= MAX_THINGS and found.name not in self._things:
+            raise ValueError(f"at most {MAX_THINGS} objects are allowed")
         self._things[found.name] = found
         self._changed()
 

@@ -40,8 +40,8 @@ import msgspec
 MAGIC: Final = b"OAKS"
 VERSION: Final = 1
 FIXED: Final = struct.Struct(">4sBBHII")
-LONGEST_HEADER: Final = 4096
-LONGEST_QUESTION: Final = 0
+MAX_HEADER: Final = 4096
+MAX_CLIENT_PAYLOAD: Final = 0
 """Longest payload from a client, bytes: its messages have none."""
 
 
@@ -81,7 +81,7 @@ class Questions:
         self._rest += data
         while len(self._rest) >= FIXED.size:
             magic, version, kind, length, payload, check = FIXED.unpack_from(self._rest)
-            if magic != MAGIC or version != VERSION or length > LONGEST_HEADER or payload > LONGEST_QUESTION:
+            if magic != MAGIC or version != VERSION or length > MAX_HEADER or payload > MAX_CLIENT_PAYLOAD:
                 raise BadMessage("not a message of version 1")
             if len(self._rest) < FIXED.size + length:
                 return

@@ -30,7 +30,7 @@ KEYS: Final = {"zero": 1, "tare": 2}
 KEYS_ACT, KEYS_OFF, KEYS_REPORT, KEYS_ACT_AND_REPORT = range(1, 5)
 DISPLAY: Final = 16
 """Characters of the display."""
-_LONGEST_LINE: Final = 64
+_MAX_LINE: Final = 64
 _LOOK: Final = 0.01
 _REPEAT: Final = 0.1
 _WHEN_STABLE: Final = ("S", "Z", "T", "SR")
@@ -38,7 +38,7 @@ _WITH_PARAMETER: Final = ("D", "K", "SR", "TA")
 _WEIGHINGS: Final = ("S", "SI", "SIR", "SR")
 _TEXT: Final = re.compile(r'"([^"]*)"')
 _WEIGHT: Final = re.compile(r"(\d{1,9}(?:\.\d{1,6})?) ([a-z]+)")
-_DEFLECTION, _LEAST_DEFLECTION = 0.125, 30
+_DEFLECTION, _MIN_DEFLECTION = 0.125, 30
 """Change of the weight after which SR sends again: relative to the last value, and at least, digits."""
 
 
@@ -99,7 +99,7 @@ class Balance:
                     self._answer("ES")
                 elif command:
                     self._obey(command)
-            elif len(self._buffer) < _LONGEST_LINE:
+            elif len(self._buffer) < _MAX_LINE:
                 self._buffer.append(byte)
             else:
                 self._too_long = True
@@ -268,7 +268,7 @@ class Balance:
     def _watch(self, last: float, preset: float | None) -> None:
         """Wait for a change of the weight, and send the dynamic weight (SR)."""
         digit = 10.0 ** -DECIMALS[self.unit] / UNITS[self.unit]
-        limit = max(_DEFLECTION * abs(last), _LEAST_DEFLECTION * digit) if preset is None else preset
+        limit = max(_DEFLECTION * abs(last), _MIN_DEFLECTION * digit) if preset is None else preset
         if abs(self.shown() - self.zero - self.tare - last) >= max(limit, digit):
             self._answer(self._outcome("SI"))
             self._repeater = self._loop.call_later(_LOOK, self._settle, preset)

@@ -30,7 +30,7 @@ from arcor2_fakes.wire import Connection, TcpWire
 log = logging.getLogger("main")
 
 _POLYSCOPE_X = 10  # has no dashboard server
-_MOST_AT_ONCE = 100  # control cycles to catch up after a delay; watchdog signals that waited count as one
+_MAX_AT_ONCE = 100  # control cycles to catch up after a delay; watchdog signals that waited count as one
 _CHUNK = 10  # cycles to catch up before the sockets are read again
 
 
@@ -50,7 +50,7 @@ def _check_serial_number(_type: object, number: str) -> None:
 
 
 class _Cycles:
-    """Runs the control cycles; after a delay, several at once, but not more than `_MOST_AT_ONCE`."""
+    """Runs the control cycles; after a delay, several at once, but not more than `_MAX_AT_ONCE`."""
 
     def __init__(self, controller: Controller, *streams: RtdeServer | RealTimeStream | StatePorts) -> None:
         self._controller, self._streams = controller, streams
@@ -58,9 +58,9 @@ class _Cycles:
 
     def tick(self, periods: int) -> None:
         """Run the cycles of the periods that have passed."""
-        if periods > _MOST_AT_ONCE:
+        if periods > _MAX_AT_ONCE:
             log.warning("stalled for %.2f s", periods * self._controller.period)
-        busy, self._owed = self._owed > 0, min(self._owed + periods, _MOST_AT_ONCE)
+        busy, self._owed = self._owed > 0, min(self._owed + periods, _MAX_AT_ONCE)
         if not busy:
             self._catch_up()
 

@@ -36,7 +36,7 @@ _BLOCK = re.compile(r"(def|thread)\s+(\w+)\s*\(\s*\)\s*:|(while|if|elif)\b(.+):|
 _ASSIGNMENT = re.compile(r"(?:(?:global|local)\s+)?(\w+)\s*=(?!=)\s*(.+)")
 _RUN = re.compile(r"run\s+(\w+)\s*\(\s*\)")
 _HANDLING = re.compile(r"(kill|join)\s+(\w+)")
-_MOST_AT_ONCE = 10_000  # statements in one control cycle; more are an infinite loop
+_MAX_AT_ONCE = 10_000  # statements in one control cycle; more are an infinite loop
 
 
 @dataclass
@@ -181,7 +181,7 @@ class WrittenProgram(Program):
     def _run(self, statements: list[Statement]) -> Steps:
         for statement in statements:
             self._done += 1
-            if self._done > _MOST_AT_ONCE:
+            if self._done > _MAX_AT_ONCE:
                 raise ValueError("an infinite loop")
             yield from self._statement(statement)
 

@@ -22,8 +22,8 @@ from arcor2_server.settings import ServerSettings, is_loopback
 log = structlog.get_logger(__name__)
 
 WRONG_TOKENS: Final = 10
-"""Number of wrong tokens from one address within WRONG_TOKENS_WITHIN after which further tokens are refused."""
-WRONG_TOKENS_WITHIN: Final = 60.0
+"""Number of wrong tokens from one address within WRONG_TOKENS_PERIOD after which further tokens are refused."""
+WRONG_TOKENS_PERIOD: Final = 60.0
 """Period in which wrong tokens are counted, s."""
 REMEDY: Final = "Create new tokens on the server with `arcor2-hw token add`."
 MAX_ADDRESSES: Final = 1000
@@ -146,7 +146,7 @@ class Access:
 
     def _attempts(self, address: str) -> deque[float]:
         attempts = self._wrong.get(address, deque())
-        while attempts and time.monotonic() - attempts[0] > WRONG_TOKENS_WITHIN:
+        while attempts and time.monotonic() - attempts[0] > WRONG_TOKENS_PERIOD:
             attempts.popleft()
         return attempts
 

@@ -20,7 +20,7 @@ from arcor2_server.files import aside, write_private
 
 FILE: Final = "tokens.json"
 COPY: Final = "tokens.copy.json"
-LONGEST_NAME: Final = 100
+MAX_NAME: Final = 100
 
 
 class Token(Data, frozen=True):
@@ -137,10 +137,10 @@ class TokenFile:
             InvalidData: the name is not valid.
             Conflict: there is a valid token with this name.
         """
-        if not name.strip() or len(name) > LONGEST_NAME or not name.isprintable():
+        if not name.strip() or len(name) > MAX_NAME or not name.isprintable():
             raise InvalidData(
                 "A token needs the name of a user or device with at most {longest_name} characters.",
-                longest_name=LONGEST_NAME,
+                longest_name=MAX_NAME,
             )
         secret = secrets.token_hex(32)  # never starts with a dash, as an option of the command line does
         expires = None

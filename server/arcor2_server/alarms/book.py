@@ -22,9 +22,9 @@ from arcor2_server.alarms.kinds import UNDECLARED
 
 MAX_RECORDS: Final = 5000
 """Maximum number of records. Beyond it the oldest ones that need no attention are deleted."""
-SAME_CAUSE_WITHIN: Final = 10.0
+SAME_CAUSE_PERIOD: Final = 10.0
 """Time after the last alarm of a group within which a further alarm counts as its consequence, s."""
-SAME_FAULT_WITHIN: Final = 3.0
+SAME_FAULT_PERIOD: Final = 3.0
 """Time within which the error of an action and the condition that its device reports are the same alarm, s. Conditions
 are queried every second."""
 UNSPECIFIC: Final = frozenset(
@@ -174,7 +174,7 @@ class AlarmBook:
         record = entry.record
         entry.last = what.stamp
         context = _context(what)
-        if record.active or (what.momentary and entry.momentary and what.stamp - entry.stamp < SAME_FAULT_WITHIN):
+        if record.active or (what.momentary and entry.momentary and what.stamp - entry.stamp < SAME_FAULT_PERIOD):
             return [self._put(entry, **context)] if context.items() - _fields(record).items() else []
         entry.momentary = what.momentary
         again = {"acknowledged": False, "acknowledged_by": UNSET, "acknowledged_at": UNSET, "count": record.count + 1}
@@ -189,7 +189,7 @@ class AlarmBook:
                 continue
             if what.momentary and what.code in UNSPECIFIC and record.active and not entry.momentary:
                 return entry  # the active condition explains the error
-            near = entry.session is not None and abs(what.stamp - entry.stamp) <= SAME_FAULT_WITHIN
+            near = entry.session is not None and abs(what.stamp - entry.stamp) <= SAME_FAULT_PERIOD
             if not what.momentary and entry.momentary and near and record.code in UNSPECIFIC:
                 return entry  # the device reports why the action failed
         return None
@@ -241,9 +241,9 @@ class AlarmBook:
         if at < 0:
             return changed
         first = last = at
-        while first > 0 and members[first].stamp - members[first - 1].last <= SAME_CAUSE_WITHIN:
+        while first > 0 and members[first].stamp - members[first - 1].last <= SAME_CAUSE_PERIOD:
             first -= 1
-        while last + 1 < len(members) and members[last + 1].stamp - members[last].last <= SAME_CAUSE_WITHIN:
+        while last + 1 < len(members) and members[last + 1].stamp - members[last].last <= SAME_CAUSE_PERIOD:
             last += 1
         group = members[first : last + 1]
         regrouped = {

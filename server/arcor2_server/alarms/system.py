@@ -22,11 +22,11 @@ PERIOD: Final = 1.0
 """Period of the checks of clock and load, s."""
 SLOW_PERIOD: Final = 60.0
 """Period of the checks of disk and certificate, s."""
-LEAST_FREE: Final = 512 * 1024 * 1024
+MIN_FREE_SPACE: Final = 512 * 1024 * 1024
 """Free space of the disk below which it counts as nearly full, bytes."""
-LARGEST_JUMP: Final = 5.0
+MAX_CLOCK_JUMP: Final = 5.0
 """Change of the difference between the clock and the monotonic clock that counts as a jump, s."""
-LONGEST_DELAY: Final = 3.0
+MAX_CHECK_DELAY: Final = 3.0
 """Delay of a check that shows that the server is overloaded, s."""
 RECOVERED_AFTER: Final = 30.0
 """Time without such a delay after which the overload counts as ended, s."""
@@ -104,13 +104,13 @@ class SystemAlarms:
             free = shutil.disk_usage(self._data_dir).free
         except OSError as error:
             log.warning("free space not read", directory=str(self._data_dir), reason=str(error))
-            free = LEAST_FREE
+            free = MIN_FREE_SPACE
         return free, None if self._certificate is None else _expires(self._certificate)
 
     def check_disk(self, free: int) -> None:
         """Check the free space of the disk, bytes."""
         text = Message.of("The disk of the server has only {free} MB left.", free=free // 1_000_000)
-        self._alarms.system("disk_nearly_full", free < LEAST_FREE, text)
+        self._alarms.system("disk_nearly_full", free < MIN_FREE_SPACE, text)
 
     def check_certificate(self, expires: datetime | None) -> None:
         """Check the time at which the certificate expires, None without one."""
@@ -122,7 +122,7 @@ class SystemAlarms:
         """Check by how much a check was late, s."""
         self._late.append(max(0.0, late))
         moment = time.monotonic()
-        if late > LONGEST_DELAY:
+        if late > MAX_CHECK_DELAY:
             self._slow_until = moment + RECOVERED_AFTER
             self._alarms.system("server_overloaded", True, with_devices=True)
         elif self._slow_until is not None and moment > self._slow_until:
@@ -132,7 +132,7 @@ class SystemAlarms:
     def check_clock(self, offset: float) -> None:
         """Check the difference between the clock and the monotonic clock, s."""
         jump, self._offset = offset - self._offset, offset
-        if abs(jump) > LARGEST_JUMP:
+        if abs(jump) > MAX_CLOCK_JUMP:
             self._alarms.system(
                 "clock_jumped", None, Message.of("The clock of the server jumped by {jump:.0f} s.", jump=jump)
             )

@@ -24,13 +24,13 @@ log = structlog.get_logger(__name__)
 
 WRITTEN_WITHIN: Final = 0.05
 """Time for which entries are collected before they are written together, s. The end of the process loses them."""
-LARGEST_CHANGES: Final = 256 * 1024
+MAX_CHANGES: Final = 256 * 1024
 """Maximum size of the changes of an entry, bytes."""
-LONGEST_REASON: Final = 1000
+MAX_REASON: Final = 1000
 """Maximum length of the reason of a refusal, characters."""
 ENDED_EARLY: Final = "The request was cancelled after it had made these changes."
 """Reason of the entry of a cancelled request."""
-MOST_WAITING: Final = 10_000
+MAX_WAITING: Final = 10_000
 """Maximum number of entries that wait for a file that cannot be written."""
 RETRY_AFTER: Final = 5.0
 """Time after which writing is tried again, s."""
@@ -133,7 +133,7 @@ class AuditTrail:
         name = "none" if role is None else role.name.lower()
         write = log.warning if outcome is AuditOutcome.FORBIDDEN else log.info
         write("command", outcome=outcome.value, request=request, target=target, user=user, role=name, address=address)
-        reason = self._redact(reason)[:LONGEST_REASON]
+        reason = self._redact(reason)[:MAX_REASON]
         self._waiting.put(Noted(now(), outcome, request, target, user, name, address, reason, changes))
 
     def _write(self) -> None:
@@ -165,7 +165,7 @@ class AuditTrail:
                 self._file.append([_entry(each) for each in lines])
         except StorageError as error:
             log.error("audit trail not written", waiting=len(noted), lost=lost, reason=str(error))
-            dropped = max(len(noted) - MOST_WAITING, 0)
+            dropped = max(len(noted) - MAX_WAITING, 0)
             del noted[:dropped]
             return dropped
         noted.clear()
@@ -189,7 +189,7 @@ def _entry(noted: Noted) -> AuditEntry:
     """Return an entry, which the file numbers."""
     changes = [AuditChange(each.kind, each.id, each.before, each.after) for each in noted.changes]
     reason = noted.reason
-    if changes and len(msgspec.json.encode(changes)) > LARGEST_CHANGES:
+    if changes and len(msgspec.json.encode(changes)) > MAX_CHANGES:
         reason = f"Changed items: {len(changes)}. Their values are too large for the audit trail."
         changes = []
     return AuditEntry(

@@ -13,7 +13,7 @@ WIDTH: Final = 120
 """Maximum length of a line."""
 DEFAULT_DEADLINE: Final = 100.0
 """Sum of the time limits of a command above which its action declares a deadline, s."""
-LONGEST_WAIT: Final = 600.0
+MAX_WAIT: Final = 600.0
 """Longest time that a program may wait for a point in one call, s."""
 MARGIN: Final = 20.0
 """Additional time of an action for its requests, s."""
@@ -271,10 +271,10 @@ def _point_actions(name: str, point: Point, kinds: Kinds) -> list[str]:
                 "        :param timeout: time limit, s",
             ]
             body = [
-                f"        assert 0.0 <= timeout <= {LONGEST_WAIT!r}",
+                f"        assert 0.0 <= timeout <= {MAX_WAIT!r}",
                 f"        self.wait_for_value({key}, value, timeout)",
             ]
-            mark = f"@action(deadline={LONGEST_WAIT + MARGIN!r})"
+            mark = f"@action(deadline={MAX_WAIT + MARGIN!r})"
             lines += _action(mark, action, ["value: bool", "timeout: float"], "None", described, body)
     return lines
 

@@ -24,13 +24,13 @@ Keys = tuple[str, ...]
 BASES: Final = ("generic", "connected", "polled_control", "modbus_device", "mapped_device")
 """Modules of `arcor2_hw.objects` with the bases of a generated type, whose names it must not use."""
 OWNERS: Final = ("us", "nobody")
-LONGEST_TIME: Final = 3600.0
+MAX_TIME: Final = 3600.0
 """Longest time in a map, s."""
-LONGEST_NAME: Final = 40
-LONGEST_TEXT: Final = 80
+MAX_NAME: Final = 40
+MAX_TEXT: Final = 80
 """Maximum lengths of texts, which become lines of the source code."""
 TEXT: Final = r'[^"\\\n]*'
-Text = Annotated[str, msgspec.Meta(min_length=1, max_length=LONGEST_TEXT, pattern=f"^{TEXT}$")]
+Text = Annotated[str, msgspec.Meta(min_length=1, max_length=MAX_TEXT, pattern=f"^{TEXT}$")]
 
 
 class _Part(Data, frozen=True, forbid_unknown_fields=True):
@@ -96,7 +96,7 @@ class StopsWithin(_Part, frozen=True):
 class DeviceMap(_Part, frozen=True, kw_only=True):
     """A device. `points` and `commands` are read separately, so that errors name them."""
 
-    name: Annotated[str, msgspec.Meta(min_length=1, max_length=LONGEST_NAME, pattern=f"^{TEXT}$")]
+    name: Annotated[str, msgspec.Meta(min_length=1, max_length=MAX_NAME, pattern=f"^{TEXT}$")]
     text: Text
     loss_reaction: Literal["holds", "continues"] | StopsWithin
     word_order: WordOrder = "high_first"
@@ -247,8 +247,8 @@ def _of_a_point(path: Keys, name: str, point: Point) -> Iterator[tuple[Keys, str
         yield path, f"{name!r} is not a valid name"
     if not point.internal and not point.text:
         yield path, "text is missing: users see it; points without actions have `internal: true`"
-    if not re.fullmatch(TEXT, point.text) or len(point.text) > LONGEST_TEXT:
-        yield (*path, "text"), f"must be one line of up to {LONGEST_TEXT} characters without quotes and backslashes"
+    if not re.fullmatch(TEXT, point.text) or len(point.text) > MAX_TEXT:
+        yield (*path, "text"), f"must be one line of up to {MAX_TEXT} characters without quotes and backslashes"
     if point.unit and unit_in(f"value, {point.unit}") != point.unit:
         yield (*path, "unit"), f"the unit {point.unit!r} is not known; examples are N m, mm/s, °C, bar, %, ml and rpm"
 
@@ -305,8 +305,8 @@ def _of_control(device: DeviceMap) -> Iterator[tuple[Keys, str]]:
 
 
 def _time(path: Keys, seconds: float) -> Iterator[tuple[Keys, str]]:
-    if not 0.0 < seconds <= LONGEST_TIME:
-        yield path, f"must be more than 0 and at most {LONGEST_TIME:g} s, not {seconds!r}"
+    if not 0.0 < seconds <= MAX_TIME:
+        yield path, f"must be more than 0 and at most {MAX_TIME:g} s, not {seconds!r}"
 
 
 def _known(path: Keys, name: str, device: DeviceMap, *, write: bool) -> Iterator[tuple[Keys, str]]:

@@ -16,7 +16,7 @@ from arcor2_hw.exceptions import Arcor2Error, Conflict, InvalidData, NotFound
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.deployment import minisign
 from arcor2_server.deployment.installation import NAME, UNIT, CommandFailed, Installation, run
-from arcor2_server.deployment.upgrade import READY_WITHIN, Systemd, UpgradeFailed, checked, upgrade as upgrade_to
+from arcor2_server.deployment.upgrade import READY_TIMEOUT, Systemd, UpgradeFailed, checked, upgrade as upgrade_to
 
 PUBLIC: Final = 0o022
 """Mask of the permissions of programs, which all users may read."""
@@ -57,7 +57,7 @@ def install(
         if server and not select_only:
             run(["systemctl", "enable", UNIT])
             if start:
-                Systemd().start(READY_WITHIN)
+                Systemd().start(READY_TIMEOUT)
     except (Arcor2Error, OSError) as error:
         return fail("install", error, _status(error))
     return ExitStatus.OK

@@ -11,10 +11,10 @@ from arcor2_hw.data.trace_comparison import compare, summarize
 from arcor2_server.cli.server_connection import printable
 from arcor2_server.cli.tables import console
 
-LONGEST_WAITS: Final = 3
+SHOWN_WAITS: Final = 3
 """Number of waits shown with a trace, longest first."""
 
-SHORTEST_WAIT: Final = 0.001
+MIN_WAIT: Final = 0.001
 """Duration above which a wait is shown, s."""
 
 
@@ -40,10 +40,10 @@ def show_trace(trace: RunTrace) -> None:
     out.print(f"cycle: {times.cycle:.3f} s{counts}")
     for device in times.devices:
         out.print(f"{_safe(device.name)}: busy {device.busy:.3f} s, {device.share:.0%}")
-    for one in times.device_waits[:LONGEST_WAITS]:
+    for one in times.device_waits[:SHOWN_WAITS]:
         waiting, other = (_safe(names.get(key, key)) for key in (one.device, one.for_device))
         out.print(f"{waiting} waits {one.duration:.3f} s for {other} at {one.start:.3f} s, before {_safe(one.before)}")
-    for wait in [wait for wait in times.waits if wait.duration > SHORTEST_WAIT][:LONGEST_WAITS]:
+    for wait in [wait for wait in times.waits if wait.duration > MIN_WAIT][:SHOWN_WAITS]:
         out.print(f"wait of {wait.duration:.3f} s at {wait.start:.3f} s, before {_safe(wait.before)}")
     if trace.omitted:
         out.print(f"The first {trace.omitted} actions are not stored.")

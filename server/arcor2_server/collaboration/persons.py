@@ -20,11 +20,11 @@ from arcor2_server.storage.persons import PersonStore, StoredLockOut, StoredPers
 
 log = structlog.get_logger(__name__)
 
-MOST_WRONG: Final = 5
+MAX_WRONG_PINS: Final = 5
 """Number of wrong PINs of a person at a device after which the person is locked out there."""
 FIRST_LOCK_OUT: Final = 60.0
 """Time of the first lock-out, s. Each further wrong PIN doubles it."""
-LONGEST_LOCK_OUT: Final = 3600.0
+MAX_LOCK_OUT: Final = 3600.0
 """Longest time of a lock-out, s."""
 FORGOTTEN_AFTER: Final = 86_400.0
 """Time after a lock-out, or after a wrong PIN, at which wrong PINs no longer count, s."""
@@ -210,7 +210,7 @@ class Persons:
         at = time.time()
         if found is None or at > found.until + FORGOTTEN_AFTER:
             return None
-        if found.wrong < MOST_WRONG or at >= found.until:
+        if found.wrong < MAX_WRONG_PINS or at >= found.until:
             return found
         seconds = max(1, round(found.until - at))
         if key == _CARDS:
@@ -225,8 +225,8 @@ class Persons:
     async def _wrong(self, key: str, device: str, before: StoredLockOut | None) -> None:
         wrong = (0 if before is None else before.wrong) + 1
         lock_out = 0.0
-        if wrong >= MOST_WRONG:
-            lock_out = min(FIRST_LOCK_OUT * 2.0 ** (wrong - MOST_WRONG), LONGEST_LOCK_OUT)
+        if wrong >= MAX_WRONG_PINS:
+            lock_out = min(FIRST_LOCK_OUT * 2.0 ** (wrong - MAX_WRONG_PINS), MAX_LOCK_OUT)
             log.warning("person locked out", person=key, device=device, wrong=wrong, seconds=lock_out)
         await self._store.put_lock_out(key, device, StoredLockOut(wrong, time.time() + lock_out))
 

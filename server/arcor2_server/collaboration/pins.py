@@ -11,9 +11,9 @@ from arcor2_hw.exceptions import InvalidData, StorageError
 from arcor2_server.files import write_private
 from arcor2_server.storage.persons import PinHash
 
-SHORTEST_PIN: Final = 4
-LONGEST_PIN: Final = 12
-SHORTEST_CARD: Final = 4
+MIN_PIN_LENGTH: Final = 4
+MAX_PIN_LENGTH: Final = 12
+MIN_CARD_LENGTH: Final = 4
 CARD_KEY: Final = "cards.key"
 """File of the data directory with the key of the hashes of cards."""
 _KEY_SIZE: Final = 32
@@ -21,13 +21,13 @@ _N: Final = 2**14
 """Cost of scrypt. One hash takes 50 to 100 ms and 16 MiB."""
 _R: Final = 8
 _P: Final = 1
-_MOST_MEMORY: Final = 64 * 1024 * 1024
+_MAX_MEMORY: Final = 64 * 1024 * 1024
 
 
 def check_pin(pin: str) -> None:
     """Raise InvalidData if a PIN is not acceptable."""
-    if not (pin.isascii() and pin.isdecimal() and SHORTEST_PIN <= len(pin) <= LONGEST_PIN):
-        raise InvalidData("A PIN has {least} to {most} digits.", least=SHORTEST_PIN, most=LONGEST_PIN)
+    if not (pin.isascii() and pin.isdecimal() and MIN_PIN_LENGTH <= len(pin) <= MAX_PIN_LENGTH):
+        raise InvalidData("A PIN has {least} to {most} digits.", least=MIN_PIN_LENGTH, most=MAX_PIN_LENGTH)
     steps = {(int(after) - int(before)) % 10 for before, after in itertools.pairwise(pin)}
     if len(steps) == 1 and steps <= {0, 1, 9}:
         raise InvalidData("This PIN is easy to guess. Use digits that are neither equal nor consecutive.")
@@ -46,7 +46,7 @@ def matches(pin: str, stored: PinHash) -> bool:
 
 
 def _scrypt(pin: str, salt: bytes, n: int, r: int, p: int) -> bytes:
-    return hashlib.scrypt(pin.encode(), salt=salt, n=n, r=r, p=p, maxmem=_MOST_MEMORY, dklen=32)
+    return hashlib.scrypt(pin.encode(), salt=salt, n=n, r=r, p=p, maxmem=_MAX_MEMORY, dklen=32)
 
 
 class CardHashes:
@@ -67,8 +67,8 @@ class CardHashes:
             StorageError: the key cannot be read or created.
         """
         number = card.strip()
-        if len(number) < SHORTEST_CARD or not number.isprintable():
-            raise InvalidData("The number of a card has at least {least} characters.", least=SHORTEST_CARD)
+        if len(number) < MIN_CARD_LENGTH or not number.isprintable():
+            raise InvalidData("The number of a card has at least {least} characters.", least=MIN_CARD_LENGTH)
         return hmac.digest(self._key(), number.encode(), "sha256").hex()
 
     def _key(self) -> bytes:

@@ -15,10 +15,10 @@ from arcor2_server.deployment.installation import NAME, UNIT, CommandFailed, Ins
 
 log = structlog.get_logger(__name__)
 
-READY_WITHIN: Final = 60.0
+READY_TIMEOUT: Final = 60.0
 """Time limit for the start of the new version, s. Half of the two minutes in which a failed upgrade is undone."""
-STOPPED_WITHIN: Final = 30.0
-BACKUP_WITHIN: Final = 600.0
+STOPPED_TIMEOUT: Final = 30.0
+BACKUP_TIMEOUT: Final = 600.0
 
 
 class Services(Protocol):
@@ -96,15 +96,15 @@ def upgrade(
     copy = installation.data / BACKUPS / f"before-{version}.zip"
     stored = False
     try:
-        services.stop(STOPPED_WITHIN)
+        services.stop(STOPPED_TIMEOUT)
         report(f"copying the data to {copy}")
         run(["install", "-d", "-m", "700", copy.parent], user=user)
         data = ("--data-dir", installation.data)
-        run([commands[old], "backup", copy, "--force", *data], BACKUP_WITHIN, user)
+        run([commands[old], "backup", copy, "--force", *data], BACKUP_TIMEOUT, user)
         stored = True
         report(f"starting version {version}")
         run([commands[version], "install", "--select-only", "--root", installation.root])
-        services.start(READY_WITHIN)
+        services.start(READY_TIMEOUT)
     except CommandFailed as error:
         report(f"{error}; going back to version {old}")
         log.error("upgrade failed", version=str(version), reason=str(error))
@@ -123,14 +123,14 @@ def upgrade(
 
 def _go_back(installation: Installation, services: Services, old: Version, copy: Path | None, user: str | None) -> None:
     try:
-        services.stop(STOPPED_WITHIN)
+        services.stop(STOPPED_TIMEOUT)
     except CommandFailed as error:
         log.warning("the service cannot be stopped", reason=str(error))
     installation.select(old)
     if copy is not None:
         command = installation.path_of(old) / "bin" / NAME
-        run([command, "restore", copy, "--data-dir", installation.data], BACKUP_WITHIN, user)
-    services.start(READY_WITHIN)
+        run([command, "restore", copy, "--data-dir", installation.data], BACKUP_TIMEOUT, user)
+    services.start(READY_TIMEOUT)
 
 
 def checked(bundle: Path, key: Path, unsigned: bool) -> Version:

@@ -26,7 +26,7 @@ from arcor2_server.documents.changes import (
 ALL: Final = 2**63 - 1
 """Value of `Base.forget` that drops all edits, also those of another document."""
 
-LONGEST_NAME: Final = 60
+MAX_NAME: Final = 60
 """Maximum length of a name in a position, characters."""
 EDIT_COLUMNS: Final = "number, time, user, changes, request, how, target"
 """Columns of the table `edit` without the checksum."""
@@ -112,7 +112,7 @@ class Position(msgspec.Struct, frozen=True):
         """Return the position after one more job."""
         match job:
             case Edit():
-                return replace(self, number=job.number, user=job.user[:LONGEST_NAME], time=job.time)
+                return replace(self, number=job.number, user=job.user[:MAX_NAME], time=job.time)
             case Base():
                 if job.forget == ALL:
                     return Position(self.serial + 1, job.number, document_of(job.items))
@@ -211,8 +211,8 @@ def document_of(items: list[Item]) -> str:
     """Return kind and name of a document: `project 'demo'`; empty if there is none."""
     names = {item.kind: item.value.name for item in items if item.kind in (Kind.SCENE, Kind.PROJECT)}
     if Kind.PROJECT in names:
-        return f"project {names[Kind.PROJECT][:LONGEST_NAME]!r}"
-    return f"scene {names[Kind.SCENE][:LONGEST_NAME]!r}" if Kind.SCENE in names else ""
+        return f"project {names[Kind.PROJECT][:MAX_NAME]!r}"
+    return f"scene {names[Kind.SCENE][:MAX_NAME]!r}" if Kind.SCENE in names else ""
 
 
 def _shown(document: str) -> Message:

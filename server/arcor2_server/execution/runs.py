@@ -32,7 +32,7 @@ log = structlog.get_logger(__name__)
 
 MAX_RUNS: Final = 1000
 """Maximum number of stored runs."""
-MOST_TRACES: Final = 10
+MAX_TRACES: Final = 10
 """Number of traces that are kept in memory while the database cannot be reached."""
 TRACE: Final = "ExecutionTrace"
 """The additional event with the start and end of actions."""
@@ -365,7 +365,7 @@ class Runs:
                     del self._unwritten[number]
         except StorageError as error:  # try again with the next change
             log.warning("run not stored", reason=str(error))
-            for old in list(self._unwritten_traces)[:-MOST_TRACES]:
+            for old in list(self._unwritten_traces)[:-MAX_TRACES]:
                 del self._unwritten_traces[old]
         finally:
             self._writing = None

@@ -48,7 +48,7 @@ from arcor2_server.storage.setting_secrets import SettingSecrets
 log = structlog.get_logger(__name__)
 S = PackageStateEnum
 
-STOP_WITHIN: Final = 5.0
+STOP_TIMEOUT: Final = 5.0
 """Time limit for a stopped program to end before its host is killed, s."""
 SPARE_AFTER: Final = 1.0
 """Time from PackageInfo to the start of the next spare host, s, so that it does not delay the starting program."""
@@ -81,7 +81,7 @@ class Execution(PackageLibrary, RunObservers):
         super().__init__(hub, packages)
         RunObservers.__init__(self)
         self.state = S.UNDEFINED
-        self.stop_within = STOP_WITHIN
+        self.stop_within = STOP_TIMEOUT
         self._reserved = False
         self.program = ProgramRun(runs)
         """The present or last run."""

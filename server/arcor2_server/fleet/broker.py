@@ -14,9 +14,9 @@ from arcor2_server.nodes.credentials import Credentials, address_of
 
 log = structlog.get_logger(__name__)
 
-CONNECT_WITHIN: Final = 3.0
+CONNECT_TIMEOUT: Final = 3.0
 """Time limit for a connection, s."""
-CLOSE_WITHIN: Final = 0.5
+CLOSE_TIMEOUT: Final = 0.5
 """Time limit for closing a connection, s."""
 PING_PERIOD: Final = 1
 """Period of pings, s. A connection whose peer has not answered two of them is lost."""
@@ -103,12 +103,12 @@ async def _connect(
 
     client = Client()
     try:
-        async with asyncio.timeout(CONNECT_WITHIN):
+        async with asyncio.timeout(CONNECT_TIMEOUT):
             await client.connect(
                 credentials.url,
                 name=name,
                 allow_reconnect=False,
-                connect_timeout=int(CONNECT_WITHIN),
+                connect_timeout=int(CONNECT_TIMEOUT),
                 ping_interval=PING_PERIOD,
                 max_outstanding_pings=2,
                 disconnected_cb=disconnected,
@@ -126,4 +126,4 @@ async def _connect(
 
 async def _close(client: Client) -> None:
     with contextlib.suppress(NatsError, OSError, TimeoutError):
-        await asyncio.wait_for(client.close(), CLOSE_WITHIN)
+        await asyncio.wait_for(client.close(), CLOSE_TIMEOUT)

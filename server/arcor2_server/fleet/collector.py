@@ -22,7 +22,7 @@ from arcor2_server.background import BackgroundTasks
 from arcor2_server.fleet import records as r
 from arcor2_server.fleet.broker import keep_connected
 from arcor2_server.fleet.file import FleetFile, FleetResult, ReceivedResult
-from arcor2_server.fleet.registry import MOST_PER_NAME, Registry
+from arcor2_server.fleet.registry import MAX_PER_NAME, Registry
 from arcor2_server.fleet.reports import FleetReports
 from arcor2_server.fleet.summaries import of_alarm, of_unit
 from arcor2_server.nodes.credentials import Credentials
@@ -39,15 +39,15 @@ STREAM_BYTES: Final = 1 << 30
 """Maximum size of the stream of a cell at the broker, bytes. Further results wait in the cell."""
 BATCH: Final = 200
 """Maximum number of results that are stored in one transaction."""
-FETCH_WITHIN: Final = 10.0
+FETCH_TIMEOUT: Final = 10.0
 """Time for which a request for results waits for them, s."""
 RETRY_PERIOD: Final = 2.0
 """Time between two attempts to receive the results of a cell, s."""
-ACKNOWLEDGED_WITHIN: Final = 10.0
+ACKNOWLEDGE_TIMEOUT: Final = 10.0
 """Time after which the broker delivers a result again that was not acknowledged, s."""
 REPORT_PERIOD: Final = 60.0
 """Shortest time between two log entries about refused messages of one cell, s."""
-MOST_REPORTED: Final = 2000
+MAX_REPORTED: Final = 2000
 """Maximum number of subjects whose last report is remembered."""
 T = TypeVar("T")
 
@@ -171,7 +171,7 @@ class Collector:
         self._notify()
         source = _Source(name, state.domain)
         same = sum(each.name == name for each in self._sources)
-        if source not in self._sources and same < MOST_PER_NAME and self.connected:
+        if source not in self._sources and same < MAX_PER_NAME and self.connected:
             task = self._background.spawn(self._collect(self._client, source), f"results of {name}")
             self._sources[source] = task
 
@@ -183,7 +183,7 @@ class Collector:
         if last and at - last < REPORT_PERIOD:
             self._reported[subject] = (last, skipped + 1)
             return
-        while len(self._reported) >= MOST_REPORTED:
+        while len(self._reported) >= MAX_REPORTED:
             del self._reported[next(iter(self._reported))]
         self._reported[subject] = (at, 0)
         log.warning(what, subject=subject, reason=str(error)[:500], others=skipped)
@@ -200,12 +200,12 @@ class Collector:
                     "",
                     durable=CONSUMER,
                     stream=r.stream_name(source.name),
-                    config=ConsumerConfig(ack_policy=AckPolicy.EXPLICIT, ack_wait=ACKNOWLEDGED_WITHIN),
+                    config=ConsumerConfig(ack_policy=AckPolicy.EXPLICIT, ack_wait=ACKNOWLEDGE_TIMEOUT),
                 )
                 reported = ""
                 while True:
                     try:
-                        messages = await subscription.fetch(BATCH, timeout=FETCH_WITHIN)
+                        messages = await subscription.fetch(BATCH, timeout=FETCH_TIMEOUT)
                     except TimeoutError:
                         continue
                     await self._store(source.name, messages)
@@ -243,7 +243,7 @@ async def _ensure_stream(stream: JetStreamContext, cell: str) -> None:
             storage=StorageType.FILE,
             discard=DiscardPolicy.NEW,
             max_bytes=STREAM_BYTES,
-            max_msg_size=r.LARGEST_RESULT,
+            max_msg_size=r.MAX_RESULT,
         )
 
 

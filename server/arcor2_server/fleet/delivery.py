@@ -26,11 +26,11 @@ log = structlog.get_logger(__name__)
 
 BATCH: Final = 200
 """Maximum number of results that are sent at once."""
-STORED_WITHIN: Final = 10.0
+STORE_TIMEOUT: Final = 10.0
 """Time limit for the broker to store a batch of results, s."""
 POLL_PERIOD: Final = 5.0
 """Period in which the outbox is checked, also without an event, and time before a failed batch is sent again, s."""
-CREATED_WITHIN: Final = 0.5
+CREATE_TIMEOUT: Final = 0.5
 """Time between two checks whether the stream of this cell exists, s."""
 HEADERS: Final = 4096
 """Size that is left for the headers of a message, bytes."""
@@ -67,7 +67,7 @@ class Delivery:
                 reported = ""
                 await self._deliver_to(client, stream)
             except NotFoundError:
-                await asyncio.sleep(CREATED_WITHIN)  # after the server of the page has seen a state with the domain
+                await asyncio.sleep(CREATE_TIMEOUT)  # after the server of the page has seen a state with the domain
                 continue
             except (NatsError, TimeoutError, Arcor2Error) as error:
                 if (reason := f"{type(error).__name__}: {error}") != reported:
@@ -81,13 +81,13 @@ class Delivery:
         Raises:
             NotFoundError: the stream does not exist yet.
         """
-        stream = client.jetstream(timeout=STORED_WITHIN)
+        stream = client.jetstream(timeout=STORE_TIMEOUT)
         self.domain = (await stream.account_info()).domain or ""
         await stream.stream_info(r.stream_name(self._name))
         return stream
 
     async def _deliver_to(self, client: Client, stream: JetStreamContext) -> None:
-        limit = min(client.max_payload, r.LARGEST_RESULT) - HEADERS
+        limit = min(client.max_payload, r.MAX_RESULT) - HEADERS
         while True:
             self._added.clear()
             self.waiting = sum([await outbox.count() for outbox in self._outboxes])
@@ -120,7 +120,7 @@ class Delivery:
                 await stream.publish_async(subject, encoded, stream=r.stream_name(self._name), headers=headers)
             )
             sent.append(waiting.number)
-        async with asyncio.timeout(STORED_WITHIN):
+        async with asyncio.timeout(STORE_TIMEOUT):
             answers = await asyncio.gather(*pending, return_exceptions=True)
         failures = [answer for answer in answers if isinstance(answer, BaseException)]
         done += [number for number, answer in zip(sent, answers, strict=True) if not isinstance(answer, BaseException)]

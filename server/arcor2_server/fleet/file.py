@@ -20,7 +20,7 @@ log = structlog.get_logger(__name__)
 
 FILE: Final = "fleet.sqlite"
 """Name in the data directory."""
-MOST_RESULTS: Final = 1_000_000
+MAX_RESULTS: Final = 1_000_000
 """Maximum number of stored results. Beyond it the oldest are deleted."""
 _VERSION: Final = 2
 _SCHEMA: Final = """
@@ -132,7 +132,7 @@ class FleetFile:
         """Store results durably. A result that is stored already is replaced by a newer version, else left alone."""
         with self._transaction():
             self._connection.executemany(columns.PUT, [(*each[:-1], *each.columns) for each in results])
-            self._connection.execute("delete from result where id <= (select max(id) from result) - ?", (MOST_RESULTS,))
+            self._connection.execute("delete from result where id <= (select max(id) from result) - ?", (MAX_RESULTS,))
 
     def results(self, cell: str, kind: str, before: int, limit: int) -> list[FleetResult]:
         """Return results, newest first.

@@ -48,7 +48,7 @@ PERIOD: Final = 0.1
 """Shortest time between two states, s."""
 STALE_AFTER: Final = 5.0
 """Age of a state after which it is not published any more, s. The fleet then shows the cell without a signal."""
-FLUSHED_WITHIN: Final = 2
+FLUSH_TIMEOUT: Final = 2
 """Time limit for the broker to receive a state, s."""
 COUNTED: Final = timedelta(hours=8)
 """Period in which units are counted."""
@@ -275,10 +275,10 @@ class FleetLink:
                 sent, due = state, loop.time() + r.BEAT_PERIOD
                 self._number += 1
                 encoded = r.encode(replace(state, number=self._number))
-                if len(encoded) > r.LARGEST_STATE:  # names with many characters outside ASCII
+                if len(encoded) > r.MAX_STATE:  # names with many characters outside ASCII
                     encoded = r.encode(replace(state, number=self._number, first_alarm=UNSET, users=(), missing=()))
                 await client.publish(subject, encoded)
-                await client.flush(FLUSHED_WITHIN)  # an old state never waits to be sent after a cable was repaired
+                await client.flush(FLUSH_TIMEOUT)  # an old state never waits to be sent after a cable was repaired
             await asyncio.sleep(PERIOD)
 
 
@@ -287,4 +287,4 @@ def _short(name: str) -> str:
 
 
 def _some(names: list[str]) -> tuple[str, ...]:
-    return tuple(map(_short, names[: r.MOST_NAMES]))
+    return tuple(map(_short, names[: r.MAX_NAMES]))

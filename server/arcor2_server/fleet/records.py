@@ -20,11 +20,11 @@ STATES: Final = f"{PREFIX}.*.state"
 """Subject of the states of all cells."""
 BEAT_PERIOD: Final = 0.5
 """Longest time between two states of a cell, s."""
-LARGEST_STATE: Final = 16 * 1024
+MAX_STATE: Final = 16 * 1024
 """Maximum size of a state, bytes."""
-LARGEST_RESULT: Final = 1024 * 1024
+MAX_RESULT: Final = 1024 * 1024
 """Maximum size of a result, bytes: the largest message that a broker accepts by default."""
-MOST_NAMES: Final = 8
+MAX_NAMES: Final = 8
 """Maximum number of users, and of devices, that a state names."""
 
 Name = Annotated[str, Meta(max_length=200)]
@@ -88,9 +88,9 @@ class FleetState(Data, frozen=True, kw_only=True):
     low: Count = 0
     first_alarm: FirstAlarm | Unset = UNSET
     started_by: Name = ""
-    users: Annotated[tuple[Name, ...], Meta(max_length=MOST_NAMES)] = ()
-    controlling: Annotated[tuple[Name, ...], Meta(max_length=MOST_NAMES)] = ()
-    missing: Annotated[tuple[Name, ...], Meta(max_length=MOST_NAMES)] = ()
+    users: Annotated[tuple[Name, ...], Meta(max_length=MAX_NAMES)] = ()
+    controlling: Annotated[tuple[Name, ...], Meta(max_length=MAX_NAMES)] = ()
+    missing: Annotated[tuple[Name, ...], Meta(max_length=MAX_NAMES)] = ()
     waiting: Count = 0
 
 
@@ -146,13 +146,13 @@ def cell_of(subject: str) -> str:
 
 def decode_state(data: bytes) -> FleetState:
     """Return a state that was received. Raise InvalidData if it is too large or not a state."""
-    state: FleetState = _decoded(data, LARGEST_STATE, _decode_state)
+    state: FleetState = _decoded(data, MAX_STATE, _decode_state)
     return state
 
 
 def decode_result(data: bytes) -> Result:
     """Return a result that was received. Raise InvalidData if it is too large or not a result."""
-    result: Result = _decoded(data, LARGEST_RESULT, _decode_result)
+    result: Result = _decoded(data, MAX_RESULT, _decode_result)
     return result
 
 

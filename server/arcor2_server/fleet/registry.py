@@ -15,9 +15,9 @@ DEAD_AFTER: Final = 1.5
 """Time without a state after which a cell has no signal, s: three beats. The page shows it within 2 s."""
 TWIN_FOR: Final = 10.0
 """Time for which two processes with the same data are shown as a conflict after the last change between them, s."""
-MOST_CELLS: Final = 1000
+MAX_CELLS: Final = 1000
 """Maximum number of cells."""
-MOST_PER_NAME: Final = 4
+MAX_PER_NAME: Final = 4
 """Maximum number of servers that are shown with one name."""
 _BOOTS: Final = 8
 """Number of remembered earlier processes of a cell."""
@@ -80,7 +80,7 @@ class Registry:
     def __init__(self, stored: Iterable[StoredCell] = ()) -> None:
         self.revision = 0
         self._cells: dict[str, _Cell] = {}
-        self._removed: deque[tuple[int, str]] = deque(maxlen=MOST_CELLS)
+        self._removed: deque[tuple[int, str]] = deque(maxlen=MAX_CELLS)
         for each in stored:
             self._add(_Cell(each.name, each.state, each.seen, None))
 
@@ -99,10 +99,10 @@ class Registry:
         cell = self._cells.get(f"{name}:{state.identity}")
         if cell is None:
             same = sum(each.name == name for each in self._cells.values())
-            if same >= MOST_PER_NAME:
+            if same >= MAX_PER_NAME:
                 raise Conflict("{count} servers use the name already. Remove those that do not exist.", count=same)
-            if len(self._cells) >= MOST_CELLS:
-                raise Conflict("{count} cells are known already. Remove those that do not exist.", count=MOST_CELLS)
+            if len(self._cells) >= MAX_CELLS:
+                raise Conflict("{count} cells are known already. Remove those that do not exist.", count=MAX_CELLS)
             self._add(_Cell(name, state, seen, at))
             return
         if state.boot != cell.boot:

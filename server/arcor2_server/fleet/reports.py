@@ -18,7 +18,7 @@ from arcor2_server.fleet.summaries import AlarmSummary, UnitSummary
 HOUR: Final = 3600
 _LONG: Final = 49 * HOUR
 """Length of a period from which it is divided into parts of 6 hours instead of 1 hour, s."""
-_MOST_CAUSES: Final = 50
+_MAX_CAUSES: Final = 50
 """Maximum number of causes of alarms."""
 _BAD: Final = "state in ('bad', 'rejected')"
 _unit = msgspec.json.Decoder(UnitSummary).decode
@@ -196,7 +196,7 @@ class FleetReports:
             f"where kind = 'alarm' and at >= ? and at < ?{of_cell} "
             "group by cell, label order by 2 desc, 3 desc limit ?"
         )
-        rows = self._rows(query, int(time.time()), period.since, period.until, *values, _MOST_CAUSES)
+        rows = self._rows(query, int(time.time()), period.since, period.until, *values, _MAX_CAUSES)
         wanted = ", ".join("?" * len(rows))
         newest = self._rows(f"select id, summary from result where id in ({wanted})", *(row[3] for row in rows))  # noqa: S608
         summaries = {number: _alarm(summary) for number, summary in newest}

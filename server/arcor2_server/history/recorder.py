@@ -13,11 +13,11 @@ from arcor2_server.settings import DeadBand
 
 log = structlog.get_logger(__name__)
 
-MOST_POINTS: Final = 2000
+MAX_POINTS: Final = 2000
 """Maximum number of recorded points."""
-MOST_WAITING: Final = 100_000
+MAX_WAITING: Final = 100_000
 """Maximum number of values that wait until they are stored. Beyond it the oldest are lost."""
-LONGEST_TEXT: Final = 200
+MAX_TEXT: Final = 200
 """Maximum length of a recorded text, characters."""
 _NUMBERS: Final = {quality: number for number, quality in enumerate(PointQuality)}
 _UNKNOWN: Final = (PointQuality.BAD, PointQuality.NOT_CONNECTED)
@@ -69,13 +69,13 @@ class PointRecorder:
         for point in points:
             recorded = known.get(point.name)
             if recorded is None:
-                if self._count >= MOST_POINTS:
+                if self._count >= MAX_POINTS:
                     continue
                 recorded = known[point.name] = self._added(object_id, object_name, point)
             time = at if isinstance(point.age, Unset) else at - round(point.age * 1000)
             value = None if point.quality in _UNKNOWN else point.value
             if isinstance(value, str):
-                value = value[:LONGEST_TEXT]
+                value = value[:MAX_TEXT]
             since = at - recorded.time
             if recorded.quality is point.quality and _equal(recorded.value, value, recorded.band):
                 if 0 <= since < REPEATED_AFTER_MS:
@@ -98,8 +98,8 @@ class PointRecorder:
 
     def _added(self, object_id: str, object_name: str, point: LivePoint) -> RecordedPoint:
         self._count += 1
-        if self._count == MOST_POINTS:
-            log.warning("further points are not recorded", most=MOST_POINTS)
+        if self._count == MAX_POINTS:
+            log.warning("further points are not recorded", most=MAX_POINTS)
         name = f"{object_name}.{point.name}"
         band = next((each.band for each in self._bands if fnmatchcase(name, each.pattern)), 0.0)
         return RecordedPoint(object_id, object_name, point, band)
@@ -113,8 +113,8 @@ class PointRecorder:
         number = None if value is None or isinstance(value, str) else float(value)
         text = value if isinstance(value, str) else None
         self._waiting.append((recorded, time, number, text, _NUMBERS[quality]))
-        if len(self._waiting) > MOST_WAITING:
-            dropped = MOST_WAITING // 10
+        if len(self._waiting) > MAX_WAITING:
+            dropped = MAX_WAITING // 10
             del self._waiting[:dropped]
             self.dropped += dropped
 
@@ -125,7 +125,7 @@ class PointRecorder:
 
     def put_back(self, values: list[Waiting]) -> None:
         """Store values again that could not be written, before newer ones."""
-        kept = values[max(0, len(values) + len(self._waiting) - MOST_WAITING) :]
+        kept = values[max(0, len(values) + len(self._waiting) - MAX_WAITING) :]
         self.dropped += len(values) - len(kept)
         self._waiting = kept + self._waiting
 

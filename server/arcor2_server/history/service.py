@@ -57,11 +57,11 @@ HOUR: Final = 3_600_000
 DAY: Final = 24 * HOUR
 LATE: Final = 60_000
 """Time after the end of an hour at which its values are moved, ms: some may still wait to be stored."""
-MOST_MERGED: Final = 5_000_000
+MAX_MERGED_ROWS: Final = 5_000_000
 """Maximum number of rows of a file that is made from others: queries wait while it is written."""
 FEW_RUNS: Final = 10_000
 """Number of runs below which a file is merged with newer runs."""
-MOST_RUNS_WAITING: Final = 1000
+MAX_RUNS_WAITING: Final = 1000
 _CONNECTED: Final = (Connection.ONLINE, Connection.BACK)
 _OWNER: Final = "history"
 NOT_RECORDED: Final = translatable("The server records no history. Start it with --history.")
@@ -168,7 +168,7 @@ class History:
     def run_ended(self, run: Run) -> None:
         """Record a run that has ended."""
         if self._settings.point_history:
-            self._runs = [*self._runs, past_run(run)][-MOST_RUNS_WAITING:]
+            self._runs = [*self._runs, past_run(run)][-MAX_RUNS_WAITING:]
 
     async def flush(self) -> None:
         """Store what waits."""
@@ -362,7 +362,7 @@ def _mergeable(files: Sequence[ColdFile], today: int) -> list[list[ColdFile]]:
     for file in files:
         if file.last // DAY < today:
             days.setdefault(file.last // DAY, []).append(file)
-    return [each for each in days.values() if len(each) > 1 and sum(file.rows for file in each) <= MOST_MERGED]
+    return [each for each in days.values() if len(each) > 1 and sum(file.rows for file in each) <= MAX_MERGED_ROWS]
 
 
 def past_run(run: Run) -> PastRun:

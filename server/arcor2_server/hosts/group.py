@@ -24,7 +24,7 @@ from arcor2_server.hosts.process import EXIT_TIMEOUT, CellError, CellHost
 
 log = structlog.get_logger(__name__)
 
-CLOSED_WITHIN: Final = 3.0
+CLOSE_TIMEOUT: Final = 3.0
 """Time limit for the other hosts to close their devices after the end of a program, s; a host allows 1.2 s."""
 
 
@@ -366,7 +366,7 @@ class HostGroup:
             each.leaving = True
             each.host.send(m.CloseScene())
         try:
-            async with asyncio.timeout(CLOSED_WITHIN):
+            async with asyncio.timeout(CLOSE_TIMEOUT):
                 await asyncio.gather(*(each.closed.wait() for each in self.others))
         except TimeoutError:
             log.warning("the devices of another host could not be closed in time")

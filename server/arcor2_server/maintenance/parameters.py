@@ -28,7 +28,7 @@ from arcor2_server.storage.maintenance import MaintenanceStore
 
 log = structlog.get_logger(__name__)
 
-MOST_BACKUPS: Final = 20
+MAX_BACKUPS: Final = 20
 """Maximum number of backups of a device; the oldest are deleted."""
 DUMP_TIMEOUT: Final = 60.0
 """Time limit for reading or writing all parameters, s. A slow serial line needs some 10 ms for each."""
@@ -81,8 +81,8 @@ class Parameters:
             backup.digest, uploaded,
         )  # fmt: skip
         kept = [info, *self._devices.get(card.object_id).backups]
-        await self._store.put_backup(info, backup, [each.id for each in kept[MOST_BACKUPS:]])
-        self._devices.set_backups(card.object_id, kept[:MOST_BACKUPS])
+        await self._store.put_backup(info, backup, [each.id for each in kept[MAX_BACKUPS:]])
+        self._devices.set_backups(card.object_id, kept[:MAX_BACKUPS])
         return info
 
     async def get(self, object_id: str, key: str) -> ParameterBackup:

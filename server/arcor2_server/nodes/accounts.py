@@ -28,7 +28,7 @@ from arcor2_server.settings import ServerSettings, is_loopback
 FILE: Final = "accounts.json"
 ACCOUNT_NAME: Final = "ARCOR2-HW"
 UPDATE_SUBJECT: Final = "$SYS.REQ.CLAIMS.UPDATE"
-UPDATE_WITHIN: Final = 2.0
+UPDATE_TIMEOUT: Final = 2.0
 """Time limit for the broker to accept a changed account, s."""
 
 
@@ -236,7 +236,7 @@ class Accounts:
         own = claims.user(SigningKey.from_seed(state.system), key.public, "revocation")
         client = await connect_client(Credentials(state.url, state.authority, own, key.seed), "arcor2-hw revocation")
         try:
-            answer = await client.request(UPDATE_SUBJECT, claim.encode(), UPDATE_WITHIN)
+            answer = await client.request(UPDATE_SUBJECT, claim.encode(), UPDATE_TIMEOUT)
             found = msgspec.json.decode(answer.data, type=_Answer)
         except (NatsError, OSError, msgspec.MsgspecError) as error:
             raise ConnectionLost("The broker did not confirm the change.", str(error)) from error

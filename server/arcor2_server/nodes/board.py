@@ -30,7 +30,7 @@ CHECK_PERIOD: Final = 0.5
 """Period of the search for changes, s."""
 LOAD_PERIOD: Final = 10.0
 """Period at which clients are notified if only load and free space have changed, s."""
-CLOSE_WITHIN: Final = 0.5
+CLOSE_TIMEOUT: Final = 0.5
 """Time limit for closing the connection, s."""
 RETRY_PERIOD: Final = 2.0
 """Period of the attempts to connect to the broker, s."""
@@ -165,7 +165,7 @@ class NodeBoard:
             raise ConnectionLost("The broker closed the connection.", str(error)) from error
         finally:
             with contextlib.suppress(NatsError, OSError, TimeoutError):
-                await asyncio.wait_for(client.close(), CLOSE_WITHIN)
+                await asyncio.wait_for(client.close(), CLOSE_TIMEOUT)
 
     # -------------------------------------------------------------------------------- state
     async def _watch(self) -> None:

@@ -13,11 +13,11 @@ from arcor2_server.nodes.credentials import Credentials, address_of
 from arcor2_server.nodes.lanes import PREFIX, Lane
 from arcor2_server.nodes.session import Connections
 
-CONNECT_WITHIN: Final = 2.0
+CONNECT_TIMEOUT: Final = 2.0
 """Time limit for a connection, s."""
 REFUSAL: Final = "authorization violation"
 """The answer of a broker to wrong credentials, in lower case."""
-CLOSE_WITHIN: Final = 0.5
+CLOSE_TIMEOUT: Final = 0.5
 """Time limit for closing a connection, s."""
 
 
@@ -86,12 +86,12 @@ async def connect_client(
         """Errors end the connection, or the call that caused them raises them."""
 
     try:
-        async with asyncio.timeout(CONNECT_WITHIN):
+        async with asyncio.timeout(CONNECT_TIMEOUT):
             await client.connect(
                 credentials.url,
                 name=name,
                 allow_reconnect=False,
-                connect_timeout=int(CONNECT_WITHIN),
+                connect_timeout=int(CONNECT_TIMEOUT),
                 disconnected_cb=disconnected,
                 error_cb=ignore,
                 inbox_prefix=answers,
@@ -121,4 +121,4 @@ async def close(connections: Connections) -> None:
 
 async def _close(client: Client) -> None:
     with contextlib.suppress(NatsError, OSError, TimeoutError):
-        await asyncio.wait_for(client.close(), CLOSE_WITHIN)
+        await asyncio.wait_for(client.close(), CLOSE_TIMEOUT)

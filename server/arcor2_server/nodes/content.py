@@ -27,7 +27,7 @@ WITH_FILES: Final = frozenset({"AddBody", "AddObject", "OpenScene", "RunPackage"
 """Messages that name files."""
 HASH_SIZE: Final = 32
 """Length of a hash, bytes."""
-LARGEST_STORE: Final = 4 * 1024**3
+MAX_STORE_SIZE: Final = 4 * 1024**3
 """Size above which files are removed from the store of a node, bytes; on a small disk a quarter of it."""
 IN_USE: Final = 600.0
 """Time for which a file is kept after its last use, s: messages on their way may need it, also those of other nodes."""
@@ -98,7 +98,7 @@ class ContentStore:
         limit: size above which files are removed, bytes.
     """
 
-    def __init__(self, directory: Path, limit: int = LARGEST_STORE) -> None:
+    def __init__(self, directory: Path, limit: int = MAX_STORE_SIZE) -> None:
         self.directory, self._limit = directory, limit
         self._size: int | None = None
         """Size of all files, bytes; None until they were listed."""

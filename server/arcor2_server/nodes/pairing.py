@@ -38,9 +38,9 @@ VALID: Final = 600.0
 """Time for which a code is valid, s."""
 ATTEMPTS: Final = 3
 """Number of wrong codes after which the code is no longer valid."""
-MESSAGE_WITHIN: Final = 10.0
+MESSAGE_TIMEOUT: Final = 10.0
 """Time limit for a message of the peer, s."""
-CLOSE_WITHIN: Final = 1.0
+CLOSE_TIMEOUT: Final = 1.0
 """Time limit for closing a connection, s."""
 ALPHABET: Final = "23456789ABCDEFGHJKLMNPQRSTUVWXYZ"
 """Characters of codes, without those that look alike."""
@@ -121,7 +121,7 @@ class Invitation:
         """
         context, self._certificate = _server_context()
         server = await asyncio.start_server(
-            self._serve, host, port, ssl=context, limit=_LARGEST, ssl_handshake_timeout=MESSAGE_WITHIN
+            self._serve, host, port, ssl=context, limit=_LARGEST, ssl_handshake_timeout=MESSAGE_TIMEOUT
         )
         async with server:
             yield server.sockets[0].getsockname()[1]
@@ -142,7 +142,7 @@ class Invitation:
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         # A peer may send nothing, nonsense or too much, or close the connection.
         with contextlib.suppress(TimeoutError, OSError, EOFError, ValueError, msgspec.MsgspecError):
-            async with asyncio.timeout(MESSAGE_WITHIN):
+            async with asyncio.timeout(MESSAGE_TIMEOUT):
                 proof, body = _split(await reader.readuntil())
             request = msgspec.json.decode(body, type=Request)
             async with self._one_at_a_time:
@@ -206,13 +206,13 @@ async def pair(
     body = msgspec.json.encode(request)
     address = f"{host}:{port}"
     try:
-        async with asyncio.timeout(MESSAGE_WITHIN):
+        async with asyncio.timeout(MESSAGE_TIMEOUT):
             reader, writer = await asyncio.open_connection(host, port, ssl=_client_context(), limit=_LARGEST)
         try:
             certificate = writer.get_extra_info("ssl_object").getpeercert(binary_form=True)
             secret = await asyncio.to_thread(_proof_key, _plain(code), request.salt, certificate)
             writer.write(_joined(_proof(secret, b"node", body), body))
-            async with asyncio.timeout(MESSAGE_WITHIN):
+            async with asyncio.timeout(MESSAGE_TIMEOUT):
                 proof, content = _split(await reader.readuntil())
         finally:
             await _close(writer)
@@ -264,7 +264,7 @@ def _split(line: bytes) -> tuple[bytes, bytes]:
 async def _close(writer: asyncio.StreamWriter) -> None:
     writer.close()
     with contextlib.suppress(OSError, TimeoutError):
-        await asyncio.wait_for(writer.wait_closed(), CLOSE_WITHIN)
+        await asyncio.wait_for(writer.wait_closed(), CLOSE_TIMEOUT)
 
 
 def _client_context() -> ssl.SSLContext:

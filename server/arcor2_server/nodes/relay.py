@@ -34,11 +34,11 @@ from arcor2_server.nodes.run_records import INTERCEPTED, RunRecords
 from arcor2_server.nodes.session import SILENCE, Connections, SessionEnd
 from arcor2_server.nodes.stream import MessageStream
 
-OPEN_WITHIN: Final = 3.0
+OPEN_TIMEOUT: Final = 3.0
 """Time limit for a node to answer the request to open a session, s."""
-ENDED_WITHIN: Final = 2.5
+END_TIMEOUT: Final = 2.5
 """Time limit for the host on the node to end after the server closed the connection, s."""
-STORED_WITHIN: Final = 1.0
+STORE_TIMEOUT: Final = 1.0
 """Time limit for the last checkpoint to be stored before the end is reported, s."""
 NICENESS: Final = -5
 """Niceness of this process: stops and beats pass through it."""
@@ -79,7 +79,7 @@ class Relay:
             reason = error.message
         if self._records is not None:  # first, because the server reads the checkpoint after the end
             with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(STORED_WITHIN):
+                async with asyncio.timeout(STORE_TIMEOUT):
                     await self._records.close()
         self._stream.send(msgspec.msgpack.encode(m.HostLost(reason)))
         self._stream.close()
@@ -96,7 +96,7 @@ class Relay:
         try:
             await end.open()
             answer = await connections[Lane.CALLS].request(
-                broker.open_subject(self._node), msgspec.json.encode(opening), OPEN_WITHIN
+                broker.open_subject(self._node), msgspec.json.encode(opening), OPEN_TIMEOUT
             )
         except (NoRespondersError, NatsTimeoutError) as error:
             raise Arcor2Error("The node {node} is not connected.", str(error), node=self._node) from error
@@ -177,7 +177,7 @@ class Relay:
             if self._records is not None and not self._over.done():
                 await self._records.server_ended()
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(asyncio.shield(self._over), ENDED_WITHIN)
+                await asyncio.wait_for(asyncio.shield(self._over), END_TIMEOUT)
         self.ended(reason, False)
 
 

@@ -47,7 +47,7 @@ log = structlog.get_logger(__name__)
 COMMAND: Final = ("-P", "-m", "arcor2_hw.runtime.host")
 EXIT_TIMEOUT: Final = 3.0
 """Time limit for a host to end by itself after its socket was closed, before it is killed, s."""
-LAST_MESSAGES_WITHIN: Final = 1.0
+LAST_MESSAGES_TIMEOUT: Final = 1.0
 """Time limit for the last messages and lines of a host after its exit, s."""
 RETRY_PERIOD: Final = 0.5
 """Period of the attempts to connect to the broker, s."""
@@ -129,7 +129,7 @@ class HostedSession:
                     process.kill()
                 status = await waiting
                 with contextlib.suppress(TimeoutError):
-                    async with asyncio.timeout(LAST_MESSAGES_WITHIN):
+                    async with asyncio.timeout(LAST_MESSAGES_TIMEOUT):
                         await self._closed.wait()
                         await output
                 self._send_recorded()

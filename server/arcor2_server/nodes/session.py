@@ -25,11 +25,11 @@ CHECK_PERIOD: Final = 0.02
 """Period of the check for silence, s."""
 WINDOW: Final = 8
 """Number of parts that are sent on the lane of frames before the receiver has confirmed them."""
-MOST_WAITING: Final = 64
+MAX_WAITING: Final = 64
 """Number of waiting messages of the lane of frames from which values that may be dropped are dropped."""
-FLUSH_WITHIN: Final = 1.0
+FLUSH_TIMEOUT: Final = 1.0
 """Time to send the last messages, s."""
-FILES_WITHIN: Final = 5.0
+FILES_TIMEOUT: Final = 5.0
 """Time limit for the peer to answer which files it lacks, s."""
 FILES_PERIOD: Final = 0.05
 """Period of these requests while files are being sent, s."""
@@ -143,7 +143,7 @@ class SessionEnd:
         if self._over:
             return
         try:
-            async with asyncio.timeout(FLUSH_WITHIN):
+            async with asyncio.timeout(FLUSH_TIMEOUT):
                 await self._queues[Lane.FRAMES].join()
                 self.send_end(reason)
                 await self._queues[Lane.STOP].join()
@@ -181,7 +181,7 @@ class SessionEnd:
             may_drop: drop the message if the peer does not keep up.
         """
         queue = self._queues[lane]
-        if self._over or (may_drop and queue.qsize() >= MOST_WAITING):
+        if self._over or (may_drop and queue.qsize() >= MAX_WAITING):
             return
         queue.put_nowait((self.next_number() if number is None else number, time.monotonic(), flags, body))
 
@@ -205,7 +205,7 @@ class SessionEnd:
         while hashes:
             try:
                 answer = await self._connections[Lane.FRAMES].request(
-                    f"{self._out}.files", msgspec.json.encode(hashes), FILES_WITHIN
+                    f"{self._out}.files", msgspec.json.encode(hashes), FILES_TIMEOUT
                 )
             except (NatsError, OSError) as error:
                 raise ConnectionLost("Files cannot be sent to {peer}.", str(error), peer=self._peer) from error

@@ -13,7 +13,7 @@ from arcor2_server.hosts.session import READ_TIMEOUT
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.online_scene import OnlineScene
 
-PICTURE_WITHIN: Final = 15.0
+PICTURE_TIMEOUT: Final = 15.0
 """Time limit for taking a picture, s. A long exposure or an average of many frames takes a while."""
 
 
@@ -60,7 +60,7 @@ class Cameras:
 
     async def take_picture(self, camera: SceneObject, method: str, **arguments: int) -> bytes:
         """Take a picture by a method of the camera; return its file."""
-        raw = await self._online.call(camera.id, method, arguments, deadline=PICTURE_WITHIN)
+        raw = await self._online.call(camera.id, method, arguments, deadline=PICTURE_TIMEOUT)
         try:
             return picture_file(msgspec.json.decode(raw, type=str))
         except msgspec.MsgspecError:

@@ -19,7 +19,7 @@ from arcor2_server.hosts.process import CellError, CellHost
 from arcor2_server.hosts.session import READ_TIMEOUT
 from arcor2_server.online.scene_opening import SceneOpening
 
-CHECK_WITHIN: Final = 30.0
+CHECK_TIMEOUT: Final = 30.0
 """Time limit for importing the object type and connecting the device, s; the host has a shorter limit."""
 
 
@@ -70,10 +70,10 @@ class ConnectionCheck:
         try:
             host.send(message)
             try:
-                async with asyncio.timeout(CHECK_WITHIN):
+                async with asyncio.timeout(CHECK_TIMEOUT):
                     error = await outcome.opened
             except TimeoutError:
-                raise RequestRefused("The device was not connected within {limit:g} s.", limit=CHECK_WITHIN) from None
+                raise RequestRefused("The device was not connected within {limit:g} s.", limit=CHECK_TIMEOUT) from None
             if error is not None:
                 raise CellError(error)
             seconds = time.monotonic() - began

@@ -13,7 +13,7 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.messages import Message
 from arcor2_server.errors import RequestRefused
 
-SEARCH_WITHIN: Final = 15.0
+SEARCH_TIMEOUT: Final = 15.0
 """Time limit for one kind of devices, s; 127 answering CAN nodes take about 10 s."""
 BUS: Final = ("interface", "channel", "bitrate")
 """Settings that describe a CAN bus, as in python-can."""
@@ -36,10 +36,10 @@ async def search(kind: Search, where: str = "", port: int | None = None) -> list
     pipe = asyncio.subprocess.PIPE
     process = await asyncio.create_subprocess_exec(*command, stdin=asyncio.subprocess.DEVNULL, stdout=pipe, stderr=pipe)
     try:
-        async with asyncio.timeout(SEARCH_WITHIN):
+        async with asyncio.timeout(SEARCH_TIMEOUT):
             output, errors = await process.communicate()
     except TimeoutError:
-        raise RequestRefused("The search did not end within {limit:g} s.", limit=SEARCH_WITHIN) from None
+        raise RequestRefused("The search did not end within {limit:g} s.", limit=SEARCH_TIMEOUT) from None
     finally:
         if process.returncode is None:
             process.kill()

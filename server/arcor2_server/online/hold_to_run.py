@@ -19,7 +19,7 @@ from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.events import HandTeachingModeData, NotificationData, NotificationLevel
 from arcor2_hw.data.operation import HoldKind, RobotHoldData
 from arcor2_hw.data.rpc import HoldHandTeachingArgs, JogRobotArgs
-from arcor2_hw.data.rpc.operation import LONGEST_LEASE_MS
+from arcor2_hw.data.rpc.operation import MAX_LEASE_MS
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
@@ -148,10 +148,10 @@ class HoldToRun:
             CellError: the robot refused the motion or failed.
         """
         arrived = asyncio.get_running_loop().time()
-        if not 0 <= args.valid_ms <= LONGEST_LEASE_MS:
+        if not 0 <= args.valid_ms <= MAX_LEASE_MS:
             raise RequestRefused(
                 "valid_ms must be 0 to {longest_lease_ms}, not {valid_ms}.",
-                longest_lease_ms=LONGEST_LEASE_MS,
+                longest_lease_ms=MAX_LEASE_MS,
                 valid_ms=args.valid_ms,
             )
         if args.valid_ms == 0:

@@ -39,9 +39,9 @@ log = structlog.get_logger(__name__)
 
 SPARE_AFTER: Final = 0.5
 """Time from the start of the server to the start of the first spare host, s."""
-START_WITHIN: Final = 60.0
+START_TIMEOUT: Final = 60.0
 """Time limit for importing object types and connecting devices, s; the host has a shorter limit for each device."""
-STOP_WITHIN: Final = 5.0
+STOP_TIMEOUT: Final = 5.0
 """Time limit for the host to close the devices, s; the host allows 2 s."""
 
 
@@ -211,11 +211,11 @@ class OnlineScene:
         host = self.host.host = await self.host.take(self.host.place(scene.objects))
         host.send(self._opening.with_workspace(message, scene))
         try:
-            async with asyncio.timeout(START_WITHIN):
+            async with asyncio.timeout(START_TIMEOUT):
                 error = await self._answer
         except TimeoutError:
             host.kill()
-            return Message.of("The scene was not online within {limit:g} s.", limit=START_WITHIN)
+            return Message.of("The scene was not online within {limit:g} s.", limit=START_TIMEOUT)
         if error is None:
             return None
         if error.detail:
@@ -304,7 +304,7 @@ class OnlineScene:
             self._answer = asyncio.get_running_loop().create_future()
             host.send(m.CloseScene())
             try:
-                async with asyncio.timeout(STOP_WITHIN):
+                async with asyncio.timeout(STOP_TIMEOUT):
                     error = await self._answer
                 problem = None if error is None else error.message
             except ConnectionLost as lost:

@@ -21,7 +21,7 @@ DOWN: Final = Orientation(1, 0, 0, 0)
 """Orientation of a tool whose z axis points down."""
 YAWS: Final = 360
 """Number of checked angles about the vertical."""
-SEARCH_WITHIN: Final = 10.0
+SEARCH_TIMEOUT: Final = 10.0
 """Time limit of the search, s. A slow controller answers fifty requests per second."""
 _POSE_INDEPENDENT: Final = frozenset({"connection_lost", "device_timeout", "not_connected", "not_implemented"})
 """Codes of errors that do not depend on the pose. They end the search."""
@@ -58,7 +58,7 @@ async def find_perpendicular_pose(
     present = await online.end_effector_pose(args.robot_id, args.end_effector_id, arm_id)
     start_joints = await online.robot_joints(args.robot_id, arm_id)
     clock = asyncio.get_running_loop().time
-    deadline = clock() + SEARCH_WITHIN
+    deadline = clock() + SEARCH_TIMEOUT
     best: tuple[float, Pose] | None = None
     refusal: CellError | str = ""
     for yaw in yaws(yaw_of(present.orientation)):
@@ -82,7 +82,7 @@ async def find_perpendicular_pose(
             if best is None or change < best[0]:
                 best = change, pose
         if clock() > deadline:
-            log.warning("search for an angle ended early", robot=args.robot_id, within=SEARCH_WITHIN)
+            log.warning("search for an angle ended early", robot=args.robot_id, within=SEARCH_TIMEOUT)
             break
     if best is None:
         raise RequestRefused("The tool cannot point straight down here: {refusal}", refusal=refusal)

@@ -18,8 +18,8 @@ from arcor2_server.packml.plc import Plc
 from arcor2_server.packml.record import RequestResult
 from arcor2_server.packml.states import COMMANDS
 
-LONGEST_REQUEST_ID: Final = 100
-LONGEST_NOTE: Final = 500
+MAX_REQUEST_ID: Final = 100
+MAX_NOTE: Final = 500
 SET_MODE: Final = RPCS["SetCellMode"].role
 """The least role that changes the mode, as on the screens."""
 
@@ -85,7 +85,7 @@ class PlantRequests:
             result, text = RequestResult.NO_AUTHORITY, error.message
         else:
             result, text = await self._plc.execute_once(
-                request.command, request.job, f"{user.name} (OPC UA)", request.request[:LONGEST_REQUEST_ID]
+                request.command, request.job, f"{user.name} (OPC UA)", request.request[:MAX_REQUEST_ID]
             )
         known = request.command in COMMANDS
         name = MachineCommand(request.command).name.capitalize() if known else str(request.command)
@@ -128,7 +128,7 @@ class PlantRequests:
         user, role, text = request.user, None, ""
         try:
             role = await self._role(user)
-            await self._alarms.acknowledge(request.alarm, user.name, role, request.note[:LONGEST_NOTE])
+            await self._alarms.acknowledge(request.alarm, user.name, role, request.note[:MAX_NOTE])
         except Arcor2Error as error:
             text = str(error)
         self._audit.note(

@@ -16,12 +16,12 @@ import structlog
 
 log = structlog.get_logger(__name__)
 
-MOST_CONNECTIONS: Final = 8
+MAX_CONNECTIONS: Final = 8
 """Maximum number of connections. A further one replaces the one that was idle longest."""
 _HEADER: Final = struct.Struct(">HHHB")
 """Transaction, protocol, number of following bytes, unit id."""
-_LONGEST_PDU: Final = 253
-_MOST_READ, _MOST_WRITTEN = 125, 123
+_MAX_PDU: Final = 253
+_MAX_READ, _MAX_WRITTEN = 125, 123
 
 
 class ExceptionCode(enum.IntEnum):
@@ -76,7 +76,7 @@ def _execute(function: int, data: bytes, registers: Registers, peer: str) -> byt
         raise ModbusRefusal(ExceptionCode.ILLEGAL_VALUE)
     address, count = struct.unpack_from(">HH", data)
     if function in (3, 4):
-        if len(data) != 4 or not 1 <= count <= _MOST_READ:
+        if len(data) != 4 or not 1 <= count <= _MAX_READ:
             raise ModbusRefusal(ExceptionCode.ILLEGAL_VALUE)
         values = registers.holding() if function == 3 else registers.inputs()
         _require_within(address, count, len(values))
@@ -86,7 +86,7 @@ def _execute(function: int, data: bytes, registers: Registers, peer: str) -> byt
             raise ModbusRefusal(ExceptionCode.ILLEGAL_VALUE)
         written: Sequence[int] = (count,)
     else:
-        if not 1 <= count <= _MOST_WRITTEN or len(data) != 5 + 2 * count or data[4] != 2 * count:
+        if not 1 <= count <= _MAX_WRITTEN or len(data) != 5 + 2 * count or data[4] != 2 * count:
             raise ModbusRefusal(ExceptionCode.ILLEGAL_VALUE)
         written = struct.unpack_from(f">{count}H", data, 5)
     _require_within(address, len(written), len(registers.holding()))
@@ -122,7 +122,7 @@ class ModbusServer:
 
     async def _serve_client(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         clock = asyncio.get_running_loop().time
-        while len(self._connections) >= MOST_CONNECTIONS:
+        while len(self._connections) >= MAX_CONNECTIONS:
             idle = min(self._connections, key=lambda each: self._connections[each])
             del self._connections[idle]
             idle.close()
@@ -132,7 +132,7 @@ class ModbusServer:
         try:
             while writer in self._connections:
                 transaction, protocol, length, unit = _HEADER.unpack(await reader.readexactly(_HEADER.size))
-                if protocol or not 2 <= length <= 1 + _LONGEST_PDU:
+                if protocol or not 2 <= length <= 1 + _MAX_PDU:
                     break  # the boundaries of the following requests are unknown
                 request = await reader.readexactly(length - 1)
                 self._connections[writer] = clock()

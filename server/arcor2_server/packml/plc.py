@@ -37,9 +37,9 @@ LIFE_RATE: Final = 10.0
 """Rate at which the life counter of the cell counts, 1/s."""
 CHECKS: Final = 8
 """Number of checks of the PLC's life counter within its time limit."""
-MOST_WAITING: Final = 16
+MAX_WAITING: Final = 16
 """Maximum number of requests that wait until the one before is executed."""
-MOST_PLANT_REQUESTS: Final = 64
+MAX_PLANT_REQUESTS: Final = 64
 """Number of stored requests of plant systems."""
 SILENT: Final = "plc_silent"
 """Code of the alarm for a life counter that does not change."""
@@ -132,7 +132,7 @@ class Plc:
         """The last executed request and its result."""
         self._job = record.job, record.job_end
         """The last job and how it ended. The file follows."""
-        self._waiting: asyncio.Queue[tuple[int, int, int]] = asyncio.Queue(MOST_WAITING)
+        self._waiting: asyncio.Queue[tuple[int, int, int]] = asyncio.Queue(MAX_WAITING)
         self._executing = asyncio.Lock()
         self._background = BackgroundTasks()
         cell.link = self.link
@@ -363,7 +363,7 @@ class Plc:
         others = [each for each in self._file.record.plant_requests if each.id != request]
         try:
             await self._file.put(
-                plant_requests=[*others[1 - MOST_PLANT_REQUESTS :], PlantRequest(request, result, text)]
+                plant_requests=[*others[1 - MAX_PLANT_REQUESTS :], PlantRequest(request, result, text)]
             )
         except StorageError as error:
             if command not in _STOPPING:

@@ -32,7 +32,7 @@ JOINTS_RATE: Final = 10.0
 """Rate at which joints are read, Hz."""
 POINTS_RATE: Final = 5.0
 """Rate at which points are read, Hz: as fast as the editor may read them."""
-MOST_LEFT: Final = 1000
+MAX_WAITING_UNITS: Final = 1000
 """Maximum number of units that wait for a process, such as while it restarts. The oldest are dropped."""
 OWNER: Final = "plant"
 """Names this part as an observer of streams."""
@@ -52,7 +52,7 @@ class FeedReader:
         self._unit: UnitData | None = None
         self.streams: dict[tuple[str, str], bytes] = {}
         self.alarms: dict[int, AlarmRecord] = {}
-        self.left: deque[Unit] = deque(maxlen=MOST_LEFT)
+        self.left: deque[Unit] = deque(maxlen=MAX_WAITING_UNITS)
 
     def wants(self, object_id: str) -> bool:
         """Return whether it gets the points and joints of a device."""

@@ -20,15 +20,15 @@ log = structlog.get_logger(__name__)
 
 PERIOD: Final = 0.1
 """Shortest time between two updates, s."""
-MOST_UNSENT: Final = 256 * 1024
+MAX_UNSENT: Final = 256 * 1024
 """Number of unsent bytes above which changes are merged instead of sent."""
 EXIT_TIMEOUT: Final = 3.0
 """Time limit for the process to end after its socket is closed, s."""
 FIRST_PAUSE: Final = 0.5
-LONGEST_PAUSE: Final = 30.0
-"""Shortest and longest time before a restart, s. It doubles each time, until the process has run for LONGEST_PAUSE."""
+MAX_PAUSE: Final = 30.0
+"""Shortest and longest time before a restart, s. It doubles each time, until the process has run for MAX_PAUSE."""
 ALARM_AFTER: Final = 3
-"""Number of ends in a row after which an alarm is raised. It ends when a process has run for LONGEST_PAUSE."""
+"""Number of ends in a row after which an alarm is raised. It ends when a process has run for MAX_PAUSE."""
 EMPTY: Final = Update()
 
 
@@ -83,16 +83,16 @@ class PlantProcess:
                 log.error(f"{self._name} failed", reason=str(error))
             self.running = False
             self.ends += 1
-            lasted = time.monotonic() - started > LONGEST_PAUSE
+            lasted = time.monotonic() - started > MAX_PAUSE
             lasting.cancel()
-            pause = FIRST_PAUSE if lasted else min(2.0 * pause, LONGEST_PAUSE)
+            pause = FIRST_PAUSE if lasted else min(2.0 * pause, MAX_PAUSE)
             ends = 1 if lasted else ends + 1
             if ends == ALARM_AFTER:
                 self._alarms.system(self._alarm, True)
             await asyncio.sleep(pause)
 
     async def _clear_later(self) -> None:
-        await asyncio.sleep(LONGEST_PAUSE)
+        await asyncio.sleep(MAX_PAUSE)
         self._alarms.system(self._alarm, False)
 
     async def _run(self, inherited: Sequence[int]) -> None:
@@ -136,7 +136,7 @@ class PlantProcess:
             await asyncio.sleep(PERIOD)
             if writer.is_closing():
                 return
-            if writer.transport.get_write_buffer_size() > MOST_UNSENT:
+            if writer.transport.get_write_buffer_size() > MAX_UNSENT:
                 continue
             update = await self._reader.changes()
             if update != EMPTY or time.monotonic() - sent > BEAT_PERIOD:

@@ -24,7 +24,7 @@ from arcor2_server.storage.units import UnitStore
 
 log = structlog.get_logger(__name__)
 
-MOST_STEPS: Final = 500
+MAX_STEPS: Final = 500
 """Maximum number of stored steps of a unit."""
 RECENT: Final = 200
 """Number of units that have left the cell and can still receive steps, such as a report to the planning service."""
@@ -153,7 +153,7 @@ class Units:
         if step is None or entry is None or (record := self._find(step)) is None:
             return
         changes: dict[str, Any] = {}
-        if len(record.steps) < MOST_STEPS:
+        if len(record.steps) < MAX_STEPS:
             changes["steps"] = [*record.steps, _step(entry)]
         else:
             changes["dropped"] = record.dropped + 1

@@ -33,7 +33,7 @@ BEFORE: Final = 60.0
 """Recorded time before the event, s."""
 AFTER: Final = 5.0
 """Recorded time after the event, s."""
-MOST_OF_ONE_ALARM: Final = 5
+MAX_PER_ALARM: Final = 5
 """Maximum number of recordings of one record of an alarm, whose condition keeps returning."""
 RECORDING: Final = "RecordingChanged"
 """The additional event with a stored recording."""
@@ -200,7 +200,7 @@ class Recordings:
             return []
         alarm = newest.alarms[0].number
         same = [info for info in self._stored.values() if info.alarms and info.alarms[0].number == alarm]
-        deleted = [info.number for info in same[1 : max(1, len(same) - MOST_OF_ONE_ALARM + 1)]]
+        deleted = [info.number for info in same[1 : max(1, len(same) - MAX_PER_ALARM + 1)]]
         for number in deleted:
             self._files.delete(number)
         return deleted

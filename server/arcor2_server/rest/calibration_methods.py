@@ -42,12 +42,12 @@ from arcor2_server.workspace.robots import SceneRobots
 
 MAX_PICTURES: Final = 256 * MIB
 """Maximum size of all pictures of a request, bytes."""
-MOST_STATES: Final = 19
+MAX_STATES: Final = 19
 """Maximum number of further joint states of a request."""
-MOST_POINTS: Final = 1000
+MAX_POINTS: Final = 1000
 """Maximum number of points of a request."""
 
-Points = Annotated[list[Position], Meta(max_length=MOST_POINTS)]
+Points = Annotated[list[Position], Meta(max_length=MAX_POINTS)]
 
 
 # ------------------------------------------------------------------------------------------------ pictures
@@ -80,7 +80,7 @@ class RobotArgs(CalibrateRobotArgs, frozen=True):
     number for each state, in this order.
     """
 
-    other_joints: Annotated[list[list[Joint]], Meta(max_length=MOST_STATES)] = field(default_factory=list)
+    other_joints: Annotated[list[list[Joint]], Meta(max_length=MAX_STATES)] = field(default_factory=list)
     distance: Annotated[float, Meta(gt=0, le=1)] = 0.08
     angle: Annotated[float, Meta(gt=0, le=1)] = 0.14
     record: RecordAs | Unset = UNSET
@@ -133,14 +133,14 @@ class FrameByPointsArgs(Data, frozen=True):
 class TipArgs(Data, frozen=True):
     """Poses of the flange in the robot's base frame, with the tip on one point."""
 
-    flanges: Annotated[list[Pose], Meta(max_length=MOST_POINTS)]
+    flanges: Annotated[list[Pose], Meta(max_length=MAX_POINTS)]
     record: RecordAs | Unset = UNSET
 
 
 class AlignmentArgs(Data, frozen=True):
     """Orientations of the flange with the tool's axes along those of a reference."""
 
-    flanges: Annotated[list[Orientation], Meta(max_length=MOST_POINTS)]
+    flanges: Annotated[list[Orientation], Meta(max_length=MAX_POINTS)]
     reference: Orientation = field(default_factory=Orientation)
     record: RecordAs | Unset = UNSET
 

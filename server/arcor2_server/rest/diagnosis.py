@@ -9,7 +9,7 @@ import msgspec
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.rest.build import ZIP
-from arcor2_server.rest.diagnosis_bundle import LARGEST_NOTES, ClientNotes, Diagnosis, packed
+from arcor2_server.rest.diagnosis_bundle import MAX_NOTES, ClientNotes, Diagnosis, packed
 from arcor2_server.rest.general import SERVER
 from arcor2_server.rest.operations import Binary, operation
 from arcor2_server.storage.setting_secrets import SettingSecrets
@@ -30,9 +30,9 @@ class DiagnosisOperations:
     @operation("POST", "/api/diagnosis", SERVER, Role.TECHNICIAN, media_type=ZIP, plain=True)
     async def diagnosis_with_notes(self, body: ClientNotes) -> Binary:
         """Return the diagnosis bundle with notes of the client, at most 256 KiB of JSON."""
-        if len(msgspec.json.encode(body.client)) > LARGEST_NOTES:
+        if len(msgspec.json.encode(body.client)) > MAX_NOTES:
             raise InvalidData(
-                "The notes of a client may have at most {largest_notes} bytes of JSON.", largest_notes=LARGEST_NOTES
+                "The notes of a client may have at most {largest_notes} bytes of JSON.", largest_notes=MAX_NOTES
             )
         return await self._bundle(body.client)
 

@@ -26,9 +26,9 @@ from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.settings import API_VERSION, VERSION, ServerSettings
 
-LARGEST_PART: Final = 4 * 1024 * 1024
+MAX_PART: Final = 4 * 1024 * 1024
 """Maximum size of an uncompressed file, bytes. A note replaces a larger file."""
-LARGEST_NOTES: Final = 256 * 1024
+MAX_NOTES: Final = 256 * 1024
 """Maximum size of the notes from a client, bytes."""
 RUNS: Final = 20
 """Number of the latest runs in the bundle."""
@@ -82,7 +82,7 @@ def packed(content: dict[str, Any], notes: Any = None, stored: Set[str] = frozen
 
 def _text(part: Any, secrets: set[str]) -> str:
     encoded = msgspec.json.format(msgspec.json.encode(hide(part)), indent=2)
-    if len(encoded) > LARGEST_PART:
+    if len(encoded) > MAX_PART:
         return f'{{"left_out": "it has {len(encoded)} bytes"}}\n'
     return clean(encoded.decode(), secrets) + "\n"
 

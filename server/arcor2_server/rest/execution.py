@@ -28,7 +28,7 @@ from arcor2_server.storage.packages import MAX_UPLOAD
 from arcor2_server.storage.project_tables import ExecutionToken, ProjectTables
 
 EXECUTION = "Execution"
-LONGEST_NAME: Final = 100
+MAX_NAME: Final = 100
 
 
 class SummaryProject(Data, frozen=True):
@@ -246,9 +246,9 @@ class ExecutionOperations:
     @operation("POST", "/tokens/create", EXECUTION, Role.PROGRAMMER)
     async def create_token(self, query: NameQuery) -> ExecutionToken:
         """Add an entry to the token table of the protocol. It grants no access: see `arcor2-hw token add`."""
-        if not query.name or len(query.name) > LONGEST_NAME or not query.name.isprintable():
+        if not query.name or len(query.name) > MAX_NAME or not query.name.isprintable():
             raise InvalidData(
-                "A token needs a name of 1 to {longest_name} printable characters.", longest_name=LONGEST_NAME
+                "A token needs a name of 1 to {longest_name} printable characters.", longest_name=MAX_NAME
             )
         token = ExecutionToken(new_id("tkn"), query.name)
         await ProjectTables(self._storage).put_token(token)

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 CONTENT_TYPE: Final = "text/plain; version=0.0.4"
 """Media type of the text format; Litestar adds the character set."""
-MOST_DEVICES: Final = 200
+MAX_DEVICES: Final = 200
 """Maximum number of devices in the metrics, so that their number of time series is bounded."""
 NO_TOKEN: Final = translatable("There is no metrics token. Create one on the server with `arcor2-hw metrics token`.")
 WRONG_TOKEN: Final = translatable("The metrics token is missing or wrong: Authorization: Bearer ...")
@@ -107,7 +107,7 @@ class Metrics:
         online = GaugeMetricFamily("arcor2_hw_device_online", "1 if the device is connected.", labels=labels)
         normal = GaugeMetricFamily("arcor2_hw_device_health_normal", "1 if the health is normal.", labels=labels)
         statuses = self.execution.board.statuses() or self.online.board.statuses()
-        for status in statuses[:MOST_DEVICES]:
+        for status in statuses[:MAX_DEVICES]:
             connected = status.connection in (Connection.ONLINE, Connection.BACK) and status.answering
             online.add_metric([status.name, status.type], connected)
             normal.add_metric([status.name, status.type], status.health.value == "normal")

@@ -37,9 +37,9 @@ log = structlog.get_logger(__name__)
 F = TypeVar("F", bound=Callable[..., Awaitable[Any]])
 
 MIB: Final = 1024 * 1024
-LARGEST_BODY: Final = 16 * MIB
+MAX_BODY: Final = 16 * MIB
 """Maximum size of a JSON body, as for a websocket message, bytes."""
-MOST_FILES: Final = 200
+MAX_FILES: Final = 200
 """Maximum number of files in one body."""
 IN_THREAD_FROM: Final = 256 * 1024
 """Size of JSON above which it is decoded or encoded in a thread, bytes."""
@@ -106,7 +106,7 @@ class Operation:
     """Title of the task that reports the upload (TaskState); `{name}` is replaced by a part of the path."""
     shown_from: int = 0
     """Size of a body below which no task reports the upload, bytes."""
-    limit: int = LARGEST_BODY
+    limit: int = MAX_BODY
     """Maximum size of the body, bytes."""
     plain: bool = False
     """Whether the fields of the result are snake_case on the wire, as in later operations of the protocol."""
@@ -311,12 +311,12 @@ async def _upload(declared: Operation, request: Request[Any, Any, Any], uploads:
 async def _uploads(declared: Operation, request: Request[Any, Any, Any], uploads: list[UploadFile]) -> Uploads:
     parts, texts = await _multipart(declared, request, uploads)
     named = [part for name, part in parts if name == declared.file]
-    if len(named) > MOST_FILES:
+    if len(named) > MAX_FILES:
         raise InvalidData(
             "The body has {count} files {file}. At most {most_files} are allowed.",
             count=len(named),
             file=declared.file,
-            most_files=MOST_FILES,
+            most_files=MAX_FILES,
         )
     files = [file for part in named if (file := _as_file(part, uploads)) is not None]
     if not files:
@@ -345,7 +345,7 @@ async def _multipart(
         if isinstance(part, str):
             texts[name] = part
         elif name in declared.parts:
-            texts[name] = (await part.read(LARGEST_BODY)).decode(errors="replace")
+            texts[name] = (await part.read(MAX_BODY)).decode(errors="replace")
     return parts, texts
 
 

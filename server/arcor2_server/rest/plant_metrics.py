@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from arcor2_server.mqtt.service import Mqtt  # few servers need it
 
-MOST_NODES: Final = 100
+MAX_NODES: Final = 100
 """Maximum number of nodes in the metrics, so that their number of time series is bounded."""
 
 
@@ -49,7 +49,7 @@ class PlantMetrics:
         return [*self._nodes(), *await self._fleet(), *await self._history(), *self._processes()]
 
     def _nodes(self) -> "Iterator[Metric]":
-        nodes = self.nodes.data().nodes[:MOST_NODES]
+        nodes = self.nodes.data().nodes[:MAX_NODES]
         if not nodes:
             return
 

@@ -16,7 +16,7 @@ from arcor2_server.rest.operations import operation
 from arcor2_server.storage import Storage
 
 STORAGE = "Storage"
-LONGEST_ID = 255
+MAX_ID = 255
 
 
 class IdDesc(Data, frozen=True):
@@ -52,12 +52,12 @@ def keep_nodes(sent: Scene, stored: Scene) -> Scene:
 
 def check_id(key: str, what: str) -> None:
     """Raise InvalidData if an id cannot be used in the path of a route."""
-    if not key or len(key) > LONGEST_ID or not key.isprintable() or "/" in key or key in (".", ".."):
+    if not key or len(key) > MAX_ID or not key.isprintable() or "/" in key or key in (".", ".."):
         raise InvalidData(
             "{key!r} cannot be the id of a {what}. Use 1 to {longest_id} printable characters without a slash.",
             key=key[:80],
             what=what,
-            longest_id=LONGEST_ID,
+            longest_id=MAX_ID,
         )
 
 

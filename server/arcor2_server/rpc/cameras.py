@@ -8,7 +8,7 @@ from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.rpc import CameraColorImageArgs, CameraColorParametersArgs
 from arcor2_hw.data.scene import SceneObject
 from arcor2_server.documents import Session
-from arcor2_server.online.cameras import PICTURE_WITHIN, Cameras
+from arcor2_server.online.cameras import PICTURE_TIMEOUT, Cameras
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.registry import Context, rpc
@@ -35,7 +35,7 @@ class CameraRequests:
         """Take a colour picture; return a JPEG file as a string with one character per byte."""
         camera = self._require_camera(context, args.id)
         # The result is JSON already. It is not decoded, since it can have a megabyte.
-        return Raw(await self._online.call(camera.id, "color_image", deadline=PICTURE_WITHIN))
+        return Raw(await self._online.call(camera.id, "color_image", deadline=PICTURE_TIMEOUT))
 
     @rpc("CameraColorParameters")
     async def camera_color_parameters(self, context: Context, args: CameraColorParametersArgs) -> CameraParameters:

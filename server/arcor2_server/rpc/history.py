@@ -25,7 +25,7 @@ from arcor2_server.rpc.change_events import emit_all
 from arcor2_server.rpc.editing import Editing
 from arcor2_server.rpc.registry import Context, rpc
 
-LONGEST_LIST: Final = 20
+MAX_LIST: Final = 20
 """Maximum number of items that History lists for one edit."""
 ATTEMPTS: Final = 5
 """Number of attempts of RestoreRevision while other users edit."""
@@ -33,7 +33,7 @@ ATTEMPTS: Final = 5
 
 def _described(edit: Edit, *, in_force: bool) -> HistoryEdit:
     changes = net(edit.changes)
-    items = [_item(change) for change in changes[:LONGEST_LIST]]
+    items = [_item(change) for change in changes[:MAX_LIST]]
     return HistoryEdit(
         number=edit.number,
         time=edit.time,

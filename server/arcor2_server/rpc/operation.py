@@ -42,7 +42,7 @@ from arcor2_server.workspace.robots import optional
 
 log = structlog.get_logger(__name__)
 
-ACKNOWLEDGED_WITHIN: Final = 30.0
+ACKNOWLEDGE_TIMEOUT: Final = 30.0
 """Time limit for acknowledging a stop, s. Restarting the safety system of a controller takes 20 s."""
 _FRAMES: Final = {JogFrame.WORLD: "world", JogFrame.ROBOT: "base", JogFrame.TOOL: "tool", JogFrame.USER: "world"}
 _RELEASED_ON_SITE: Final = {
@@ -229,7 +229,7 @@ class OperationRequests:
         found = session.document.scene_object(args.object_id)
         cell.board.require_not_failed(args.object_id)
         if not isinstance(args.code, Unset):
-            await cell.call(args.object_id, "acknowledge", {"code": args.code}, deadline=ACKNOWLEDGED_WITHIN)
+            await cell.call(args.object_id, "acknowledge", {"code": args.code}, deadline=ACKNOWLEDGE_TIMEOUT)
             log.warning("alarm acknowledged", object=found.name, code=args.code, confirmed_by=user)
             return
         cell.robot(args.object_id)
@@ -237,7 +237,7 @@ class OperationRequests:
         self._motion.require_not_moving(args.object_id)
         state: RobotState = await cell.ask(RobotState, args.object_id, "state")
         method = _acknowledging_method(found.name, state.safety, context.client.role)
-        await cell.call(args.object_id, method, {"confirmed_by": user}, deadline=ACKNOWLEDGED_WITHIN)
+        await cell.call(args.object_id, method, {"confirmed_by": user}, deadline=ACKNOWLEDGE_TIMEOUT)
         log.warning("stop acknowledged", object=found.name, safety=state.safety.value, confirmed_by=user)
 
     async def _acknowledge_of_program(self, context: Context, args: AcknowledgeStopArgs, user: str) -> None:
@@ -245,11 +245,11 @@ class OperationRequests:
         execution = self._execution
         found = execution.device_of_hold(args.object_id)
         if not isinstance(args.code, Unset):
-            await execution.call(found.id, "acknowledge", {"code": args.code}, ACKNOWLEDGED_WITHIN)
+            await execution.call(found.id, "acknowledge", {"code": args.code}, ACKNOWLEDGE_TIMEOUT)
             log.warning("alarm acknowledged", object=found.name, code=args.code, confirmed_by=user)
             return
         self._motion.require_feature_of(found, "acknowledge_stop")
         state = msgspec.json.decode(await execution.call(found.id, "state", {}, READ_TIMEOUT), type=RobotState)
         method = _acknowledging_method(found.name, state.safety, context.client.role)
-        await execution.call(found.id, method, {"confirmed_by": user}, ACKNOWLEDGED_WITHIN)
+        await execution.call(found.id, method, {"confirmed_by": user}, ACKNOWLEDGE_TIMEOUT)
         log.warning("stop acknowledged", object=found.name, safety=state.safety.value, confirmed_by=user)

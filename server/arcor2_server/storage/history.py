@@ -23,7 +23,7 @@ from arcor2_server.files import DIRECTORY_MODE, aside, ensure_private
 
 log = structlog.get_logger(__name__)
 
-LEAST_FREE: Final = 100_000_000
+MIN_FREE_SPACE: Final = 100_000_000
 """Free space of the disk below which nothing is stored, bytes."""
 CLEARED_AT_ONCE: Final = 10_000
 """Number of rows that are deleted in one transaction."""
@@ -139,7 +139,7 @@ class HistoryFile:
     # -------------------------------------------------------------------------------- recording
     def require_space(self) -> None:
         """Raise StorageError if the disk is nearly full."""
-        if shutil.disk_usage(self.directory).free < LEAST_FREE:
+        if shutil.disk_usage(self.directory).free < MIN_FREE_SPACE:
             raise StorageError("The disk of the server is nearly full. The history is not recorded.")
 
     def number_points(self, points: Sequence[HistoryPoint]) -> list[int]:

@@ -25,9 +25,9 @@ log = structlog.get_logger(__name__)
 
 MAX_RECORDINGS: Final = 100
 """Maximum number of recordings."""
-MOST_BYTES: Final = 200_000_000
+MAX_BYTES: Final = 200_000_000
 """Maximum size of all recordings, bytes."""
-LEAST_FREE: Final = 100_000_000
+MIN_FREE_SPACE: Final = 100_000_000
 """Free space of the disk below which nothing is recorded, bytes."""
 LARGEST: Final = 64 * 1024 * 1024
 """Maximum size of the content of a recording, bytes."""
@@ -118,7 +118,7 @@ class RecordingFiles:
         """Store a recording, or replace it; return it with its size. Raise StorageError, also for a full disk."""
         try:
             self._directory.mkdir(parents=True, exist_ok=True, mode=DIRECTORY_MODE)
-            if shutil.disk_usage(self._directory).free < LEAST_FREE:
+            if shutil.disk_usage(self._directory).free < MIN_FREE_SPACE:
                 raise StorageError("The disk of the server is nearly full. Nothing is recorded.")
             head, body = _encode(info), zlib.compress(_encode(values), 6)
             content = _HEADER.pack(_MAGIC, len(head), zlib.crc32(head), len(body), zlib.crc32(body)) + head + body
@@ -127,7 +127,7 @@ class RecordingFiles:
             raise StorageError("The recording cannot be stored: {reason}", reason=error) from error
         return msgspec.structs.replace(info, size=len(content))
 
-    def delete_oldest(self, most: int = MAX_RECORDINGS, most_bytes: int = MOST_BYTES) -> list[int]:
+    def delete_oldest(self, most: int = MAX_RECORDINGS, most_bytes: int = MAX_BYTES) -> list[int]:
         """Delete the oldest files until the limits are met; return their numbers."""
         deleted, total = [], 0
         for count, number in enumerate(reversed(self._numbers()), 1):

@@ -11,9 +11,9 @@ from websockets.http11 import Request
 
 from arcor2_server.access.connection_limits import Connection
 
-CLOSE_WITHIN: Final = 1.0
+CLOSE_TIMEOUT: Final = 1.0
 """Time limit for sending the close frame to a client that does not answer pings, s."""
-LONGEST_UNADMITTED: Final = 64 * 1024
+MAX_UNADMITTED_MESSAGE: Final = 64 * 1024
 """Maximum length of a message from an unadmitted client, bytes. A longer message closes the connection."""
 EXTENSION: Final = "arcor2_hw.wire"
 """Key of the WireProtocol in the extensions of an ASGI scope."""
@@ -26,7 +26,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
         super().__init__(*args, **kwargs)
         self._connection = connection
         self._max_size = self.conn.max_message_size
-        self.conn.max_message_size = LONGEST_UNADMITTED
+        self.conn.max_message_size = MAX_UNADMITTED_MESSAGE
         self._pongs: dict[bytes, asyncio.Future[None]] = {}
 
     def handle_connect(self, event: Request) -> None:
@@ -56,7 +56,7 @@ class WireProtocol(WebSocketsSansIOProtocol):
     def keepalive_timeout(self) -> None:
         """Close the connection; abort it if the client does not receive the close frame in time."""
         super().keepalive_timeout()
-        self.loop.call_later(CLOSE_WITHIN, self.abort)
+        self.loop.call_later(CLOSE_TIMEOUT, self.abort)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Notify the waiters that no pong will arrive."""

@@ -12,9 +12,9 @@ from arcor2_server.events import encode
 
 UNREADABLE: Final = "Error"
 """Request name in the answer to an unreadable message."""
-LONGEST_NAME: Final = 200
+MAX_NAME: Final = 200
 """Maximum length of an unknown request name in an answer, characters."""
-LONGEST_REASON: Final = 4000
+MAX_REASON: Final = 4000
 """Maximum length of the message of a refusal, characters. It may quote the request."""
 _decode_anything = msgspec.json.Decoder().decode
 
@@ -48,7 +48,7 @@ def refusal(request: "Request | Head", message: Message, code: str = "", data: A
         code: The code of the error, for clients that asked for codes.
         data: Results of a request that was done in part.
     """
-    name = request.request if len(request.request) <= LONGEST_NAME else UNREADABLE
+    name = request.request if len(request.request) <= MAX_NAME else UNREADABLE
     text = shortened(message.text)
     response = Response(request.id, name, False, [text], data)
     if isinstance(request, Request) and request.codes:
@@ -62,12 +62,12 @@ def refusal(request: "Request | Head", message: Message, code: str = "", data: A
 
 def _translation(message: Message) -> dict[str, Any]:
     """Return key and values of a message that is not shortened."""
-    return message.translation() if len(message.text) <= LONGEST_REASON else {}
+    return message.translation() if len(message.text) <= MAX_REASON else {}
 
 
 def shortened(message: str) -> str:
-    """Return a message, cut to `LONGEST_REASON`."""
-    return message if len(message) <= LONGEST_REASON else message[:LONGEST_REASON] + " …"
+    """Return a message, cut to `MAX_REASON`."""
+    return message if len(message) <= MAX_REASON else message[:MAX_REASON] + " …"
 
 
 def read_head(text: str) -> Head:

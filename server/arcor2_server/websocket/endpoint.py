@@ -28,9 +28,9 @@ from arcor2_server.websocket.routes import AUTHENTICATE, Service
 log = structlog.get_logger(__name__)
 
 _TOKEN_NEEDED: Final = Message.of("A token is needed: send {request} first.", request=AUTHENTICATE)
-AUTHENTICATE_WITHIN: Final = 10.0
+AUTHENTICATION_TIMEOUT: Final = 10.0
 """Time limit for a client to send its token, s."""
-LONGEST_AUTHENTICATION: Final = 4096
+MAX_AUTHENTICATION_MESSAGE: Final = 4096
 """Maximum length of a message from an unadmitted client, characters."""
 TOKENS_PERIOD: Final = 2.0
 """Period of checking for revoked and expired tokens, s."""
@@ -111,7 +111,7 @@ class Endpoint:
                 self._hub.add(client, client.events)
             else:
                 loop = asyncio.get_running_loop()
-                deadline = loop.call_later(AUTHENTICATE_WITHIN, self._expect_admitted, client)
+                deadline = loop.call_later(AUTHENTICATION_TIMEOUT, self._expect_admitted, client)
             await self._read(socket, client)
         finally:
             if deadline is not None:
@@ -153,7 +153,7 @@ class Endpoint:
     @staticmethod
     def _expect_admitted(client: Client) -> None:
         if not client.admitted:
-            client.close(CloseCode.NOT_ADMITTED, f"no token came within {AUTHENTICATE_WITHIN:g} s")
+            client.close(CloseCode.NOT_ADMITTED, f"no token came within {AUTHENTICATION_TIMEOUT:g} s")
 
     async def _read(self, socket: WebSocket[Any, Any, Any], client: Client) -> None:
         receive = socket.receive
@@ -171,7 +171,7 @@ class Endpoint:
                 long = Message.of("The message is longer than {limit} bytes: it was not read.", limit=served)
                 refuse(client, read_head(text), long)
                 continue
-            if not client.admitted and len(text) > LONGEST_AUTHENTICATION:
+            if not client.admitted and len(text) > MAX_AUTHENTICATION_MESSAGE:
                 refuse(client, Head(), _TOKEN_NEEDED)
                 continue
             try:

@@ -61,8 +61,8 @@ def test_a_mesh_with_too_many_triangles(tmp_path: Path, monkeypatch: pytest.Monk
 
     from arcor2_drivers.bin_picking import models
 
-    assert models.MOST_TRIANGLES == 200_000
-    monkeypatch.setattr(models, "MOST_TRIANGLES", 11)
+    assert models.MAX_TRIANGLES == 200_000
+    monkeypatch.setattr(models, "MAX_TRIANGLES", 11)
     mesh = o3d.geometry.TriangleMesh.create_box(0.1, 0.1, 0.1)
     mesh.compute_triangle_normals()
     o3d.io.write_triangle_mesh(str(tmp_path / "fine.stl"), mesh)

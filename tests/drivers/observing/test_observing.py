@@ -44,7 +44,7 @@ class Line:
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(observing, "FIRST_PAUSE", 0.01)
-    monkeypatch.setattr(observing, "LONGEST_PAUSE", 0.02)
+    monkeypatch.setattr(observing, "MAX_PAUSE", 0.02)
 
 
 def test_start_and_stop_are_idempotent() -> None:
@@ -112,7 +112,7 @@ def test_stopping_while_lost_ends_reconnecting() -> None:
 
 
 def test_a_hung_thread_does_not_block_stopping(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(observing, "STOP_WITHIN", 0.05)
+    monkeypatch.setattr(observing, "STOP_TIMEOUT", 0.05)
     line = Line()
     hold = threading.Event()
     line.life = Observing("line 1", line.do_open, lambda _: (hold.wait(60.0), None)[1], line.close)

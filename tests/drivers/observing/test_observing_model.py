@@ -71,7 +71,7 @@ class Device:
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(observing, "FIRST_PAUSE", PAUSES[0])
-    monkeypatch.setattr(observing, "LONGEST_PAUSE", PAUSES[1])
+    monkeypatch.setattr(observing, "MAX_PAUSE", PAUSES[1])
 
 
 DAY = st.lists(st.sampled_from(["start", "stop", "break", "unplug", "plug", "settle", "call", "bug"]), max_size=14)
@@ -173,7 +173,7 @@ class LogCounter(logging.Handler):
 
 def test_reconnection_attempts_back_off_up_to_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(observing, "FIRST_PAUSE", 0.02)
-    monkeypatch.setattr(observing, "LONGEST_PAUSE", 0.16)
+    monkeypatch.setattr(observing, "MAX_PAUSE", 0.16)
     device = Device()
     device.life.start(1.0)
     device.reachable = False
@@ -187,7 +187,7 @@ def test_reconnection_attempts_back_off_up_to_a_limit(monkeypatch: pytest.Monkey
 
 def test_a_connection_that_breaks_at_once_keeps_the_back_off(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(observing, "FIRST_PAUSE", 0.01)
-    monkeypatch.setattr(observing, "LONGEST_PAUSE", 0.1)
+    monkeypatch.setattr(observing, "MAX_PAUSE", 0.1)
     device = Device()
     device.watch = lambda stopping: device.until(lambda: True) or _break()  # type: ignore[method-assign]
     with listening(lambda life: device.path.append(life.state)):

@@ -3,7 +3,7 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from arcor2_drivers.scale.sics import LONGEST_LINE, Answer, answers
+from arcor2_drivers.scale.sics import MAX_LINE, Answer, answers
 
 
 @pytest.mark.parametrize(
@@ -42,4 +42,4 @@ def test_invalid_lines_are_not_answers(line: bytes) -> None:
 def test_random_bytes_raise_nothing(data: bytes) -> None:
     for answer in answers(data + b"\r\n"):
         assert answer.value is None or abs(answer.value) < 1e10
-    assert len(answers(b"S S " + b" " * LONGEST_LINE + b"1.0 g\r\n")) == 0
+    assert len(answers(b"S S " + b" " * MAX_LINE + b"1.0 g\r\n")) == 0

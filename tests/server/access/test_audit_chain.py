@@ -152,7 +152,7 @@ async def test_a_file_with_a_problem_is_kept_and_a_new_one_started(path: Path, d
 
 async def test_reasons_are_redacted_and_large_changes_are_counted(path: Path) -> None:
     class Change:
-        kind, id, before, after = "project", "1", None, "x" * trail.LARGEST_CHANGES
+        kind, id, before, after = "project", "1", None, "x" * trail.MAX_CHANGES
 
     audit = reopened(path, redact=True)
     await audit.open()
@@ -167,7 +167,7 @@ async def test_reasons_are_redacted_and_large_changes_are_counted(path: Path) ->
 async def test_entries_wait_while_the_file_cannot_be_written(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trail, "RETRY_AFTER", 0.01)
     monkeypatch.setattr(trail, "WRITTEN_WITHIN", 0.0)
-    monkeypatch.setattr(trail, "MOST_WAITING", 2)
+    monkeypatch.setattr(trail, "MAX_WAITING", 2)
     write, attempts, full = AuditFile.append, [], True
 
     def append_if_room(file: AuditFile, rows: list[chain.Row]) -> None:

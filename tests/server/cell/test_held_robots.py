@@ -103,7 +103,7 @@ LEASE_MS = 20_000
 
 @pytest.fixture(autouse=True)
 def long_leases(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hold_to_run, "LONGEST_LEASE_MS", LEASE_MS)
+    monkeypatch.setattr(hold_to_run, "MAX_LEASE_MS", LEASE_MS)
 
 
 async def with_arm(server: Server) -> None:

@@ -23,7 +23,7 @@ from arcor2_server.app.wiring import connect_devices
 from arcor2_server.audit import changes as audit
 from arcor2_server.errors import RequestRefused
 from arcor2_server.maintenance.devices import Devices
-from arcor2_server.maintenance.parameters import MOST_BACKUPS, Parameters
+from arcor2_server.maintenance.parameters import MAX_BACKUPS, Parameters
 from arcor2_server.rpc.maintenance import MaintenanceRequests
 from arcor2_server.rpc.registry import Handlers
 from arcor2_server.settings import ServerSettings
@@ -282,10 +282,10 @@ async def test_files_of_backups_are_checked(tmp_path: Path) -> None:
         again = await upload(file)
         assert (again.digest, again.uploaded) == (info.digest, True)
         await place.ask("DeleteParameterBackup", object_id="obj_unit", backup_id=again.id)
-        for _ in range(MOST_BACKUPS):
+        for _ in range(MAX_BACKUPS):
             newest = await place.ask("BackUpParameters", object_id="obj_unit")
         backups = (await place.card()).backups
-        assert len(backups) == MOST_BACKUPS
+        assert len(backups) == MAX_BACKUPS
         assert backups[0] == newest
         with pytest.raises(Arcor2Error, match="does not exist"):
             await place.ask("GetParameterBackup", object_id="obj_unit", backup_id=info.id)

@@ -10,7 +10,7 @@ from arcor2_hw.data.device import Observation, Quality, Reading
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import NotFound, Refused, Stale
 from arcor2_hw.objects import IOBlock, Suction
-from arcor2_hw.objects.small import MOST_POINTS, IOPoint, PointDirection, PointKind
+from arcor2_hw.objects.small import MAX_POINTS, IOPoint, PointDirection, PointKind
 from arcor2_server.errors import RequestRefused
 from tests.runtime.conftest import scene_object
 from tests.server.cell.conftest import Server, serving
@@ -91,7 +91,7 @@ class Block(IOBlock):
     """An I/O block, of which one point is broken and one is stale."""
 
     def points(self) -> list[IOPoint]:
-        names = ["level", "broken", "stale", *(f"p{n}" for n in range(MOST_POINTS))]
+        names = ["level", "broken", "stale", *(f"p{n}" for n in range(MAX_POINTS))]
         return [IOPoint(name, PointDirection.INPUT, PointKind.ANALOG, "bar") for name in names]
 
     def read(self, name: str) -> Reading[bool | float]:
@@ -128,7 +128,7 @@ def test_points_and_vacuum_are_observed() -> None:
     assert level == Observation("level", 1.5, "bar")
     assert broken == Observation("broken", None, "bar", Quality.BAD)
     assert stale == Observation("stale", None, "bar", Quality.BAD)
-    assert len(others) == MOST_POINTS - 3
+    assert len(others) == MAX_POINTS - 3
     cup = Cup("obj", "cup")
     assert cup.observations() == [Observation("Vacuum", 4e4, "Pa", Quality.UNCERTAIN)]
     cup.pressure = None

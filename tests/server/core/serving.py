@@ -18,7 +18,7 @@ from tests.forking import Forked, Forker, ended, readable
 from tests.postgresql import variables
 
 COMMAND = [sys.executable, "-m", "arcor2_server.cli.main"]
-READY_WITHIN = 60.0
+READY_TIMEOUT = 60.0
 WITHIN = 30.0
 """Time limit for expected messages, s. Long, because only a failing test waits for all of it."""
 
@@ -97,14 +97,14 @@ class ServerProcess:
         assert self.process.stdout is not None
         line = b""
         try:
-            async with asyncio.timeout(READY_WITHIN):
+            async with asyncio.timeout(READY_TIMEOUT):
                 while not line.endswith(b"\n"):
                     await readable(self.process.stdout.fileno())
                     if not (part := os.read(self.process.stdout.fileno(), 4096)):
                         break
                     line += part
         except TimeoutError:
-            raise TimeoutError(f"not ready within {READY_WITHIN:g} s; its log: {self.log.read_text()}") from None
+            raise TimeoutError(f"not ready within {READY_TIMEOUT:g} s; its log: {self.log.read_text()}") from None
         assert line.startswith(b"ready "), self.log.read_text()
         return line.decode().split()[1]
 

@@ -13,7 +13,7 @@ from arcor2_hw.data.role import Role
 from arcor2_hw.data.rpc import ListAlarmsArgs
 from arcor2_hw.exceptions import Refused
 from arcor2_hw.messages import Message
-from arcor2_server.alarms.book import MAX_RECORDS, SAME_CAUSE_WITHIN, AlarmBook, Occurrence
+from arcor2_server.alarms.book import MAX_RECORDS, SAME_CAUSE_PERIOD, AlarmBook, Occurrence
 from arcor2_server.alarms.kinds import AlarmKinds
 from arcor2_server.alarms.service import Alarms
 from arcor2_server.alarms.system import SystemAlarms
@@ -68,7 +68,7 @@ def test_first_cause_is_on_top_when_ten_follow_in_any_order() -> None:
 def test_alarm_after_a_quiet_time_or_of_another_run_is_a_first_up_itself() -> None:
     book = AlarmBook()
     book.raised(occurrence("a", "x", 100.0))
-    book.raised(occurrence("b", "x", 100.1 + SAME_CAUSE_WITHIN))
+    book.raised(occurrence("b", "x", 100.1 + SAME_CAUSE_PERIOD))
     book.raised(Occurrence("c", "x", kind("x"), AT, 100.2, session="run 2"))
     assert first_ups(book) == {"a": 1, "b": 2, "c": 3}
 

@@ -21,7 +21,7 @@ from arcor2_server.access.connection_limits import OWN_FILES, Connection, Connec
 from arcor2_server.settings import ServerSettings
 from arcor2_server.web import http_server
 from arcor2_server.web.http_server import Server, configuration
-from arcor2_server.web.websocket_transport import EXTENSION, LONGEST_UNADMITTED
+from arcor2_server.web.websocket_transport import EXTENSION, MAX_UNADMITTED_MESSAGE
 from tests.server.core.serving import Talker, running, talking, until
 
 TIMEOUT = 0.3
@@ -281,7 +281,7 @@ async def test_a_flood_of_connections_blocks_no_admitted_client(tmp_path: Path) 
 
 @on_uvloop
 async def test_a_long_message_needs_an_admitted_client(tmp_path: Path) -> None:
-    message = "x" * (LONGEST_UNADMITTED + 1)
+    message = "x" * (MAX_UNADMITTED_MESSAGE + 1)
     async with served(tmp_path, request_timeout=3.0) as here, connect(f"ws://127.0.0.1:{here.port}/admitted") as client:
         await client.send(message)
         assert await client.recv() == str(len(message))

@@ -23,7 +23,7 @@ from arcor2_hw.runtime.ring import Ring
 from arcor2_server.execution.run_message import RunMessages
 from arcor2_server.execution.runs import How
 from arcor2_server.recordings.export import as_csv
-from arcor2_server.recordings.service import MOST_OF_ONE_ALARM, Recordings
+from arcor2_server.recordings.service import MAX_PER_ALARM, Recordings
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import recordings as storage
 from arcor2_server.storage.recordings import RecordingFiles
@@ -121,7 +121,7 @@ def test_the_oldest_files_are_deleted_by_number_and_by_size(tmp_path: Path) -> N
 
 
 def test_nothing_is_stored_on_a_disk_that_is_nearly_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    free = SimpleNamespace(free=storage.LEAST_FREE - 1)
+    free = SimpleNamespace(free=storage.MIN_FREE_SPACE - 1)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: free)
     with pytest.raises(StorageError, match="nearly full"):
         RecordingFiles(tmp_path).put(info(1), VALUES)
@@ -186,13 +186,13 @@ async def test_an_alarm_that_keeps_returning_deletes_only_its_own_recordings(ben
         await bench.settled()
     numbers = [each.number for each in bench.recordings.find(RecordingQuery())]
     assert numbers == [9, 8, 7, 6, 2, 1]
-    assert len(numbers) == MOST_OF_ONE_ALARM + 1
+    assert len(numbers) == MAX_PER_ALARM + 1
     assert [number for event in bench.events for number in event.deleted] == [3, 4, 5]
 
 
 async def test_a_full_disk_stops_no_alarm(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     await bench.recordings.open(lambda _: None)
-    monkeypatch.setattr(storage, "LEAST_FREE", 1 << 60)
+    monkeypatch.setattr(storage, "MIN_FREE_SPACE", 1 << 60)
     bench.recordings.alarm(alarm(1), time.monotonic())
     await bench.settled()
     assert bench.recordings.find(RecordingQuery()) == []

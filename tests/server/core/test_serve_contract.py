@@ -65,7 +65,7 @@ async def test_ready_line_and_end(tmp_path: Path, number: signal.Signals) -> Non
 async def test_the_test_helper_ends_a_server_that_is_not_ready_in_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(serving, "READY_WITHIN", 0.01)
+    monkeypatch.setattr(serving, "READY_TIMEOUT", 0.01)
     server = ServerProcess(tmp_path / "data")
     with pytest.raises(TimeoutError, match="not ready"):
         await server.start()

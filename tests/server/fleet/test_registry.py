@@ -6,7 +6,7 @@ import pytest
 from arcor2_hw.data.base import now
 from arcor2_hw.exceptions import Conflict, InvalidData, NotFound
 from arcor2_server.fleet import records
-from arcor2_server.fleet.registry import DEAD_AFTER, MOST_PER_NAME, TWIN_FOR, FleetCard, Registry, StoredCell
+from arcor2_server.fleet.registry import DEAD_AFTER, MAX_PER_NAME, TWIN_FOR, FleetCard, Registry, StoredCell
 from tests.server.fleet.cells import state_of
 
 A, B = "a" * 32, "b" * 32
@@ -86,7 +86,7 @@ def test_two_servers_with_the_same_data_are_a_conflict_but_a_restart_is_none() -
 
 def test_the_number_of_servers_with_one_name_is_limited() -> None:
     registry = Registry()
-    for number in range(MOST_PER_NAME):
+    for number in range(MAX_PER_NAME):
         registry.accept("press", state_of(f"{number:032x}"), now(), 1.0)
     with pytest.raises(Conflict, match="4 servers use the name"):
         registry.accept("press", state_of("f" * 32), now(), 1.0)
@@ -103,7 +103,7 @@ def test_known_cells_have_no_signal_after_a_restart_of_the_fleet() -> None:
     ("data", "reason"),
     [
         (b"{", "truncated"),
-        (b"x" * (records.LARGEST_STATE + 1), "at most 16384"),
+        (b"x" * (records.MAX_STATE + 1), "at most 16384"),
         (b"[" * 10_000, "nested too deeply|object"),
         (msgspec.json.encode(state_of(identity="")), "length >= 1"),
         (msgspec.json.encode(state_of(address="javascript:alert(1)")), "regex"),

@@ -100,7 +100,7 @@ def test_units_are_counted_by_cell_and_product(
     file.put_results([received(left(2, 50, UnitState.GOOD, "A"), stamp=NOON * 1_000_000 + 1)])
     file.put_results([received(left(2, 50, UnitState.REJECTED, "A"))])
     assert counts(reports)[2] == ("press-3", "A", "sorting", 2, 0, 0)
-    monkeypatch.setattr(fleet_file, "MOST_RESULTS", 2)
+    monkeypatch.setattr(fleet_file, "MAX_RESULTS", 2)
     file.put_results([received(left(9, 80, product="A"))])
     assert counts(reports)[-1] == ("press-3", "A", "sorting", 1, 0, 0)
     assert sum(int(str(each[3])) for each in counts(reports)) == file.count()

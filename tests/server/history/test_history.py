@@ -129,8 +129,8 @@ def test_a_lost_value_is_recorded_at_once_and_an_unchanged_one_every_ten_minutes
 
 
 def test_the_memory_of_the_recorder_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("arcor2_server.history.recorder.MOST_WAITING", 100)
-    monkeypatch.setattr("arcor2_server.history.recorder.MOST_POINTS", 2)
+    monkeypatch.setattr("arcor2_server.history.recorder.MAX_WAITING", 100)
+    monkeypatch.setattr("arcor2_server.history.recorder.MAX_POINTS", 2)
     recorder = PointRecorder(0.1)
     for at in range(500):
         recorder.reported("obj", "oven", [point("a", float(at)), point("b", 1.0), point("c", 1.0)], at * 1000)

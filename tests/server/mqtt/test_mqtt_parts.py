@@ -306,7 +306,7 @@ async def test_json_is_published_and_topics_of_removed_devices_disappear(
 
 async def test_a_broker_that_does_not_answer_leaves_no_sockets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(link, "TIMEOUT", 0.05)
-    monkeypatch.setattr(link, "LONGEST_PAUSE", 0.05)
+    monkeypatch.setattr(link, "MAX_PAUSE", 0.05)
     attempts: set[asyncio.StreamWriter] = set()
     ended = 0
 
@@ -326,7 +326,7 @@ async def test_a_broker_that_does_not_answer_leaves_no_sockets(tmp_path: Path, m
 
 
 async def test_results_wait_for_the_broker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plain, "MOST_EVENTS", 3)
+    monkeypatch.setattr(plain, "MAX_EVENTS", 3)
     broker = Mosquitto(tmp_path)
     broker.end()
     async with publishing(PlainJson, broker.port, tmp_path) as cell:
@@ -395,7 +395,7 @@ def test_the_address_of_the_broker_is_read() -> None:
 
 async def test_a_process_that_ends_again_and_again_is_an_alarm(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process, "FIRST_PAUSE", 0.0)
-    monkeypatch.setattr(process, "LONGEST_PAUSE", 1.0)
+    monkeypatch.setattr(process, "MAX_PAUSE", 1.0)
     alarms: Any = SimpleNamespace(raised=[])
     alarms.system = lambda *alarm: alarms.raised.append(alarm)
     nothing: Any = None

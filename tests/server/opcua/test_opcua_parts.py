@@ -217,13 +217,13 @@ async def test_a_process_that_does_not_read_gets_no_queue_of_updates(monkeypatch
     _, writer = await asyncio.open_unix_connection(sock=ours)
     sending = asyncio.create_task(running._send(writer))
     try:
-        while writer.transport.get_write_buffer_size() <= process.MOST_UNSENT:
+        while writer.transport.get_write_buffer_size() <= process.MAX_UNSENT:
             await asyncio.sleep(0)
         calls = feed.calls
         for _ in range(100):
             await asyncio.sleep(0)
         assert feed.calls <= calls + 1
-        assert writer.transport.get_write_buffer_size() < process.MOST_UNSENT + 200_000
+        assert writer.transport.get_write_buffer_size() < process.MAX_UNSENT + 200_000
     finally:
         sending.cancel()
         writer.transport.abort()

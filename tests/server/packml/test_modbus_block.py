@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 from arcor2_hw.data.cell_state import CellAuthority, CellMode
 from arcor2_hw.exceptions import StorageError
 from arcor2_server.packml.modbus import ExceptionCode, ModbusRefusal, answer
-from arcor2_server.packml.plc import MOST_WAITING, Plc
+from arcor2_server.packml.plc import MAX_WAITING, Plc
 from arcor2_server.packml.record import CellFile, CellRecord, JobEnd
 from arcor2_server.storage.damage_notices import DataDamage
 from arcor2_server.websocket.hub import Hub
@@ -77,7 +77,7 @@ async def test_a_second_plc_and_too_many_requests_are_refused(tmp_path: Path) ->
         block.write(0, [9, 9, 9, 9], "10.0.0.2")
     assert refused.value.code is ExceptionCode.BUSY
     assert block.holding() == [1, 2, 3, 4]
-    for number in range(5, 4 + MOST_WAITING):
+    for number in range(5, 4 + MAX_WAITING):
         block.write(3, [number], "10.0.0.1")
     with pytest.raises(ModbusRefusal):
         block.write(3, [100], "10.0.0.1")

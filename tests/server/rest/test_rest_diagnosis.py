@@ -23,7 +23,7 @@ from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.main import app
 from arcor2_server.log.recent import MAX_LINE, RecentLog
 from arcor2_server.log.redaction import clean, hide, secrets_in
-from arcor2_server.rest.diagnosis_bundle import LARGEST_PART, packed
+from arcor2_server.rest.diagnosis_bundle import MAX_PART, packed
 from tests.server.core.serving import ServerProcess, running
 
 PASSWORD = "opensesame-7"
@@ -81,12 +81,12 @@ def test_the_newest_part_of_the_log_is_included() -> None:
 
 
 def test_an_oversized_document_is_omitted_with_a_note() -> None:
-    large = {"about.json": {}, "scene.json": {"description": "x" * (LARGEST_PART + 1)}, "project.json": None}
+    large = {"about.json": {}, "scene.json": {"description": "x" * (MAX_PART + 1)}, "project.json": None}
     archive = packed(large)
     files = content(archive)
     assert "left_out" in json.loads(files["scene.json"])
     assert "project.json" not in files
-    assert len(archive) < LARGEST_PART / 4
+    assert len(archive) < MAX_PART / 4
 
 
 # ------------------------------------------------------------------------------------------------ the bundle

@@ -18,7 +18,7 @@ ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 PROMPT = re.compile(r"\n([^\n]*?(?:\?|Enter\.)) (?:\[y/N\] )?(?:$|The connection to )")
 """A question, possibly with a message about the connection behind it."""
 SHOWN_WITHIN = 90.0  # s, on a busy machine
-ENDS_WITHIN = 60.0  # s
+END_TIMEOUT = 60.0  # s
 
 
 class Operator:
@@ -88,11 +88,11 @@ class Operator:
         until = time.monotonic() + SHOWN_WITHIN
         while self._more(until):
             pass
-        return self.process.wait(ENDS_WITHIN)
+        return self.process.wait(END_TIMEOUT)
 
     def close(self) -> None:
         """End the command, if it still runs, as when the terminal is closed."""
         os.close(self._ours)
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGTERM)
-            self.process.wait(ENDS_WITHIN)
+            self.process.wait(END_TIMEOUT)

@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { addBranch, dissolveParallel, removeBranch } from "../../commands/parallel";
 import { notEditable } from "../../commands/program";
 import { byName } from "../../formats";
-import { LEAST_BRANCHES, lanesOf, MOST_BRANCHES, whyNotAtOnce } from "../../program/lanes";
+import { MIN_BRANCHES, lanesOf, MAX_BRANCHES, whyNotAtOnce } from "../../program/lanes";
 import { CALL, calledBy } from "../../program/operands";
 import { callsIn } from "../../program/parallel";
 import { valuesOf } from "../../program/step";
@@ -26,7 +26,7 @@ const Branches: Section["Body"] = ({ selection: { id } }) => {
   const calls = callsIn(doc, action);
   const why = notEditable(state, "UpdateParallel");
   const clash = whyNotAtOnce(doc, calls);
-  const few = calls.length <= LEAST_BRANCHES ? t`Parallel work has at least two branches.` : "";
+  const few = calls.length <= MIN_BRANCHES ? t`Parallel work has at least two branches.` : "";
   return (
     <>
       {clash && (
@@ -39,7 +39,7 @@ const Branches: Section["Body"] = ({ selection: { id } }) => {
           <Branch key={each.id} state={state} doc={doc} call={each} why={why || few} owner={id} />
         ))}
       </ul>
-      {calls.length < MOST_BRANCHES ? (
+      {calls.length < MAX_BRANCHES ? (
         <Pick
           label={t`Add a branch`}
           value=""

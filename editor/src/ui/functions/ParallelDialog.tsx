@@ -5,7 +5,7 @@ import { useState } from "react";
 import { addParallel, parallelName } from "../../commands/parallel";
 import { byName } from "../../formats";
 import type { Slot } from "../../program/chain";
-import { devicesOf, LEAST_BRANCHES, MOST_BRANCHES, whyNotAtOnce } from "../../program/lanes";
+import { devicesOf, MIN_BRANCHES, MAX_BRANCHES, whyNotAtOnce } from "../../program/lanes";
 import { CALL } from "../../program/operands";
 import { useEditor } from "../../store/store";
 import { Window } from "../kit/dialogs";
@@ -22,7 +22,7 @@ export default function ParallelDialog({ slot, onClose }: { slot: Slot | null; o
     doc,
     called.map((each) => ({ name: each.name, type: `${each.id}/${CALL}` })),
   );
-  const fits = called.length >= LEAST_BRANCHES && called.length <= MOST_BRANCHES;
+  const fits = called.length >= MIN_BRANCHES && called.length <= MAX_BRANCHES;
   const submit = () => {
     void addParallel(name.trim(), chosen, slot);
     onClose();

@@ -15,7 +15,7 @@ const HEIGHT = 16;
 const SPACE = 56;
 /** Distance from an action at which a tap still finds it, pixels. */
 const FINGER = 22;
-const MOST_ZOOM = 4096;
+const MAX_ZOOM = 4096;
 
 interface GanttProps {
   name: string;
@@ -54,7 +54,7 @@ export function Gantt({ name, trace, summary, span: visible }: GanttProps) {
   };
   const zoomBy = (factor: number) => {
     const { current } = box;
-    const next = Math.min(Math.max(zoom * factor, 1 / MOST_ZOOM), MOST_ZOOM);
+    const next = Math.min(Math.max(zoom * factor, 1 / MAX_ZOOM), MAX_ZOOM);
     const middle = (view.left + view.width / 2) / scale;
     setZoom(next);
     // After the new width is drawn.
@@ -70,7 +70,7 @@ export function Gantt({ name, trace, summary, span: visible }: GanttProps) {
           <Button look="plain" aria-label={t`Zoom out`} isDisabled={whole <= view.width} onPress={() => zoomBy(0.5)}>
             −
           </Button>
-          <Button look="plain" aria-label={t`Zoom in`} isDisabled={zoom >= MOST_ZOOM} onPress={() => zoomBy(2)}>
+          <Button look="plain" aria-label={t`Zoom in`} isDisabled={zoom >= MAX_ZOOM} onPress={() => zoomBy(2)}>
             +
           </Button>
         </span>

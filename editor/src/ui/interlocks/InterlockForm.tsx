@@ -14,7 +14,7 @@ import { RefusedText, useRefusal } from "../points/Refusal";
 import { NeedFields } from "./NeedFields";
 
 /** Longest time for which an action waits, s. */
-const LONGEST_WAIT = 3600;
+const MAX_WAIT = 3600;
 
 export function InterlockForm({ interlock, onDone }: { interlock: Interlock; onDone: () => void }) {
   const [draft, setDraft] = useState(interlock);
@@ -111,7 +111,7 @@ export function InterlockForm({ interlock, onDone }: { interlock: Interlock; onD
             value={draft.within}
             digits={0}
             least={0}
-            most={LONGEST_WAIT}
+            most={MAX_WAIT}
             step={5}
             onChange={(within) => change({ within })}
           />

@@ -9,12 +9,12 @@ export type Span = keyof typeof SPANS;
 /** Number of equal parts of a period. */
 export const BUCKETS = 300;
 
-const LEAST_PAUSE = 5000;
-const LONGEST_PAUSE = 60_000;
+const MIN_PAUSE = 5000;
+const MAX_PAUSE = 60_000;
 
 /** Return the time between two readings of a period that ends now, ms: half of its parts, within limits. */
 export function pauseOf(span: Span): number {
-  return Math.min(Math.max(SPANS[span] / BUCKETS / 2, LEAST_PAUSE), LONGEST_PAUSE);
+  return Math.min(Math.max(SPANS[span] / BUCKETS / 2, MIN_PAUSE), MAX_PAUSE);
 }
 
 type Column = (number | null)[];

@@ -18,7 +18,7 @@ interface Press extends Point {
 /** Distance below which a finger counts as still, CSS pixels. */
 const STILL = 12;
 /** Time in which a browser sends the click of a press itself, ms. */
-const CLICKED_WITHIN = 100;
+const CLICK_TIMEOUT = 100;
 
 const contains = (rect: Rect, { clientX: x, clientY: y }: Point): boolean =>
   x >= rect.left && x <= rect.right && y >= rect.top && y <= rect.bottom;
@@ -52,6 +52,6 @@ export function keepPresses(page: Document): void {
     control.addEventListener("click", () => (clicked = true), { once: true, capture: true });
     setTimeout(() => {
       if (!clicked && control.isConnected) control.click();
-    }, CLICKED_WITHIN);
+    }, CLICK_TIMEOUT);
   });
 }

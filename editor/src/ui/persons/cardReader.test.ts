@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { CardKeys, LONGEST_GAP } from "./cardReader";
+import { CardKeys, MAX_GAP } from "./cardReader";
 
 /** Type keys with a time between them, ms; return the card and what reached the page, with Enter as a line break. */
 function typed(text: string, gap: number): { cards: string[]; page: string } {
@@ -9,7 +9,7 @@ function typed(text: string, gap: number): { cards: string[]; page: string } {
   let at = 1000;
   for (const each of text) {
     at += gap;
-    if (gap > LONGEST_GAP) page += keys.flush(); // the timer of the page has ended
+    if (gap > MAX_GAP) page += keys.flush(); // the timer of the page has ended
     const verdict = keys.key(each === "\n" ? "Enter" : each, at);
     if ("card" in verdict) cards.push(verdict.card);
     else if (!verdict.hold) page += verdict.typed + each;

@@ -4,7 +4,7 @@
  */
 
 /** Longest time between two keys of a reader, ms. Persons need longer for most keys. */
-export const LONGEST_GAP = 50;
+export const MAX_GAP = 50;
 /** Least length of the number of a card. */
 const SHORTEST = 4;
 
@@ -21,7 +21,7 @@ export class CardKeys {
 
   /** Take a key at a time, ms. */
   key(key: string, at: number): Verdict {
-    const fast = at - this.at <= LONGEST_GAP;
+    const fast = at - this.at <= MAX_GAP;
     this.at = at;
     if (!fast) this.given = "";
     const number = this.given + this.held;
@@ -79,8 +79,8 @@ export function readCards(onCard: (card: string) => void): () => void {
       if (isField(document.activeElement ?? document.body))
         for (let each = 0; each < verdict.late; each++) document.execCommand("delete");
       onCard(verdict.card);
-    } else if (passes) timer = window.setTimeout(() => keys.flush(), LONGEST_GAP);
-    else if (verdict.hold) timer = window.setTimeout(() => give(keys.flush()), LONGEST_GAP);
+    } else if (passes) timer = window.setTimeout(() => keys.flush(), MAX_GAP);
+    else if (verdict.hold) timer = window.setTimeout(() => give(keys.flush()), MAX_GAP);
     else give(verdict.typed);
   };
   window.addEventListener("keydown", listen, { capture: true });

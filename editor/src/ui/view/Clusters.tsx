@@ -9,7 +9,7 @@ import { boundsOf, type Thing } from "../../engine/thing";
 import { taken } from "../aim/OffScreen";
 
 /** Names in the label for screen readers. */
-const MOST_NAMES = 6;
+const MAX_NAMES = 6;
 const at = new Vector3();
 
 export function Clusters({ engine }: { engine: Engine }) {
@@ -31,7 +31,7 @@ export function Clusters({ engine }: { engine: Engine }) {
     return () => engine.arrangeBy((labels) => [labels, []]);
   }, [engine]);
   return clusters.map((cluster) => {
-    const names = cluster.ids.map((id) => engine.item(id)?.name).slice(0, MOST_NAMES);
+    const names = cluster.ids.map((id) => engine.item(id)?.name).slice(0, MAX_NAMES);
     const count = plural(cluster.ids.length, { one: "# object", other: "# objects" });
     return (
       <button
