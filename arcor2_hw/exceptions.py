@@ -239,7 +239,7 @@ class Conflict(Arcor2Error):
 
 
 class PartError(Conflict):
-    """An action does not agree with the books of parts."""
+    """An action does not agree with the part inventory."""
 
     code = "part"
 

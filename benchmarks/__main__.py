@@ -2,7 +2,7 @@
 
 `python -m benchmarks [--long] [GROUP ...]` measures the named groups, or all. `--long` increases the number of samples:
 recovery 50 cycles (3 without it), stops 500 for each driver in a busy process (100), demo 5 runs (1), calibration 2,000
-pictures of each kind (200), robot_pose 300 views (30). The group `books` runs 10 seeds if it is named, otherwise one;
+pictures of each kind (200), robot_pose 300 views (30). The group `parts` runs 10 seeds if it is named, otherwise one;
 `--seeds`, `--boards` and `--faults` change this. The exit code is 1 if a group failed, or if a metric with the goal
 "<= 0", which counts errors, misses it.
 """
@@ -20,7 +20,6 @@ from typing import Final
 from benchmarks import (
     analysing,
     backup,
-    books,
     building,
     buses,
     calibration,
@@ -40,6 +39,7 @@ from benchmarks import (
     nodes,
     opcua,
     operation,
+    parts,
     recorder,
     recovery,
     requests,
@@ -50,8 +50,8 @@ from benchmarks import (
     stops,
     unresponsive_devices,
 )
-from benchmarks.books import Size
 from benchmarks.metrics import Report
+from benchmarks.parts import Size
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Options:
     """The options of the command line."""
 
     long: bool = False
-    books: Size = field(default_factory=Size)
+    parts: Size = field(default_factory=Size)
 
 
 def measurements(options: Options) -> dict[str, Callable[[Report, Path], Awaitable[None]]]:
@@ -92,7 +92,7 @@ def measurements(options: Options) -> dict[str, Callable[[Report, Path], Awaitab
         "kinematics": lambda report, _: kinematics.run(report),
         "stops": lambda report, _: stops.run(report, options.long),
         "demo": lambda report, folder: demo.run(report, folder, options.long),
-        "books": lambda report, folder: books.run(report, folder, options.books),
+        "parts": lambda report, folder: parts.run(report, folder, options.parts),
         "dry_run": dry_run.run,
         "recorder": recorder.run,
         "recovery": lambda report, _: recovery.run(report, options.long),
@@ -123,14 +123,14 @@ def arguments() -> tuple[list[str], Options]:
     parser = argparse.ArgumentParser(prog="benchmarks")
     parser.add_argument("groups", nargs="*", metavar="GROUP", help=f"{', '.join(GROUPS)}; default: all")
     parser.add_argument("--long", action="store_true", help="take more samples")
-    in_books = parser.add_argument_group("group books")
-    in_books.add_argument("--seeds", type=int, help=f"default: {books.SEEDS} if the group is named, otherwise 1")
-    in_books.add_argument("--boards", type=int, default=books.BOARDS, help="boards of a seed (%(default)s)")
-    in_books.add_argument("--faults", type=int, default=books.FAULTS, help="faults of a seed (%(default)s)")
+    in_parts = parser.add_argument_group("group parts")
+    in_parts.add_argument("--seeds", type=int, help=f"default: {parts.SEEDS} if the group is named, otherwise 1")
+    in_parts.add_argument("--boards", type=int, default=parts.BOARDS, help="boards of a seed (%(default)s)")
+    in_parts.add_argument("--faults", type=int, default=parts.FAULTS, help="faults of a seed (%(default)s)")
     parsed = parser.parse_args()
     if unknown := set(parsed.groups) - set(GROUPS):
         parser.error(f"Unknown group: {', '.join(sorted(unknown))}. Choose from: {', '.join(GROUPS)}.")
-    seeds = parsed.seeds or (books.SEEDS if parsed.long or "books" in parsed.groups else 1)
+    seeds = parsed.seeds or (parts.SEEDS if parsed.long or "parts" in parsed.groups else 1)
     return parsed.groups, Options(parsed.long, Size(seeds, parsed.boards, parsed.faults))
 
 

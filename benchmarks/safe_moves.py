@@ -9,8 +9,8 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.object_type import Box
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.exceptions import Cancelled, PathBlocked
-from arcor2_hw.objects.safe_moves import Way
-from arcor2_hw.objects.surroundings import Nothing, Obstacle
+from arcor2_hw.objects.motion_path import MotionPath
+from arcor2_hw.objects.surroundings import EmptySurroundings, Obstacle
 from arcor2_hw.objects.urdf_robot import UrdfRobot
 from benchmarks.metrics import Metric, median, percentile
 from benchmarks.models import UR5E
@@ -23,7 +23,7 @@ READY: Final = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
 ACROSS: Final = (2.0, *READY[1:])
 
 
-class Boxes(Nothing):
+class Boxes(EmptySurroundings):
     """Twenty boxes near the arm that do not block it, and one that appears in its path."""
 
     def __init__(self) -> None:
@@ -57,7 +57,7 @@ class InstantArm(UrdfRobot):
         """Return the present joint values."""
         return self.now
 
-    def follow(self, way: Way) -> None:
+    def follow(self, way: MotionPath) -> None:
         """Go to the goal immediately, or wait until stopped."""
         self.moving.set()
         if self.waits:

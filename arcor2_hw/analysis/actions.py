@@ -14,7 +14,7 @@ from arcor2_hw.analysis.hierarchy import Hierarchy
 from arcor2_hw.analysis.hints import parameter_type_of, results, without_none
 from arcor2_hw.analysis.module import ClassInfo, FunctionNode, Value
 from arcor2_hw.analysis.presentation import of_action, of_type
-from arcor2_hw.analysis.source import Broken, sendable
+from arcor2_hw.analysis.source import AnalysisStopped, sendable
 from arcor2_hw.analysis.symbols import External, framework_name
 from arcor2_hw.analysis.units import unit_in
 from arcor2_hw.data.base import UNSET, Unset
@@ -33,7 +33,7 @@ class ActionReader:
     def __init__(self, hierarchy: Hierarchy) -> None:
         self._hierarchy = hierarchy
         self._resolver = hierarchy.resolver
-        self._known_marks: dict[ClassInfo, list[tuple[FunctionNode, ActionMetadata | Broken]]] = {}
+        self._known_marks: dict[ClassInfo, list[tuple[FunctionNode, ActionMetadata | AnalysisStopped]]] = {}
 
     # -------------------------------------------------------------------------------- which methods are actions
     def mark(self, owner: ClassInfo, name: str, node: FunctionNode) -> ActionMetadata | None:
@@ -70,10 +70,10 @@ class ActionReader:
         shown = of_type(seen_from, self._hierarchy)
         for node, metadata in self._marked(info):
             try:
-                if isinstance(metadata, Broken):
+                if isinstance(metadata, AnalysisStopped):
                     raise metadata
                 category, icon = of_action(node, info, shown, self._hierarchy)
-            except Broken as error:
+            except AnalysisStopped as error:
                 result[node.name] = ObjectAction(node.name).disabled_because(error.problem.message)
                 continue
             found = self._action(info, node, metadata, seen_from)
@@ -102,18 +102,18 @@ class ActionReader:
                         found.setdefault(present, []).append(str(former))
         return found
 
-    def _marked(self, info: ClassInfo) -> list[tuple[FunctionNode, ActionMetadata | Broken]]:
+    def _marked(self, info: ClassInfo) -> list[tuple[FunctionNode, ActionMetadata | AnalysisStopped]]:
         """Return the methods of a class that are visible actions, by name, with their metadata or the error in it."""
         if info in self._known_marks:
             return self._known_marks[info]
-        marked: list[tuple[FunctionNode, ActionMetadata | Broken]] = []
+        marked: list[tuple[FunctionNode, ActionMetadata | AnalysisStopped]] = []
         for name in sorted(info.members):
             node = info.function(name)
             if node is None:
                 continue
             try:
                 metadata = self.mark(info, name, node)
-            except Broken as error:
+            except AnalysisStopped as error:
                 marked.append((node, error))
                 continue
             if metadata is not None and not metadata.hidden and not self._is_offer(info, node):
@@ -141,7 +141,7 @@ class ActionReader:
             self._check_form(info, node)
             returns = self._returns(info, node)
             parameters = self._parameters(info, node, seen_from, text)
-        except Broken as error:
+        except AnalysisStopped as error:
             action = ObjectAction(node.name, description, parameters, metadata, UNSET, returns)
             return action.disabled_because(error.problem.message)
         return ObjectAction(node.name, description, parameters, metadata, UNSET, returns)
@@ -177,7 +177,7 @@ class ActionReader:
                 parameter_type_of(hint, info.module, info, self._resolver)[0].name
                 for hint in results(node.returns, info.module, self._resolver)
             ]
-        except Broken as error:
+        except AnalysisStopped as error:
             raise info.problem("{action}: result: {reason}", node.returns, action=node.name, reason=error) from None
 
     def _parameters(
@@ -207,7 +207,7 @@ class ActionReader:
                 kind, enumeration = parameter_type_of(argument.annotation, info.module, info, self._resolver)
                 extra = self._extra(info, kind, enumeration, ranges.get(name), descriptions.get(name, ""))
                 default = self.default(info, kind, enumeration, defaults.get(name))
-            except Broken as error:
+            except AnalysisStopped as error:
                 raise error.within("{action}: parameter {name}: {reason}", action=node.name, name=name) from None
             parents = dynamic.get(name)
             result.append(
@@ -263,7 +263,7 @@ class ActionReader:
         """Return a default as JSON. Poses, positions, joints and images have none, because they belong to a project.
 
         Raises:
-            Broken: It has another type, or cannot be determined from the source.
+            AnalysisStopped: It has another type, or cannot be determined from the source.
         """
         if expression is None or (enumeration is None and kind.name not in _LITERALS):
             return UNSET

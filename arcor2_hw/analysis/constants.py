@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from arcor2_hw.analysis.module import ClassInfo, Module, Value
-from arcor2_hw.analysis.source import Broken
+from arcor2_hw.analysis.source import AnalysisStopped
 from arcor2_hw.analysis.symbols import Constant, External, Resolver, framework_name
 
 _BINARY: Final[dict[type[ast.operator], Callable[[Any, Any], Any]]] = {
@@ -47,7 +47,7 @@ def enum_members(info: ClassInfo, resolver: Resolver) -> dict[str, str | int] | 
     """Return the members of an enumeration by name, None for any other class.
 
     Raises:
-        Broken: A value cannot be determined from the source.
+        AnalysisStopped: A value cannot be determined from the source.
     """
     kind = enum_kind(info, resolver)
     if kind is None:
@@ -87,7 +87,7 @@ def constant(
     """Return the value of an expression.
 
     Raises:
-        Broken: It cannot be determined without running it; the error has the line.
+        AnalysisStopped: It cannot be determined without running it; the error has the line.
     """
 
     def again(part: ast.expr) -> Any:
@@ -138,7 +138,7 @@ def constant(
     raise _unreadable(expression, module)
 
 
-def _unreadable(expression: ast.expr, module: Module) -> Broken:
+def _unreadable(expression: ast.expr, module: Module) -> AnalysisStopped:
     text = "the value {value} cannot be determined from the source"
     return module.problem(text, expression.lineno, value=_shown(expression))
 

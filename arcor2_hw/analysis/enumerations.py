@@ -7,7 +7,7 @@ from arcor2_hw.analysis.constants import enum_members
 from arcor2_hw.analysis.hierarchy import Hierarchy
 from arcor2_hw.analysis.hints import parameter_type_of
 from arcor2_hw.analysis.module import ClassInfo, FunctionNode
-from arcor2_hw.analysis.source import Broken
+from arcor2_hw.analysis.source import AnalysisStopped
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.object_type import ObjectAction
 
@@ -49,7 +49,7 @@ def _taken(owner: ClassInfo, node: FunctionNode, parameter: str, hierarchy: Hier
     try:
         _, kind = parameter_type_of(hint, owner.module, owner, hierarchy.resolver)
         members = enum_members(kind, hierarchy.resolver) if kind is not None else None
-    except Broken:
+    except AnalysisStopped:
         return None
     if kind is None or members is None:
         return None

@@ -6,7 +6,7 @@ from typing import Final
 from arcor2_hw.actions.parameter_types import ParameterType, by_annotation
 from arcor2_hw.analysis.constants import enum_kind
 from arcor2_hw.analysis.module import ClassInfo, Module
-from arcor2_hw.analysis.source import Broken
+from arcor2_hw.analysis.source import AnalysisStopped
 from arcor2_hw.analysis.symbols import External, Resolver, Symbol, framework_name
 from arcor2_hw.parsing import parse_expression
 
@@ -18,7 +18,7 @@ def plain(hint: ast.expr, module: Module) -> ast.expr:
     """Return a hint without quotes around it.
 
     Raises:
-        Broken: The quoted text is not an expression.
+        AnalysisStopped: The quoted text is not an expression.
     """
     if isinstance(hint, ast.Constant) and isinstance(hint.value, str):
         try:
@@ -76,7 +76,7 @@ def parameter_type_of(
     """Return the parameter type of a hint, and its enumeration if it has one.
 
     Raises:
-        Broken: The hint is not a parameter type; the message names it.
+        AnalysisStopped: The hint is not a parameter type; the message names it.
     """
     symbol = meaning(hint, module, owner, resolver)
     found: ParameterType | None = None
@@ -93,7 +93,7 @@ def parameter_type_of(
     return found, None
 
 
-def unsupported(hint: ast.expr, module: Module, symbol: Symbol | None) -> Broken:
+def unsupported(hint: ast.expr, module: Module, symbol: Symbol | None) -> AnalysisStopped:
     """Return the error for a hint that is not a parameter type."""
     shown = shown_hint(plain(hint, module))
     if symbol is None and isinstance(plain(hint, module), ast.Name):

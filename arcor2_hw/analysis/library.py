@@ -16,7 +16,7 @@ from arcor2_hw.analysis.observations import observations_of
 from arcor2_hw.analysis.presentation import display_name, of_type
 from arcor2_hw.analysis.robots import robot_meta
 from arcor2_hw.analysis.settings import SettingsReader
-from arcor2_hw.analysis.source import UPLOADED, Broken, Problem, SourceFile, Stamp, sendable, stamp_of
+from arcor2_hw.analysis.source import UPLOADED, AnalysisStopped, Problem, SourceFile, Stamp, sendable, stamp_of
 from arcor2_hw.analysis.symbols import External, Resolver, is_framework
 from arcor2_hw.analysis.type_analysis import TypeAnalysis
 from arcor2_hw.data.base import UNSET
@@ -50,7 +50,7 @@ class Library:
         self._files: dict[str, SourceFile] = {}
         self._by_module: dict[str, SourceFile] = {}
         self._roots: dict[str, Path] = {"arcor2_hw": _OURS.parent}
-        self._modules: dict[str, Module | Broken | None] = {}
+        self._modules: dict[str, Module | AnalysisStopped | None] = {}
         self._parsed: dict[str, Module] = {}  # parsed files; a file is parsed again only when its text changed
         self._analyses: dict[str, TypeAnalysis] = {}
         self.stamps: dict[str, Stamp | None] = {}
@@ -139,17 +139,17 @@ class Library:
         """Return a module by its full name: uploaded, of an added distribution, or ours.
 
         Raises:
-            Broken: It cannot be parsed.
+            AnalysisStopped: It cannot be parsed.
         """
         if dotted not in self._modules:
             try:
                 file = self._by_module.get(dotted) or self._on_disk(dotted)
                 self._modules[dotted] = self._shared(dotted) if file is None else self._parse(file, dotted)
-            except Broken as error:
+            except AnalysisStopped as error:
                 self._modules[dotted] = error
         found = self._modules[dotted]
-        if isinstance(found, Broken):
-            raise Broken(found.message, found.problem.path, found.problem.line)
+        if isinstance(found, AnalysisStopped):
+            raise AnalysisStopped(found.message, found.problem.path, found.problem.line)
         return found
 
     def _shared(self, dotted: str) -> Module | None:
@@ -180,14 +180,16 @@ class Library:
             except (FileNotFoundError, NotADirectoryError):
                 continue
             except OSError as error:
-                raise Broken("the file cannot be read: {reason}", str(path), 1, reason=error.strerror) from None
+                raise AnalysisStopped(
+                    "the file cannot be read: {reason}", str(path), 1, reason=error.strerror
+                ) from None
         return None
 
     def _needed(self, module: Module) -> list[SourceFile]:
         """Return the files that a module needs, each after those it needs itself.
 
         Raises:
-            Broken: A file is missing.
+            AnalysisStopped: A file is missing.
         """
         done: dict[str, SourceFile] = {}
         seen = {module.dotted}
@@ -210,7 +212,7 @@ class Library:
         try:
             first = self._load(found.module)
             second = self._load(f"{found.module}.{found.name}") if found.name not in (None, "*") else None
-        except Broken:
+        except AnalysisStopped:
             if found.guarded:
                 return []
             raise
@@ -253,11 +255,11 @@ class Library:
             if not isinstance(info, ClassInfo) or not info.node.bases or not self._is_object_type(info):
                 return TypeAnalysis(ObjectTypeMeta(name, abstract=True), modules=needed, is_object_type=False)
             return self._of_class(name, info, needed)
-        except Broken as error:
+        except AnalysisStopped as error:
             problem = error.problem
         except (RecursionError, MemoryError):
             path = file.path or f"{_dotted(file).replace('.', '/')}.py"
-            problem = Broken("the source is nested too deeply", path, 1).problem
+            problem = AnalysisStopped("the source is nested too deeply", path, 1).problem
         meta = ObjectTypeMeta(name, NO_DESCRIPTION, base=base, abstract=True).disabled_because(problem.message)
         return TypeAnalysis(meta, modules=needed, problem=problem)
 
@@ -269,7 +271,7 @@ class Library:
         """Return whether a class derives from Generic.
 
         Raises:
-            Broken: It cannot be determined, or the base is wrong.
+            AnalysisStopped: It cannot be determined, or the base is wrong.
         """
         hierarchy = self._hierarchy
         last = info.node.bases[-1]
@@ -299,7 +301,7 @@ class Library:
             observations = observations_of(info, hierarchy)
             if hierarchy.derives_from(info, "Robot") and not abstract:
                 robot = robot_meta(name, info, hierarchy)
-        except Broken as error:
+        except AnalysisStopped as error:
             problem = error.problem
         meta = ObjectTypeMeta(
             name,

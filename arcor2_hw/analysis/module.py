@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from arcor2_hw.analysis.source import Broken, SourceFile
+from arcor2_hw.analysis.source import AnalysisStopped, SourceFile
 from arcor2_hw.messages import Message
 from arcor2_hw.parsing import parse
 
@@ -46,7 +46,7 @@ class ClassInfo:
     marks: dict[tuple[str, str], ast.expr] = field(default_factory=dict)
     """Values assigned to attributes of members: {("move", "__action__"): expression}."""
 
-    def problem(self, message: str | Message, node: ast.AST | None = None, /, **values: object) -> Broken:
+    def problem(self, message: str | Message, node: ast.AST | None = None, /, **values: object) -> AnalysisStopped:
         """Return an error at `node`, or at the class statement."""
         return self.module.problem(message, getattr(node, "lineno", self.node.lineno), **values)
 
@@ -60,7 +60,7 @@ class Module:
     """A parsed source file.
 
     Raises:
-        Broken: It cannot be parsed; the error has file and line.
+        AnalysisStopped: It cannot be parsed; the error has file and line.
     """
 
     def __init__(self, file: SourceFile) -> None:
@@ -84,9 +84,9 @@ class Module:
         except RecursionError:
             raise self.problem("the source is nested too deeply", 1) from None
 
-    def problem(self, message: str | Message, line: int, /, **values: object) -> Broken:
+    def problem(self, message: str | Message, line: int, /, **values: object) -> AnalysisStopped:
         """Return an error at `line` of this file."""
-        return Broken(message, self.path, line, **values)
+        return AnalysisStopped(message, self.path, line, **values)
 
     # -------------------------------------------------------------------------------- binding
     def _bind(self, body: Sequence[ast.stmt], scope: dict[str, Binding], owner: ClassInfo | None) -> None:

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 from arcor2_hw.analysis.constants import constant
 from arcor2_hw.analysis.hierarchy import Hierarchy
 from arcor2_hw.analysis.module import ClassInfo, FunctionNode
-from arcor2_hw.analysis.source import Broken, sendable
+from arcor2_hw.analysis.source import AnalysisStopped, sendable
 from arcor2_hw.analysis.symbols import framework_name
 from arcor2_hw.data.base import UNSET, Unset
 
@@ -31,7 +31,7 @@ def of_type(info: ClassInfo, hierarchy: Hierarchy) -> Presentation:
     def text(name: str) -> object:
         try:
             return hierarchy.attribute(info, name)
-        except Broken:
+        except AnalysisStopped:
             return None
 
     return Presentation(_title(text("category")), _icon(text("icon")))
@@ -43,7 +43,7 @@ def display_name(info: ClassInfo, hierarchy: Hierarchy) -> str | Unset:
         return UNSET
     try:
         return _title(hierarchy.attribute(info, "display_name"))
-    except Broken:
+    except AnalysisStopped:
         return UNSET
 
 

@@ -6,7 +6,7 @@ from arcor2_hw.analysis.constants import constant
 from arcor2_hw.analysis.hierarchy import Hierarchy
 from arcor2_hw.analysis.hints import normal
 from arcor2_hw.analysis.module import ClassInfo, FunctionNode, Value
-from arcor2_hw.analysis.source import Broken
+from arcor2_hw.analysis.source import AnalysisStopped
 from arcor2_hw.analysis.symbols import External, framework_name, is_framework
 from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.robot import RobotFeatures, RobotMeta, RobotType
@@ -33,7 +33,7 @@ def robot_meta(name: str, info: ClassInfo, hierarchy: Hierarchy) -> RobotMeta:
     `urdf_package_filename` is the name declared by the type; the file need not exist.
 
     Raises:
-        Broken: The type of robot cannot be determined.
+        AnalysisStopped: The type of robot cannot be determined.
     """
     urdf = hierarchy.attribute(info, "urdf_package_name")
     return RobotMeta(
@@ -61,7 +61,7 @@ def _robot_type(info: ClassInfo, hierarchy: Hierarchy) -> RobotType:
                 return RobotType[member]
         try:
             return RobotType(constant(binding.expression, owner.module, owner, hierarchy.resolver))
-        except (Broken, ValueError):
+        except (AnalysisStopped, ValueError):
             pass
     raise owner.problem("robot_type must be a member of RobotType", getattr(binding, "expression", None))
 
@@ -93,7 +93,7 @@ def _signature(node: FunctionNode, owner: ClassInfo, hierarchy: Hierarchy) -> tu
             return None
         try:
             return repr(constant(expression, module, owner, resolver))
-        except Broken:
+        except AnalysisStopped:
             return ast.dump(expression)
 
     return (

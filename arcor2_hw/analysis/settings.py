@@ -10,7 +10,7 @@ from arcor2_hw.analysis.constants import enum_members
 from arcor2_hw.analysis.hierarchy import Hierarchy
 from arcor2_hw.analysis.hints import meaning, parameter_type_of, plain, unannotated, without_none
 from arcor2_hw.analysis.module import ClassInfo, Value
-from arcor2_hw.analysis.source import Broken
+from arcor2_hw.analysis.source import AnalysisStopped
 from arcor2_hw.analysis.symbols import External, is_framework
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.discovery import Search
@@ -45,7 +45,7 @@ class SettingsReader:
         """Return the settings in the order of the constructor.
 
         Raises:
-            Broken: They cannot be determined.
+            AnalysisStopped: They cannot be determined.
         """
         found = self._class(info)
         return [] if found is None else self._fields(found)
@@ -149,7 +149,7 @@ class SettingsReader:
                 raise info.problem("a secret setting must be of type str, not {type}", hint, type=kind.name)
             if kind.name != "string" and field.address:
                 raise info.problem("an address must be of type str, not {type}", hint, type=kind.name)
-        except Broken as error:
+        except AnalysisStopped as error:
             raise error.within("setting {name}: {reason}", name=name) from None
         except InvalidData as error:
             raise info.problem("setting {name}: {reason}", hint, name=name, reason=error) from None

@@ -81,7 +81,7 @@ class Problem(Data, frozen=True):
         return self.message.text
 
 
-class Broken(Exception):
+class AnalysisStopped(Exception):
     """Reading cannot continue. It is caught inside the analysis.
 
     Args:
@@ -94,9 +94,9 @@ class Broken(Exception):
         super().__init__(self.message.text)
         self.problem = Problem(self.message, sendable(path), line)
 
-    def within(self, template: str, /, **values: object) -> "Broken":
+    def within(self, template: str, /, **values: object) -> "AnalysisStopped":
         """Return this error as `reason` of another message about the same place."""
-        return Broken(template, self.problem.path, self.problem.line, **values, reason=self)
+        return AnalysisStopped(template, self.problem.path, self.problem.line, **values, reason=self)
 
 
 def _sendable(message: Message) -> Message:

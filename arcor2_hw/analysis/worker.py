@@ -17,7 +17,7 @@ from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.messages import Message
 
-HUGE: Final = 64 * 1024
+SEPARATE_PROCESS_SIZE: Final = 64 * 1024
 """Number of characters above which a source is analysed in a separate process; a shorter one is parsed in about 20 ms.
 """
 TIME_LIMIT: Final = 30.0
@@ -26,7 +26,11 @@ _encode = msgspec.msgpack.Encoder().encode
 
 
 def _huge(library: Library) -> list[str]:
-    return [name for name in library.names() if name not in BUILT_IN and _longest(library.file(name)) > HUGE]
+    return [
+        name
+        for name in library.names()
+        if name not in BUILT_IN and _longest(library.file(name)) > SEPARATE_PROCESS_SIZE
+    ]
 
 
 def _longest(file: SourceFile) -> int:

@@ -7,7 +7,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from arcor2_hw.calibration.edges import ALONG, Chart, Measured, measure
+from arcor2_hw.calibration.edges import PLACES_PER_EDGE, Chart, Measured, measure
 from arcor2_hw.calibration.layout import CharucoBoard, Layout
 from arcor2_hw.calibration.lens import Array, Lens
 from arcor2_hw.calibration.markers import TONES, dictionary_number, dictionary_size
@@ -75,7 +75,7 @@ def board_points(board: CharucoBoard, made: cv2.aruco.CharucoBoard) -> Array:
     return np.column_stack((points[:, 0] - middle[0], middle[1] - points[:, 1], np.zeros(len(points))))
 
 
-def seen_of_board(
+def board_observations(
     grey: Grey, board: CharucoBoard, made: cv2.aruco.CharucoBoard, found: list[tuple[int, Array]]
 ) -> tuple[Array, Array]:
     """Return the corners of a board that are detected, (n, 3) in its frame, and their pixels, (n, 2)."""
@@ -150,16 +150,16 @@ def _chart(board: CharucoBoard, white: Array) -> Chart:
     side = 2 * board.square / (board.square - board.marker)
     light = np.zeros((board.rows, board.columns), dtype=bool)
     light[(white[:, 1] / board.square).astype(int), (white[:, 0] / board.square).astype(int)] = True
-    fractions = (np.arange(ALONG) + 0.5) / ALONG
+    fractions = (np.arange(PLACES_PER_EDGE) + 0.5) / PLACES_PER_EDGE
     points, across, towards = [], [], []
     for row in range(board.rows):
         for column in range(board.columns):
             if column:
-                points.append(np.column_stack((np.full(ALONG, column), row + fractions)))
+                points.append(np.column_stack((np.full(PLACES_PER_EDGE, column), row + fractions)))
                 across.append(0)
                 towards.append(1.0 if light[row, column] else -1.0)
             if row:
-                points.append(np.column_stack((column + fractions, np.full(ALONG, row))))
+                points.append(np.column_stack((column + fractions, np.full(PLACES_PER_EDGE, row))))
                 across.append(1)
                 towards.append(-1.0 if light[row, column] else 1.0)
     flat = np.concatenate(points)
@@ -167,8 +167,8 @@ def _chart(board: CharucoBoard, white: Array) -> Chart:
     x, y = half - 1
     return Chart(
         np.column_stack((flat[:, 0] - half[0], half[1] - flat[:, 1])) * side,
-        np.repeat(np.array(across, dtype=np.intp), ALONG),
-        np.repeat(np.array(towards), ALONG),
+        np.repeat(np.array(across, dtype=np.intp), PLACES_PER_EDGE),
+        np.repeat(np.array(towards), PLACES_PER_EDGE),
         np.tile(np.minimum(fractions, 1 - fractions), len(points)) * side,
         np.array([[-x, y], [x, y], [x, -y], [-x, -y]]) * side,
     )

@@ -13,7 +13,7 @@ from arcor2_hw.calibration.camera_results import CameraPose, LensCheck, LensStat
 from arcor2_hw.calibration.detection import Detection, detect_layout
 from arcor2_hw.calibration.diagnosis import check_not_mirrored, wanted_markers
 from arcor2_hw.calibration.drawing import GOOD, Canvas, error_picture
-from arcor2_hw.calibration.layout import Layout, called
+from arcor2_hw.calibration.layout import Layout, item_name
 from arcor2_hw.calibration.lens import Array, Lens
 from arcor2_hw.calibration.lens_check import Checked, check_of_lens
 from arcor2_hw.calibration.pictures import Picture, grey_of, one_by_one
@@ -233,7 +233,7 @@ def _check_known(found: Found, lens: LensCheck, position: float, options: PoseOp
         "or where the camera roughly is.",
         f"standard deviation {position * 1000:.1f} mm, at most {options.largest_deviation * 1000:.1f} mm",
         Reason.UNOBSERVABLE,
-        name=called(first.name),
+        name=item_name(first.name),
         position=position * 1000,
     )
 
@@ -271,7 +271,7 @@ def _verdict(
         parts.append(
             Message.of(
                 "Not used, because it is about {distance:.0f} mm from its configured pose: {name}.",
-                name=called(name),
+                name=item_name(name),
                 distance=worst.residual * worst.distance / f * 1000,
             )
         )

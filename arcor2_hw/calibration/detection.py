@@ -6,10 +6,10 @@ from typing import Final
 
 import numpy as np
 
-from arcor2_hw.calibration.boards import CORNER_DEVIATION, board_of, check_layout, measured_board, seen_of_board
+from arcor2_hw.calibration.boards import CORNER_DEVIATION, board_observations, board_of, check_layout, measured_board
 from arcor2_hw.calibration.diagnosis import check_not_mirrored, check_visible, glare_of, wanted_markers
 from arcor2_hw.calibration.edges import Measured
-from arcor2_hw.calibration.layout import CharucoBoard, Layout, MarkerDictionary, called
+from arcor2_hw.calibration.layout import CharucoBoard, Layout, MarkerDictionary, item_name
 from arcor2_hw.calibration.lens import Array, Lens
 from arcor2_hw.calibration.markers import detect, measured
 from arcor2_hw.calibration.pictures import Grey
@@ -163,7 +163,7 @@ def _detect_board(
         pixels, points, root = fine[0].corners, fine[1], _root_of(fine[0])
         content.blurs.append(fine[0].blur)
     else:
-        points, pixels = seen_of_board(grey, board, made, found)
+        points, pixels = board_observations(grey, board, made, found)
         root = np.eye(2 * len(points)) / CORNER_DEVIATION
     if len(points):
         placed = board.pose.matrix()
@@ -201,7 +201,7 @@ def _missing(greys: Sequence[Grey], layout: Layout, contents: Sequence[_ImageCon
     Raises:
         CalibrationRefused: The image is mirrored.
     """
-    wanted = [called(f"marker {marker.marker_id}") for marker in layout.markers[:8]]
+    wanted = [item_name(f"marker {marker.marker_id}") for marker in layout.markers[:8]]
     wanted += [
         Message.of("a board of {columns} × {rows} squares", columns=board.columns, rows=board.rows)
         for board in layout.boards

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from arcor2_hw.calibration.lens import Array, Lens
 
-ALONG: Final = 6
+PLACES_PER_EDGE: Final = 6
 """Number of places on each edge of a cell."""
 _UNIT: Final = np.linspace(-1.0, 1.0, 17)
 """Positions of samples across an edge."""
@@ -46,7 +46,7 @@ class Chart:
     """The edges inside and around a marker, in cells from its middle (x right, y up).
 
     Attributes:
-        points: (n, 2), ALONG on each edge.
+        points: (n, 2), PLACES_PER_EDGE on each edge.
         across: (n), 0 where the edge is crossed along x, 1 along y.
         towards: (n), 1 or -1, the direction of the light side.
         free: (n), distance to the end of the edge.
@@ -90,7 +90,7 @@ def chart_of(dictionary: int, number: int) -> Chart:
     side = known.markerSize + 2
     light = np.pad(cv2.aruco.generateImageMarker(known, number, side) > 127, 1, constant_values=True)
     half = side / 2
-    fractions = (np.arange(ALONG) + 0.5) / ALONG
+    fractions = (np.arange(PLACES_PER_EDGE) + 0.5) / PLACES_PER_EDGE
     points: list[tuple[float, float]] = []
     across: list[int] = []
     towards: list[float] = []
@@ -108,8 +108,8 @@ def chart_of(dictionary: int, number: int) -> Chart:
                 at = (column - half, half - (along - 1)) if axis == 0 else (along - 1 - half, half - column)
                 points.append((float(at[0]), float(at[1])))
                 free.append(float(min(along - first, last + 1 - along)))
-            across += [axis] * ALONG
-            towards += [float(line[row]) * (1.0 if axis == 0 else -1.0)] * ALONG
+            across += [axis] * PLACES_PER_EDGE
+            towards += [float(line[row]) * (1.0 if axis == 0 else -1.0)] * PLACES_PER_EDGE
     return Chart(
         np.array(points),
         np.array(across, dtype=np.intp),
@@ -266,9 +266,11 @@ def _crossings(
         return None
     values = cv2.remap(picture, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float64)
     # Dark and light levels are taken from the whole edge, so that noise does not shift single places.
-    counts = np.maximum(valid.reshape(-1, ALONG).sum(axis=1), 1) * 2.0
+    counts = np.maximum(valid.reshape(-1, PLACES_PER_EDGE).sum(axis=1), 1) * 2.0
     dark, light = (
-        np.repeat(((values[:, a] + values[:, b]) * valid).reshape(-1, ALONG).sum(axis=1) / counts, ALONG)
+        np.repeat(
+            ((values[:, a] + values[:, b]) * valid).reshape(-1, PLACES_PER_EDGE).sum(axis=1) / counts, PLACES_PER_EDGE
+        )
         for a, b in ((0, 1), (-2, -1))
     )
     difference = light - dark
@@ -283,7 +285,7 @@ def _crossings(
     share = valid / np.maximum(reach * view.slant, 0.1)
     blurs = []
     for chosen in (valid & (axes == 0), valid & (axes == 1)):
-        if (count := np.count_nonzero(chosen)) >= ALONG:
+        if (count := np.count_nonzero(chosen)) >= PLACES_PER_EDGE:
             mean = (share * chosen) @ parts
             steepest = float(np.max(mean[2:] - mean[:-2])) / ((_UNIT[2] - _UNIT[0]) * count)
             blurs.append(1.0 / (max(steepest, 1e-3) * math.sqrt(math.tau)))

@@ -28,7 +28,7 @@ from arcor2_hw.calibration.pose_problem import Hints
 from arcor2_hw.calibration.pose_search import search
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.results import Grade
-from arcor2_hw.calibration.rigid import crossed, inverted, mean_rotation, motion, rotation_vector
+from arcor2_hw.calibration.rigid import cross_matrix, inverted, mean_rotation, motion, rotation_vector
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Pose
 from arcor2_hw.exceptions import InvalidData
@@ -235,7 +235,7 @@ def _result(
         )
     # Outside of the solvers, position comes before rotation, and the displacement is that of the camera itself.
     turn = np.zeros((6, 6))
-    turn[:3, :3] = -crossed(best.mount[:3, 3])
+    turn[:3, :3] = -cross_matrix(best.mount[:3, 3])
     turn[:3, 3:] = turn[3:, :3] = np.eye(3)
     covariance = turn @ best.covariance @ turn.T
     if checked.contradicted:

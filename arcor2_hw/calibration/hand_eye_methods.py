@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from arcor2_hw.calibration.rigid import Array, crossed, rotation_vector
+from arcor2_hw.calibration.rigid import Array, cross_matrix, rotation_vector
 
 Method = Callable[[Sequence[Array], Sequence[Array], Sequence[Array], Sequence[Array], float], tuple[Array, Array]]
 
@@ -63,9 +63,9 @@ def daniilidis(
         qb, db = _dual_quaternion(b, b_at)
         block = np.zeros((6, 8))
         block[:3, 0] = block[3:, 4] = qa[1:] - qb[1:]
-        block[:3, 1:4] = block[3:, 5:] = crossed(qa[1:] + qb[1:])
+        block[:3, 1:4] = block[3:, 5:] = cross_matrix(qa[1:] + qb[1:])
         block[3:, 0] = da[1:] - db[1:]
-        block[3:, 1:4] = crossed(da[1:] + db[1:])
+        block[3:, 1:4] = cross_matrix(da[1:] + db[1:])
         rows.append(block)
     _, _, v = np.linalg.svd(np.vstack(rows), full_matrices=False)
     first, second = v[6], v[7]
@@ -113,5 +113,5 @@ def _dual_quaternion(rotation: Array, position: Array) -> tuple[Array, Array]:
 
 def _matrix(q: Array) -> Array:
     """Return the rotation matrix of a quaternion, scalar first."""
-    k = crossed(q[1:])
+    k = cross_matrix(q[1:])
     return np.asarray(np.eye(3) + 2 * q[0] * k + 2 * k @ k)

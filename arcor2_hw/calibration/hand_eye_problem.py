@@ -12,7 +12,7 @@ import numpy as np
 
 from arcor2_hw.calibration.lens import Array, Lens
 from arcor2_hw.calibration.pose_problem import Seen
-from arcor2_hw.calibration.rigid import crossed, inverted, moved
+from arcor2_hw.calibration.rigid import cross_matrix, inverted, moved
 
 _ROUNDS: Final = 60
 _WEIGHINGS: Final = 2
@@ -167,7 +167,9 @@ def slopes_of(lens: Lens, each: Station, mount: Array, target: Array) -> Array:
     _, by_point, _ = lens.projected_with_slopes(camera, np.zeros(len(lens.numbers)))
     by_hand = by_point @ camera_from_hand[:3, :3]
     by_placed = by_hand @ hand_from_parent[:3, :3]
-    a = np.concatenate((by_hand @ crossed(at_hand), -by_hand, -by_placed @ crossed(placed), by_placed), axis=2)
+    a = np.concatenate(
+        (by_hand @ cross_matrix(at_hand), -by_hand, -by_placed @ cross_matrix(placed), by_placed), axis=2
+    )
     return np.asarray(a.reshape(-1, 12))
 
 

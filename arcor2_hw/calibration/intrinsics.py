@@ -8,7 +8,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from arcor2_hw.calibration.boards import board_of, seen_of_board
+from arcor2_hw.calibration.boards import board_observations, board_of
 from arcor2_hw.calibration.camera_results import Intrinsics, IntrinsicsOptions, ViewError
 from arcor2_hw.calibration.drawing import error_picture
 from arcor2_hw.calibration.layout import CharucoBoard
@@ -86,7 +86,7 @@ def find_intrinsics(
     problems: dict[int, Message] = {}
     for index, grey in enumerate(one_by_one(pictures)):
         size = grey.shape[1], grey.shape[0]
-        points, pixels = seen_of_board(grey, board, made, detect(grey, board.dictionary))
+        points, pixels = board_observations(grey, board, made, detect(grey, board.dictionary))
         if len(points):
             views.append(_View(index, points, pixels))
         else:

@@ -70,7 +70,7 @@ class Layout(Data, frozen=True):
     dictionary: MarkerDictionary = "4x4_50"
 
 
-def called(name: str) -> Message:
+def item_name(name: str) -> Message:
     """Return the name of a marker or board as a value of messages."""
     kind, _, number = name.partition(" ")
     if kind == "marker":

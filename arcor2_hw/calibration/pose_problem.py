@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from arcor2_hw.calibration.lens import Array, Lens
-from arcor2_hw.calibration.rigid import crossed, inverted, motion, moved, rotation_vector
+from arcor2_hw.calibration.rigid import cross_matrix, inverted, motion, moved, rotation_vector
 
 _ROUNDS: Final = 30
 _CONVERGED: Final = 1e-3
@@ -78,14 +78,14 @@ class Hints:
             # frame.
             eye = pose[:3, :3] @ inverted(self.expected)[:3, 3] + pose[:3, 3]
             residuals.append(eye / self.expected_position)
-            slopes.append(np.hstack((-crossed(eye), np.eye(3))) / self.expected_position)
+            slopes.append(np.hstack((-cross_matrix(eye), np.eye(3))) / self.expected_position)
             turn = rotation_vector(pose[:3, :3] @ self.expected[:3, :3].T)
             residuals.append(turn / self.expected_orientation)
             slopes.append(np.hstack((np.eye(3), np.zeros((3, 3)))) / self.expected_orientation)
         if self.gravity is not None:
             down = -pose[:3, 2]
             residuals.append((down - self.gravity) / self.gravity_deviation)
-            slopes.append(np.hstack((-crossed(down), np.zeros((3, 3)))) / self.gravity_deviation)
+            slopes.append(np.hstack((-cross_matrix(down), np.zeros((3, 3)))) / self.gravity_deviation)
         if not residuals:
             return np.zeros(0), np.zeros((0, 6))
         return np.concatenate(residuals), np.vstack(slopes)

@@ -7,11 +7,11 @@ from typing import Final
 import numpy as np
 
 from arcor2_hw.calibration.camera_results import PoseOptions
-from arcor2_hw.calibration.layout import called
+from arcor2_hw.calibration.layout import item_name
 from arcor2_hw.calibration.lens import Array, Lens
 from arcor2_hw.calibration.pose_problem import Hints, PoseProblem, Seen, Solution
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
-from arcor2_hw.calibration.rigid import apart, inverted
+from arcor2_hw.calibration.rigid import inverted, pose_difference
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.messages import Message
 
@@ -75,7 +75,7 @@ def search(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions)
                 "it is at another place, or has another size.",
                 f"residual {worst:.1f} px, at most {options.largest_residual:.1f}",
                 Reason.IMPLAUSIBLE,
-                names=Message.listed([called(name) for name in sorted(names.values())]),
+                names=Message.listed([item_name(name) for name in sorted(names.values())]),
                 worst=worst,
             )
         left_out.add(worst_key)
@@ -125,7 +125,7 @@ def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
     if worst_of(problem, best)[0] > options.largest_residual:
         return best
     for other in allowed[1:]:
-        distance, angle = apart(inverted(best.pose), inverted(other.pose))
+        distance, angle = pose_difference(inverted(best.pose), inverted(other.pose))
         if other.cost - best.cost < _TELL_APART and distance > 2 * options.largest_deviation:
             raise CalibrationRefused(
                 "Two poses of the camera, {distance:.0f} mm and {angle:.0f}° apart, explain the picture, because it "
@@ -135,7 +135,7 @@ def solve(problem: PoseProblem, options: PoseOptions) -> Solution:
                 Reason.AMBIGUOUS,
                 distance=distance * 1000,
                 angle=np.degrees(angle),
-                names=Message.listed([called(name) for name in sorted({each.name for each in problem.seen})]),
+                names=Message.listed([item_name(name) for name in sorted({each.name for each in problem.seen})]),
             )
     return best
 
@@ -187,7 +187,7 @@ def _minima(problem: PoseProblem, starts: list[Array]) -> list[Solution]:
 
 def _same(a: Array, b: Array) -> bool:
     """Return whether two poses (camera_from_origin) are the same."""
-    distance, angle = apart(inverted(a), inverted(b))
+    distance, angle = pose_difference(inverted(a), inverted(b))
     return distance < _SAME[0] and angle < _SAME[1]
 
 

@@ -20,9 +20,9 @@ MIN_SEEN: Final = 60
 COARSE: Final = 5e-4
 FINE: Final = 1e-5
 """Step size at which a stage ends, m."""
-COMES_NEAR: Final = 4.0
+CANDIDATE_FACTOR: Final = 4.0
 """Multiple of a stage's reach beyond which a point is not considered again."""
-GRAZING: Final = 0.2
+MIN_INCIDENCE_COSINE: Final = 0.2
 """Cosine of the angle between ray and normal below which a point is not used."""
 
 
@@ -206,11 +206,11 @@ def refine(model: Model, cloud: Floats, start: Floats, stages: tuple[Stage, ...]
             rays = points - pose[:3, 3]
             slope = np.abs(np.einsum("ij,ij->i", normals, rays)) / np.linalg.norm(rays, axis=1)
             gaps = np.linalg.norm(targets - points, axis=1)
-            near = (slope > GRAZING) & (gaps < stage.reach)
+            near = (slope > MIN_INCIDENCE_COSINE) & (gaps < stage.reach)
             if np.count_nonzero(near) < MIN_SEEN:
                 return None
             fit, pose = _fit(pose, points[near], kept[near], targets[near], normals[near], stage.reach)
-            kept = kept[gaps < COMES_NEAR * stage.reach]  # nearest-point queries take longest for far points
+            kept = kept[gaps < CANDIDATE_FACTOR * stage.reach]  # nearest-point queries take longest for far points
             if fit.moved < FINE:
                 break
     return fit

@@ -6,7 +6,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 
-def crossed(vector: Array) -> Array:
+def cross_matrix(vector: Array) -> Array:
     """Return the matrix of the cross product with a vector; for (n, 3) vectors, (n, 3, 3)."""
     zero = np.zeros(vector.shape[:-1])
     x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
@@ -17,7 +17,7 @@ def crossed(vector: Array) -> Array:
 def turned(vector: Array) -> Array:
     """Return the rotation matrix of a rotation vector, rad (Rodrigues)."""
     angle = float(np.linalg.norm(vector))
-    k = crossed(vector)
+    k = cross_matrix(vector)
     if angle < 1e-9:
         return np.asarray(np.eye(3) + k + k @ k / 2)
     return np.asarray(np.eye(3) + np.sin(angle) / angle * k + (1 - np.cos(angle)) / angle**2 * (k @ k))
@@ -58,7 +58,7 @@ def moved(matrix: Array, step: Array) -> Array:
     return motion(turn @ matrix[:3, :3], turn @ matrix[:3, 3] + step[3:])
 
 
-def apart(a: Array, b: Array) -> tuple[float, float]:
+def pose_difference(a: Array, b: Array) -> tuple[float, float]:
     """Return the difference of two motions: m, rad."""
     return (float(np.linalg.norm(a[:3, 3] - b[:3, 3])), float(np.linalg.norm(rotation_vector(a[:3, :3].T @ b[:3, :3]))))
 

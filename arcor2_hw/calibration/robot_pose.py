@@ -17,7 +17,7 @@ from arcor2_hw.calibration.depth import DepthPictures, depth_view
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.registration import Fit
 from arcor2_hw.calibration.results import Grade, RobotPose
-from arcor2_hw.calibration.robot_search import Compared, End, Search, angle_of
+from arcor2_hw.calibration.robot_search import Agreement, Search, SearchResult, angle_of
 from arcor2_hw.calibration.surface import RobotSurface
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.geometry import Pose
@@ -27,20 +27,20 @@ from arcor2_hw.messages import Message
 Floats = npt.NDArray[np.float64]
 
 MANY_RAYS: Final = 60_000
-ALIKE: Final = 0.93
+AMBIGUOUS_RATIO: Final = 0.93
 """Fraction of the best score from which another result counts as equally good."""
 UNEVEN: Final = (0.0015, 0.012)
 """Unevenness up to which a result is good, and from which it is refused, m."""
 MIN_VISIBILITY: Final = 0.05
 """Minimum visibility of a motion in the worst direction, see `Fit.least_known`."""
-FLOOR: Final = (4e-4, math.radians(0.05))
+MIN_DEVIATIONS: Final = (4e-4, math.radians(0.05))
 """Minimum standard deviations, m and rad.
 
 They cover errors that more points do not reduce: curved surfaces, edges, and a lens known to 0.05 %.
 """
 GOOD: Final = (0.0015, math.radians(0.25))
 """Standard deviations up to which a result is good, m and rad."""
-SETTLED: Final = 2e-4
+MAX_LAST_STEP: Final = 2e-4
 """Length of the last step above which the search did not converge, m."""
 
 
@@ -112,7 +112,7 @@ def find_robot_pose(
     best = search.last(ends[0].fit)
     compared = search.compare(best.base_from_camera, MANY_RAYS)
     _refuse_disagreement(surface, compared, best, limits)
-    covariance = best.covariance(search.tiles) + np.diag([FLOOR[0] ** 2] * 3 + [FLOOR[1] ** 2] * 3)
+    covariance = best.covariance(search.tiles) + np.diag([MIN_DEVIATIONS[0] ** 2] * 3 + [MIN_DEVIATIONS[1] ** 2] * 3)
     deviations = tuple(
         float(np.sqrt(np.linalg.eigvalsh(part)[-1])) for part in (covariance[:3, :3], covariance[3:, 3:])
     )
@@ -152,7 +152,7 @@ def find_robot_pose(
     )
 
 
-def _refuse_disagreement(surface: RobotSurface, found: Compared, fit: Fit, limits: RobotPoseOptions) -> None:
+def _refuse_disagreement(surface: RobotSurface, found: Agreement, fit: Fit, limits: RobotPoseOptions) -> None:
     figures = (
         f"confirmed {found.confirmed:.0%}, hidden {found.occluded:.0%}, contradicted {found.contradicted:.0%} of"
         f" {found.rays} rays; residual {fit.residual * 1e3:.1f} mm, uneven by {found.uneven * 1e3:.1f} mm"
@@ -174,7 +174,7 @@ def _refuse_disagreement(surface: RobotSurface, found: Compared, fit: Fit, limit
 
 
 def _refuse_unsettled(surface: RobotSurface, best: Fit, start: Floats, limits: RobotPoseOptions) -> None:
-    if best.moved > SETTLED:
+    if best.moved > MAX_LAST_STEP:
         raise CalibrationRefused(
             "The search for {name} did not converge.",
             f"the last step was {best.moved * 1e3:.2f} mm",
@@ -195,10 +195,13 @@ def _refuse_unsettled(surface: RobotSurface, best: Fit, start: Floats, limits: R
         )
 
 
-def _refuse_ambiguous(surface: RobotSurface, ends: list[End]) -> None:
+def _refuse_ambiguous(surface: RobotSurface, ends: list[SearchResult]) -> None:
     best, *others = ends
     for other in others:
-        if other.compared.score >= ALIKE * best.compared.score and other.fit.residual <= 1.3 * best.fit.residual:
+        if (
+            other.compared.score >= AMBIGUOUS_RATIO * best.compared.score
+            and other.fit.residual <= 1.3 * best.fit.residual
+        ):
             between = other.fit.base_from_camera @ np.linalg.inv(best.fit.base_from_camera)
             at_middle = between[:3, :3] @ best.fit.centre + between[:3, 3] - best.fit.centre
             raise CalibrationRefused(
@@ -213,7 +216,7 @@ def _refuse_ambiguous(surface: RobotSurface, ends: list[End]) -> None:
             )
 
 
-def _verdict(name: str, found: Compared, deviations: tuple[float, ...], moved: float, turned: float) -> Message:
+def _verdict(name: str, found: Agreement, deviations: tuple[float, ...], moved: float, turned: float) -> Message:
     parts = [
         Message.of(
             "{name} is {moved:.0f} mm and {turned:.1f}° from its assumed pose, known to {position:.1f} mm and"

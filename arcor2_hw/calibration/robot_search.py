@@ -9,21 +9,21 @@ import numpy.typing as npt
 
 from arcor2_hw.calibration.depth import MIN_POINTS, DepthView, plane_thickness, planes
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
-from arcor2_hw.calibration.registration import GRAZING, Fit, Model, Stage, approach, refine, rotation
+from arcor2_hw.calibration.registration import MIN_INCIDENCE_COSINE, Fit, Model, Stage, approach, refine, rotation
 from arcor2_hw.calibration.surface import RobotSurface
 
 Floats = npt.NDArray[np.float64]
 
 FAR: Final = (Stage(0.06, 8), Stage(0.03, 7), Stage(0.015, 7))
 NEAR: Final = (Stage(0.02, 8), Stage(0.01, 12))
-FITTING: Final = 3.0
+OUTLIER_FACTOR: Final = 3.0
 """Multiple of the standard deviation of the distances beyond which a point is not part of the robot."""
 REACH: Final = (0.004, 0.012)
 FEW_POINTS: Final = 1_500
 """Number of points of the cloud used in the search."""
 MAX_POINTS: Final = 20_000
 """Number of points of the cloud used for the result."""
-ENOUGH: Final = 7
+AGREEING_STARTS: Final = 7
 """Number of starts after which the search ends when all of them, along and about each axis, ended at one pose."""
 CELL: Final = 0.03
 """Grid cell size for pre-filtering the point cloud, m."""
@@ -32,13 +32,13 @@ TILES: Final = 40
 """Number of tiles across the image, each counted as one independent measurement."""
 TOLERANCE: Final = (0.008, 0.006)
 """Difference up to which a depth confirms the model: constant in m, and a factor of its square in 1/m."""
-APART: Final = (0.004, 0.012)
+DISTINCT_POSES: Final = (0.004, 0.012)
 """Differences beyond which two results are different, m and rad."""
 FEW_IN_TILE: Final = 8
 """Number of rays of a tile below which its mean is not used."""
 
 
-class Compared(NamedTuple):
+class Agreement(NamedTuple):
     """Comparison of model and image, as fractions of the rays that hit the model and have a depth."""
 
     confirmed: float
@@ -54,11 +54,11 @@ class Compared(NamedTuple):
         return self.confirmed - self.contradicted
 
 
-class End(NamedTuple):
+class SearchResult(NamedTuple):
     """A result of the search, the number of starts that reached it, and its comparison with the image."""
 
     fit: Fit
-    compared: Compared
+    compared: Agreement
     starts: int
 
 
@@ -110,7 +110,7 @@ class Search:
         allowed = self._within + self._angle_within * np.linalg.norm(centres, axis=1) + CELL
         return np.asarray((self._model.distance(centres.astype(np.float64)) < allowed)[where.reshape(-1)])
 
-    def ends(self) -> list[End]:
+    def ends(self) -> list[SearchResult]:
         """Search from all starts and return the distinct results, best first.
 
         Raises:
@@ -130,18 +130,18 @@ class Search:
                 found.append((fit, 1))
             else:
                 found[same] = found[same][0], found[same][1] + 1
-            if found[0][1] == self.starts == ENOUGH:  # starts from all sides reached one pose
+            if found[0][1] == self.starts == AGREEING_STARTS:  # starts from all sides reached one pose
                 break
         compared = [(fit, count, self.compare(fit.base_from_camera, FEW_RAYS)) for fit, count in found]
         compared.sort(key=lambda each: -each[2].score)
-        ends: list[End] = []
+        ends: list[SearchResult] = []
         for fit, count, _ in compared[:4]:
             finer = refine(self._model, some, fit.base_from_camera, NEAR)
             if finer is None:
                 continue
             same = next((i for i, end in enumerate(ends) if _near(finer, end.fit, 1.0)), None)
             if same is None:
-                ends.append(End(finer, self.compare(finer.base_from_camera, FEW_RAYS), count))
+                ends.append(SearchResult(finer, self.compare(finer.base_from_camera, FEW_RAYS), count))
             else:
                 ends[same] = ends[same]._replace(starts=ends[same].starts + count)
         if not ends:
@@ -157,7 +157,7 @@ class Search:
         best = refine(self._model, self._cloud, fit.base_from_camera, (Stage(REACH[1], 12),))
         if best is not None:
             sigma = 1.4826 * float(np.median(np.abs(best.errors)))
-            reach = float(np.clip(FITTING * sigma, *REACH))
+            reach = float(np.clip(OUTLIER_FACTOR * sigma, *REACH))
             best = refine(self._model, self._cloud, best.base_from_camera, (Stage(reach, 25),))
         if best is None:
             raise self._unlike("no points near enough were left at the end")
@@ -171,7 +171,7 @@ class Search:
             name=self._surface.name,
         )
 
-    def compare(self, base_from_camera: Floats, most_rays: int) -> Compared:
+    def compare(self, base_from_camera: Floats, most_rays: int) -> Agreement:
         """Compare model and image."""
         stride = self._stride(most_rays)
         rays = self._view.rays[::stride, ::stride].reshape(-1, 3)
@@ -180,16 +180,16 @@ class Search:
         both = np.isfinite(expected) & (seen > 0)
         count = int(np.count_nonzero(both))
         if not count:
-            return Compared(0.0, 0.0, 0.0, 0)
+            return Agreement(0.0, 0.0, 0.0, 0)
         farther = seen[both] - expected[both]
         allowed = TOLERANCE[0] + TOLERANCE[1] * expected[both] ** 2
         nearer, beyond = float(np.mean(farther < -allowed)), float(np.mean(farther > allowed))
         slope = np.abs(np.einsum("ij,ij->i", normals[both], rays[both] @ base_from_camera[:3, :3].T))
-        confirmed = (np.abs(farther) <= allowed) & (slope > 2.0 * GRAZING)
+        confirmed = (np.abs(farther) <= allowed) & (slope > 2.0 * MIN_INCIDENCE_COSINE)
         rows, columns = np.divmod(np.flatnonzero(both)[confirmed], self._view.seen[::stride, ::stride].shape[1])
         tile = max(1, self._tile // stride)
         uneven = _uneven((farther * slope)[confirmed], (rows // tile) * (TILES + 2) + columns // tile)
-        return Compared(1.0 - nearer - beyond, nearer, beyond, count, uneven)
+        return Agreement(1.0 - nearer - beyond, nearer, beyond, count, uneven)
 
     def _stride(self, most_rays: int) -> int:
         return max(1, math.ceil(math.sqrt(self._view.depth.size / most_rays)))
@@ -221,7 +221,10 @@ def _uneven(distances: Floats, tiles: npt.NDArray[np.intp]) -> float:
 def _near(one: Fit, other: Fit, times: float) -> bool:
     between = one.base_from_camera @ np.linalg.inv(other.base_from_camera)
     at_middle = between[:3, :3] @ one.centre + between[:3, 3] - one.centre
-    return float(np.linalg.norm(at_middle)) < times * APART[0] and angle_of(between[:3, :3]) < times * APART[1]
+    return (
+        float(np.linalg.norm(at_middle)) < times * DISTINCT_POSES[0]
+        and angle_of(between[:3, :3]) < times * DISTINCT_POSES[1]
+    )
 
 
 def angle_of(matrix: Floats) -> float:

@@ -15,13 +15,13 @@ from arcor2_hw.messages import Message
 
 Floats = npt.NDArray[np.float64]
 
-SHORTEST: Final = 0.01
+MIN_POINT_DISTANCE: Final = 0.01
 """Minimum distance between points, m; below it, half a millimetre of error rotates the frame by 3°."""
 MIN_SINE: Final = math.sin(math.radians(10.0))
 """Minimum sine of the angle that three points must form."""
-FITS: Final = 0.001
+GOOD_RESIDUAL: Final = 0.001
 """Root mean square residual up to which touched points agree well, m."""
-MISFIT: Final = 0.05
+MAX_MISFIT: Final = 0.05
 """Maximum ratio of residual to spread of the points; above it they are different points."""
 ORIENTATION_SPREAD: Final = 0.12
 """Minimum singular value, per square root of the count, of the equations of the tip: some 15° about every axis."""
@@ -58,11 +58,11 @@ def frame_by_axes(origin: Position, on_x: Position, in_plane: Sequence[Position]
     """
     points = _points("touched", [origin, on_x, *in_plane], 3)
     along = points[1] - points[0]
-    if np.linalg.norm(along) < SHORTEST:
+    if np.linalg.norm(along) < MIN_POINT_DISTANCE:
         raise _too_near("x")
     aside = points[2] - points[0]
     upward = np.cross(along, aside)
-    if np.linalg.norm(aside) < SHORTEST:
+    if np.linalg.norm(aside) < MIN_POINT_DISTANCE:
         raise _too_near("plane")
     if np.linalg.norm(upward) < MIN_SINE * np.linalg.norm(along) * np.linalg.norm(aside):
         raise _on_one_line()
@@ -112,7 +112,7 @@ def frame_by_points(known: Sequence[Position], touched: Sequence[Position]) -> T
     ours, theirs = _points("known", known, 3), _points("touched", touched, 3)
     for points in (ours, theirs):
         spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-        if spread[0] < SHORTEST:
+        if spread[0] < MIN_POINT_DISTANCE:
             raise _too_near()
         if spread[1] < MIN_SINE * spread[0]:
             raise _on_one_line()
@@ -266,7 +266,7 @@ def orientation_by_points(flange: Orientation, tip: Position, along_z: Position,
     """
     start, forward, side = _points("tip", [tip, along_z, on_x], 3)
     z, x = forward - start, side - start
-    if min(np.linalg.norm(z), np.linalg.norm(x)) < SHORTEST:
+    if min(np.linalg.norm(z), np.linalg.norm(x)) < MIN_POINT_DISTANCE:
         raise _too_near()
     z, x = z / np.linalg.norm(z), x / np.linalg.norm(x)
     off = abs(math.asin(float(np.clip(x @ z, -1.0, 1.0))))
@@ -317,7 +317,7 @@ def _too_near(what: Literal["points", "x", "plane"] = "points") -> CalibrationRe
         if what == "x"
         else "The point in the plane and the origin are less than {shortest:.0f} mm apart. Take points farther apart."
     )
-    return CalibrationRefused(text, reason=Reason.DEGENERATE, shortest=SHORTEST * 1000.0)
+    return CalibrationRefused(text, reason=Reason.DEGENERATE, shortest=MIN_POINT_DISTANCE * 1000.0)
 
 
 def _on_one_line() -> CalibrationRefused:
@@ -329,7 +329,7 @@ def _on_one_line() -> CalibrationRefused:
 
 def _refuse_misfit(residuals: Floats, points: Floats, what: Message) -> None:
     spread = float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
-    if _rms(residuals) > MISFIT * spread:
+    if _rms(residuals) > MAX_MISFIT * spread:
         raise CalibrationRefused(
             "{what}: off by {residual:.1f} mm on average; point {worst} is worst. Check that every point was "
             "touched, in this order.",
@@ -355,13 +355,13 @@ def _touch_deviation(residuals: Floats, freedom: int) -> float:
 
 def _frame(matrix: Floats, residuals: Floats, checked: bool, deviation: float, *advice: Message) -> TouchedFrame:
     residual, worst = _rms(residuals), int(np.argmax(residuals))
-    good = checked and residual <= FITS and deviation <= ANGLE_GOOD
+    good = checked and residual <= GOOD_RESIDUAL and deviation <= ANGLE_GOOD
     known = Message.of(
         "The frame's orientation is known to {deviation:.2f}° (standard deviation).", deviation=math.degrees(deviation)
     )
     if not checked:
         parts = [Message.of("The three points determine the frame, but cannot be checked."), *advice]
-    elif residual > FITS:
+    elif residual > GOOD_RESIDUAL:
         agree = Message.of(
             "The {count} points agree to {residual:.1f} mm only; point {worst} is {off:.1f} mm off: touch it again.",
             count=len(residuals),

@@ -62,7 +62,7 @@ from arcor2_hw.data.object_type import ObjectAction, ObjectModel, ObjectTypeMeta
 from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHoldData
 from arcor2_hw.data.package import PackageSummary
 from arcor2_hw.data.parameter import IdValue, Parameter
-from arcor2_hw.data.parts import ConfirmedPart, PartBooks
+from arcor2_hw.data.parts import ConfirmedPart, PartInventory
 from arcor2_hw.data.persons import LogOnChangedData, Person
 from arcor2_hw.data.points import ForcesChangedData, ObjectPointsData
 from arcor2_hw.data.position import ProgramPosition, ProgramStep
@@ -583,7 +583,7 @@ class Requests(ABC):
     ) -> ParameterBackup:
         """GetParameterBackup: the device and the backup. Needs the role technician."""
 
-    async def get_parts(self, *, timeout: float | None = None) -> list[PartBooks]:
+    async def get_parts(self, *, timeout: float | None = None) -> list[PartInventory]:
         """GetParts. Needs the role operator."""
 
     async def get_production(
@@ -1662,7 +1662,9 @@ class Requests(ABC):
         self, name: Literal["PackageState"], /, *, limit: int = LIMIT
     ) -> EventStream[TypedEvent[PackageStateData]]: ...
     @overload
-    def follow(self, name: Literal["PartsChanged"], /, *, limit: int = LIMIT) -> EventStream[TypedEvent[PartBooks]]: ...
+    def follow(
+        self, name: Literal["PartsChanged"], /, *, limit: int = LIMIT
+    ) -> EventStream[TypedEvent[PartInventory]]: ...
     @overload
     def follow(self, name: Literal["PersonChanged"], /, *, limit: int = LIMIT) -> EventStream[TypedEvent[Person]]: ...
     @overload

@@ -19,7 +19,7 @@ RESOLUTION: Final = 0.01
 
 Overlaps of less than half of it can be missed. None is missed when the margin of the world is half of it.
 """
-FARTHEST: Final = 0.08
+MAX_CHECK_TRAVEL: Final = 0.08
 """Maximum travel covered by one check with an enlarged margin, m."""
 MAX_CHECKS: Final = 200_000
 """Maximum number of checks of one motion."""
@@ -61,14 +61,14 @@ class Sweep:
         robot: str,
         arm: Arm,
         resolution: float = RESOLUTION,
-        farthest: float = FARTHEST,
+        farthest: float = MAX_CHECK_TRAVEL,
     ) -> None:
         if not 1e-4 <= resolution <= 1.0:
             raise InvalidData("The resolution must be 0.0001 to 1 m, not {resolution!r}.", resolution=resolution)
         self.world, self.robot, self.arm, self.resolution = world, robot, arm, resolution
         self._standing = world.robot(robot)
         self._q = self._standing.q.copy()
-        self.levers = levers(self._standing)[arm.indices]
+        self.levers = travel_per_joint(self._standing)[arm.indices]
         self.checks = 0
         self._levels = int(np.log2(farthest / resolution)) if resolution < farthest else 0
 
@@ -191,7 +191,7 @@ def _far_apart(count: int) -> tuple[int, ...]:
     return tuple(order)
 
 
-def levers(robot: CollisionRobot) -> Array:
+def travel_per_joint(robot: CollisionRobot) -> Array:
     """Return for each joint of the model an upper bound of the travel of any point of the robot per rad, or per m.
 
     The bound holds for all joint values within the limits: it adds up the distances from the joint axis to the

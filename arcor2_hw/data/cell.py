@@ -175,7 +175,7 @@ def _values(parameters: Iterable[Parameter]) -> list[tuple[str, Any]]:
     return [(one.name, msgspec.json.decode(one.value)) for one in parameters]
 
 
-def strangers(cell: Cell, scene: Scene) -> list[str]:
+def unknown_objects(cell: Cell, scene: Scene) -> list[str]:
     """Return the names in a cell that no object of the scene has: misspelt or unused."""
     names = {scene_object.name for scene_object in scene.objects}
     return [device.name for device in cell.devices if device.name not in names]

@@ -31,7 +31,7 @@ from arcor2_hw.data.object_type import ObjectTypeMeta
 from arcor2_hw.data.operation import ObjectHealthData, ObjectValuesData, RobotHoldData
 from arcor2_hw.data.package import CollisionModels, PackageStateEnum, PackageSummary
 from arcor2_hw.data.parameter import Parameter
-from arcor2_hw.data.parts import PartBooks
+from arcor2_hw.data.parts import PartInventory
 from arcor2_hw.data.persons import LogOnChangedData, Person
 from arcor2_hw.data.points import ForcesChangedData, ObjectPointsData
 from arcor2_hw.data.position import ProgramPosition
@@ -393,7 +393,7 @@ EVENTS: Final = {
         EventType("LogOnChanged", LogOnChangedData, Role.OPERATOR, additional=True),
         EventType("MovePreview", MovePreviewData, Role.OPERATOR, additional=True),
         EventType("NodesChanged", NodesData, Role.OPERATOR, additional=True),
-        EventType("PartsChanged", PartBooks, Role.OPERATOR, additional=True),
+        EventType("PartsChanged", PartInventory, Role.OPERATOR, additional=True),
         EventType("PersonChanged", Person, Role.OPERATOR, additional=True),
         EventType("ProgramPosition", ProgramPosition, Role.OPERATOR, additional=True),
         EventType("ChangeoverChanged", Changeover, Role.OPERATOR, additional=True),

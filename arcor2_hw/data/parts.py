@@ -200,7 +200,7 @@ class RunCheckpoint(Data, frozen=True):
         )
 
 
-class PartBooks(Data, frozen=True):
+class PartInventory(Data, frozen=True):
     """The parts of a scene, its places, the counts, and the last run."""
 
     scene_id: str
@@ -222,7 +222,7 @@ class PartBooks(Data, frozen=True):
 class ConfirmedPart(Data, frozen=True):
     """The place of a part as a person has found it.
 
-    number: of the part; 0: a part that is not in the books, which counts as fed. place: id of the place; empty: the
+    number: of the part; 0: a part that is not in the inventory, which counts as fed. place: id of the place; empty: the
     part was taken out of the cell, which counts as rejected. serial: corrects the serial number. exists: false if there
     has never been such a part, for example because a sensor was wrong: it does not count as fed. A part that was read
     has existed.

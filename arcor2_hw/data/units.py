@@ -12,7 +12,7 @@ class UnitState(enum.StrEnum):
     """Where a unit is: in the cell, in a box for good, bad or rejected parts, or unknown.
 
     REJECTED includes parts that a person has taken out of the cell. UNKNOWN: it left while the server was off, and the
-    books no longer contain its serial number.
+    inventory no longer contains its serial number.
     """
 
     IN_CELL = "in_cell"
@@ -55,8 +55,8 @@ class Unit(Data, frozen=True):
     """A unit that the cell has worked on, without its steps.
 
     number: of the record. serial: serial number; empty if it was never read. scene_id, part: the scene, and the number
-    of the part in its books. order: id of the order. entered, left: when it came into the cell and left it. verdict:
-    result of its last test. runs: numbers of the runs that worked on it.
+    of the part in the inventory. order: id of the order. entered, left: when it came into the cell and left it.
+    verdict: result of its last test. runs: numbers of the runs that worked on it.
     """
 
     number: int

@@ -33,10 +33,10 @@ from arcor2_hw.kinematics.subproblems import (
     nearest_points,
     nearest_turn,
     product,
+    rotated_about,
     rotation,
     rows_of,
     solved,
-    spun,
     subtract,
     transposed,
     turned,
@@ -212,9 +212,9 @@ class SphericalWrist:
     def _all(self, turn: Rows, wrist: Vector, q1_if_free: float, q4_if_free: float) -> Iterator[Values]:
         h1, h2 = self._h1, self._h2
         for q1 in level(h1, wrist, h2, self._beside, q1_if_free, backwards=True):
-            shoulder = subtract(spun(h1, -q1, wrist), self._p12)
+            shoulder = subtract(rotated_about(h1, -q1, wrist), self._p12)
             for q3 in folded(h2, self._p34, self._p23, shoulder):
-                q2 = between(h2, add(self._p23, spun(h2, q3, self._p34)), shoulder, 0.0)
+                q2 = between(h2, add(self._p23, rotated_about(h2, q3, self._p34)), shoulder, 0.0)
                 of_wrist = product(rotation(h2, -q2 - q3), product(rotation(h1, -q1), turn))
                 for angles in self._wrist(of_wrist, q4_if_free):
                     yield q1, q2, self._sign3 * q3, *angles
@@ -223,8 +223,8 @@ class SphericalWrist:
         h4, h5, h6 = self._h4, self._h5, self._h6
         last = turned(turn, h6)
         for q5 in level(h5, h6, h4, dot(h4, last), 0.0):
-            q4 = between(h4, spun(h5, q5, h6), last, q4_if_free)
-            aside = spun(h5, -q5, spun(h4, -q4, turned(turn, self._across_last)))
+            q4 = between(h4, rotated_about(h5, q5, h6), last, q4_if_free)
+            aside = rotated_about(h5, -q5, rotated_about(h4, -q4, turned(turn, self._across_last)))
             yield q4, q5, between(h6, self._across_last, aside, 0.0)
 
 

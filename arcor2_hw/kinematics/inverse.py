@@ -24,13 +24,13 @@ from arcor2_hw.kinematics.subproblems import Values, nearest_turn
 CollisionCheck = Callable[[Array], str]
 """Function from joint values of the arm to the first contact as text, empty when there is none."""
 
-STARTS: Final = 40
+MAX_STARTS: Final = 40
 """Maximum number of random starts; an arm with few joints has fewer local minima and gets fewer starts."""
 _STARTS_PER_JOINT: Final = 6
-ROUNDS: Final = 60
-EXACT: Final = 1e-8
+MAX_ITERATIONS: Final = 60
+EXACT_ERROR: Final = 1e-8
 """Error below which a solution is exact, m and rad; others must be within the tolerances of the end effector."""
-SAME: Final = 1e-3
+DISTINCT_SOLUTIONS: Final = 1e-3
 """Minimum difference of some joint between two distinct solutions, rad or m."""
 _FEW: Final = 2
 _MAX_DAMPING: Final = 1e-4
@@ -68,7 +68,7 @@ class InverseKinematics:
         middle = np.clip(0.0, lower[wide] + np.pi, upper[wide] - np.pi)
         lower[wide], upper[wide] = middle - np.pi, middle + np.pi
         self._starts = np.random.default_rng(0).uniform(
-            lower, upper, (min(STARTS, _STARTS_PER_JOINT * arm.dof), arm.dof)
+            lower, upper, (min(MAX_STARTS, _STARTS_PER_JOINT * arm.dof), arm.dof)
         )
 
     @property
@@ -142,7 +142,7 @@ class InverseKinematics:
         if math.dist(target[:3, 3].tolist(), self._centre) > self.arm.reach + self._tolerance[0]:
             return iter(())
         if self._form is None:
-            return self._searched(target, seed, everything, STARTS)
+            return self._searched(target, seed, everything, MAX_STARTS)
         return self._computed(self._form, target, seed, everything)
 
     def _computed(
@@ -179,9 +179,9 @@ class InverseKinematics:
             yield from self._searched(target, seed, everything, _FEW)
 
     def _is_exact(self, target: Array, q: Array) -> bool:
-        """Return whether the error is below EXACT. The norm of a small difference of rotations is above their angle."""
+        """Return whether the error is below EXACT_ERROR. The norm of a difference of rotations exceeds their angle."""
         apart = self.arm.forward(q) - target
-        return float(np.vdot(apart, apart)) < EXACT * EXACT
+        return float(np.vdot(apart, apart)) < EXACT_ERROR * EXACT_ERROR
 
     def _is_within(self, values: Values) -> bool:
         lower, upper = self._limits
@@ -206,7 +206,7 @@ class InverseKinematics:
             if self.arm.within(q) and not self._known(q, [*given, *found]):
                 found.append(q)
                 idle = 0
-            if not everything and found and idle >= STARTS // 5:
+            if not everything and found and idle >= MAX_STARTS // 5:
                 break
         yield from sorted(found, key=lambda q: _apart(q, seed))
 
@@ -214,7 +214,7 @@ class InverseKinematics:
         values = q.tolist()
         return any(
             all(
-                abs(math.remainder(one - two, math.tau) if turning else one - two) < SAME
+                abs(math.remainder(one - two, math.tau) if turning else one - two) < DISTINCT_SOLUTIONS
                 for one, two, turning in zip(values, other.tolist(), self._turning, strict=True)
             )
             for other in given
@@ -237,7 +237,7 @@ class InverseKinematics:
         return (np.array(each) for each in itertools.product(*choices))
 
     # -------------------------------------------------------------------------------- refinement
-    def _refined(self, goal: Any, q: Array, rounds: int = ROUNDS, clamp: bool = True) -> Array | None:
+    def _refined(self, goal: Any, q: Array, rounds: int = MAX_ITERATIONS, clamp: bool = True) -> Array | None:
         """Refine joint values near `q` until they reach the goal; None when the iteration does not converge."""
         arm = self.arm
         error, size = self._error(goal, q)
@@ -245,7 +245,7 @@ class InverseKinematics:
         jacobian: Array | None = None
         before = np.inf
         for number in range(rounds):
-            if size < EXACT:
+            if size < EXACT_ERROR:
                 break
             if number % _PATIENCE == 0:
                 if size > _PROGRESS * before:  # a local minimum, or motion along a limit
@@ -270,7 +270,7 @@ class InverseKinematics:
                 damping *= 10.0
                 if damping > 1e2:
                     break
-        if size < EXACT:
+        if size < EXACT_ERROR:
             return q
         position, orientation = self._tolerance
         rows = int(np.count_nonzero(self._rows < 3))

@@ -14,7 +14,7 @@ from arcor2_hw.kinematics.shapes import Array
 TINY: Final = 1e-9
 SINGULAR: Final = 1e-10
 """Product of two sines below which an angle is undetermined."""
-BEYOND: Final = 0.02
+COSINE_TOLERANCE: Final = 0.02
 """Excess of a cosine over 1 that is still accepted; the result is refined later."""
 
 Vector = tuple[float, float, float]
@@ -36,7 +36,7 @@ def nearest_turn(angle: float, seed: float, lower: float, upper: float) -> float
 
 def around(middle: float, cosine: float) -> Values:
     """Return the angles, on both sides of `middle`, of which the distance from it has a cosine."""
-    if not abs(cosine) <= 1.0 + BEYOND:
+    if not abs(cosine) <= 1.0 + COSINE_TOLERANCE:
         return ()
     half = math.acos(max(-1.0, min(1.0, cosine)))
     return (middle + half, middle - half) if half > TINY else (middle,)
@@ -46,7 +46,7 @@ def solved(cosine: float, sine: float, height: float, if_free: float) -> Values:
     """Return the angles of which the cosine and sine, multiplied by factors, add up to a height."""
     size = math.hypot(cosine, sine)
     if size < TINY:
-        return (if_free,) if abs(height) < BEYOND else ()
+        return (if_free,) if abs(height) < COSINE_TOLERANCE else ()
     return around(math.atan2(sine, cosine), height / size)
 
 
@@ -153,7 +153,7 @@ def rotation(axis: Vector, angle: float) -> Rows:
     )
 
 
-def spun(axis: Vector, angle: float, v: Vector) -> Vector:
+def rotated_about(axis: Vector, angle: float, v: Vector) -> Vector:
     """Return a vector rotated about a unit axis."""
     (x, y, z), (a, b, d), c, s = axis, v, math.cos(angle), math.sin(angle)
     along = (1.0 - c) * (x * a + y * b + z * d)

@@ -15,7 +15,7 @@ from arcor2_hw.objects.state_observer import CLOSED_BY_US
 
 T = TypeVar("T")
 
-LAST_REQUEST_TIME: Final = 0.3
+CLOSING_REQUEST_TIME: Final = 0.3
 """Time that a request in progress has before the line is closed, s."""
 
 
@@ -107,7 +107,7 @@ class LineDevice(Connected):
 
     def disconnect(self) -> None:
         """Stop observing and close the line. A request in progress may end first."""
-        with contextlib.suppress(DeviceError), self.line.held(LAST_REQUEST_TIME):
+        with contextlib.suppress(DeviceError), self.line.held(CLOSING_REQUEST_TIME):
             pass
         self._ending = True
         self.line.close()

@@ -16,7 +16,7 @@ REQUESTS_TO_OPEN: Final = 4
 """Number of requests within the time limit of connecting: two readings, each repeated once."""
 MIN_REQUEST_TIMEOUT: Final = 0.02
 """Shortest time limit of a request, s."""
-LAST_REQUEST: Final = 0.3
+RELEASE_REQUEST_TIMEOUT: Final = 0.3
 """Time limit of a request that releases control during disconnecting, s, which may take 1 s."""
 
 
@@ -49,5 +49,5 @@ class ModbusDevice(PolledControl[T]):
 
     def leave(self) -> None:
         """Release control during disconnecting."""
-        with self.link.limited(LAST_REQUEST):
+        with self.link.limited(RELEASE_REQUEST_TIMEOUT):
             super().leave()

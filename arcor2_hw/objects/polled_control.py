@@ -17,7 +17,7 @@ from arcor2_hw.objects.state_observer import Snapshot, StateObserver
 
 T = TypeVar("T")
 
-US: Final = "us"
+OWNED_BY_US: Final = "us"
 NOBODY: Final = Phrase.of("nobody has control")
 STANDSTILL_TIMEOUT: Final = 1.0
 """Time limit from a stop to standstill, s."""
@@ -116,12 +116,12 @@ class PolledControl(Connected, typing.Generic[T]):
 
     def owner_of(self, state: T) -> str | None:
         """Return the owner of control in a state: "us", the name of another client, or None."""
-        return US if self.in_control else None
+        return OWNED_BY_US if self.in_control else None
 
     def why_control_ended(self, state: T) -> str:
         """Return why our control has ended according to a state; empty if it has not."""
         owner = self.owner_of(state)
-        return "" if owner == US else Phrase.of("{owner} has control", owner=owner) if owner else NOBODY
+        return "" if owner == OWNED_BY_US else Phrase.of("{owner} has control", owner=owner) if owner else NOBODY
 
     def fault_of(self, state: T) -> int:
         """Return the number of the fault in a state; 0 for none."""
@@ -156,7 +156,7 @@ class PolledControl(Connected, typing.Generic[T]):
             why = Phrase.of("{owner} has control", owner=owner) if other else self.why_not
             raise NotInControl("{device}: {what} is refused: {reason}", device=self.who, what=what, reason=why)
 
-    def send(self, what: str, write: Callable[[], None], go_on: GoOn | None = None) -> None:
+    def send(self, what: str, write: Callable[[], object], go_on: GoOn | None = None) -> None:
         """Send a command unless a stop or a connection loss came first. Raises NotInControl.
 
         Args:
@@ -221,7 +221,7 @@ class PolledControl(Connected, typing.Generic[T]):
         """Take control. It does nothing when we have control. Raises NotInControl if another client has it."""
         with self._taking_control:
             owner = self.owner_of(self.fresh())
-            if owner not in (None, US):
+            if owner not in (None, OWNED_BY_US):
                 raise NotInControl("{device}: control is refused: {owner} has it", device=self.who, owner=owner)
             if self.in_control:
                 return
@@ -252,10 +252,10 @@ class PolledControl(Connected, typing.Generic[T]):
     def control_owner(self) -> str | None:
         """Return the owner of control: "us", the name of another client, or None."""
         if self.in_control:
-            return US
+            return OWNED_BY_US
         newest = self.newest()
         owner = None if newest is None else self.owner_of(newest)
-        return None if owner == US else owner  # the device still reports an earlier session of this driver
+        return None if owner == OWNED_BY_US else owner  # the device still reports an earlier session of this driver
 
     def drop_control(self, why: str = NOBODY) -> None:
         """Record that we no longer have control. Nothing is sent."""

@@ -10,7 +10,7 @@ from arcor2_hw.data.robot import Joint, KinematicCalibration, MoveResult, RobotS
 from arcor2_hw.exceptions import Arcor2NotImplemented, DeviceError, KinematicsError, Refused
 from arcor2_hw.objects.generic import GenericWithPose
 from arcor2_hw.objects.settings import Settings
-from arcor2_hw.objects.surroundings import HeldPart, Nothing, Surroundings
+from arcor2_hw.objects.surroundings import EmptySurroundings, HeldPart, Surroundings
 
 
 class RobotException(DeviceError):
@@ -48,7 +48,7 @@ class Robot(GenericWithPose):
     @property
     def surroundings(self) -> Surroundings:
         """Return the surroundings of the robot; empty if none were set."""
-        return self.__dict__.get("_around") or Nothing()
+        return self.__dict__.get("_around") or EmptySurroundings()
 
     # -------------------------------------------------------------------------------- held parts
     @property

@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 RESOLUTION: Final = 0.01
 """Maximum travel of any point of the robot between two checked configurations, m."""
-WITHIN: Final = 2.0
+PLANNING_TIMEOUT: Final = 2.0
 """Time limit of planning, s."""
-MAX_TIME: Final = 4
+MAX_TIME_FACTOR: Final = 4
 """Maximum factor of the time limit after repeated failures."""
-FAILURES: Final = 100
+MAX_REMEMBERED_FAILURES: Final = 100
 """Maximum number of goals whose failures are remembered; the oldest is dropped."""
 TCP_RAMP: Final = 4.0
 """Acceleration along a line divided by the speed along it, 1/s."""
@@ -40,8 +40,8 @@ Way = MotionPath  # object types in older packages use this name
 class SafeMoves(RobotKinematics):
     """Safe moves of one robot, and its kinematics: plan paths that are free of obstacles, and monitor them.
 
-    If no path to a goal is found within WITHIN, each repeat searches twice as long, at most MAX_TIME times WITHIN, and
-    with another seed.
+    If no path to a goal is found within PLANNING_TIMEOUT, each repeat searches twice as long and with another seed, at
+    most MAX_TIME_FACTOR times PLANNING_TIMEOUT.
     """
 
     def __init__(
@@ -200,12 +200,12 @@ class SafeMoves(RobotKinematics):
 
         key = (arm.end_effector.link, goal.tobytes())
         failures = self._failures.get(key, 0)
-        within = WITHIN * min(2**failures, MAX_TIME)
+        within = PLANNING_TIMEOUT * min(2**failures, MAX_TIME_FACTOR)
         try:
             return search(start, goal, within=within, seed=failures, stopped=stopped)
         except NoPath:
             self._failures[key] = failures + 1
-            if len(self._failures) > FAILURES:
+            if len(self._failures) > MAX_REMEMBERED_FAILURES:
                 self._failures.pop(next(iter(self._failures)), None)
             raise
 

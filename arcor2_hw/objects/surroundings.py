@@ -11,7 +11,7 @@ from arcor2_hw.data.object_type import Models
 from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.objects.generic import GenericWithPose
 
-__all__ = ["Attachment", "HeldPart", "Nothing", "Obstacle", "Surroundings"]
+__all__ = ["Attachment", "EmptySurroundings", "HeldPart", "Nothing", "Obstacle", "Surroundings"]
 
 
 class HeldPart(Data, frozen=True):
@@ -50,7 +50,7 @@ class Surroundings(Protocol):
         """Return the calibrated kinematics of a robot, read from its controller; None: nominal kinematics."""
 
 
-class Nothing:
+class EmptySurroundings:
     """Empty surroundings."""
 
     def obstacles(self) -> list[Obstacle]:
@@ -68,3 +68,6 @@ class Nothing:
     def calibration(self, robot_id: str) -> KinematicCalibration | None:
         """Return None."""
         return None
+
+
+Nothing = EmptySurroundings  # object types written before this name existed import it

@@ -15,7 +15,7 @@ from arcor2_hw.objects.safe_moves import SafeMoves, Stopped
 from arcor2_hw.objects.settings import Settings
 from arcor2_hw.objects.surroundings import Surroundings
 
-SLACK: Final = 1e-4
+LIMIT_TOLERANCE: Final = 1e-4
 """Rounding error that is tolerated beyond a joint limit, rad or m."""
 
 
@@ -136,7 +136,7 @@ class UrdfRobot(Robot):
 
     def move_to_joints(self, target_joints: list[Joint], speed: float, safe: bool = True) -> None:
         """Move to joint values, with `safe` around obstacles. Raises as `move_to_pose`."""
-        joint_values(self.name, target_joints, self.joint_limits(), SLACK)
+        joint_values(self.name, target_joints, self.joint_limits(), LIMIT_TOLERANCE)
 
         def way(now: list[Joint], stopped: Stopped) -> MotionPath:
             return self.safe_moves.to_joints(now, target_joints, speed, safe=safe, stopped=stopped)

@@ -29,9 +29,9 @@ RESOLUTION: Final = 0.02
 """Maximum travel of any point of the robot between two checked configurations, m."""
 FARTHEST: Final = 0.16
 """Maximum travel covered by one check with an enlarged margin, m. It is long, because most paths are free."""
-COARSE: Final = 4.0
+TOLERANCE_FACTOR: Final = 4.0
 """Factor on the tolerances of `straight_line`: the waypoints are only checked, not followed."""
-ENOUGH: Final = 0.3
+SUFFICIENT_CLEARANCE: Final = 0.3
 """Clearance above which configurations are equally good, m."""
 _STANDS: Final = 1e-6
 
@@ -90,8 +90,8 @@ class MotionTimer:
         return sorted(found, key=lambda q: (bool(self.arm.near_limits(q)), -self._clearance(q)))
 
     def _clearance(self, q: Array) -> float:
-        clearance = self.sweep.world.clearance(self.sweep.robot, self.sweep.whole(q), ENOUGH)
-        return ENOUGH if clearance is None else clearance.distance
+        clearance = self.sweep.world.clearance(self.sweep.robot, self.sweep.whole(q), SUFFICIENT_CLEARANCE)
+        return SUFFICIENT_CLEARANCE if clearance is None else clearance.distance
 
     def move(
         self,
@@ -140,7 +140,9 @@ class MotionTimer:
         if isinstance(target, Pose):
             matrix = self._in_root(target)
             if linear:
-                return straight_line(self.arm, start, matrix, self._name, coarse=COARSE, inverse=self._inverse)
+                return straight_line(
+                    self.arm, start, matrix, self._name, coarse=TOLERANCE_FACTOR, inverse=self._inverse
+                )
             goal = next(self._inverse.candidates(matrix, start), None)
             if goal is None:
                 raise OutOfReach

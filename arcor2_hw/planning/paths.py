@@ -17,13 +17,13 @@ from arcor2_hw.kinematics.errors import MotionInCollision, NoStraightLine
 from arcor2_hw.kinematics.inverse import InverseKinematics
 from arcor2_hw.kinematics.shapes import Array
 
-OFF_LINE: Final = 0.0005
+LINE_TOLERANCE: Final = 0.0005
 """Maximum distance of the end effector from its line between two waypoints, m."""
-OFF_TURN: Final = 0.005
+ORIENTATION_TOLERANCE: Final = 0.005
 """Maximum deviation of the orientation from its interpolation between two waypoints, rad."""
-PIECE: Final = 0.05
+MAX_SEGMENT_LENGTH: Final = 0.05
 """Length of a line between two waypoints before it is subdivided where needed, m."""
-TURN: Final = 0.2
+MAX_SEGMENT_ROTATION: Final = 0.2
 """Rotation between two waypoints before it is subdivided where needed, rad."""
 _HALVINGS: Final = 10
 
@@ -47,14 +47,15 @@ def straight_line(
 ) -> list[Array]:
     """Compute waypoints that move the end effector in a straight line.
 
-    Between waypoints the end effector stays within OFF_LINE and OFF_TURN of the line.
+    Between waypoints the end effector stays within LINE_TOLERANCE and ORIENTATION_TOLERANCE of the line.
 
     Args:
         arm: The arm.
         start: Joint values at the start.
         target: Pose at the end, (4, 4), in the frame of the model's root link.
         name: Name of the robot in messages.
-        coarse: Factor on OFF_LINE and OFF_TURN, for fewer waypoints where the robot does not follow them.
+        coarse: Factor on LINE_TOLERANCE and ORIENTATION_TOLERANCE, for fewer waypoints where
+            the robot does not follow them.
         inverse: Inverse kinematics of the arm, for callers that compute many lines.
 
     Raises:
@@ -71,7 +72,7 @@ class _Line:
     def __init__(self, inverse: InverseKinematics, start: Array, target: Array, name: str, coarse: float) -> None:
         arm = inverse.arm
         self._arm, self._inverse, self._name = arm, inverse, name
-        self._off_line, self._trace = coarse * OFF_LINE, 1.0 + 2.0 * math.cos(coarse * OFF_TURN)
+        self._off_line, self._trace = coarse * LINE_TOLERANCE, 1.0 + 2.0 * math.cos(coarse * ORIENTATION_TOLERANCE)
         self._longer = math.sqrt(coarse)  # the deviation grows with the square of the distance between waypoints
         self._to = target
         self._from = arm.forward(start).copy()
@@ -91,7 +92,11 @@ class _Line:
 
     def waypoints(self, start: Array) -> list[Array]:
         angle = float(np.linalg.norm(self._turn)) if self._turns else 0.0
-        count = max(1, math.ceil(self._length / (self._longer * PIECE)), math.ceil(angle / (self._longer * TURN)))
+        count = max(
+            1,
+            math.ceil(self._length / (self._longer * MAX_SEGMENT_LENGTH)),
+            math.ceil(angle / (self._longer * MAX_SEGMENT_ROTATION)),
+        )
         way, before = [start], 0.0
         if next(self._inverse.candidates(self._to, start), None) is None:
             self._inverse.solve(self._to, start)  # raises

@@ -29,9 +29,9 @@ SEARCH_RANGE: Final = np.pi
 """Range of joint values beyond start and goals that is searched first, rad; longer detours are rarely useful."""
 MAX_GOALS: Final = 8
 SHORTCUTS: Final = 60
-IDLE: Final = 15
+MAX_FAILED_SHORTCUTS: Final = 15
 """Number of failed shortcuts in a row after which shortening ends."""
-BEYOND: Final = 0.05
+LIMIT_TOLERANCE: Final = 0.05
 """Distance by which a joint may be beyond its limit at the start, rad or m: a real joint can be slightly beyond it."""
 _GIVEN: Final = 1e-9
 
@@ -153,7 +153,7 @@ class Planner:
 
     def _check_start(self, q: Array) -> None:
         self._check_finite(q)
-        if beyond := self._beyond_limits(q, BEYOND):
+        if beyond := self._beyond_limits(q, LIMIT_TOLERANCE):
             raise InvalidData(
                 "{name} cannot move from there: {names} would be beyond the limits.", name=self.name, names=beyond
             )
@@ -292,7 +292,7 @@ class _Search:
         points = self._drop_redundant(points, resolution)
         idle = 0
         for _ in range(SHORTCUTS):
-            if len(points) < 3 or idle >= IDLE or self._over():
+            if len(points) < 3 or idle >= MAX_FAILED_SHORTCUTS or self._over():
                 break
             idle += 1
             at = np.concatenate(([0.0], np.cumsum([np.linalg.norm(b - a) for a, b in itertools.pairwise(points)])))

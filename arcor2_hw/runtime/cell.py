@@ -17,7 +17,7 @@ from arcor2_hw.exceptions import Arcor2Error, NotConnected, NotFound, ProgramSto
 from arcor2_hw.messages import Message
 from arcor2_hw.objects import Camera, Generic, Robot
 from arcor2_hw.runtime.creation import Recipe, load_type, recipe
-from arcor2_hw.runtime.device import CLOSE_DEADLINE, Device, describe, until
+from arcor2_hw.runtime.device import CLOSE_DEADLINE, Device, describe, time_left
 from arcor2_hw.runtime.identification import Identification, Reported
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.messages import OpenScene, RunPackage
@@ -240,7 +240,7 @@ class Cell:
             first = min(pending, key=lambda job: pending[job][1])
             device, moment = pending[first]
             try:
-                ended = self._ended.get(timeout=until(moment))
+                ended = self._ended.get(timeout=time_left(moment))
             except Empty:
                 device.lane.expire(first, moment - began)
                 continue
@@ -298,7 +298,7 @@ class Cell:
         jobs = [(device, job) for device in self if (job := device.begin_identify()) is not None]
         deadline = time.monotonic() + IDENTIFY_DEADLINE
         for device, job in jobs:
-            if not job.wait(until(deadline)):
+            if not job.wait(time_left(deadline)):
                 device.lane.expire(job, IDENTIFY_DEADLINE)
             if isinstance(job.error, Refused):  # other errors occur again with the first command
                 raise SceneFault(device.id, job.error) from job.error
@@ -358,7 +358,7 @@ class Cell:
             if job is not None:
                 jobs.append((device, job))
         for device, job in jobs:
-            if not job.wait(until(deadline)):
+            if not job.wait(time_left(deadline)):
                 (device.stop_lane if device.lane.busy_with != "disconnect" else device.lane).expire(job, CLOSE_DEADLINE)
             if job.error is not None:
                 problem = problem or describe(device, job.error)
@@ -399,6 +399,6 @@ class Cell:
                 jobs.append((device, job))
         deadline = time.monotonic() + CONTROL_DEADLINE
         for device, job in jobs:
-            if not job.wait(until(deadline)):
+            if not job.wait(time_left(deadline)):
                 device.lane.expire(job, CONTROL_DEADLINE)
         return [(device, job.error) for device, job in jobs if job.error is not None]

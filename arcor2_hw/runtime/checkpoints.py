@@ -9,7 +9,7 @@ from urllib.parse import quote, unquote
 
 import msgspec
 
-from arcor2_hw.data.parts import PartBooks
+from arcor2_hw.data.parts import PartInventory
 from arcor2_hw.exceptions import StorageError
 from arcor2_hw.files import sync
 
@@ -18,16 +18,16 @@ _HEADER: Final = struct.Struct("<QII")
 _SUFFIXES: Final = (".0", ".1")
 
 _encode = msgspec.msgpack.Encoder().encode
-_decode = msgspec.msgpack.Decoder(PartBooks).decode
+_decode = msgspec.msgpack.Decoder(PartInventory).decode
 
 
 class Checkpoints(Protocol):
     """The checkpoints of a scene, of which the newest is stored."""
 
-    def write(self, books: PartBooks) -> None:
+    def write(self, inventory: PartInventory) -> None:
         """Store a checkpoint. It is on disk when this returns. Raises StorageError."""
 
-    def read(self) -> PartBooks | None:
+    def read(self) -> PartInventory | None:
         """Return the newest valid checkpoint, None if there is none. Raises StorageError."""
 
     def close(self) -> None:
@@ -47,7 +47,7 @@ class CheckpointFile:
         self._files: list[int] = []
         self._sequence = max((found[0] for path in self._paths if (found := _read(path)) is not None), default=0)
 
-    def write(self, books: PartBooks) -> None:
+    def write(self, inventory: PartInventory) -> None:
         """Store a checkpoint. It is on disk when this returns. Raises StorageError."""
         try:
             if not self._files:
@@ -55,14 +55,14 @@ class CheckpointFile:
                 self._files = [os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600) for path in self._paths]
                 sync(self._paths[0].parent)
             self._sequence += 1
-            body = _encode(books)
+            body = _encode(inventory)
             file = self._files[self._sequence % 2]
             os.pwrite(file, _HEADER.pack(self._sequence, len(body), zlib.crc32(body)) + body, 0)
             os.fdatasync(file)
         except OSError as error:
             raise StorageError("The state of the run cannot be stored: {reason}", reason=error) from error
 
-    def read(self) -> PartBooks | None:
+    def read(self) -> PartInventory | None:
         """Return the newest valid checkpoint, None if there is none."""
         found = [one for path in self._paths if (one := _read(path)) is not None]
         return max(found, key=lambda one: one[0])[1] if found else None
@@ -78,7 +78,7 @@ def stored_scenes(directory: Path) -> list[str]:
     return sorted({unquote(path.stem) for suffix in _SUFFIXES for path in directory.glob(f"*{suffix}")})
 
 
-def _read(path: Path) -> tuple[int, PartBooks] | None:
+def _read(path: Path) -> tuple[int, PartInventory] | None:
     """Return sequence number and content of a file, None if it does not exist or was written incompletely."""
     try:
         data = path.read_bytes()

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from queue import Empty, SimpleQueue
 from typing import Final
 
-from arcor2_hw.data.parts import PartBooks
+from arcor2_hw.data.parts import PartInventory
 from arcor2_hw.exceptions import StorageError
 from arcor2_hw.runtime import messages as m
 
@@ -28,11 +28,11 @@ class CheckpointsAtServer:
         self._answers: SimpleQueue[m.CheckpointAnswer | None] = SimpleQueue()
         self._lost = False
 
-    def write(self, books: PartBooks) -> None:
+    def write(self, inventory: PartInventory) -> None:
         """Store a checkpoint. It is on the disk of the server when this returns. Raises StorageError."""
-        self._request(lambda number: m.StoreCheckpoint(number, books))
+        self._request(lambda number: m.StoreCheckpoint(number, inventory))
 
-    def read(self) -> PartBooks | None:
+    def read(self) -> PartInventory | None:
         """Return the newest checkpoint, None if there is none. Raises StorageError."""
         return self._request(m.ReadCheckpoint).books
 

@@ -404,6 +404,6 @@ def describe(device: Device, error: BaseException) -> Arcor2Error:
     return described
 
 
-def until(deadline: float) -> float:
+def time_left(deadline: float) -> float:
     """Return the time left until a time of the monotonic clock, s; at least 0."""
     return max(0.0, deadline - time.monotonic())

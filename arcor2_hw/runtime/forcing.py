@@ -28,7 +28,7 @@ CHECK_PERIOD: Final = 0.25
 READ_TIMEOUT: Final = 1.0
 """Time for reading the value of an output before it is forced, s."""
 READ_POLL: Final = 0.01
-WRITTEN_WITHIN: Final = 2.0
+WRITE_TIMEOUT: Final = 2.0
 """Time limit of a driver to write an output, s."""
 
 
@@ -77,7 +77,7 @@ class Forces:
             self._post(m.CallFailed(message.id, error_data(error, message.object_id)))
             return
         job = Job("force", lambda: self._force(force), notify=lambda done: self._started(force, done))
-        within = CONTROL_DEADLINE + WRITTEN_WITHIN
+        within = CONTROL_DEADLINE + WRITE_TIMEOUT
         if device.lane.submit_or_fail(job):
             self._clock.after(within, lambda: device.lane.expire(job, within))
 
@@ -200,7 +200,7 @@ class Forces:
         )
         lane = force.device.stop_lane  # an action may run on the other lane
         if lane.submit_or_fail(job):
-            self._clock.after(WRITTEN_WITHIN, lambda: lane.expire(job, WRITTEN_WITHIN))
+            self._clock.after(WRITE_TIMEOUT, lambda: lane.expire(job, WRITE_TIMEOUT))
 
     def _report(self, force: _Force, problem: BaseException | None) -> None:
         device = force.device

@@ -7,7 +7,7 @@ from arcor2_hw.data.geometry import Position
 from arcor2_hw.exceptions import Interlocked
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime.device import Device
-from arcor2_hw.runtime.retreat import Leaving
+from arcor2_hw.runtime.retreat import ZoneExit
 
 
 class Guard:
@@ -35,7 +35,7 @@ class Guard:
         self.targets_known, self.stop = targets_known, stop
         self.broken: Interlocked | None = None
         """Why it was stopped."""
-        self.leaving: Leaving | None = None
+        self.leaving: ZoneExit | None = None
         """Set if it may only leave the zones in which the robot is."""
         self.retracts = False
         """Whether it follows the retract paths of these zones."""

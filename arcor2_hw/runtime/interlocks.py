@@ -22,8 +22,8 @@ from arcor2_hw.runtime.cell import Cell
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.guards import Guard, Obstruction, Track
 from arcor2_hw.runtime.messages import Lease
-from arcor2_hw.runtime.needs import Key, Seen, Verdict, key_of, read, verdict
-from arcor2_hw.runtime.retreat import Leaving, Retreat
+from arcor2_hw.runtime.needs import CachedValue, Key, Verdict, key_of, read, verdict
+from arcor2_hw.runtime.retreat import Retreat, ZoneExit
 from arcor2_hw.runtime.stopping import send_stop
 from arcor2_hw.runtime.zone_motions import ZoneBodies, extrapolated, lines_over, targets_of, tips_of
 from arcor2_hw.runtime.zones import ZoneTokens
@@ -60,7 +60,7 @@ class Interlocks:
         self._needed: dict[str, set[Key]] = {}
         """What is read of each device; nothing but the position of a robot."""
         self._threads: dict[str, threading.Thread] = {}
-        self._seen: dict[Key, Seen] = {}
+        self._seen: dict[Key, CachedValue] = {}
         self._tracks: dict[str, Track] = {}
         self._tokens = ZoneTokens()
         self._bodies = ZoneBodies(cell, lambda: self._zones)
@@ -114,7 +114,7 @@ class Interlocks:
             with contextlib.suppress(Arcor2Error):  # the object has failed; it is not read until it is retried
                 device = self._cell()[object_id]
                 for key in keys:
-                    self._seen[key] = read(device, key[1], key[2], self._seen.get(key, Seen()))
+                    self._seen[key] = read(device, key[1], key[2], self._seen.get(key, CachedValue()))
                 if self._zones and issubclass(device.recipe.cls, Robot):
                     self._follow(device)
             self._check_guards()
@@ -343,7 +343,7 @@ class Interlocks:
                 paths = (one.retract for one in self._interlocks.values() if one.zone == zone and one.retract)
                 ways[self._name(zone)] = Retreat(bodies[zone], next(paths, []), there[zone])
             guard = Guard(device, what, inside, self._watched(device.id, what, inside - leaving), False, stop)
-            guard.leaving, guard.retracts = Leaving(device.name, ways, tips), refused is None
+            guard.leaving, guard.retracts = ZoneExit(device.name, ways, tips), refused is None
             self._guards[device.id] = guard
             return guard
 

@@ -1,4 +1,4 @@
-"""The books of the parts in a cell: where each part is, and how many came in and left."""
+"""The inventory of parts in a cell: where each part is, and how many came in and left."""
 
 from collections import deque
 from collections.abc import Iterable, Sequence
@@ -8,7 +8,7 @@ from msgspec import UNSET
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.parts import ConfirmedPart, Part, PartBooks, PartCounts, Place, PlaceKind
+from arcor2_hw.data.parts import ConfirmedPart, Part, PartCounts, PartInventory, Place, PlaceKind
 from arcor2_hw.exceptions import Conflict, NotFound, PartUnconfirmed, PlaceEmpty, PlaceOccupied, WrongPart
 
 SERIALS: Final = 100
@@ -20,18 +20,18 @@ class PartGone(WrongPart):
 
 
 class Ledger:
-    """The books of the parts of a scene. Every operation leaves fed = good + bad + rejected + in the cell.
+    """The part inventory of a scene. Every operation leaves fed = good + bad + rejected + in the cell.
 
     Args:
-        books: the books so far.
+        inventory: the inventory so far.
     """
 
-    def __init__(self, books: PartBooks) -> None:
-        self._scene_id = books.scene_id
-        self._parts = {part.number: part for part in books.parts}
-        self._places = {place.id: place for place in books.places}
-        self._serials = {place.id: deque(place.parts, SERIALS) for place in books.places if place.kind.is_box}
-        counts = books.counts
+    def __init__(self, inventory: PartInventory) -> None:
+        self._scene_id = inventory.scene_id
+        self._parts = {part.number: part for part in inventory.parts}
+        self._places = {place.id: place for place in inventory.places}
+        self._serials = {place.id: deque(place.parts, SERIALS) for place in inventory.places if place.kind.is_box}
+        counts = inventory.counts
         self._left = {PlaceKind.GOOD: counts.good, PlaceKind.BAD: counts.bad, PlaceKind.REJECTED: counts.rejected}
         self._fed = counts.fed
         self._gone: dict[int, str] = {}
@@ -40,8 +40,8 @@ class Ledger:
         """Whether the program tests parts, so that only those that have passed may go into a good box."""
 
     @property
-    def books(self) -> PartBooks:
-        """The present books, without the run."""
+    def inventory(self) -> PartInventory:
+        """The present inventory, without the run."""
         places = [
             replace(place, parts=list(self._serials[key])) if key in self._serials else place
             for key, place in self._places.items()
@@ -50,7 +50,7 @@ class Ledger:
         counts = PartCounts(
             self._fed, left[PlaceKind.GOOD], left[PlaceKind.BAD], left[PlaceKind.REJECTED], len(self._parts)
         )
-        return PartBooks(self._scene_id, list(self._parts.values()), places, counts)
+        return PartInventory(self._scene_id, list(self._parts.values()), places, counts)
 
     def set_places(self, places: Iterable[Place]) -> None:
         """Replace the places. Those that still contain a part remain."""
@@ -71,7 +71,7 @@ class Ledger:
     def move(self, source: str, target: str) -> int:
         """Start to move a part from one place to another, and return its number.
 
-        A part at a feeder that the books do not know yet is new. The move ends by `complete` or `fail`. A part whose
+        A part at a feeder that is not in the inventory is new. The move ends by `complete` or `fail`. A part whose
         place is not confirmed may only be moved as before: a person has decided to repeat the action.
 
         Raises:
@@ -89,7 +89,7 @@ class Ledger:
                 raise self._unconfirmed(one)
         if part is None and start.kind is not PlaceKind.FEEDER:
             raise PlaceEmpty(
-                "The books have no part at {place}. Check the place, then confirm where the parts are.",
+                "The inventory has no part at {place}. Check the place, then confirm where the parts are.",
                 place=start.name,
             )
         self._require_room(end, None if part is None else part.number)

@@ -10,7 +10,7 @@ from arcor2_hw.data.held import HoldChoice
 from arcor2_hw.data.interlocks import Interlock
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.operation import HoldKind
-from arcor2_hw.data.parts import ConfirmedPart, PartBooks
+from arcor2_hw.data.parts import ConfirmedPart, PartInventory
 from arcor2_hw.data.position import ProgramStep
 from arcor2_hw.data.project import Project
 from arcor2_hw.data.robot import Joint, KinematicCalibration
@@ -72,7 +72,7 @@ class RunPackage(ToHost, frozen=True):
     cell: settings of devices in this cell, which override those of the package. breakpoints: ids of action points and
     actions, all of which must exist. shared_breakpoints: further ids; those that the project lacks are ignored. assets,
     bodies, calibrations, secrets, identities: as in OpenScene. hold_on_error: whether a failed action holds the
-    program, see ProgramHeld. run: number of the run. records: directory of the books of parts and of checkpoints; empty
+    program, see ProgramHeld. run: number of the run. records: directory of the part inventory and of checkpoints; empty
     to store nothing. checkpoints: whether the state is stored before and after each action. continues: whether the
     program continues where it was interrupted. continue_at: how many actions of its cycle are not repeated. values:
     values of constants and variables of the project by their ids, JSON in a string, which replace those of the package.
@@ -301,7 +301,7 @@ class CheckpointAnswer(ToHost, frozen=True):
     """
 
     number: int
-    books: PartBooks | None = None
+    books: PartInventory | None = None
     problem: Message | None = None
 
 

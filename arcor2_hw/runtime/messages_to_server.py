@@ -7,7 +7,7 @@ from msgspec import Struct, field
 from arcor2_hw.data.device import Alarm, Connection, Health, Identity
 from arcor2_hw.data.held import HeldData
 from arcor2_hw.data.interlocks import InterlockState
-from arcor2_hw.data.parts import PartBooks
+from arcor2_hw.data.parts import PartInventory
 from arcor2_hw.data.position import MAIN_BRANCH, Frame
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime.message_parts import ErrorData, HeldPart
@@ -174,9 +174,9 @@ class HeldChanged(ToServer, frozen=True):
 
 
 class PartsChanged(ToServer, frozen=True):
-    """The books of parts have changed."""
+    """The part inventory has changed."""
 
-    books: PartBooks
+    books: PartInventory
 
 
 class ReadCheckpoint(ToServer, frozen=True):
@@ -189,7 +189,7 @@ class StoreCheckpoint(ToServer, frozen=True):
     """Store a checkpoint of the run. Answer: CheckpointAnswer with this number."""
 
     number: int
-    books: PartBooks
+    books: PartInventory
 
 
 class PartStep(ToServer, frozen=True):

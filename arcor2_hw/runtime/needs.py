@@ -17,14 +17,14 @@ from arcor2_hw.exceptions import NotFound, message_of
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime.device import Device
 
-FRESH_FOR: Final = 1.0
+MAX_VALUE_AGE: Final = 1.0
 """Age up to which a value counts, s. Drivers poll their devices about ten times per second."""
 
 Key = tuple[str, str, str]
 """Object, observation and point."""
 
 
-class Seen(NamedTuple):
+class CachedValue(NamedTuple):
     """The last known value of an observation, its time (monotonic, s), and why no newer one is known."""
 
     value: Any = None
@@ -44,7 +44,7 @@ def key_of(need: Need) -> Key:
     return need.object_id, need.observation, need.point
 
 
-def read(device: Device, observation: str, point: str, before: Seen) -> Seen:
+def read(device: Device, observation: str, point: str, before: CachedValue) -> CachedValue:
     """Read an observation. If that fails, return the one before with the reason."""
     asked = time.monotonic()
     try:
@@ -60,10 +60,10 @@ def read(device: Device, observation: str, point: str, before: Seen) -> Seen:
         if value.quality is not Quality.GOOD:
             return before._replace(problem=Message.of("the value is not reliable"))
         value, asked = value.value, value.monotonic
-    return Seen(value.value if isinstance(value, enum.Enum) else value, asked)
+    return CachedValue(value.value if isinstance(value, enum.Enum) else value, asked)
 
 
-def verdict(need: Need, seen: Seen | None, device: str) -> Verdict:
+def verdict(need: Need, seen: CachedValue | None, device: str) -> Verdict:
     """Compare a need with the last known value.
 
     Args:
@@ -76,7 +76,7 @@ def verdict(need: Need, seen: Seen | None, device: str) -> Verdict:
         text = Message.of("{device}: {need} is not confirmed, no value is known", device=device, need=shown)
         return Verdict(InterlockCondition.UNKNOWN, text)
     age = time.monotonic() - seen.at
-    if age > FRESH_FOR:
+    if age > MAX_VALUE_AGE:
         text = Message.of(
             "{device}: {need} is not confirmed, last known {age:.0f} s ago", device=device, need=shown, age=age
         )

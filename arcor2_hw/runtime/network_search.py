@@ -21,7 +21,7 @@ ANSWER_TIME: Final = 1.0
 """Time in which a device at one address accepts a connection and answers, s."""
 SEARCH_TIME: Final = 10.0
 """Time limit of one search, s. Devices found until then are returned."""
-AT_ONCE: Final = 64
+MAX_CONNECTIONS: Final = 64
 """Maximum number of open connections."""
 DASHBOARD_PORT: Final = 29999
 _GREETING: Final = b"Universal Robots Dashboard Server"
@@ -63,7 +63,7 @@ def addresses_of(text: str) -> list[str]:
 async def search(probe: Probe, addresses: list[str], port: int) -> list[Found]:
     """Return the devices that answer at these addresses within SEARCH_TIME, in the order of the addresses."""
     found: dict[str, Found] = {}
-    free = asyncio.Semaphore(AT_ONCE)
+    free = asyncio.Semaphore(MAX_CONNECTIONS)
 
     async def one(address: str) -> None:
         async with free:

@@ -10,7 +10,7 @@ from arcor2_hw.actions import metadata_of
 from arcor2_hw.actions.decorator import PartFlow, part_flow_of
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.geometry import Pose
-from arcor2_hw.data.parts import ConfirmedPart, DoneAction, PartBooks, Place, PlaceKind
+from arcor2_hw.data.parts import ConfirmedPart, DoneAction, PartInventory, Place, PlaceKind
 from arcor2_hw.data.project import Project
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, PlaceEmpty, PlaceOccupied
 from arcor2_hw.runtime.cell import Cell
@@ -41,19 +41,19 @@ class PartTracking:
     """Tracks the places of parts while a program runs, in scenes with a feeder or a box. Calls must not overlap.
 
     Args:
-        former: The books so far.
+        former: The inventory so far.
         project: The project of the program.
         cell: Its devices, all connected.
-        changed: Called with the books after each change of a part.
+        changed: Called with the inventory after each change of a part.
         concerned: Called before the end of each action that concerned a part, with the values of PartStep.
     """
 
     def __init__(
         self,
-        former: PartBooks,
+        former: PartInventory,
         project: Project,
         cell: Cell,
-        changed: Callable[[PartBooks], None],
+        changed: Callable[[PartInventory], None],
         concerned: Callable[[int, int, str, str, bool | None], None],
     ) -> None:
         self._cell, self._changed, self._concerned = cell, changed, concerned
@@ -72,9 +72,9 @@ class PartTracking:
             self._ledger.set_places(self._find_places(project))
 
     @property
-    def books(self) -> PartBooks:
-        """The present books, without the run."""
-        return self._ledger.books
+    def inventory(self) -> PartInventory:
+        """The present inventory, without the run."""
+        return self._ledger.inventory
 
     def _find_places(self, project: Project) -> list[Place]:
         """Return the places of the scene and of the project, and assign action points and actions to them."""
@@ -174,16 +174,16 @@ class PartTracking:
         self._ledger.confirm(found)
 
     def publish(self, *, sense: bool = False) -> None:
-        """Publish the books. sense: whether sensors are read, which may take some milliseconds."""
+        """Publish the inventory. sense: whether sensors are read, which may take some milliseconds."""
         if not self._active:
             return
-        books = self._ledger.books
+        inventory = self._ledger.inventory
         if sense:
-            sensed = ((place, self._sensed(place.id)) for place in books.places)
-            books = replace(
-                books, places=[replace(place, sensed=UNSET if found is None else found) for place, found in sensed]
+            sensed = ((place, self._sensed(place.id)) for place in inventory.places)
+            inventory = replace(
+                inventory, places=[replace(place, sensed=UNSET if found is None else found) for place, found in sensed]
             )
-        self._changed(books)
+        self._changed(inventory)
 
     def report(self, step: Step, verdict: bool | None = None) -> None:
         """Report that an action has concerned a part."""
@@ -206,7 +206,7 @@ class PartTracking:
             )
         if not self._ledger.has_part(target) and self._sensed(target) is True:
             raise PlaceOccupied(
-                "{place} is occupied: its sensor detects a part that is not in the books. Remove it.",
+                "{place} is occupied: its sensor detects a part that is not in the inventory. Remove it.",
                 place=self._ledger.name_of(target),
             )
 

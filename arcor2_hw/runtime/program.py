@@ -92,7 +92,7 @@ class Program:
     ) -> None:
         self.channel = channel
         self.record = record
-        """Keeps the books of parts and stores checkpoints; None if nothing is stored."""
+        """Keeps the part inventory and stores checkpoints; None if nothing is stored."""
         self.cell_file = cell_file
         """Settings of devices in this cell, which override those of the package."""
         self.secrets = secrets

@@ -1,4 +1,4 @@
-"""The record of a run: the books of parts, and checkpoints before and after each action."""
+"""The record of a run: the part inventory, and checkpoints before and after each action."""
 
 import enum
 import hashlib
@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from arcor2_hw.actions.decorator import ends_with_program
 from arcor2_hw.data.base import Unset, now
 from arcor2_hw.data.geometry import Orientation, Pose, Position
-from arcor2_hw.data.parts import ConfirmedPart, DoneAction, PartBooks, RunCheckpoint, RunningAction
+from arcor2_hw.data.parts import ConfirmedPart, DoneAction, PartInventory, RunCheckpoint, RunningAction
 from arcor2_hw.data.project import START, Project
 from arcor2_hw.exceptions import Arcor2Error, Conflict, PartUnconfirmed, StorageError
 from arcor2_hw.runtime import messages as m
@@ -42,7 +42,7 @@ class RunRecord:
         checkpoints: returns the checkpoints of a scene.
         run: number of the run.
         package_id: the package.
-        changed: called with the books after each change of a part.
+        changed: called with the inventory after each change of a part.
         concerned: called before the end of each action that concerned a part, with the values of PartStep.
         each_action: whether a checkpoint is stored before and after each action, or only of the start and the end.
         continues: whether the program continues where it was interrupted.
@@ -54,7 +54,7 @@ class RunRecord:
         checkpoints: Callable[[str], Checkpoints],
         run: int,
         package_id: str,
-        changed: Callable[[PartBooks], None],
+        changed: Callable[[PartInventory], None],
         concerned: Callable[[int, int, str, str, bool | None], None] = lambda *_: None,
         *,
         each_action: bool = True,
@@ -103,7 +103,7 @@ class RunRecord:
             lambda scene: at_server if run.records_at_server else CheckpointFile(Path(run.records), scene),
             run.run,
             run.package_id,
-            lambda books: post(m.PartsChanged(books)),
+            lambda inventory: post(m.PartsChanged(inventory)),
             lambda *concerned: post(m.PartStep(*concerned)),
             each_action=run.checkpoints,
             continues=run.continues,
@@ -111,7 +111,7 @@ class RunRecord:
         )
 
     def open(self, project: Project, cell: Cell, package: Path) -> None:
-        """Read the books of the scene, and store that the run has started. All devices are connected.
+        """Read the inventory of the scene, and store that the run has started. All devices are connected.
 
         Raises:
             StorageError: the checkpoint cannot be stored.
@@ -119,7 +119,7 @@ class RunRecord:
             Conflict: the program cannot continue, because it was not interrupted, or was changed since.
         """
         file = self._checkpoints(project.scene_id)
-        former = file.read() or PartBooks(project.scene_id)
+        former = file.read() or PartInventory(project.scene_id)
         if former.unconfirmed:
             raise PartUnconfirmed("Confirm where the parts are before the program starts: {parts}.",
                                   parts=", ".join(part.shown for part in former.unconfirmed))  # fmt: skip
@@ -168,7 +168,7 @@ class RunRecord:
             keywords: named arguments.
 
         Raises:
-            PartError: the action does not agree with the books. Nothing is recorded.
+            PartError: the action does not agree with the inventory. Nothing is recorded.
             InvalidData: the place of the part is unknown, because the pose is at no action point.
             StorageError: the checkpoint cannot be stored.
         """
@@ -313,7 +313,7 @@ class RunRecord:
         """
         with self._lock:
             if self._parts is None:  # the program is still starting
-                raise Conflict("The program keeps no books of parts.")
+                raise Conflict("The program keeps no part inventory.")
             if self._running:
                 names = ", ".join(action.action_name for action in self._running.values())
                 raise Conflict("Parts cannot be confirmed while an action runs: {names}.", names=names)
@@ -332,7 +332,7 @@ class RunRecord:
             unfinished = [] if self.continuation is None else self.continuation.unfinished
             actions = [*self._running.values(), *self._held.values(), *unfinished]
             run = replace(self._run, actions=actions, results=self._results, done=self._done)
-            self._file.write(replace(self._tracking.books, run=run))
+            self._file.write(replace(self._tracking.inventory, run=run))
 
     def _store_later(self, *, always: bool = False) -> None:
         """Store a checkpoint. If the disk fails, the next action does not start, but this one does not fail."""

@@ -22,11 +22,11 @@ MAX_SPEED: Final = 0.05
 """Maximum speed of a robot that leaves a zone, m/s."""
 TOLERANCE: Final = 0.003
 """Distance by which a robot may move back while it leaves, m: noise of its readings."""
-STEP: Final = 0.01
+PROBE_LENGTH: Final = 0.01
 """Length of the motion for which the progress of a velocity is computed, m."""
 MIN_PROGRESS: Final = 0.3
 """Smallest part of a motion that has to lead out of each zone."""
-REACHED: Final = 0.005
+REACHED_DISTANCE: Final = 0.005
 """Distance to a point of the path at which it counts as reached, m."""
 
 
@@ -61,7 +61,7 @@ class Retreat:
             if depth < 0.0:
                 return None
         length = math.hypot(*target)
-        if length < REACHED and self._path:
+        if length < REACHED_DISTANCE and self._path:
             return None
         return Position(*(each / length for each in target)).rotated(self._body.pose.orientation)
 
@@ -80,11 +80,11 @@ class Retreat:
         if not sections:
             return 0
         nearest = min(range(len(sections)), key=lambda index: _distance(point, *sections[index]))
-        at_end = point.distance_to(self._path[nearest + 1]) < REACHED
+        at_end = point.distance_to(self._path[nearest + 1]) < REACHED_DISTANCE
         return min(nearest + 1 + at_end, len(self._path) - 1)
 
 
-class Leaving:
+class ZoneExit:
     """A hold-to-run motion out of zones, which is slow and may not lead deeper into any of them.
 
     Args:
@@ -133,9 +133,9 @@ class Leaving:
         speed = math.hypot(*lease.twist[:3])
         if speed == 0.0:
             return lease, 1.0
-        step = Position(*(STEP * each / speed for each in lease.twist[:3]))
+        step = Position(*(PROBE_LENGTH * each / speed for each in lease.twist[:3]))
         for zone, way in self._ways.items():
-            if way.remaining(tips) - way.remaining([tip + step for tip in tips]) < MIN_PROGRESS * STEP:
+            if way.remaining(tips) - way.remaining([tip + step for tip in tips]) < MIN_PROGRESS * PROBE_LENGTH:
                 raise Interlocked(
                     "{device} may only move out of the zone {zone}, not deeper.", device=self._device, zone=zone
                 )

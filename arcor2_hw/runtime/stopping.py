@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 
 from arcor2_hw.exceptions import Arcor2Error, Cancelled
 from arcor2_hw.messages import Message
-from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe, until
+from arcor2_hw.runtime.device import STOP_DEADLINE, Device, describe, time_left
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.message_parts import DeviceStop
 
@@ -64,7 +64,7 @@ def _call_error(stop: SentStop, deadline: float, within: float) -> Arcor2Error |
     device, call = stop.device, stop.call
     if call is None:
         return None
-    if not call.wait(until(deadline)):
+    if not call.wait(time_left(deadline)):
         device.stop_lane.expire(call, within)
     if call.error is None or isinstance(call.error, Cancelled):
         return None

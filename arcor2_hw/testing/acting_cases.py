@@ -11,8 +11,8 @@ from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.methods import STOP_RACE_TIME
 from arcor2_hw.testing.bench import Bench, needs
 from arcor2_hw.testing.connecting_cases import DISCONNECT_TIMEOUT
-from arcor2_hw.testing.life import SLACK, raised, stays, timed, wait_until
-from arcor2_hw.testing.steps import START_TIMEOUT, WATCHED, on_lanes, start_action, stop_of
+from arcor2_hw.testing.life import TIME_TOLERANCE, require_error, require_in_time, require_throughout, wait_until
+from arcor2_hw.testing.steps import START_TIMEOUT, WATCH_TIME, on_lanes, start_action, stop_of
 
 ASK_TIMEOUT: Final = 20.0
 """Time limit of `ask` of a bench, s. For some devices it is a motion."""
@@ -29,7 +29,7 @@ class ActingCases:
             wait_until(lambda: device.control_owner() not in (None, "us"), 2.0, "reporting the other owner of control")
             owner = device.control_owner()
             before = arcor2_bench.writes()
-            error = raised(
+            error = require_error(
                 device.take_control,
                 NotInControl,
                 within=arcor2_bench.call_within,
@@ -43,7 +43,7 @@ class ActingCases:
         """A command without control is refused without effect; with control it acts."""
         device = arcor2_bench.connected()
         before = arcor2_bench.writes()
-        raised(
+        require_error(
             lambda: arcor2_bench.command(device),
             NotInControl,
             within=arcor2_bench.call_within,
@@ -62,18 +62,20 @@ class ActingCases:
         for pause in (0.0, 0.13):
             act = start_action(arcor2_bench, device)
             time.sleep(pause)
-            timed(stop, arcor2_bench.stops_within, "stop")
+            require_in_time(stop, arcor2_bench.stops_within, "stop")
             assert not arcor2_bench.running(), "stop() returned before the device was at standstill"
             error = act.outcome(arcor2_bench.stops_within, "the stopped action")
             assert isinstance(error, Cancelled), f"the stopped action ended with {error!r}, not Cancelled"
-        stays(lambda: not arcor2_bench.running(), WATCHED, "the device started again after the stop")
+        require_throughout(lambda: not arcor2_bench.running(), WATCH_TIME, "the device started again after the stop")
 
     @needs("run_long", "running")
     def test_one_act_at_a_time(self, arcor2_bench: Bench) -> None:
         """A second action during the first is refused, and the first continues (rule 8)."""
         device = arcor2_bench.controlled()
         act = start_action(arcor2_bench, device)
-        raised(lambda: arcor2_bench.run_long(device), Refused, within=arcor2_bench.call_within, what="a second action")
+        require_error(
+            lambda: arcor2_bench.run_long(device), Refused, within=arcor2_bench.call_within, what="a second action"
+        )
         assert not act.over, f"the second action ended the first: {act.error!r}"
         stop_of(device)()
         act.outcome(arcor2_bench.stops_within, "the first action")
@@ -83,7 +85,7 @@ class ActingCases:
         """disconnect() during an action takes at most 1 s, and the action ends with a typed error."""
         device = arcor2_bench.controlled()
         act = start_action(arcor2_bench, device)
-        timed(device.disconnect, DISCONNECT_TIMEOUT, "disconnecting during an action")
+        require_in_time(device.disconnect, DISCONNECT_TIMEOUT, "disconnecting during an action")
         error = act.outcome(arcor2_bench.call_within, "the disconnected action")
         assert isinstance(error, DeviceError), f"the disconnected action ended with {error!r}"
 
@@ -101,16 +103,22 @@ class ActingCases:
                 assert not act.ended, f"the action had ended {when}: {act.error!r}"
                 stop, _ = held.begin_stop() or (None, None)
                 assert stop is not None, "a device with run_long must have a stop()"
-                wait_until(partial(stop.wait, 0.0), arcor2_bench.stops_within + SLACK, f"stop {when}")
+                wait_until(partial(stop.wait, 0.0), arcor2_bench.stops_within + TIME_TOLERANCE, f"stop {when}")
                 stop.outcome()
-                wait_until(partial(act.wait, 0.0), arcor2_bench.stops_within + SLACK, f"the action after a stop {when}")
+                wait_until(
+                    partial(act.wait, 0.0),
+                    arcor2_bench.stops_within + TIME_TOLERANCE,
+                    f"the action after a stop {when}",
+                )
                 assert isinstance(act.error, Cancelled), (
                     f"stopped {when}, the action ended with {act.error!r}, not Cancelled"
                 )
                 assert not arcor2_bench.running(), f"stopped {when}, the device still runs"
         finally:
             held.release_lanes()
-        stays(lambda: not arcor2_bench.running(), WATCHED / 2, "the device started again after the stop")
+        require_throughout(
+            lambda: not arcor2_bench.running(), WATCH_TIME / 2, "the device started again after the stop"
+        )
 
     @needs("run_long", "running", "observe", like="stop_passes")
     def test_cancelling_leaves_the_line_usable(self, arcor2_bench: Bench) -> None:
@@ -124,11 +132,11 @@ class ActingCases:
             wait_until(lambda: arcor2_bench.running() or act.ended, START_TIMEOUT, "run_long")
             stop, _ = held.begin_stop() or (None, None)
             assert stop is not None, "a device with run_long must have a stop()"
-            wait_until(partial(stop.wait, 0.0), arcor2_bench.stops_within + SLACK, "stop")
-            wait_until(partial(act.wait, 0.0), arcor2_bench.stops_within + SLACK, "the action after the stop")
+            wait_until(partial(stop.wait, 0.0), arcor2_bench.stops_within + TIME_TOLERANCE, "stop")
+            wait_until(partial(act.wait, 0.0), arcor2_bench.stops_within + TIME_TOLERANCE, "the action after the stop")
             for _ in range(3):
                 given = held.lane.call(
-                    "observe", lambda: arcor2_bench.observe(device), deadline=arcor2_bench.call_within + SLACK
+                    "observe", lambda: arcor2_bench.observe(device), deadline=arcor2_bench.call_within + TIME_TOLERANCE
                 )
                 assert type(given) is kinds, (
                     f"after the cancelled call a reading returned {given!r}, the answer of another call"

@@ -5,8 +5,8 @@ from typing import Final
 from arcor2_hw.data.device import Connection
 from arcor2_hw.exceptions import DeviceTimeout, NotConnected
 from arcor2_hw.testing.bench import Bench, knows_control, needs
-from arcor2_hw.testing.life import held, left_behind, named, raised, timed
-from arcor2_hw.testing.steps import GONE
+from arcor2_hw.testing.life import leaked_resources, named, open_resources, require_error, require_in_time
+from arcor2_hw.testing.steps import LOSS_ERRORS
 
 DISCONNECT_TIMEOUT: Final = 1.0
 """Time limit of disconnect, s, in any state of the wire."""
@@ -17,18 +17,18 @@ class ConnectingCases:
 
     def test_constructor_opens_nothing(self, arcor2_bench: Bench) -> None:
         """The constructor only stores: it creates no thread, socket or connection."""
-        before = held()
-        device = timed(arcor2_bench.new, 0.5, "the constructor")
-        assert not (new := held() - before), f"the constructor opened {', '.join(sorted(new))}"
+        before = open_resources()
+        device = require_in_time(arcor2_bench.new, 0.5, "the constructor")
+        assert not (new := open_resources() - before), f"the constructor opened {', '.join(sorted(new))}"
         assert device.connection is Connection.OFFLINE, f"it is {device.connection} before it was connected"
 
     def test_connect_is_idempotent(self, arcor2_bench: Bench) -> None:
         """Connecting twice is the same as once, within the time limit."""
         device = arcor2_bench.new()
         for what in ("connect", "a second connect"):
-            timed(lambda: device.connect(arcor2_bench.connect_timeout), arcor2_bench.connect_timeout, what)
+            require_in_time(lambda: device.connect(arcor2_bench.connect_timeout), arcor2_bench.connect_timeout, what)
             assert device.connection is Connection.ONLINE, f"after {what} it is {device.connection}"
-            now = held()
+            now = open_resources()
             if what == "connect":
                 before = now
         assert not (new := now - before), f"a second connect opened {', '.join(sorted(new))}"
@@ -40,16 +40,16 @@ class ConnectingCases:
         for _ in range(2):
             device.connect(arcor2_bench.connect_timeout)
             for what in ("disconnect", "a second disconnect"):
-                timed(device.disconnect, DISCONNECT_TIMEOUT, what)
+                require_in_time(device.disconnect, DISCONNECT_TIMEOUT, what)
                 assert device.connection is Connection.OFFLINE, f"after {what} it is {device.connection}"
 
     def test_nothing_is_left_behind(self, arcor2_bench: Bench) -> None:
         """After three connections no thread, socket or port is left."""
-        before = held()
+        before = open_resources()
         for _ in range(3):
             device = arcor2_bench.controlled()
             device.disconnect()
-        left = left_behind(before)
+        left = leaked_resources(before)
         assert not left, f"after disconnect there is still {', '.join(sorted(left))}"
 
     @needs("writes")
@@ -73,14 +73,14 @@ class ConnectingCases:
         """For a missing device, connect fails within the time limit with an error that names object and address."""
         device, address = arcor2_bench.absent()
         arcor2_bench.keep(device)
-        before = held()
-        error = raised(
+        before = open_resources()
+        error = require_error(
             lambda: device.connect(1.0), NotConnected, DeviceTimeout, within=1.0, what="connecting to nothing"
         )
         named(error, device.name, address, "connecting to nothing")
         assert device.connection is Connection.FAILED, f"it is {device.connection} after that"
         device.disconnect()
-        left = left_behind(before)
+        left = leaked_resources(before)
         assert not left, f"an attempt that failed left {', '.join(sorted(left))}"
 
     @needs("cut", "heal")
@@ -88,7 +88,9 @@ class ConnectingCases:
         """For a silent device, connect fails with a typed error in time; when it answers again, connect works."""
         device = arcor2_bench.new()
         arcor2_bench.cut()
-        error = raised(lambda: device.connect(1.0), *GONE, within=1.0, what="connecting to a silent device")
+        error = require_error(
+            lambda: device.connect(1.0), *LOSS_ERRORS, within=1.0, what="connecting to a silent device"
+        )
         named(error, device.name, arcor2_bench.address, "connecting to a silent device")
         arcor2_bench.heal()
         device.connect(arcor2_bench.connect_timeout)

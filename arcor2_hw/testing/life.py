@@ -11,13 +11,13 @@ from arcor2_hw.exceptions import DeviceError
 from arcor2_hw.testing.own_time import own_time
 
 POLL: Final = 0.01
-SLACK: Final = 0.5
+TIME_TOLERANCE: Final = 0.5
 """Time that a busy machine may add to any time limit, s."""
-GRACE: Final = 2.0
+CLEAN_UP_TIMEOUT: Final = 2.0
 """Time in which threads and sockets have to end, s."""
 
 
-def held() -> set[str]:
+def open_resources() -> set[str]:
     """Return the threads, open sockets and serial ports of this process."""
     found = {f"thread {thread.name} ({thread.ident})" for thread in threading.enumerate()}
     for descriptor in Path("/proc/self/fd").glob("*"):
@@ -30,10 +30,10 @@ def held() -> set[str]:
     return found
 
 
-def left_behind(before: set[str]) -> set[str]:
+def leaked_resources(before: set[str]) -> set[str]:
     """Return the resources that this process did not have before, after waiting for them to end."""
     began = own_time()
-    while (left := held() - before) and own_time() - began < GRACE:
+    while (left := open_resources() - before) and own_time() - began < CLEAN_UP_TIMEOUT:
         gc.collect()
         time.sleep(POLL)
     return left
@@ -48,7 +48,7 @@ def wait_until(holds: Callable[[], bool], within: float, what: str) -> float:
     return own_time() - began
 
 
-def stays(holds: Callable[[], bool], seconds: float, what: str) -> None:
+def require_throughout(holds: Callable[[], bool], seconds: float, what: str) -> None:
     """Fail when a condition ceases to hold within some seconds."""
     until = time.monotonic() + seconds
     while time.monotonic() < until:
@@ -56,22 +56,22 @@ def stays(holds: Callable[[], bool], seconds: float, what: str) -> None:
         time.sleep(POLL)
 
 
-def timed(call: Callable[[], Any], within: float, what: str) -> Any:
+def require_in_time(call: Callable[[], Any], within: float, what: str) -> Any:
     """Call and return the result. Fail when it took longer than `within` s plus the slack."""
     began = own_time()
     try:
         return call()
     finally:
         took = own_time() - began
-        assert took <= within + SLACK, f"{what} took {took:.2f} s, not {within:g} s at most"
+        assert took <= within + TIME_TOLERANCE, f"{what} took {took:.2f} s, not {within:g} s at most"
 
 
-def raised(call: Callable[[], Any], *kinds: type[DeviceError], within: float, what: str) -> DeviceError:
+def require_error(call: Callable[[], Any], *kinds: type[DeviceError], within: float, what: str) -> DeviceError:
     """Call and return the typed error it has to raise in time. Fail when it returns, or raises another."""
     given: object = None
     error: Exception | None = None
     try:
-        given = timed(call, within, what)
+        given = require_in_time(call, within, what)
     except AssertionError:
         raise
     except Exception as e:  # noqa: BLE001 - judged below
@@ -112,7 +112,7 @@ class BackgroundCall:
     def outcome(self, within: float, what: str) -> BaseException | None:
         """Wait for the end and return the raised error. Fail when the call does not end in time."""
         began = own_time()
-        while not self.over and own_time() - began < within + SLACK:
+        while not self.over and own_time() - began < within + TIME_TOLERANCE:
             self._thread.join(POLL)
         assert self.over, f"{what} has not ended within {within:g} s"
         return self.error

@@ -6,16 +6,16 @@ from arcor2_hw.data.device import LossKind
 from arcor2_hw.exceptions import DeviceError, NotInControl
 from arcor2_hw.testing.bench import Bench, needs
 from arcor2_hw.testing.connecting_cases import DISCONNECT_TIMEOUT
-from arcor2_hw.testing.life import SLACK, named, raised, stays, timed, wait_until
+from arcor2_hw.testing.life import TIME_TOLERANCE, named, require_error, require_in_time, require_throughout, wait_until
 from arcor2_hw.testing.steps import (
-    GONE,
+    LOSS_ERRORS,
     START_TIMEOUT,
-    WATCHED,
-    back,
-    goes_on,
-    lose,
+    WATCH_TIME,
+    await_connection,
+    await_reading,
+    cut_and_await_loss,
     observed,
-    seen_again,
+    require_continuation,
     start_action,
 )
 
@@ -28,9 +28,11 @@ class LossCases:
         """A call of a silent device raises a typed error in time, which names object and address."""
         device = arcor2_bench.controlled()
         arcor2_bench.cut()
-        error = raised(lambda: arcor2_bench.ask(device), *GONE, within=arcor2_bench.call_within, what="the call")
+        error = require_error(
+            lambda: arcor2_bench.ask(device), *LOSS_ERRORS, within=arcor2_bench.call_within, what="the call"
+        )
         named(error, device.name, arcor2_bench.address, "a call of a silent device")
-        timed(device.disconnect, DISCONNECT_TIMEOUT, "disconnecting from a silent device")
+        require_in_time(device.disconnect, DISCONNECT_TIMEOUT, "disconnecting from a silent device")
 
     @needs("cut", "heal", "observe")
     def test_stale_is_an_error(self, arcor2_bench: Bench) -> None:
@@ -39,8 +41,8 @@ class LossCases:
         arcor2_bench.observe(device)
         arcor2_bench.cut()
         time.sleep(arcor2_bench.stale_after)
-        error = raised(
-            lambda: arcor2_bench.observe(device), *GONE, within=arcor2_bench.call_within, what="an old reading"
+        error = require_error(
+            lambda: arcor2_bench.observe(device), *LOSS_ERRORS, within=arcor2_bench.call_within, what="an old reading"
         )
         named(error, device.name, arcor2_bench.address, "a stale reading")
 
@@ -48,9 +50,9 @@ class LossCases:
     def test_observation_comes_back(self, arcor2_bench: Bench) -> None:
         """A loss is reported as lost; when the device answers again, observation resumes by itself."""
         device = arcor2_bench.connected()
-        lose(arcor2_bench, device)
+        cut_and_await_loss(arcor2_bench, device)
         arcor2_bench.heal()
-        back(arcor2_bench, device)
+        await_connection(arcor2_bench, device)
         wait_until(lambda: observed(arcor2_bench, device), arcor2_bench.back_within, "a reading after the loss")
 
     @needs("cut", "heal", "command")
@@ -58,11 +60,11 @@ class LossCases:
         """After a loss, commands are refused until a user takes control again (rules 1 and 3)."""
         device = arcor2_bench.controlled()
         assert device.control_owner() == "us"
-        lose(arcor2_bench, device)
+        cut_and_await_loss(arcor2_bench, device)
         arcor2_bench.heal()
-        back(arcor2_bench, device)
+        await_connection(arcor2_bench, device)
         assert device.control_owner() != "us", "control was taken again without a request"
-        error = raised(
+        error = require_error(
             lambda: arcor2_bench.command(device),
             NotInControl,
             within=arcor2_bench.call_within,
@@ -80,12 +82,16 @@ class LossCases:
         assert isinstance(error, DeviceError), f"the interrupted action ended with {error!r}"
         if type(device).loss_reaction.kind is LossKind.STOPS_WITHIN:
             limit = type(device).loss_reaction.within
-            wait_until(lambda: not arcor2_bench.running(), limit + SLACK, "the reaction of the device to the loss")
+            wait_until(
+                lambda: not arcor2_bench.running(), limit + TIME_TOLERANCE, "the reaction of the device to the loss"
+            )
         arcor2_bench.heal()
-        back(arcor2_bench, device)
+        await_connection(arcor2_bench, device)
         if type(device).loss_reaction.kind is LossKind.CONTINUES:
             wait_until(lambda: not arcor2_bench.running(), arcor2_bench.back_within, "the end of the continued action")
-        stays(lambda: not arcor2_bench.running(), WATCHED, "the device continued by itself after the loss")
+        require_throughout(
+            lambda: not arcor2_bench.running(), WATCH_TIME, "the device continued by itself after the loss"
+        )
 
     @needs("orphan", "running", "holding", "progress")
     def test_loss_reaction(self, arcor2_bench: Bench) -> None:
@@ -108,16 +114,20 @@ class LossCases:
             process.kill()
             process.wait()
         if reaction.kind is LossKind.CONTINUES:
-            goes_on(arcor2_bench)
+            require_continuation(arcor2_bench)
             return
         if holds:
             what = f"the device is declared to hold, but after the process was killed it no longer holds {held!r}"
-            stays(lambda: arcor2_bench.holding() == held, arcor2_bench.loss_watched, what)
+            require_throughout(lambda: arcor2_bench.holding() == held, arcor2_bench.loss_watched, what)
         else:
             wait_until(
-                lambda: not arcor2_bench.running(), reaction.within + SLACK, "standstill after the process was killed"
+                lambda: not arcor2_bench.running(),
+                reaction.within + TIME_TOLERANCE,
+                "standstill after the process was killed",
             )
-        stays(lambda: not arcor2_bench.running(), WATCHED, "the device started again after the process was killed")
+        require_throughout(
+            lambda: not arcor2_bench.running(), WATCH_TIME, "the device started again after the process was killed"
+        )
 
     @needs("reset_link", "observe", for_silver=True)
     def test_reset_and_back(self, arcor2_bench: Bench) -> None:
@@ -126,7 +136,7 @@ class LossCases:
         arcor2_bench.observe(device)
         arcor2_bench.reset_link()
         time.sleep(arcor2_bench.stale_after)  # until then, a reading may be older than the reset
-        seen_again(arcor2_bench, device)
+        await_reading(arcor2_bench, device)
 
     @needs("half_frame", "heal", "ask", "observe", for_silver=True)
     def test_half_a_frame(self, arcor2_bench: Bench) -> None:
@@ -134,8 +144,8 @@ class LossCases:
         device = arcor2_bench.controlled()
         arcor2_bench.observe(device)
         arcor2_bench.half_frame()
-        raised(
+        require_error(
             lambda: arcor2_bench.ask(device), DeviceError, within=arcor2_bench.call_within, what="an incomplete answer"
         )
         arcor2_bench.heal()
-        seen_again(arcor2_bench, device)
+        await_reading(arcor2_bench, device)

@@ -7,7 +7,7 @@ from arcor2_hw.data.device import Identity
 from arcor2_hw.data.maintenance import DeviceParameter, ParameterFailure
 from arcor2_hw.testing import capabilities
 from arcor2_hw.testing.bench import Bench
-from arcor2_hw.testing.life import timed
+from arcor2_hw.testing.life import require_in_time
 
 DUMP_TIMEOUT = 60.0
 """Time limit for reading or writing all parameters, s."""
@@ -25,7 +25,7 @@ class MaintenanceCases:
         for _ in range(2):
             device = arcor2_bench.connected()
             before = _writes(arcor2_bench)
-            identity = timed(device.identify, arcor2_bench.call_within, "identify")
+            identity = require_in_time(device.identify, arcor2_bench.call_within, "identify")
             assert isinstance(identity, Identity), f"identify() returned {identity!r}"
             assert identity.vendor or identity.model, "identify() returned neither vendor nor model"
             assert _writes(arcor2_bench) == before, "identify() acted on the device"
@@ -47,7 +47,7 @@ class MaintenanceCases:
             return
         device = arcor2_bench.connected()
         before = _writes(arcor2_bench)
-        dumped = timed(device.parameters_dump, DUMP_TIMEOUT, "parameters_dump")
+        dumped = require_in_time(device.parameters_dump, DUMP_TIMEOUT, "parameters_dump")
         assert _writes(arcor2_bench) == before, "parameters_dump() acted on the device"
         names = [each.name for each in dumped]
         assert dumped, "parameters_dump() returned nothing"
@@ -56,7 +56,9 @@ class MaintenanceCases:
         assert device.parameters_dump() == dumped, "parameters change without being written"
         if "parameters_restore" not in said or arcor2_bench.real:
             return
-        failures = timed(lambda: device.parameters_restore([_UNKNOWN, *dumped]), DUMP_TIMEOUT, "parameters_restore")
+        failures = require_in_time(
+            lambda: device.parameters_restore([_UNKNOWN, *dumped]), DUMP_TIMEOUT, "parameters_restore"
+        )
         assert all(isinstance(each, ParameterFailure) and each.reason for each in failures), "a failure has no reason"
         assert [each.name for each in failures] == [_UNKNOWN.name], (
             f"parameters_restore() reported {[each.name for each in failures]}, not only the unknown parameter"

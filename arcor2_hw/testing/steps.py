@@ -11,16 +11,16 @@ from arcor2_hw.objects import Axis, Generic
 from arcor2_hw.runtime.creation import Recipe
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.testing.bench import Bench
-from arcor2_hw.testing.life import POLL, SLACK, BackgroundCall, wait_until
+from arcor2_hw.testing.life import POLL, TIME_TOLERANCE, BackgroundCall, wait_until
 from arcor2_hw.testing.own_time import own_time
 
-WATCHED: Final = 0.5
+WATCH_TIME: Final = 0.5
 """Time in which nothing may start to move again, s."""
 START_TIMEOUT: Final = 40.0
 """Time limit until a long action runs at the device, s. A process that imports a vendor library needs some time."""
-GONE: Final = (NotConnected, ConnectionLost, DeviceTimeout, Stale)
+LOSS_ERRORS: Final = (NotConnected, ConnectionLost, DeviceTimeout, Stale)
 """Errors that a call of a silent device may raise."""
-UP: Final = (Connection.ONLINE, Connection.BACK)
+CONNECTED_STATES: Final = (Connection.ONLINE, Connection.BACK)
 
 
 def start_action(bench: Bench, device: Generic) -> BackgroundCall:
@@ -31,15 +31,17 @@ def start_action(bench: Bench, device: Generic) -> BackgroundCall:
     return act
 
 
-def lose(bench: Bench, device: Generic) -> None:
+def cut_and_await_loss(bench: Bench, device: Generic) -> None:
     """Cut the cable and wait until the driver reports it."""
     bench.cut()
     wait_until(lambda: device.connection is Connection.LOST, bench.lost_within, "reporting the connection as lost")
 
 
-def back(bench: Bench, device: Generic) -> None:
+def await_connection(bench: Bench, device: Generic) -> None:
     """Wait until the device is observed again."""
-    wait_until(lambda: device.connection in UP, bench.back_within, "reporting the connection as online again")
+    wait_until(
+        lambda: device.connection in CONNECTED_STATES, bench.back_within, "reporting the connection as online again"
+    )
 
 
 def observed(bench: Bench, device: Generic) -> bool:
@@ -52,24 +54,24 @@ def observed(bench: Bench, device: Generic) -> bool:
     return True
 
 
-def seen_again(bench: Bench, device: Generic) -> None:
+def await_reading(bench: Bench, device: Generic) -> None:
     """Wait until a reading is available after a connection loss, even if the loss was too short to be reported."""
 
     def is_observed() -> bool:
         try:
-            return device.connection in UP and observed(bench, device)
-        except GONE:
+            return device.connection in CONNECTED_STATES and observed(bench, device)
+        except LOSS_ERRORS:
             time.sleep(POLL)
             return False
 
     wait_until(is_observed, bench.back_within, "a reading after the loss")
 
 
-def goes_on(bench: Bench) -> None:
+def require_continuation(bench: Bench) -> None:
     """Fail unless the action continues after its process was killed, until it is done or was watched long enough."""
     killed = changed = own_time()
     done = bench.progress()
-    while (now := own_time()) - killed < max(bench.loss_watched, bench.progress_within + SLACK) and done < 1.0:
+    while (now := own_time()) - killed < max(bench.loss_watched, bench.progress_within + TIME_TOLERANCE) and done < 1.0:
         if (present := bench.progress()) != done:
             done, changed = present, now
         assert now - changed <= bench.progress_within, (

@@ -11,7 +11,7 @@ from typing import Any, Final
 from arcor2_hw.objects import Generic
 from arcor2_hw.testing.own_time import own_time
 
-LOOK_EVERY: Final = 0.5
+CHECK_PERIOD: Final = 0.5
 """Time between two comparisons with the limit, s. The end of the call is noticed at once."""
 SUITE: Final = str(Path(__file__).parent)
 
@@ -61,7 +61,7 @@ def within(limit: float, call: Callable[[], Any], what: str) -> Any:
     began = own_time()
     thread.start()
     while thread.is_alive():
-        thread.join(LOOK_EVERY)
+        thread.join(CHECK_PERIOD)
         if thread.is_alive() and own_time() - began > limit:
             raise CallHangs(what, limit, thread)
     if errors:

@@ -6,7 +6,7 @@ from arcor2_hw.exceptions import InvalidData, KinematicsError, NotFound, OutOfRa
 from arcor2_hw.objects.small import HasPoints
 from arcor2_hw.testing import capabilities, declarations
 from arcor2_hw.testing.bench import Bench, needs
-from arcor2_hw.testing.life import raised, timed
+from arcor2_hw.testing.life import require_error, require_in_time
 
 
 class WrittenCases:
@@ -62,7 +62,7 @@ class WrittenCases:
     def test_points_declared(self, arcor2_bench: Bench) -> None:
         """Points have distinct names and are returned at once, and forces are offered only where a crash ends them."""
         device = arcor2_bench.connected()
-        points = timed(device.live_points, 1.0, "live_points")
+        points = require_in_time(device.live_points, 1.0, "live_points")
         names = [point.name for point in points]
         assert len(names) == len(set(names)), "live_points returns a name twice"
         forcible = [point.name for point in points if not isinstance(point.force, Unset)]
@@ -123,7 +123,9 @@ class WrittenCases:
         assert calls, "the bench does not try any limit"
         for what, call in calls.items():
             before = arcor2_bench.writes() if arcor2_bench.has("writes") else None
-            error = raised(call, OutOfRange, Refused, KinematicsError, within=arcor2_bench.call_within, what=what)
+            error = require_error(
+                call, OutOfRange, Refused, KinematicsError, within=arcor2_bench.call_within, what=what
+            )
             text = f"{error} {error.detail}"
             assert device.name in text, f"the refusal of {what} does not name {device.name!r}: {text}"
             if before is not None:

@@ -28,7 +28,7 @@ def ensure_private(path: Path) -> None:
         os.close(descriptor)
 
 
-def tighten(directory: Path) -> None:
+def restrict_permissions(directory: Path) -> None:
     """Remove the permissions of group and others from a directory and its entries. Log what cannot be changed."""
     for path in (directory, *directory.iterdir()):
         try:
@@ -44,7 +44,7 @@ def write_private(path: Path, content: bytes) -> None:
     replace_file(path, content)
 
 
-def aside(path: Path, stamp: str) -> Path:
+def damaged_copy_path(path: Path, stamp: str) -> Path:
     """Return an unused path next to a damaged file to which it can be moved."""
     stamp = stamp.replace(":", "").replace("-", "").partition(".")[0]
     found, number = path.with_name(f"{path.stem}.damaged-{stamp}{path.suffix}"), 1

@@ -222,7 +222,7 @@ class ServerSettings(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def checkpoints_dir(self) -> Path:
-        """The books of parts and the checkpoints of runs."""
+        """The part inventory and the checkpoints of runs."""
         return self.data_dir / "checkpoints"
 
     @property

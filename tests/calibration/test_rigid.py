@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from arcor2_hw.calibration.rigid import apart, crossed, inverted, mean_rotation, motion, moved, rotation_vector, turned
+from arcor2_hw.calibration.rigid import (
+    cross_matrix,
+    inverted,
+    mean_rotation,
+    motion,
+    moved,
+    pose_difference,
+    rotation_vector,
+    turned,
+)
 from arcor2_hw.data.geometry import Orientation
 
 axes = (
@@ -35,13 +44,13 @@ def test_motions_are_inverted_and_transformed(axis: np.ndarray, angle: float) ->
     after = moved(pose, step)
     x, y, z = pose[:3, 3]
     assert after[:3, 3] == pytest.approx([-y + 0.1, x, z])
-    assert apart(pose, moved(pose, np.array([0.0, 0.2, 0.0, 0.0, 0.0, 0.0])))[1] == pytest.approx(0.2)
+    assert pose_difference(pose, moved(pose, np.array([0.0, 0.2, 0.0, 0.0, 0.0, 0.0])))[1] == pytest.approx(0.2)
 
 
 def test_batched_cross_products_match_single_ones() -> None:
     vectors = np.random.default_rng(1).normal(size=(5, 3))
     other = np.array([0.3, -0.2, 0.9])
-    assert crossed(vectors) @ other == pytest.approx(np.cross(vectors, other))
+    assert cross_matrix(vectors) @ other == pytest.approx(np.cross(vectors, other))
 
 
 def test_mean_rotation_is_the_eigenvector_of_the_quaternions() -> None:

@@ -153,9 +153,9 @@ async def test_five_readings_agree(cell: Cell) -> None:
     assert len(erp["results"]) == boards
 
     async with Client(cell.url, "tests") as client:
-        (books,) = await client.get_parts()
-    assert books.counts == PartCounts(boards, passed, failed)
-    boxes = {place.kind: set(place.parts) for place in books.places if place.kind.is_box}
+        (inventory,) = await client.get_parts()
+    assert inventory.counts == PartCounts(boards, passed, failed)
+    boxes = {place.kind: set(place.parts) for place in inventory.places if place.kind.is_box}
     assert boxes[PlaceKind.GOOD] == {board["code"] for board in world["boards"] if board["good"]}
     assert boxes[PlaceKind.BAD] == {board["code"] for board in world["boards"] if not board["good"]}
 

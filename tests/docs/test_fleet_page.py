@@ -32,7 +32,7 @@ def test_the_tests_use_the_permissions_of_the_page() -> None:
 
 
 def test_the_page_states_the_limits_variables_and_options() -> None:
-    assert f"no state for {registry.DEAD_AFTER:g} s" in PAGE
+    assert f"no state for {registry.SILENT_AFTER:g} s" in PAGE
     assert f"up to {collector.ACKNOWLEDGE_TIMEOUT:g} s later" in PAGE
     named = set(re.findall(r"ARCOR2_HW_\w+", PAGE))
     assert named - set(_VARIABLES) == set()

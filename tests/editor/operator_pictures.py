@@ -16,8 +16,8 @@ from playwright.async_api import Error, expect
 
 from arcor2_hw.client import Client
 from arcor2_hw.exceptions import DeviceTimeout
-from benchmarks.books.cell import Cell
-from benchmarks.books.places import NAMES
+from benchmarks.parts.cell import Cell
+from benchmarks.parts.places import NAMES
 from tests.e2e.harness import until
 from tests.editor.screen import Screen, running_browser, screen_of
 

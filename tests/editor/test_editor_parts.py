@@ -67,7 +67,7 @@ async def test_operator_confirms_a_part_and_continues_after_kill(tmp_path: Path,
                 await expect(held).to_have_count(0)
                 await expect(parts).to_have_count(0)
             await until(lambda: notes.read_text().split() == ["pick", "place"], "the part is placed")
-            (books,) = await client.get_parts()
-            assert books.counts == PartCounts(fed=1, in_cell=1)
+            (inventory,) = await client.get_parts()
+            assert inventory.counts == PartCounts(fed=1, in_cell=1)
     finally:
         await server.stop()

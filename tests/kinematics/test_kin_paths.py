@@ -12,7 +12,7 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.kinematics.errors import MotionInCollision, NoStraightLine, OutOfReach
 from arcor2_hw.kinematics.model import RobotModel
 from arcor2_hw.kinematics.shapes import Array, Box
-from arcor2_hw.planning.paths import OFF_LINE, OFF_TURN, free_line, interpolate, straight_line
+from arcor2_hw.planning.paths import LINE_TOLERANCE, ORIENTATION_TOLERANCE, free_line, interpolate, straight_line
 from arcor2_hw.planning.timing import MotionLimits, Trajectory, along_line, point_to_point, with_stops
 from tests.kinematics import kin_robots
 
@@ -51,9 +51,9 @@ def test_the_tip_stays_on_the_line_and_rotates_evenly(model: RobotModel) -> None
             assert np.abs(b - a).max() < 0.6
             for share in np.linspace(0.0, 1.0, 7):
                 at = arm.pose(a + share * (b - a))
-                assert line_off(here.position, there.position, at.position) < 3.0 * OFF_LINE
+                assert line_off(here.position, there.position, at.position) < 3.0 * LINE_TOLERANCE
                 come = here.position.distance_to(at.position) / whole
-                assert at.orientation.angle_to(interpolate(here, there, come).orientation) < 6.0 * OFF_TURN
+                assert at.orientation.angle_to(interpolate(here, there, come).orientation) < 6.0 * ORIENTATION_TOLERANCE
     assert done >= 5
 
 
@@ -82,7 +82,7 @@ def test_a_planar_arm_follows_the_line_with_a_free_heading() -> None:
     assert len(way) > 2
     for a, b in itertools.pairwise(way):
         at = arm.pose((a + b) / 2.0).position
-        assert line_off(here.position, here.position + Position(-0.05, 0.04, 0.0), at) < 2.0 * OFF_LINE
+        assert line_off(here.position, here.position + Position(-0.05, 0.04, 0.0), at) < 2.0 * LINE_TOLERANCE
 
 
 def test_a_colliding_line_is_refused_with_the_point_of_collision() -> None:
@@ -152,7 +152,7 @@ def test_a_line_has_the_requested_tip_speed() -> None:
     assert np.median(speed) > 0.095
     assert timed.duration == pytest.approx(lengths[-1] / 0.1 + 0.1 / 0.5, rel=0.05)
     for values in at:
-        assert line_off(here.position, there.position, Position(*values)) < 2.0 * OFF_LINE
+        assert line_off(here.position, there.position, Position(*values)) < 2.0 * LINE_TOLERANCE
 
 
 def test_invalid_limits_are_refused() -> None:

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from arcor2_hw.collision.sweep import Sweep, levers
+from arcor2_hw.collision.sweep import Sweep, travel_per_joint
 from arcor2_hw.collision.world import CollisionWorld
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import Cancelled, InvalidData
@@ -165,7 +165,7 @@ def test_levers_bound_the_travel_of_points(make: object) -> None:
     model = make()  # type: ignore[operator]
     world = world_of(model)
     robot = world.robot("arm")
-    bound = levers(robot)
+    bound = travel_per_joint(robot)
     chance = np.random.default_rng(3)
     corners = {each.link: [] for each in model.collision}
     for each in model.collision:

@@ -27,7 +27,7 @@ SOURCE = '''"""A robot arm that goes from joint values to joint values."""
 
 from arcor2_hw.data.robot import Joint, KinematicCalibration
 from arcor2_hw.exceptions import Cancelled
-from arcor2_hw.objects.safe_moves import Way
+from arcor2_hw.objects.motion_path import MotionPath
 from arcor2_hw.objects.urdf_robot import UrdfRobot
 
 
@@ -42,7 +42,7 @@ class PlainArm(UrdfRobot):
         gripper = [Joint("finger", 0.01)] if include_gripper else []
         return [*self.now, *gripper]
 
-    def follow(self, way: Way) -> None:
+    def follow(self, way: MotionPath) -> None:
         """Go from waypoint to waypoint."""
         self.ways.append(way)
         for waypoint in way.waypoints[1:]:

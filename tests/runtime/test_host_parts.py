@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.geometry import Orientation, Position
 from arcor2_hw.data.held import HeldData, HoldChoice
-from arcor2_hw.data.parts import ConfirmedPart, Part, PartBooks
+from arcor2_hw.data.parts import ConfirmedPart, Part, PartInventory
 from arcor2_hw.data.project import (
     START,
     Action,
@@ -122,7 +122,7 @@ class Cell:
         host.send(m.RunPackage("pkg_1", str(path), streaming_period=0, **more))  # type: ignore[arg-type]
         return host
 
-    def books(self) -> PartBooks:
+    def inventory(self) -> PartInventory:
         found = CheckpointFile(self.records, "scn_1").read()
         assert found is not None
         return found
@@ -161,12 +161,12 @@ def confirm(host: HostProcess, *parts: ConfirmedPart) -> object:
 def test_a_nest_is_not_filled_twice_by_another_run(cell: Cell) -> None:
     host = cell.start(ONE)
     assert host.expect_state("stopped").finished
-    books = cell.books()
-    assert books.parts == [Part(1, "obj_nest", "A-1")]
-    assert books.run is not UNSET
-    assert books.run.ended
-    assert books.run.cycle == 1
-    assert books.run.results["act_scan"] == ['"A-1"']
+    inventory = cell.inventory()
+    assert inventory.parts == [Part(1, "obj_nest", "A-1")]
+    assert inventory.run is not UNSET
+    assert inventory.run.ended
+    assert inventory.run.cycle == 1
+    assert inventory.run.results["act_scan"] == ['"A-1"']
 
     host = cell.start(ONE.replace("A-1", "A-2"))
     found = held(host)
@@ -176,17 +176,17 @@ def test_a_nest_is_not_filled_twice_by_another_run(cell: Cell) -> None:
     assert confirm(host, ConfirmedPart(1, "obj_good")) is None
     decide(host, found.number, HoldChoice.RETRY)
     assert host.expect_state("stopped").finished
-    assert (cell.books().counts.fed, cell.books().counts.good) == (2, 1)
-    assert [part.serial for part in cell.books().parts] == ["A-2"]
+    assert (cell.inventory().counts.fed, cell.inventory().counts.good) == (2, 1)
+    assert [part.serial for part in cell.inventory().parts] == ["A-2"]
 
 
 def test_a_failed_movement_is_repeated_or_done_by_hand(cell: Cell) -> None:
     (cell.directory / "fault").touch()
     host = cell.start(ONE + 'arm.test(True, an="test")\narm.pick(inside, an="take")\narm.place(box, an="into_box")')
     found = held(host)
-    assert cell.books().parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm", confirmed=False)]
+    assert cell.inventory().parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm", confirmed=False)]
     changed = [each.books for each in host.seen if isinstance(each, m.PartsChanged)]
-    assert changed[-1].parts == cell.books().parts
+    assert changed[-1].parts == cell.inventory().parts
     (cell.directory / "sensor").write_text("on")
     decide(host, found.number, HoldChoice.SKIP)  # the part is in the gripper
     found = held(host)
@@ -205,7 +205,7 @@ def test_a_failed_movement_is_repeated_or_done_by_hand(cell: Cell) -> None:
     (cell.directory / "sensor").unlink()
     decide(host, found.number, HoldChoice.RETRY)
     assert host.expect_state("stopped").finished
-    assert cell.books().counts.good == 1
+    assert cell.inventory().counts.good == 1
 
 
 def test_after_kill_the_checkpoint_names_the_running_action(cell: Cell) -> None:
@@ -216,22 +216,22 @@ def test_after_kill_the_checkpoint_names_the_running_action(cell: Cell) -> None:
         pass
     os.kill(host.process.pid, signal.SIGKILL)
     host.gone()
-    books = cell.books()
-    assert books.run is not UNSET
-    assert not books.run.ended
-    assert [(action.action_name, action.branch) for action in books.run.actions] == [("pick", "main")]
-    assert books.run.last == "act_scan"
-    assert len(books.run.package_hash) == 64
-    assert books.parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm")]
+    inventory = cell.inventory()
+    assert inventory.run is not UNSET
+    assert not inventory.run.ended
+    assert [(action.action_name, action.branch) for action in inventory.run.actions] == [("pick", "main")]
+    assert inventory.run.last == "act_scan"
+    assert len(inventory.run.package_hash) == 64
+    assert inventory.parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm")]
 
 
 def test_checkpoints_of_actions_can_be_switched_off(cell: Cell) -> None:
     host = cell.start(BODY + 'arm.scan("A-1", an="scan")\narm.pick(box, an="pick")', checkpoints=False)
     found = held(host)  # parts are not taken from a box
-    assert cell.books().parts == []
+    assert cell.inventory().parts == []
     decide(host, found.number, HoldChoice.END)
     host.expect_state("stopped")
-    assert cell.books().parts == [Part(1, "obj_feeder", "A-1")]
+    assert cell.inventory().parts == [Part(1, "obj_feeder", "A-1")]
 
 
 def test_a_part_that_is_elsewhere_does_not_count_as_moved(cell: Cell) -> None:
@@ -279,7 +279,7 @@ def test_an_interrupted_program_continues_at_its_interrupted_action(cell: Cell, 
     os.kill(host.process.pid, signal.SIGKILL)
     host.gone()
     (cell.directory / "hang").unlink()
-    run = cell.books().run
+    run = cell.inventory().run
     assert run is not UNSET
     assert (run.published().continues, run.published().continues_at) == (True, ["pick"])
 
@@ -292,9 +292,9 @@ def test_an_interrupted_program_continues_at_its_interrupted_action(cell: Cell, 
     decide(host, found.number, HoldChoice.RETRY)
     assert host.expect_state("stopped").finished
     assert cell.notes() == ["pick", "pick", "place", "pick", "place"]
-    assert cell.books().counts.good == 1
-    assert cell.books().run.cycle == 1  # type: ignore[union-attr]
-    assert [done.name for done in cell.books().run.done] == ["scan", "pick", "insert", "test", "take", "into_box"]  # type: ignore[union-attr]
+    assert cell.inventory().counts.good == 1
+    assert cell.inventory().run.cycle == 1  # type: ignore[union-attr]
+    assert [done.name for done in cell.inventory().run.done] == ["scan", "pick", "insert", "test", "take", "into_box"]  # type: ignore[union-attr]
 
 
 def test_an_interrupted_program_continues_at_a_chosen_action(cell: Cell) -> None:
@@ -312,7 +312,7 @@ def test_an_interrupted_program_continues_at_a_chosen_action(cell: Cell) -> None
     decide(host, found.number, HoldChoice.RETRY)
     assert host.expect_state("stopped").finished
     assert cell.notes() == ["pick", "pick", "place", "pick", "place"]
-    assert cell.books().counts.good == 1
+    assert cell.inventory().counts.good == 1
 
 
 COUNTING = f"""{BODY}
@@ -346,7 +346,7 @@ def test_an_interrupted_program_continues_with_its_variables(cell: Cell) -> None
     os.kill(host.process.pid, signal.SIGKILL)
     host.gone()
     (cell.directory / "hang").unlink()
-    assert cell.books().run.variables == {"last": '"x"'}  # type: ignore[union-attr]
+    assert cell.inventory().run.variables == {"last": '"x"'}  # type: ignore[union-attr]
 
     host = cell.start(COUNTING, WITH_VARIABLE, continues=True)
     decide(host, held(host).number, HoldChoice.RETRY)

@@ -26,7 +26,7 @@ ACROSS = (2.74, -1.57, 1.57, -1.57, -1.57, 0.0)
 MEETING = (1.04, -1.57, 1.57, -1.57, -1.57, 0.0)
 """A pose of the tip that another arm can reach too."""
 ARM = """
-from arcor2_hw.objects.safe_moves import Way
+from arcor2_hw.objects.motion_path import MotionPath
 from arcor2_hw.objects.urdf_robot import UrdfRobot
 import ctypes
 
@@ -47,7 +47,7 @@ class Arm(UrdfRobot):
         ctypes.PyDLL(None).usleep(self.stall)  # holds the interpreter lock, like a machine that does not run the host
         return self.now
 
-    def follow(self, way: Way) -> None:
+    def follow(self, way: MotionPath) -> None:
         self.count, self.now = len(way.waypoints), way.waypoints[-1]
 
     def stop(self) -> None:
@@ -69,7 +69,7 @@ class SlowArm(Arm):
         super().stop()
         self.stopped = True
 
-    def follow(self, way: Way) -> None:
+    def follow(self, way: MotionPath) -> None:
         self.stopped = False
         goal = way.waypoints[-1]
         while abs(goal[0].value - self.now[0].value) > 0.01:

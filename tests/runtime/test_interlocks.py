@@ -25,7 +25,7 @@ from arcor2_hw.data.scene import Scene
 from arcor2_hw.messages import Message
 from arcor2_hw.objects import Generic
 from arcor2_hw.runtime import messages as m
-from arcor2_hw.runtime.needs import FRESH_FOR, Seen, read, verdict
+from arcor2_hw.runtime.needs import MAX_VALUE_AGE, CachedValue, read, verdict
 from arcor2_hw.runtime.zones import ZoneTokens
 
 from .conftest import PATIENCE, HostProcess, Package, scene_object, type_code
@@ -117,16 +117,16 @@ TestTokens = Tokens.TestCase
 def test_values_are_compared(operator: Operator, value: str, upper: str | None, seen: Any, state: str) -> None:
     need = Need("obj", "value", operator, value)
     need = need if upper is None else replace(need, upper=upper)
-    assert verdict(need, Seen(seen, time.monotonic()), "door").state == state
+    assert verdict(need, CachedValue(seen, time.monotonic()), "door").state == state
 
 
 def test_unknown_and_old_values_do_not_count() -> None:
     need = Need("obj", "open")
     never = verdict(need, None, "door")
     assert (never.state, str(never.text)) == ("unknown", "door: open is not confirmed, no value is known")
-    old = verdict(need, Seen(True, time.monotonic() - FRESH_FOR - 2.0), "door")
+    old = verdict(need, CachedValue(True, time.monotonic() - MAX_VALUE_AGE - 2.0), "door")
     assert (old.state, str(old.text)) == ("unknown", "door: open is not confirmed, last known 3 s ago")
-    closed = verdict(need, Seen(False, time.monotonic()), "door")
+    closed = verdict(need, CachedValue(False, time.monotonic()), "door")
     assert (closed.state, str(closed.text)) == ("not_met", "door: open is not met")
 
 
@@ -489,8 +489,8 @@ class Sensor(Generic):
 def test_an_uncertain_value_does_not_count() -> None:
     sensor = Sensor()
     device: Any = SimpleNamespace(name="sensor", recipe=SimpleNamespace(cls=Sensor), require=lambda: sensor)
-    good = read(device, "level", "", Seen())
+    good = read(device, "level", "", CachedValue())
     assert (good.value, good.problem) == (0.5, None)
     sensor.quality = Quality.UNCERTAIN
     assert read(device, "level", "", good) == good._replace(problem=Message.of("the value is not reliable"))
-    assert read(device, "height", "", Seen()).at == 0.0, "height is not marked as an observation"
+    assert read(device, "height", "", CachedValue()).at == 0.0, "height is not marked as an observation"

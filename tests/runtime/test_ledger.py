@@ -1,4 +1,4 @@
-"""Books of parts, and their checkpoints on disk."""
+"""Part inventory, and their checkpoints on disk."""
 
 import itertools
 import random
@@ -8,7 +8,7 @@ import pytest
 from msgspec import UNSET
 from msgspec.structs import replace
 
-from arcor2_hw.data.parts import ConfirmedPart, DoneAction, PartBooks, Place, PlaceKind, RunCheckpoint
+from arcor2_hw.data.parts import ConfirmedPart, DoneAction, PartInventory, Place, PlaceKind, RunCheckpoint
 from arcor2_hw.exceptions import Conflict, NotFound, PartError, PartUnconfirmed, PlaceEmpty, PlaceOccupied, WrongPart
 from arcor2_hw.runtime.checkpoints import CheckpointFile, stored_scenes
 from arcor2_hw.runtime.ledger import Ledger
@@ -24,7 +24,7 @@ PLACES = [
 
 @pytest.fixture
 def ledger() -> Ledger:
-    made = Ledger(PartBooks("scn_1"))
+    made = Ledger(PartInventory("scn_1"))
     made.set_places(PLACES)
     return made
 
@@ -37,7 +37,7 @@ def carry(ledger: Ledger, *way: str) -> None:
 def test_a_part_is_followed_from_the_feeder_to_the_box(ledger: Ledger) -> None:
     ledger.identify("stop", "A-1")
     carry(ledger, "stop", "robot", "nest")
-    (part,) = ledger.books.parts
+    (part,) = ledger.inventory.parts
     assert (part.place, part.serial, part.moving_to, part.confirmed) == ("nest", "A-1", UNSET, True)
     carry(ledger, "nest", "robot")
     ledger.tests = True
@@ -47,9 +47,9 @@ def test_a_part_is_followed_from_the_feeder_to_the_box(ledger: Ledger) -> None:
     with pytest.raises(WrongPart, match="A-1 does not belong in bad box: it has passed its test"):
         carry(ledger, "robot", "bad")
     carry(ledger, "robot", "good")
-    books = ledger.books
-    assert (books.counts.fed, books.counts.good, books.counts.in_cell) == (1, 1, 0)
-    assert next(place.parts for place in books.places if place.id == "good") == ["A-1"]
+    inventory = ledger.inventory
+    assert (inventory.counts.fed, inventory.counts.good, inventory.counts.in_cell) == (1, 1, 0)
+    assert next(place.parts for place in inventory.places if place.id == "good") == ["A-1"]
 
 
 def test_an_occupied_place_is_not_filled_twice(ledger: Ledger) -> None:
@@ -60,7 +60,7 @@ def test_an_occupied_place_is_not_filled_twice(ledger: Ledger) -> None:
         ledger.move("robot", "nest")
     with pytest.raises(PlaceOccupied, match="robot is occupied: part #2 is there"):
         ledger.move("stop", "robot")
-    assert ledger.books.counts.fed == 2  # a refused pick feeds nothing
+    assert ledger.inventory.counts.fed == 2  # a refused pick feeds nothing
     ledger.confirm([ConfirmedPart(1, ""), ConfirmedPart(2, "")])
     with pytest.raises(PlaceEmpty, match="no part at nest"):
         ledger.move("nest", "robot")
@@ -81,9 +81,9 @@ def test_after_a_failure_a_person_confirms_the_place(ledger: Ledger) -> None:
         ledger.confirm([ConfirmedPart(0, "nest")])
     with pytest.raises(Conflict, match="A-2"):
         ledger.confirm([ConfirmedPart(0, "robot", "A-2")])
-    assert ledger.books.counts.fed == 1
+    assert ledger.inventory.counts.fed == 1
     ledger.confirm([ConfirmedPart(0, "robot", "B-1"), ConfirmedPart(1, "")])
-    assert (ledger.books.counts.fed, ledger.books.counts.rejected, ledger.books.counts.in_cell) == (2, 1, 1)
+    assert (ledger.inventory.counts.fed, ledger.inventory.counts.rejected, ledger.inventory.counts.in_cell) == (2, 1, 1)
 
 
 def test_a_code_that_is_expected_elsewhere_is_refused(ledger: Ledger) -> None:
@@ -96,12 +96,12 @@ def test_a_code_that_is_expected_elsewhere_is_refused(ledger: Ledger) -> None:
         ledger.identify("stop", "A-1")
 
 
-def test_books_balance_after_random_operations(ledger: Ledger) -> None:
+def test_the_inventory_balances_after_random_operations(ledger: Ledger) -> None:
     seed = random.SystemRandom().randrange(1_000_000)
     chance = random.Random(seed)
     ids = [place.id for place in PLACES]
     for _ in range(3000):
-        parts = ledger.books.parts
+        parts = ledger.inventory.parts
         try:
             match chance.randrange(6):
                 case 0:
@@ -121,11 +121,11 @@ def test_books_balance_after_random_operations(ledger: Ledger) -> None:
                     carry(ledger, chance.choice(ids), chance.choice(ids))
         except PartError:
             pass
-        books, counts = ledger.books, ledger.books.counts
-        assert counts.fed == counts.good + counts.bad + counts.rejected + len(books.parts), seed
-        held = [part.place for part in books.parts]
+        inventory, counts = ledger.inventory, ledger.inventory.counts
+        assert counts.fed == counts.good + counts.bad + counts.rejected + len(inventory.parts), seed
+        held = [part.place for part in inventory.parts]
         assert len(held) == len(set(held)), seed
-    assert ledger.books.counts.good, seed
+    assert ledger.inventory.counts.good, seed
 
 
 def test_a_part_that_a_sensor_has_invented_does_not_count(ledger: Ledger) -> None:
@@ -133,10 +133,10 @@ def test_a_part_that_a_sensor_has_invented_does_not_count(ledger: Ledger) -> Non
     number = ledger.move("stop", "nest")
     ledger.fail(number)
     ledger.confirm([ConfirmedPart(1, "", exists=False)])
-    assert (ledger.books.counts.fed, ledger.books.counts.in_cell, ledger.books.counts.rejected) == (1, 1, 0)
+    assert (ledger.inventory.counts.fed, ledger.inventory.counts.in_cell, ledger.inventory.counts.rejected) == (1, 1, 0)
     ledger.confirm([ConfirmedPart(number, "nest")])
     ledger.identify("stop", "A-1")
-    assert [part.number for part in ledger.books.parts] == [2, 3]
+    assert [part.number for part in ledger.inventory.parts] == [2, 3]
     with pytest.raises(Conflict, match="A-1 was read, so it exists"):
         ledger.confirm([ConfirmedPart(3, "", exists=False)])
 
@@ -159,7 +159,7 @@ def test_a_power_cut_leaves_the_checkpoint_before(tmp_path: Path) -> None:
     file = CheckpointFile(tmp_path, "scn/1")
     assert file.read() is None
     for number in range(4):
-        file.write(PartBooks(f"{number}"))
+        file.write(PartInventory(f"{number}"))
     newest = max(tmp_path.iterdir(), key=lambda path: path.read_bytes()[0])
     whole = newest.read_bytes()
     for damaged in (whole[:-1], whole[:10], b"", whole[:-1] + bytes([whole[-1] ^ 1])):
@@ -168,7 +168,7 @@ def test_a_power_cut_leaves_the_checkpoint_before(tmp_path: Path) -> None:
         assert found is not None
         assert found.scene_id == "2"
     again = CheckpointFile(tmp_path, "scn/1")
-    again.write(PartBooks("5"))
+    again.write(PartInventory("5"))
     found = CheckpointFile(tmp_path, "scn/1").read()
     assert found is not None
     assert found.scene_id == "5"

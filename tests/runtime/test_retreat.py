@@ -11,7 +11,7 @@ from arcor2_hw.data.object_type import Box, Cylinder, Models, Sphere
 from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.exceptions import Cancelled, Interlocked
 from arcor2_hw.runtime.messages import Lease
-from arcor2_hw.runtime.retreat import MAX_SPEED, TOLERANCE, Leaving, Retreat, ends_outside
+from arcor2_hw.runtime.retreat import MAX_SPEED, TOLERANCE, Retreat, ZoneExit, ends_outside
 
 QUARTER: Final = Orientation(0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
 AT: Final = Pose(Position(1.0, 2.0, 0.0), QUARTER)
@@ -57,8 +57,8 @@ def jog(*twist: float, frame: str = "world", retract: bool = False) -> Lease:
     return Lease(1, "obj", 1, HoldKind.JOG, 1.0, None if retract else (*twist, 0.0, 0.0, 0.0), frame, retract=retract)  # type: ignore[arg-type]
 
 
-def leaving(*tips: Position) -> Leaving:
-    return Leaving("arm", {"zone": Retreat(Obstacle("zone", BOX, Pose()), [])}, tips)
+def leaving(*tips: Position) -> ZoneExit:
+    return ZoneExit("arm", {"zone": Retreat(Obstacle("zone", BOX, Pose()), [])}, tips)
 
 
 def test_a_robot_leaves_slowly_and_only_outwards() -> None:

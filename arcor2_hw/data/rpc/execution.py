@@ -5,7 +5,7 @@ from typing import Final
 from arcor2_hw.data.base import UNSET, Data, Unset
 from arcor2_hw.data.held import HeldData, HoldChoice, OnError
 from arcor2_hw.data.package import PackageSummary
-from arcor2_hw.data.parts import ConfirmedPart, PartBooks
+from arcor2_hw.data.parts import ConfirmedPart, PartInventory
 from arcor2_hw.data.position import ProgramPosition, ProgramStep
 from arcor2_hw.data.recipes import OrderId
 from arcor2_hw.data.role import Role
@@ -131,7 +131,7 @@ EXECUTION_RPCS: Final = (
     Rpc("DeletePackage", IdArgs, None, Role.ADVANCED_USER),
     Rpc("ExecuteAction", ExecuteActionArgs, None, Role.STANDARD_USER, dry_run=True),
     Rpc("GetHeld", None, GetHeldData, Role.OPERATOR, additional=True),
-    Rpc("GetParts", None, list[PartBooks], Role.OPERATOR, additional=True),
+    Rpc("GetParts", None, list[PartInventory], Role.OPERATOR, additional=True),
     Rpc("GetProgramPosition", None, ProgramPosition, Role.OPERATOR, additional=True),
     Rpc("ListPackages", None, list[PackageSummary], Role.OPERATOR),
     Rpc("PausePackage", None, None, Role.OPERATOR),

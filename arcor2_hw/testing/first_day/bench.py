@@ -30,7 +30,7 @@ from arcor2_hw.testing.first_day.declaration import FirstDay, Motion, read
 from arcor2_hw.testing.first_day.person import Interrupted, Person
 from arcor2_hw.testing.first_day.readings import readings_of
 from arcor2_hw.testing.life import wait_until
-from arcor2_hw.testing.steps import UP, stop_of
+from arcor2_hw.testing.steps import CONNECTED_STATES, stop_of
 
 STANDSTILL: Final = frozenset(
     {
@@ -226,11 +226,11 @@ class RealBench(CellBench):
             if self._observer is None:
                 self._observer = self._made_with({})
                 self._observer.connect(self.connect_timeout)
-            if self._observer.connection not in UP and not self._pulled:
+            if self._observer.connection not in CONNECTED_STATES and not self._pulled:
                 observer = self._observer
-                wait_until(lambda: observer.connection in UP, self.back_within, "observing the device")
-            return self._observer if self._observer.connection in UP else None
-        return next((each for each in self._made if each.connection in UP), None)
+                wait_until(lambda: observer.connection in CONNECTED_STATES, self.back_within, "observing the device")
+            return self._observer if self._observer.connection in CONNECTED_STATES else None
+        return next((each for each in self._made if each.connection in CONNECTED_STATES), None)
 
     @property
     def _single(self) -> bool:
@@ -258,12 +258,16 @@ class RealBench(CellBench):
             super().cut()
             return
         self._pulled = True
-        connected = [each for each in self._made if each.connection in UP]
+        connected = [each for each in self._made if each.connection in CONNECTED_STATES]
         if not connected:
             self.person.done("Pull the cable of the device, then press Enter.")
             return
         self.person.say("Pull the cable of the device now.", "warning")
-        wait_until(lambda: not any(each.connection in UP for each in connected), PULLED_WITHIN, "pulling the cable")
+        wait_until(
+            lambda: not any(each.connection in CONNECTED_STATES for each in connected),
+            PULLED_WITHIN,
+            "pulling the cable",
+        )
 
     def heal(self) -> None:
         """Undo `cut`."""
@@ -337,7 +341,9 @@ _OURS: Final = frozenset({"command", "run_long", "running", "orphan", "foreign",
 
 def _stop(device: Generic) -> None:
     with contextlib.suppress(Arcor2Error, AssertionError):
-        if device.connection in UP and (not knows_control(type(device)) or device.control_owner() == "us"):
+        if device.connection in CONNECTED_STATES and (
+            not knows_control(type(device)) or device.control_owner() == "us"
+        ):
             stop_of(device)()
 
 

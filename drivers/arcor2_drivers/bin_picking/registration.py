@@ -19,13 +19,13 @@ Floats = npt.NDArray[np.float64]
 
 MAX_POINTS: Final = 3000
 """Largest number of points that are registered."""
-REFINED: Final = 4
+REFINED_HYPOTHESES: Final = 4
 """Number of hypotheses, best first, that are refined."""
 ITERATIONS: Final = 30
 """Largest number of iterations of a round of ICP."""
 ROUNDS: Final = ((3.0, 2.0), (1.5, 1.0))
 """Search radius and Tukey's constant of each round of ICP, both in multiples of the tolerance."""
-WORTH_POLISHING: Final = 0.5
+MIN_REFINED_QUALITY: Final = 0.5
 """Smallest quality of a pose that is refined by small steps."""
 STEPS: Final = (0.001, 0.0005, 0.00025)
 """Step lengths, m."""
@@ -35,7 +35,7 @@ MAX_STEPS: Final = 4
 """Largest number of steps of one length."""
 MARGIN: Final = 6
 """Width of the margin around a cluster that is compared with the model, pixels."""
-NEAREST: Final = 0.01
+MIN_POINT_DISTANCE: Final = 0.01
 """Smallest distance of a point from the camera, m."""
 MIN_SEEN: Final = 0.5
 """Smallest fraction of valid depth among the pixels in which the model is expected."""
@@ -85,13 +85,13 @@ def register(crate: Crate, pixels: Pixels, model: Model, camera: Floats, rays: A
     starts.sort(key=lambda pose: _distance(tree, sparse, pose, tolerance))
     judge = _Evaluator(crate, pixels, model, camera, rays, tolerance)
     fits = []
-    for start in starts[:REFINED]:
+    for start in starts[:REFINED_HYPOTHESES]:
         pose = _refined(points, model, start, tolerance)
         fits.append(judge(pose))
         if fits[-1].quality > 0.95:
             break
     best = max(fits, key=lambda fit: fit.quality)
-    if best.quality < WORTH_POLISHING:
+    if best.quality < MIN_REFINED_QUALITY:
         return best
     return _polished(best, judge, points)
 
@@ -234,7 +234,7 @@ class _Evaluator:
         top, bottom, left, right = self._bounds
         in_crate = self._model.vertices @ pose[:3, :3].T + pose[:3, 3]
         seen = (in_crate - self._camera[:3, 3]) @ self._camera[:3, :3]
-        seen = seen[seen[:, 2] > NEAREST]
+        seen = seen[seen[:, 2] > MIN_POINT_DISTANCE]
         if len(seen):
             x, y = seen[:, 0] / seen[:, 2], seen[:, 1] / seen[:, 2]
             left = min(left, int(np.searchsorted(self._across, x.min())))

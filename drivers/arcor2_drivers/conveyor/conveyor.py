@@ -5,11 +5,11 @@ from typing import ClassVar, Final
 from arcor2_hw.actions import action, observation
 from arcor2_hw.data.device import Alarm, Health, Identity, LossReaction, Reading
 from arcor2_hw.data.maintenance import DeviceParameter, ParameterFailure
-from arcor2_hw.exceptions import ConnectionLost, NotFound, NotInControl, OutOfRange, Refused
+from arcor2_hw.exceptions import ConnectionLost, NotFound, OutOfRange, Refused
 from arcor2_hw.messages import Phrase
 from arcor2_hw.objects import Axis, Machine, MachineCommand, MachineState
 from arcor2_hw.objects.observing import GoOn
-from arcor2_hw.objects.polled_control import NOBODY, US, PolledControl
+from arcor2_hw.objects.polled_control import NOBODY, OWNED_BY_US, PolledControl
 
 from . import cia402
 from .cia402 import FAULTY, SWITCHED_OFF, Power, State
@@ -22,7 +22,7 @@ from .settings import MAX_HEARTBEAT_TIME, MAX_MOVE_TIME, MAX_RAMP_TIME, Conveyor
 
 MARGIN: Final = 30.0
 """Time a move may take beyond MAX_MOVE_TIME, s: enabling, handshake and stop, including timeouts."""
-NOTICES: Final = 0.1
+DECELERATION_DELAY: Final = 0.1
 """Time from the heartbeat timeout until the drive decelerates, s."""
 
 
@@ -33,7 +33,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
     display_name = "Conveyor"
     states: ClassVar[frozenset[MachineState]] = STATES
     loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(
-        MAX_HEARTBEAT_TIME / 1000.0 + NOTICES + MAX_RAMP_TIME
+        MAX_HEARTBEAT_TIME / 1000.0 + DECELERATION_DELAY + MAX_RAMP_TIME
     )
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {
         "home": "halt",
@@ -153,7 +153,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
     def owner_of(self, state: State) -> str | None:
         """Return who has control: us, the node whose heartbeat is monitored, or the client that enabled the drive."""
         if self.in_control:
-            return US
+            return OWNED_BY_US
         master, limit = self._observer.consumer >> 16 & 0x7F, self._observer.consumer & 0xFFFF
         if limit and self._observer.received_heartbeat(master, limit / 1000.0):
             return Phrase.of("node {node}, whose heartbeat the drive monitors,", node=master)
@@ -172,17 +172,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
     def _begin(self, what: str, resting: bool = True) -> tuple[State, GoOn]:
         go_on = self.begin(what)
         now = self.fresh()
-        if not self.in_control:
-            owner = self.control_owner()
-            raise NotInControl(
-                "{device}: {what} is refused in state {state}: {owner} has control"
-                if owner
-                else "{device}: {what} is refused in state {state}: nobody has control",
-                device=self.who,
-                what=what,
-                state=now.power,
-                owner=owner,
-            )
+        self.require_control(what)
         if resting and not self._motion.is_stopped(now):
             raise Refused("{device}: {what} is refused while the belt moves: halt it first", device=self.who, what=what)
         return now, go_on

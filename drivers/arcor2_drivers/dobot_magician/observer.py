@@ -22,7 +22,7 @@ PERIOD: Final = 0.025
 """Time between readings, s: three short exchanges, which take 10 ms at 115200 baud."""
 STANDSTILL_AFTER: Final = 0.1
 """Time without a change after which the arm is at standstill, s."""
-STILL: Final = math.radians(0.005)
+STANDSTILL_CHANGE: Final = math.radians(0.005)
 """Change of a joint between two readings at standstill, rad."""
 MAX_AGE: Final = 0.5
 """Greatest age of a sample, s."""
@@ -162,7 +162,7 @@ class Observer(StateObserver[Sample]):
         one, two, three, four = map(math.radians, angles)
         q = one, two, three, four
         before = self._before
-        if before is not None and max(abs(a - b) for a, b in zip(before.q, q, strict=True)) > STILL:
+        if before is not None and max(abs(a - b) for a, b in zip(before.q, q, strict=True)) > STANDSTILL_CHANGE:
             self._moved_at = started
         if before is not None and RESET in alarms and RESET not in before.alarms:
             raise ConnectionLost("{device} was switched off and on.", device=self.who)

@@ -12,7 +12,7 @@ from arcor2_hw.exceptions import Cancelled, DeviceError, DeviceFault, DeviceTime
 from arcor2_hw.messages import Phrase, translatable
 from arcor2_hw.objects import CollisionObject, Machine, MachineCommand, MachineState, UnitMode
 
-from .registers import DOOR_CLOSE, DOOR_OPEN, FALLEN, PASSING, STATES, Holding, Inputs, fault_of, title
+from .registers import ABORT_STATES, DOOR_CLOSE, DOOR_OPEN, STATES, TRANSIENT_STATES, Holding, Inputs, fault_of, title
 from .settings import MAX_TEST_TIME, MAX_WATCHDOG_TIMEOUT, FunctionalTesterSettings
 from .tester import TRANSITION, Tester
 
@@ -131,7 +131,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         inputs = self.current()
         if inputs.fault_code:
             return f"fault {inputs.fault_code}: {fault_of(inputs.fault_code).text}"
-        if inputs.state in FALLEN:
+        if inputs.state in ABORT_STATES:
             return "aborted by command"
         return "stopped" if inputs.state in (S.STOPPED, S.STOPPING) else ""
 
@@ -140,12 +140,12 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         what = f"reaching {title(state)}"
         self.reach({state}, timeout, what, self.begin(what))
 
-    def command(self, command: MachineCommand) -> None:
-        """Send a command; return when the tester has accepted it. Raises Refused, naming command and state."""
-        self._command(command)
+    def command(self, command: MachineCommand, then: MachineState | None = None) -> None:
+        """Send a command; return when it is accepted and, if `then` is set, when the tester is in that state.
 
-    def _command(self, command: MachineCommand, then: MachineState | None = None) -> None:
-        """Send a command and wait for the state `then`."""
+        Raises:
+            Refused: The tester does not accept the command.
+        """
         name = command.name.lower()
         go_on = self.begin(name)
         self.require_command(name)
@@ -162,22 +162,20 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         if not self.in_control:
             return
         go_on = self.begin("stop")
-        if self.fresh().state in FALLEN | {S.STOPPED, S.CLEARING}:
+        if self.fresh().state in ABORT_STATES | {S.STOPPED, S.CLEARING}:
             return
         self.send_command(MachineCommand.STOP, go_on)
-        self.reach({S.STOPPED, *FALLEN}, TRANSITION, "stop", go_on)
+        self.reach({S.STOPPED, *ABORT_STATES}, TRANSITION, "stop", go_on)
 
     # -------------------------------------------------------------------------------- actions
     @action
     def open_door(self, *, an: str | None = None) -> None:
         """Open the door and wait until it is open."""
-        self.require_command("open_door")
         self.move_door(DOOR_OPEN, "open_door", lambda now: now.door_open)
 
     @action
     def close_door(self, *, an: str | None = None) -> None:
         """Close the door and wait until it is closed."""
-        self.require_command("close_door")
         self.move_door(DOOR_CLOSE, "close_door", lambda now: now.door_closed)
 
     @action(deadline=MAX_TEST_TIME + MARGIN, verdict=True)
@@ -191,9 +189,11 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         what = Phrase.of("test with program {program}", program=program)
         go_on = self.begin(what)
         before = self.require_command("test")
-        if before.state in PASSING:
-            before = self.wait(lambda now: now.state not in PASSING, TRANSITION, "leaving the short state", go_on)
-        if before.state in FALLEN:
+        if before.state in TRANSIENT_STATES:
+            before = self.wait(
+                lambda now: now.state not in TRANSIENT_STATES, TRANSITION, "leaving the short state", go_on
+            )
+        if before.state in ABORT_STATES:
             raise self.fault(before, f"test is refused in state {title(before.state)}: what ran before")
         if before.state in (S.COMPLETE, S.STOPPED):
             self.send_command(MachineCommand.RESET, go_on)
@@ -203,7 +203,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         self.link.write_registers(Holding.TEST_PROGRAM, program)
 
         def finished(inputs: Inputs) -> bool:
-            if inputs.state in FALLEN:
+            if inputs.state in ABORT_STATES:
                 raise self.fault(inputs, what)
             if inputs.state in (S.STOPPING, S.STOPPED):
                 raise Cancelled("{device}: {what} was stopped at the station", device=self.who, what=what)
@@ -259,14 +259,14 @@ class FunctionalTester(Tester, Machine, CollisionObject):
     @action
     def reset(self, *, an: str | None = None) -> None:
         """Reset the tester for a test, and wait until it is idle."""
-        self._command(MachineCommand.RESET, S.IDLE)
+        self.command(MachineCommand.RESET, S.IDLE)
 
     @action
     def clear(self, *, an: str | None = None) -> None:
         """Clear a fault after its cause was removed; return when the tester is stopped."""
-        self._command(MachineCommand.CLEAR, S.STOPPED)
+        self.command(MachineCommand.CLEAR, S.STOPPED)
 
     @action
     def abort(self, *, an: str | None = None) -> None:
         """Abort; return when the tester is aborted. It has to be cleared afterwards."""
-        self._command(MachineCommand.ABORT, S.ABORTED)
+        self.command(MachineCommand.ABORT, S.ABORTED)

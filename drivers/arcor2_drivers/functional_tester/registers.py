@@ -33,9 +33,9 @@ S = MachineState
 STATES: Final = frozenset(S) - {S.SUSPENDED, S.SUSPENDING, S.UNSUSPENDING}
 RUNNING: Final = frozenset({S.STARTING, S.EXECUTE, S.COMPLETING, S.HOLDING, S.HELD, S.UNHOLDING})
 DOOR_MAY_MOVE: Final = frozenset({S.STOPPED, S.IDLE, S.COMPLETE, S.ABORTED})
-PASSING: Final = frozenset({S.RESETTING, S.CLEARING, S.STOPPING, S.ABORTING})
+TRANSIENT_STATES: Final = frozenset({S.RESETTING, S.CLEARING, S.STOPPING, S.ABORTING})
 """Short states without a test that end by themselves."""
-FALLEN: Final = frozenset({S.ABORTING, S.ABORTED})
+ABORT_STATES: Final = frozenset({S.ABORTING, S.ABORTED})
 COMMANDS: Final = frozenset(
     {
         MachineCommand.RESET,

@@ -23,18 +23,18 @@ from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from arcor2_hw.objects.modbus_device import ModbusDevice
 from arcor2_hw.objects.modbus_link import ModbusLink
 from arcor2_hw.objects.observing import GoOn
-from arcor2_hw.objects.polled_control import US
+from arcor2_hw.objects.polled_control import OWNED_BY_US
 from arcor2_hw.objects.state_observer import Snapshot
 
 from . import registers
-from .registers import FALLEN, RUNNING, Holding, Inputs, fault_of, title
+from .registers import ABORT_STATES, RUNNING, Holding, Inputs, fault_of, title
 from .settings import FunctionalTesterSettings
 
 TRANSITION: Final = 3.0
 """Time for a short state, s: Resetting, Clearing, Stopping, Aborting take about 0.2 s."""
 LIFE_TIMEOUT: Final = 1.0
 """Time without a change of the life counter after which the values are old, s."""
-NOTICED: Final = 0.2
+WATCHDOG_MARGIN: Final = 0.2
 """Time beyond the watchdog after which the tester has certainly detected our absence, s."""
 
 
@@ -87,7 +87,7 @@ class Tester(ModbusDevice[Inputs]):
         """End control. Send no requests for a while, so that the watchdog of the tester ends a running test."""
         newest = self.newest()
         if self.in_control and newest is not None and newest.state in RUNNING:
-            self._leave_alone_until = self.link.sent + self._s.watchdog_ms / 1000.0 + NOTICED
+            self._leave_alone_until = self.link.sent + self._s.watchdog_ms / 1000.0 + WATCHDOG_MARGIN
         super().on_lost(error)
 
     def current(self) -> Inputs:
@@ -148,7 +148,7 @@ class Tester(ModbusDevice[Inputs]):
         if state.mode is not UnitMode.PRODUCE:
             return Phrase.of("the key switch at the station ({mode})", mode=state.mode.name.lower())
         if self.in_control:
-            return US
+            return OWNED_BY_US
         other = Phrase.of("another client, which started a test (state {state}),", state=title(state.state))
         return other if state.state in RUNNING else None
 
@@ -165,7 +165,7 @@ class Tester(ModbusDevice[Inputs]):
         """Return a fresh state if we have control. Raises NotInControl, which names the owner."""
         inputs = self.fresh()
         owner = self.owner_of(inputs)
-        if owner != US:
+        if owner != OWNED_BY_US:
             raise NotInControl(
                 "{device}: {what} is refused in state {state}: {owner} has control"
                 if owner
@@ -191,10 +191,7 @@ class Tester(ModbusDevice[Inputs]):
             )
         with self._one_command:
             before = self.fresh()
-            # Read the number, because the tester may have restarted or another host may have sent commands.
-            sequence = (self._read_holding()[Holding.COMMAND_SEQUENCE] + 1) & 0xFFFF
-            go_on()
-            self.link.write_registers(Holding.COMMAND, command, sequence)
+            sequence = self._write_numbered(Holding.COMMAND, command, go_on)
             after = self.wait(
                 lambda inputs: inputs.command_acknowledged == sequence,
                 4.0 * self._s.request_timeout,
@@ -220,7 +217,7 @@ class Tester(ModbusDevice[Inputs]):
         def arrived(inputs: Inputs) -> bool:
             if inputs.state in wanted:
                 return True
-            if inputs.state in FALLEN and not wanted & FALLEN:
+            if inputs.state in ABORT_STATES and not wanted & ABORT_STATES:
                 raise self.fault(inputs, what)
             return False
 
@@ -248,6 +245,7 @@ class Tester(ModbusDevice[Inputs]):
 
     def move_door(self, command: int, what: str, arrived: Callable[[Inputs], bool]) -> None:
         """Move the door and wait for its end position. The tester reports no refusal, so the state is checked."""
+        self.require_command(what)
         go_on = self.begin(what)
         began = time.monotonic()
 
@@ -259,7 +257,7 @@ class Tester(ModbusDevice[Inputs]):
                     kind="emergency_stop",
                     **values,
                 )
-            if inputs.state not in registers.DOOR_MAY_MOVE | registers.PASSING:
+            if inputs.state not in registers.DOOR_MAY_MOVE | registers.TRANSIENT_STATES:
                 text = "{device}: {what} is refused in state {state}: the door moves only when no test runs"
                 raise Refused(text, **values)
             return arrived(inputs)
@@ -270,14 +268,18 @@ class Tester(ModbusDevice[Inputs]):
 
         self.wait(movable, TRANSITION, f"{what}: reaching a state that lets the door move", go_on)
         with self._one_command:
-            sequence = (self._read_holding()[Holding.DOOR_SEQUENCE] + 1) & 0xFFFF
-            go_on()
-            self.link.write_registers(Holding.DOOR_COMMAND, command, sequence)
+            self._write_numbered(Holding.DOOR_COMMAND, command, go_on)
         left = max(0.1, began + self._s.door_timeout - time.monotonic())
         try:
             self.wait(done, left, what, go_on)
         except DeviceTimeout as error:
             raise DeviceTimeout("{reason}: the door does not reach its end position", reason=error) from error
 
-    def _read_holding(self) -> list[int]:
-        return self.link.read_holding_registers(0, registers.HOLDING_COUNT)
+    def _write_numbered(self, register: int, command: int, go_on: GoOn) -> int:
+        """Write a command with its number, which is in the next register; return the number."""
+        # Read the number, because the tester may have restarted or another host may have sent commands.
+        holding = self.link.read_holding_registers(0, registers.HOLDING_COUNT)
+        sequence = (holding[register + 1] + 1) & 0xFFFF
+        go_on()
+        self.link.write_registers(register, command, sequence)
+        return sequence

@@ -20,7 +20,7 @@ from arcor2_hw.exceptions import (
 from arcor2_hw.messages import Phrase
 from arcor2_hw.objects.edges import DigitalPoints
 from arcor2_hw.objects.observing import GoOn
-from arcor2_hw.objects.polled_control import US, PolledControl
+from arcor2_hw.objects.polled_control import OWNED_BY_US, PolledControl
 from arcor2_hw.objects.state_observer import Snapshot
 
 from .link import Link, status_name
@@ -28,14 +28,14 @@ from .points import parse_handshake, parse_points
 from .settings import OpcUaPlcSettings
 from .values import INTEGERS, content, fits, is_bad, stamp, type_of
 
-BEATS: Final = 5
+LIFE_SIGNS_PER_TIMEOUT: Final = 5
 """Number of changes of our life sign within the shorter of both timeouts."""
 SERVER_STATE: Final = 2259
 IDLE_TIMEOUT: Final = 1.0
 """Time the PLC has to end the handshake of a former host, s."""
 ANSWER_TIMEOUT: Final = 2.0
 """Time the PLC has to answer a request by busy, done or error, and to become idle after its end, s."""
-LEAVING: Final = 0.3
+RELEASE_TIMEOUT: Final = 0.3
 """Time limit for releasing control when the connection is closed, s."""
 STATUS: Final = ("plc_life", "owner", "busy", "done", "error", "code")
 """Variables of the handshake that are read, in the order of the fields of `Handshake`."""
@@ -80,7 +80,7 @@ class Plc(PolledControl[Handshake]):
         self.digital_points = DigitalPoints(point.io for point in self.plc_points.values())
         self.newest_values: dict[str, ua.DataValue] = {}
         self.types: dict[str, ua.VariantType] = {}
-        self.period = min(settings.plc_patience, settings.life_timeout) / BEATS
+        self.period = min(settings.plc_patience, settings.life_timeout) / LIFE_SIGNS_PER_TIMEOUT
         self.answers_within = max(self.answers_within, 3.0 * settings.request_timeout)
         self._life, self._beat = 0, 0.0
         self._plc_life: tuple[Any, float] = (None, 0.0)
@@ -189,12 +189,12 @@ class Plc(PolledControl[Handshake]):
     def leave(self) -> None:
         """Release control because we disconnect; the PLC detects the missing life sign otherwise."""
         self.drop_control()
-        self.link.write(self._request(False) | {"owner": self.variant("owner", 0)}, LEAVING)
+        self.link.write(self._request(False) | {"owner": self.variant("owner", 0)}, RELEASE_TIMEOUT)
 
     def owner_of(self, state: Handshake) -> str | None:
         """Return the owner: us, or another host by its number."""
         if self.in_control and state.owner == self._s.host_number:
-            return US
+            return OWNED_BY_US
         return self._named(state.owner) if state.owner else None
 
     def _named(self, owner: int) -> str:

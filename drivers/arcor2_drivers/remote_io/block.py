@@ -14,7 +14,7 @@ from arcor2_hw.objects.connected import AlarmText
 from arcor2_hw.objects.edges import DigitalPoints
 from arcor2_hw.objects.modbus_device import ModbusDevice
 from arcor2_hw.objects.modbus_link import ModbusLink
-from arcor2_hw.objects.polled_control import US
+from arcor2_hw.objects.polled_control import OWNED_BY_US
 from arcor2_hw.objects.settings import within
 from arcor2_hw.objects.state_observer import Snapshot
 
@@ -118,7 +118,7 @@ class Block(ModbusDevice[Image]):
         if running is not WatchdogState.RUNNING:
             return None
         if number == self._number:
-            return US
+            return OWNED_BY_US
         return Phrase.of("another host (number {number} on watchdog {watchdog})", number=number, watchdog=watchdog)
 
     def why_control_ended(self, state: Image) -> str:

@@ -11,7 +11,7 @@ from arcor2_hw.exceptions import DeviceError, DeviceFault, DeviceTimeout, NotFou
 from arcor2_hw.messages import Message, Phrase
 from arcor2_hw.objects import Gripper, GripResult, PartSize
 from arcor2_hw.objects.observing import GoOn
-from arcor2_hw.objects.polled_control import NOBODY, US, PolledControl
+from arcor2_hw.objects.polled_control import NOBODY, OWNED_BY_US, PolledControl
 from arcor2_hw.objects.small import GripperState
 from arcor2_hw.objects.state_observer import Snapshot
 
@@ -19,7 +19,7 @@ from . import scaling
 from .ascii_link import AsciiLink
 from .rtu_link import RtuLink
 from .settings import Robotiq2FSettings, Wire
-from .status import FIRST_MAJOR, HELD, Activation, Command, Link, Object, Status, fault_of
+from .status import FIRST_MAJOR_FAULT, HELD, Activation, Command, Link, Object, Status, fault_of
 
 MARGIN: Final = 2.0
 """Time a motion may take beyond stroke / speed, s: for acceleration, the force to build up, and a slow wire."""
@@ -117,7 +117,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
         status = self.fresh()
         if not status.fault or str(status.fault) != code:
             raise NotFound("{device} has no alarm {code}", device=self.who, code=code)
-        if status.fault < FIRST_MAJOR:
+        if status.fault < FIRST_MAJOR_FAULT:
             fault = fault_of(status.fault)
             raise Refused(
                 "{device}: fault {code} ({text}) is cleared by removing its cause: {remedy}.",
@@ -145,7 +145,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
     def owner_of(self, state: Status) -> str | None:
         """Return the owner; another client is detected only while it moves the gripper."""
         if self.in_control:
-            return US
+            return OWNED_BY_US
         return Phrase.of("another client, which moves the gripper,") if state.moving else None
 
     def arm(self) -> None:
@@ -171,31 +171,20 @@ class Robotiq2F(PolledControl[Status], Gripper):
         super().drop_control(why)
         self._commanded = None
 
-    def _require_ready(self, what: str) -> Status:
+    def _check(self, status: Status, what: str) -> None:
+        """Check that we have control and that no major fault is active. Raise NotInControl or DeviceFault."""
         self.require_control(what)
-        status = self.fresh()
-        if status.fault >= FIRST_MAJOR:
-            raise self._fault(status, what)
-        if not status.active:
-            raise Refused(
-                "{device}: {what} is refused in state {inactive}: activate it first",
+        if status.fault >= FIRST_MAJOR_FAULT:
+            fault = fault_of(status.fault)
+            raise DeviceFault(
+                "{device}: {what} ended by fault {code}: {text}",
+                fault.remedy,
+                status.fault,
                 device=self.who,
                 what=what,
-                inactive=GripperState.INACTIVE,
+                code=status.fault,
+                text=Message.of(fault.text),
             )
-        return status
-
-    def _fault(self, status: Status, what: str) -> DeviceFault:
-        fault = fault_of(status.fault)
-        return DeviceFault(
-            "{device}: {what} ended by fault {code}: {text}",
-            fault.remedy,
-            status.fault,
-            device=self.who,
-            what=what,
-            code=status.fault,
-            text=Message.of(fault.text),
-        )
 
     # -------------------------------------------------------------------------------- observing
     def state(self) -> GripperState:
@@ -274,13 +263,20 @@ class Robotiq2F(PolledControl[Status], Gripper):
         except OutOfRange as e:
             raise OutOfRange("{device}: {reason}", device=self.who, reason=e) from e
         with self.act(what) as go_on:
-            self._require_ready(what)
+            self.require_control(what)
+            status = self.fresh()
+            self._check(status, what)
+            if not status.active:
+                raise Refused(
+                    "{device}: {what} is refused in state {inactive}: activate it first",
+                    device=self.who,
+                    what=what,
+                    inactive=GripperState.INACTIVE,
+                )
             self._write(command, what, go_on)
 
             def at_standstill(status: Status) -> bool:
-                self.require_control(what)
-                if status.fault >= FIRST_MAJOR:
-                    raise self._fault(status, what)
+                self._check(status, what)
                 if not status.active:
                     raise DeviceFault(
                         "{device}: {what} ended early: the gripper was reset or switched off",
@@ -305,8 +301,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
         with self.act(what) as go_on:
             self.require_control(what)
             status = self.fresh()
-            if status.fault >= FIRST_MAJOR:
-                raise self._fault(status, what)
+            self._check(status, what)
             if status.active:
                 return
             self._reset(go_on)
@@ -315,9 +310,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
                 self._write(Command(act=True, go_to=False), what, go_on)
 
                 def ready(status: Status) -> bool:
-                    self.require_control(what)
-                    if status.fault >= FIRST_MAJOR:
-                        raise self._fault(status, what)
+                    self._check(status, what)
                     return status.active
 
                 self.wait(ready, self._s.activation_timeout, what, go_on)

@@ -49,7 +49,7 @@ class Status:
     def moving(self) -> bool:
         """Return whether the fingers move."""
         return self.activation is Activation.ACTIVATING or (
-            self.active and self.go_to and self.object is Object.MOVING and self.fault < FIRST_MAJOR
+            self.active and self.go_to and self.object is Object.MOVING and self.fault < FIRST_MAJOR_FAULT
         )
 
 
@@ -91,7 +91,7 @@ class Fault(NamedTuple):
     health: Health
 
 
-FIRST_MAJOR: Final = 0x0A
+FIRST_MAJOR_FAULT: Final = 0x0A
 """Lowest code of the faults that only a reset clears."""
 _REACTIVATE: Final = "; acknowledge the fault, then activate the gripper"
 

@@ -22,11 +22,11 @@ from .sics import Answer
 
 STATUS_PERIOD: Final = 0.5
 """Time between status requests while the line is free, s."""
-RECENT: Final = 2.0
+MAX_SHOWN_AGE: Final = 2.0
 """Age up to which a weight is shown as present, s."""
 STABLE_PERIOD: Final = 0.03
 """Time between requests while waiting for a stable value, s; a scale measures about 20 times per second."""
-OUTSIDE_FOR: Final = 0.5
+OUT_OF_RANGE_TIME: Final = 0.5
 """Time outside the range after which it is a fault, s: placing a part exceeds its weight for a moment."""
 DEADLINE: Final = 90.0
 CANCEL: Final = b"@\r\n"
@@ -160,7 +160,7 @@ class MtSicsScale(LineDevice, Scale):
             self._needs_tare()
             if answer.mark not in ("+", "-"):
                 inside = began
-            elif began - inside > OUTSIDE_FOR:
+            elif began - inside > OUT_OF_RANGE_TIME:
                 raise self._complaint(answer)
             if answer.mark == "S":
                 return self._reading(answer, began)
@@ -217,7 +217,7 @@ class MtSicsScale(LineDevice, Scale):
         newest = self._newest
         if newest is None:
             return [Observation(translatable("Net weight"), None, "kg", Quality.BAD)]
-        quality = newest.quality if newest.age <= RECENT else Quality.UNCERTAIN
+        quality = newest.quality if newest.age <= MAX_SHOWN_AGE else Quality.UNCERTAIN
         return [Observation(translatable("Net weight"), newest.value, "kg", quality)]
 
     # -------------------------------------------------------------------------------- actions

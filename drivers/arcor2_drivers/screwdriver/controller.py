@@ -143,10 +143,6 @@ class Controller(StateObserver[State]):
             self.line.send(telegrams.encode(mid, data, revision))
             self._sent = time.monotonic()
 
-    def command(self, mid: Mid, data: bytes = b"", revision: int = 1) -> None:
-        """Send a request; see `request`."""
-        self.request(mid, data, revision)
-
     def request(self, mid: Mid, data: bytes = b"", revision: int = 1, timeout: float = 0.0) -> Telegram:
         """Send a request and return its reply. A missing reply ends the connection.
 

@@ -85,7 +85,7 @@ class OpenProtocolScrewdriver(PolledControl[State], Generic):
         if code not in {alarm.code for alarm in self.fresh().alarms}:
             raise NotFound("{device} has no alarm {code}", device=self.who, code=code)
         what = f"acknowledging alarm {code}"
-        self.send(what, lambda: self._controller.command(Mid.CLEAR_ALARM))
+        self.send(what, lambda: self._controller.request(Mid.CLEAR_ALARM))
         self.wait(
             lambda state: code not in {alarm.code for alarm in state.alarms}, self._controller.answers_within, what
         )
@@ -193,7 +193,7 @@ class OpenProtocolScrewdriver(PolledControl[State], Generic):
 
     # -------------------------------------------------------------------------------- checks
     def _request(self, mid: Mid, data: bytes, revision: int = 1) -> None:
-        self.send(mid.name.lower(), lambda: self._controller.command(mid, data, revision))
+        self.send(mid.name.lower(), lambda: self._controller.request(mid, data, revision))
 
     def _require_ready(self, what: str) -> State:
         self.require_control(what)

@@ -22,19 +22,19 @@ from .registers import LED, STATUS_ERRORS, Register
 
 POLL: Final = 0.002
 """Time a read waits for bytes, s: the library itself would poll continuously."""
-LONGEST: Final = 0.35
+MAX_EXCHANGE_TIME: Final = 0.35
 """Longest exchange, s; the library does not check its own limit while bytes keep arriving."""
 WRITE_TIMEOUT: Final = 1.0
 """Time to write a packet, s: long enough for a process that is not scheduled while it writes."""
-PATIENCE: Final = 0.25
+FIRST_BYTE_TIMEOUT: Final = 0.25
 """Time to wait for the first byte of an answer, s; the library's 0.034 s is too short on a busy computer."""
-QUIET: Final = 0.03
+QUIET_TIME: Final = 0.03
 """Time without bytes after which the line is quiet, s."""
 ALERT: Final = 0x80
 PKT_ID, PKT_LENGTH_L, PKT_LENGTH_H, PKT_ERROR, PKT_DATA = 4, 5, 6, 8, 9
 EMPTY: Final = 4
 """Length field of an answer without data: instruction, error, checksum."""
-SHORTEST: Final = 11
+MIN_ANSWER: Final = 11
 """Size of an answer without data, bytes."""
 
 
@@ -56,7 +56,7 @@ class _Port(PortHandler):  # type: ignore[misc]
         self._heard = False
 
     def readPort(self, length: int) -> bytes:  # noqa: N802 - the library's name
-        if self._clock() > LONGEST:
+        if self._clock() > MAX_EXCHANGE_TIME:
             raise _Endless
         found: bytes = self.ser.read(max(length, 0))
         self._heard = self._heard or bool(found)
@@ -68,7 +68,7 @@ class _Port(PortHandler):  # type: ignore[misc]
 
     def isPacketTimeout(self) -> bool:  # noqa: N802 - the library's name
         limit = float(self.packet_timeout) / 1000.0
-        return self._clock() - self._asked > (limit if self._heard else max(limit, PATIENCE))
+        return self._clock() - self._asked > (limit if self._heard else max(limit, FIRST_BYTE_TIMEOUT))
 
 
 class _Recorder:
@@ -148,10 +148,10 @@ class Bus:
     def drain(self) -> None:
         """Discard received bytes until the line is quiet."""
         with self._exchange() as port:
-            quiet = time.monotonic() + QUIET
+            quiet = time.monotonic() + QUIET_TIME
             while time.monotonic() < quiet:
                 if port.readPort(256):
-                    quiet = time.monotonic() + QUIET
+                    quiet = time.monotonic() + QUIET_TIME
 
     def _check(self, number: int, result: int, error: int, what: str) -> None:
         if result == COMM_RX_TIMEOUT:
@@ -213,7 +213,7 @@ class Bus:
         with self._exchange() as port:
             sent = self._packets.writeTxOnly(port, number, register.address, register.size, data)
             self._check(number, sent, 0, what)
-            port.setPacketTimeout(SHORTEST)
+            port.setPacketTimeout(MIN_ANSWER)
             self._answer(port, number, 0, what)
 
     def reboot(self, number: int) -> None:

@@ -24,7 +24,7 @@ STANDSTILL_TIMEOUT: Final = 1.0
 """Time after which stopped joints must be at standstill, s."""
 ANSWER_TIMEOUT: Final = 2.0
 """Time a servo may take to reboot, s."""
-ANSWERS_EVERY: Final = 0.05
+ANSWER_POLL: Final = 0.05
 GOALS: Final = reg.PROFILE_ACCELERATION.address
 """Address of profile acceleration, profile velocity and goal, which are adjacent."""
 
@@ -246,7 +246,7 @@ class Control:
             until = time.monotonic() + ANSWER_TIMEOUT
             for number in failed:
                 while True:
-                    time.sleep(ANSWERS_EVERY)
+                    time.sleep(ANSWER_POLL)
                     try:
                         bus.ping(number)
                         break

@@ -33,12 +33,12 @@ TILTED: Final = 0.02
 """Greatest angle between the z axis of a pose and the axes of the joints, rad."""
 REACHED: Final = 12
 """Ticks (1°) from the goal within which a joint at standstill has arrived: a loaded servo stops short of its goal."""
-STILL: Final = 1e-6
+ZERO_VELOCITY: Final = 1e-6
 """Velocity below which a component of a twist is zero, m/s or rad/s."""
-STANDING: Final = 0.5
+STALL_TIME: Final = 0.5
 """Time after which joints that do not move, short of the goal, count as a failed move, s."""
-FLICKER: Final = 2
-"""Ticks by which the position of a joint at standstill may vary. The slowest profile covers 8 ticks in STANDING s."""
+POSITION_NOISE: Final = 2
+"""Ticks by which the position of a joint at standstill may vary. The slowest profile covers 8 ticks in STALL_TIME s."""
 
 
 class Motion:
@@ -201,10 +201,10 @@ class Motion:
                 if not guard.stopped():
                     return
             elif not state.standing or any(
-                abs(s.position - p) > FLICKER for s, p in zip(servos, positions, strict=True)
+                abs(s.position - p) > POSITION_NOISE for s, p in zip(servos, positions, strict=True)
             ):
                 since, positions = now, (servos[0].position, servos[1].position)
-            elif now - since > STANDING:
+            elif now - since > STALL_TIME:
                 raise DeviceFault(
                     "{joints} of {robot} stopped short of the goal. Remove what blocks the arm.",
                     fault_code="short_of_goal",
@@ -273,7 +273,7 @@ class Motion:
             "tool": Orientation.from_rotation_vector(0.0, 0.0, heading),
         }
         x, y, z = Position(*twist[:3]).rotated(jog_axes(self._name, frame, axes))
-        if abs(z) > STILL or any(abs(part) > STILL for part in twist[3:]):
+        if abs(z) > ZERO_VELOCITY or any(abs(part) > ZERO_VELOCITY for part in twist[3:]):
             raise Refused("{name} moves in a plane, and cannot rotate its tool separately.", name=self._name)
         rates = kinematics.rates(self._links, q, x, y)
         if rates is None:

@@ -19,13 +19,13 @@ from .settings import TwoAxisRobotSettings
 
 JOB_TIMEOUT: Final = 1.5
 """Time for a job, s."""
-QUIET: Final = 0.1
+MAX_READING_GAP: Final = 0.1
 """Time without a reading after which the child process signals the watchdog, s: no answer is then pending."""
 KICK_PERIOD: Final = 0.05
 """Time between signals of the child process, s; much shorter than the shortest bus watchdog."""
-TURNS: Final = 0.02
+REVERSAL_TIME: Final = 0.02
 """Time at velocity 0 after which a joint is at standstill, s: a joint that reverses reports 0, too."""
-JITTERS: Final = 0.1
+JITTER_TIME: Final = 0.1
 """Time at the lowest velocity after which a joint is at standstill, s: the last digit may flicker."""
 
 log = logging.getLogger(__name__)
@@ -78,7 +78,7 @@ class Observer(StateObserver[State]):
     def start_keep_alive(self) -> None:
         """Start the child process that keeps the watchdog from tripping while this process is busy."""
         if self._keep_alive is None:
-            self._keep_alive = self.bus.keep_alive(self._ids, KICK_PERIOD, QUIET)
+            self._keep_alive = self.bus.keep_alive(self._ids, KICK_PERIOD, MAX_READING_GAP)
 
     def open(self, timeout: float) -> Snapshot[State]:
         """Open the port, and read setup and state of the servos."""
@@ -148,4 +148,4 @@ class Observer(StateObserver[State]):
             self._moved = asked
         if fastest > 1:
             self._faster = asked
-        return State(servos, asked - self._moved > TURNS or asked - self._faster > JITTERS), asked
+        return State(servos, asked - self._moved > REVERSAL_TIME or asked - self._faster > JITTER_TIME), asked

@@ -23,7 +23,7 @@ POLL: Final = 0.01
 """Time between two readings of a sensor that is awaited, s."""
 WATCH_PERIOD: Final = 0.05
 """Time between two checks of the carrier and of a gripped part, s."""
-BLAST_ENDS: Final = 0.4
+BLAST_END_TIMEOUT: Final = 0.4
 """Time for a cancelled action to switch the blast of air off, s."""
 NOTHING_HELD: Final = "nothing_held"
 PART_LOST: Final = "part_lost"
@@ -120,7 +120,7 @@ class SuctionGripper(Connected, Suction):
     def stop(self) -> None:
         """Cancel the present action and end a blast of air. The vacuum stays as it is, so that no part falls."""
         self.stop_waiting()
-        if self._acting.acquire(timeout=BLAST_ENDS):  # the cancelled action ends the blast
+        if self._acting.acquire(timeout=BLAST_END_TIMEOUT):  # the cancelled action ends the blast
             self._acting.release()
 
     # -------------------------------------------------------------------------------- part

@@ -2,7 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import type { Slot } from "../program/chain";
-import { MIN_BRANCHES, MAX_BRANCHES, whyNotAtOnce } from "../program/lanes";
+import { MAX_BRANCHES, MIN_BRANCHES, whyNotAtOnce } from "../program/lanes";
 import { calledBy, callMeta } from "../program/logic";
 import { actionNames, freeName } from "../program/naming";
 import { callsIn } from "../program/parallel";
@@ -22,8 +22,7 @@ export const parallelName = (): string => {
 /** Return why the selected actions cannot run at once; an empty string if they can. */
 export async function whyNotParallel(ids: readonly string[]): Promise<string> {
   const { doc } = now();
-  if (!doc || ids.length < MIN_BRANCHES || ids.length > MAX_BRANCHES)
-    return t`Select two to four calls of functions.`;
+  if (!doc || ids.length < MIN_BRANCHES || ids.length > MAX_BRANCHES) return t`Select two to four calls of functions.`;
   const calls = callsIn(doc, { branches: [...ids] });
   const other = calls.find((each) => !calledBy(doc, each));
   if (other) return t`${other.name} does not call a function. Make a function of it first.`;

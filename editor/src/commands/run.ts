@@ -42,7 +42,7 @@ export async function run({ paused = false } = {}): Promise<boolean> {
 
 /**
  * Run a package. `recipe`: id of the recipe and the order. `continues`: where it was interrupted, see `continues` of
- * the books of parts.
+ * the part inventory.
  */
 export const runPackage = (id: string, paused = false, continues = false, recipe: object = {}) =>
   ask(

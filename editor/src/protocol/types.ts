@@ -747,7 +747,7 @@ export interface ConfirmPartsArgs {
 /**
  * The place of a part as a person has found it.
  *
- * number: of the part; 0: a part that is not in the books, which counts as fed. place: id of the place; empty: the
+ * number: of the part; 0: a part that is not in the inventory, which counts as fed. place: id of the place; empty: the
  * part was taken out of the cell, which counts as rejected. serial: corrects the serial number. exists: false if there
  * has never been such a part, for example because a sensor was wrong: it does not count as fed. A part that was read
  * has existed.
@@ -2485,15 +2485,6 @@ export interface Part {
   confirmed: boolean;
 }
 
-/** The parts of a scene, its places, the counts, and the last run. */
-export interface PartBooks {
-  scene_id: string;
-  parts: Part[];
-  places: Place[];
-  counts: PartCounts;
-  run?: RunCheckpoint;
-}
-
 /** What was counted since the scene exists: fed = good + bad + rejected + in_cell. */
 export interface PartCounts {
   fed: number;
@@ -2501,6 +2492,15 @@ export interface PartCounts {
   bad: number;
   rejected: number;
   in_cell: number;
+}
+
+/** The parts of a scene, its places, the counts, and the last run. */
+export interface PartInventory {
+  scene_id: string;
+  parts: Part[];
+  places: Place[];
+  counts: PartCounts;
+  run?: RunCheckpoint;
 }
 
 /**
@@ -3804,8 +3804,8 @@ export interface UndoData {
  * A unit that the cell has worked on, without its steps.
  *
  * number: of the record. serial: serial number; empty if it was never read. scene_id, part: the scene, and the number
- * of the part in its books. order: id of the order. entered, left: when it came into the cell and left it. verdict:
- * result of its last test. runs: numbers of the runs that worked on it.
+ * of the part in the inventory. order: id of the order. entered, left: when it came into the cell and left it.
+ * verdict: result of its last test. runs: numbers of the runs that worked on it.
  */
 export interface Unit {
   number: number;
@@ -3864,7 +3864,7 @@ export interface UnitRecord {
  * Where a unit is: in the cell, in a box for good, bad or rejected parts, or unknown.
  *
  * REJECTED includes parts that a person has taken out of the cell. UNKNOWN: it left while the server was off, and the
- * books no longer contain its serial number.
+ * inventory no longer contains its serial number.
  */
 export type UnitState = "in_cell" | "good" | "bad" | "rejected" | "unknown";
 
@@ -4216,7 +4216,7 @@ export interface Requests {
   GetObjectTypes: { args: undefined; data: ObjectTypeMeta[] };
   GetPackageParameters: { args: IdArgs; data: PackageParametersData };
   GetParameterBackup: { args: BackupArgs; data: ParameterBackup };
-  GetParts: { args: undefined; data: PartBooks[] };
+  GetParts: { args: undefined; data: PartInventory[] };
   GetProduction: { args: GetProductionArgs | undefined; data: Production };
   GetProgramPosition: { args: undefined; data: ProgramPosition };
   GetProject: { args: IdArgs; data: Project };
@@ -4410,7 +4410,7 @@ export interface Events {
   PackageChanged: PackageSummary;
   PackageInfo: PackageInfoData;
   PackageState: PackageStateData;
-  PartsChanged: PartBooks;
+  PartsChanged: PartInventory;
   PersonChanged: Person;
   ProcessState: ProcessStateData;
   ProgramPosition: ProgramPosition;

@@ -12,7 +12,7 @@ import {
   type CellStatus,
   type ObjectObservationsData,
   type ObjectPointsData,
-  type PartBooks,
+  type PartInventory,
   type RecordingChangedData,
   ROLES,
   type ServerEvent,
@@ -50,8 +50,8 @@ declare module "../store/runtime" {
     takeAlarm?: Set<(record: AlarmRecord) => void>;
     /** Receive stored recordings, which bypass the store, while they are listed. */
     takeRecording?: Set<(changed: RecordingChangedData) => void>;
-    /** Receive changed books of parts, which bypass the store, while they are shown. */
-    takeParts?: Set<(books: PartBooks) => void>;
+    /** Receive changed part inventories, which bypass the store, while they are shown. */
+    takeParts?: Set<(inventory: PartInventory) => void>;
     /** Receive the changed state of the cell, which bypasses the store, while it is shown. */
     takeCell?: Set<(cell: CellStatus) => void>;
     /** Receive changed interlocks and their states, which bypass the store, while they are shown. */

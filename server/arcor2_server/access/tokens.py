@@ -16,7 +16,7 @@ from arcor2_hw.data.base import Data, Timestamp, now
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Conflict, InvalidData, NotFound, StorageError
 from arcor2_hw.messages import Message
-from arcor2_server.files import aside, write_private
+from arcor2_server.files import damaged_copy_path, write_private
 
 FILE: Final = "tokens.json"
 COPY: Final = "tokens.copy.json"
@@ -174,7 +174,7 @@ class TokenFile:
                 yield tokens
                 content = msgspec.json.format(msgspec.json.encode(tokens))
                 if self.damage:
-                    aside(self._path, now()).hardlink_to(self._path)
+                    damaged_copy_path(self._path, now()).hardlink_to(self._path)
                 write_private(self._copy, content)
                 write_private(self._path, content)
         except OSError as error:

@@ -17,8 +17,8 @@ from arcor2_server.app.wiring import (
     connect_devices,
     connect_edits,
     connect_production,
+    send_to_both_hosts,
     stored_name,
-    to_both,
 )
 from arcor2_server.audit.trail import AuditTrail
 from arcor2_server.build.importing import PackageImport
@@ -42,13 +42,13 @@ from arcor2_server.documents.saved_problems import SavedProblems
 from arcor2_server.dry_run.service import DryRuns
 from arcor2_server.execution.breakpoints import SharedBreakpoints
 from arcor2_server.execution.package_runs import PackageRuns
-from arcor2_server.execution.part_books import AllPartBooks
+from arcor2_server.execution.part_inventories import PartInventories
 from arcor2_server.execution.run_message import RunMessages
 from arcor2_server.execution.runs import Runs
 from arcor2_server.execution.service import Execution
 from arcor2_server.execution.stop_all import StopAll
 from arcor2_server.execution.temporary import TemporaryRuns
-from arcor2_server.files import tighten
+from arcor2_server.files import restrict_permissions
 from arcor2_server.fleet.link import FleetLink
 from arcor2_server.history.service import History
 from arcor2_server.hosts.pool import CellHosts
@@ -144,7 +144,7 @@ class Server:
 
     async def _open_stores(self) -> None:
         """Open the stores: documents, assets, object types, credentials and the audit trail."""
-        tighten(self.settings.data_dir)
+        restrict_permissions(self.settings.data_dir)
         hub = self.hub = Hub()
         known_types = KnownTypes()
         secrets = self.secrets = SettingSecrets(
@@ -239,7 +239,9 @@ class Server:
     async def _build_online_scene(self) -> None:
         """Build what works with connected devices."""
         maintenance_store = self._maintenance_store = MaintenanceStore(self.storage)
-        devices = self.devices = Devices(self.hub, maintenance_store, to_both(self.scene_host, self.program_host))
+        devices = self.devices = Devices(
+            self.hub, maintenance_store, send_to_both_hosts(self.scene_host, self.program_host)
+        )
         await devices.open()
         self._closed(devices)
         opening = SceneOpening(
@@ -293,7 +295,7 @@ class Server:
         breakpoints = self.breakpoints = SharedBreakpoints(self.hub, self.storage, self.session, self._shared)
         connect_edits(self.edit_notifications, self.previews, breakpoints)
         messages = RunMessages(self.settings, self.secrets, breakpoints, self._host_world, self.devices.identities)
-        books = self._books = AllPartBooks(self.hub, self.settings.checkpoints_dir)
+        inventory = self._inventories = PartInventories(self.hub, self.settings.checkpoints_dir)
         execution = self.execution = self._closed(
             Execution(
                 self._packages,
@@ -306,7 +308,7 @@ class Server:
                 breakpoints,
                 self.secrets,
                 messages,
-                books,
+                inventory,
             )
         )
         execution.before_start.append(lambda _: self.online.forces.require_none())
@@ -322,7 +324,7 @@ class Server:
         units = self.units = self._closed(
             Units(self.hub, unit_store, self.runs, self._packages, self.calibration_records)
         )
-        await units.open(self._books.all)
+        await units.open(self._inventories.all)
         cell_time = self.cell_time = self._closed(CellTime(unit_store, lambda: activity_of(self.execution)))
         cell_time.start()
         connect_production(recipes, units, cell_time, self.execution)

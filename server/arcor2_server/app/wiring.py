@@ -88,7 +88,7 @@ def audit_end_of_force(audit: AuditTrail) -> Callable[[Force, Message], None]:
     return note
 
 
-def to_both(scene_host: HostSession, program_host: HostSession) -> Callable[[ToHost], None]:
+def send_to_both_hosts(scene_host: HostSession, program_host: HostSession) -> Callable[[ToHost], None]:
     """Return a function that sends a message to the host of the scene and to that of the program."""
 
     def send(message: ToHost) -> None:

@@ -18,11 +18,11 @@ from arcor2_hw.exceptions import StorageError
 from arcor2_hw.messages import Message
 from arcor2_server.audit.chain import AuditFile
 from arcor2_server.audit.changes import Change
-from arcor2_server.files import aside
+from arcor2_server.files import damaged_copy_path
 
 log = structlog.get_logger(__name__)
 
-WRITTEN_WITHIN: Final = 0.05
+COLLECTION_TIME: Final = 0.05
 """Time for which entries are collected before they are written together, s. The end of the process loses them."""
 MAX_CHANGES: Final = 256 * 1024
 """Maximum size of the changes of an entry, bytes."""
@@ -36,7 +36,7 @@ RETRY_AFTER: Final = 5.0
 """Time after which writing is tried again, s."""
 
 
-class Noted(NamedTuple):
+class WaitingEntry(NamedTuple):
     """A request that has ended."""
 
     time: str
@@ -61,7 +61,7 @@ class AuditTrail:
     def __init__(self, path: Path, redact: Callable[[str], str]) -> None:
         self._file = AuditFile(path)
         self._redact = redact
-        self._waiting: SimpleQueue[Noted | None] = SimpleQueue()
+        self._waiting: SimpleQueue[WaitingEntry | None] = SimpleQueue()
         self._writer: threading.Thread | None = None
 
     async def open(self) -> Message | None:
@@ -94,7 +94,7 @@ class AuditTrail:
         except StorageError as error:
             problem = error.message
         self._file.close()
-        stored = aside(path, now())
+        stored = damaged_copy_path(path, now())
         try:
             for ending in ("", "-wal", "-shm", ".head"):
                 if (part := path.with_name(path.name + ending)).exists():
@@ -134,22 +134,22 @@ class AuditTrail:
         write = log.warning if outcome is AuditOutcome.FORBIDDEN else log.info
         write("command", outcome=outcome.value, request=request, target=target, user=user, role=name, address=address)
         reason = self._redact(reason)[:MAX_REASON]
-        self._waiting.put(Noted(now(), outcome, request, target, user, name, address, reason, changes))
+        self._waiting.put(WaitingEntry(now(), outcome, request, target, user, name, address, reason, changes))
 
     def _write(self) -> None:
         """Write entries until the trail is closed."""
-        noted: list[Noted] = []
+        noted: list[WaitingEntry] = []
         lost = 0
         while not self._collect(noted):
             lost += self._write_all(noted, lost)
         self._write_all(noted, lost)
 
-    def _collect(self, noted: list[Noted]) -> bool:
+    def _collect(self, noted: list[WaitingEntry]) -> bool:
         """Wait for entries and collect them. Return whether the trail is being closed."""
         try:
             each = self._waiting.get(timeout=RETRY_AFTER if noted else None)
             if each is not None:
-                time.sleep(WRITTEN_WITHIN)
+                time.sleep(COLLECTION_TIME)
             while each is not None:
                 noted.append(each)
                 each = self._waiting.get_nowait()
@@ -157,7 +157,7 @@ class AuditTrail:
             return False
         return True
 
-    def _write_all(self, noted: list[Noted], lost: int) -> int:
+    def _write_all(self, noted: list[WaitingEntry], lost: int) -> int:
         """Write entries and remove them from the list. Return by how much the number of lost entries changes."""
         lines = [*noted, _losses(lost)] if lost else noted
         try:
@@ -185,7 +185,7 @@ class AuditTrail:
         return await asyncio.to_thread(self._file.check)
 
 
-def _entry(noted: Noted) -> AuditEntry:
+def _entry(noted: WaitingEntry) -> AuditEntry:
     """Return an entry, which the file numbers."""
     changes = [AuditChange(each.kind, each.id, each.before, each.after) for each in noted.changes]
     reason = noted.reason
@@ -198,6 +198,6 @@ def _entry(noted: Noted) -> AuditEntry:
     )  # fmt: skip
 
 
-def _losses(count: int) -> Noted:
+def _losses(count: int) -> WaitingEntry:
     reason = f"Lost entries: {count}. The file could not be written."
-    return Noted(now(), AuditOutcome.REFUSED, "WriteAuditTrail", "", "", "none", "", reason, ())
+    return WaitingEntry(now(), AuditOutcome.REFUSED, "WriteAuditTrail", "", "", "none", "", reason, ())

@@ -24,7 +24,7 @@ from arcor2_server.storage.persons import StoredPerson
 
 log = structlog.get_logger(__name__)
 
-RESUMED_WITHIN: Final = 120.0
+RESUME_PERIOD: Final = 120.0
 """Time after a lost connection within which the device may log the person on again without a PIN, s."""
 
 ENDED: Final = Message.of("You were logged off. Log on again.")
@@ -187,7 +187,7 @@ class LogOns:
             found.timer = None
         limit = self.log_off_after or float("inf")
         if found.client is None:
-            limit = min(limit, RESUMED_WITHIN)
+            limit = min(limit, RESUME_PERIOD)
         if limit == float("inf"):
             return
         if (left := found.active + limit - time.monotonic()) > 0:

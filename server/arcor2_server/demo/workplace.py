@@ -398,10 +398,10 @@ class Creation:
 
 async def confirm_emptied(client: Client) -> None:
     """Confirm that all parts were taken out of the cell, so that the next program starts without parts."""
-    for books in await client.get_parts():
-        removed = [ConfirmedPart(part.number, "") for part in books.parts]
-        if removed or not isinstance(books.run, Unset):
-            await client.confirm_parts(scene_id=books.scene_id, parts=removed)
+    for inventory in await client.get_parts():
+        removed = [ConfirmedPart(part.number, "") for part in inventory.parts]
+        if removed or not isinstance(inventory.run, Unset):
+            await client.confirm_parts(scene_id=inventory.scene_id, parts=removed)
 
 
 @dataclass(slots=True)

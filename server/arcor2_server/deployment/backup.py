@@ -29,7 +29,7 @@ FORMAT: Final = 1
 MANIFEST: Final = "backup.json"
 BACKUPS: Final = "backups"
 """Directory of the data directory for backups before upgrades."""
-BEFORE: Final = "before-restore"
+REPLACED_PREFIX: Final = "before-restore"
 """Start of the names of directories with the data that a restoration has replaced."""
 LOCK: Final = "lock"
 """The file that a server locks."""
@@ -180,7 +180,7 @@ def _files(directory: Path, prefix: str = "") -> Iterator[str]:
 
 def _stays(name: str) -> bool:
     """Return whether an entry of the data directory is neither copied nor replaced."""
-    return name in (LOCK, BACKUPS) or name.startswith(BEFORE)
+    return name in (LOCK, BACKUPS) or name.startswith(REPLACED_PREFIX)
 
 
 def _is_sqlite(path: Path) -> bool:
@@ -380,10 +380,10 @@ def finish_restoration(data_dir: Path) -> None:
 def _unused(data_dir: Path) -> Path:
     """Return an unused path for replaced files."""
     stamp = now()[:19].replace(":", "").replace("-", "")
-    path, number = data_dir / f"{BEFORE}-{stamp}", 1
+    path, number = data_dir / f"{REPLACED_PREFIX}-{stamp}", 1
     while path.exists():
         number += 1
-        path = data_dir / f"{BEFORE}-{stamp}-{number}"
+        path = data_dir / f"{REPLACED_PREFIX}-{stamp}-{number}"
     return path
 
 

@@ -15,7 +15,7 @@ from arcor2_server.events import Connection, EventHub, encode, make_event
 
 DELAY: Final = 0.005
 """Delay after an edit, s. Its answer and events are sent first, and successive edits cause one notification."""
-AT_LATEST: Final = 0.1
+MAX_DELAY: Final = 0.1
 """Maximum delay while further edits arrive, s."""
 NAME: Final = "HistoryChanged"
 
@@ -61,7 +61,7 @@ class EditNotifications:
     def _publish(self) -> None:
         loop = asyncio.get_running_loop()
         busy = self._session.revision != self._stored_revision or loop.time() < self._last + DELAY
-        if busy and loop.time() < self._since + AT_LATEST:
+        if busy and loop.time() < self._since + MAX_DELAY:
             self._timer = loop.call_later(DELAY, self._publish)
             return
         self._timer = None

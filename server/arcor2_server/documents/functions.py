@@ -37,7 +37,7 @@ from arcor2_server.documents.item_indexes import action_of
 from arcor2_server.documents.parallel_work import mapped_branches, with_branches
 from arcor2_server.errors import RequestRefused
 
-FROM_OUTSIDE = frozenset({ActionParameterType.PROJECT_PARAMETER, ActionParameterType.FUNCTION_PARAMETER})
+EXTERNAL_VALUES = frozenset({ActionParameterType.PROJECT_PARAMETER, ActionParameterType.FUNCTION_PARAMETER})
 """Parameters of actions that become parameters of the function, in addition to links to actions outside of it."""
 
 
@@ -175,7 +175,7 @@ class _Parameters:
                 source, flow, index = parse_link(text_of(one))
                 if source in ids:
                     return replace(one, value=encoded(f"{ids[source]}/{flow}/{index}"))
-            elif one.type not in FROM_OUTSIDE:
+            elif one.type not in EXTERNAL_VALUES:
                 return one
             name = self._name(one, kinds[meta.present_name(one.name)])
             return replace(one, type=ActionParameterType.FUNCTION_PARAMETER, value=encoded(name))

@@ -36,7 +36,7 @@ from arcor2_server.documents.journal_records import (
     read_content,
     write_job,
 )
-from arcor2_server.files import FILE_MODE, aside, ensure_private
+from arcor2_server.files import FILE_MODE, damaged_copy_path, ensure_private
 
 log = structlog.get_logger(__name__)
 
@@ -232,7 +232,7 @@ class JournalFile:
 
     def _rename_damaged(self, copy: Path | None) -> Path:
         """Rename the damaged files; return the new path of the database."""
-        stored = aside(self._path, now())
+        stored = damaged_copy_path(self._path, now())
         source = copy or self._path
         for ending in ("", "-wal", "-shm"):
             if _with_ending(source, ending).exists():

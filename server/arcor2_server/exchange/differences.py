@@ -15,9 +15,9 @@ from arcor2_hw.data.project import END, START, Project
 from arcor2_server.documents.comparisons import text_of
 from arcor2_server.exchange.archive import Archive
 
-TIMES: Final = frozenset({"created", "modified", "int_modified"})
+IGNORED_FIELDS: Final = frozenset({"created", "modified", "int_modified"})
 """Fields that are not compared."""
-WHOLE: Final = (frozenset("xyz"), frozenset("xyzw"))
+VECTOR_FIELDS: Final = (frozenset("xyz"), frozenset("xyzw"))
 """Fields of positions and orientations, which are compared as one value."""
 _ID: Final = re.compile(r"[a-z]+_[0-9a-f]{32}")
 
@@ -123,7 +123,7 @@ def _compare(old: Any, new: Any, path: list[str], names: Mapping[str, str]) -> I
             old, new = before, after
     if isinstance(old, dict) and isinstance(new, dict) and not _is_one_value(old, new):
         for key in [*old, *(key for key in new if key not in old)]:
-            if key not in TIMES:
+            if key not in IGNORED_FIELDS:
                 yield from _compare(old.get(key, UNSET), new.get(key, UNSET), [*path, names.get(key, key)], names)
         return
     if old == new:
@@ -139,7 +139,7 @@ def _compare(old: Any, new: Any, path: list[str], names: Mapping[str, str]) -> I
 
 
 def _is_one_value(old: dict[str, Any], new: dict[str, Any]) -> bool:
-    return old.keys() == new.keys() and frozenset(old) in WHOLE
+    return old.keys() == new.keys() and frozenset(old) in VECTOR_FIELDS
 
 
 def _keyed(items: list[Any]) -> dict[str, Any] | None:
@@ -166,7 +166,7 @@ def _plain(value: Any) -> Any:
 def describe(value: Any, names: Mapping[str, str]) -> str:
     """Return a short description of a value, with names in place of ids."""
     match value:
-        case dict() if frozenset(value) in WHOLE:
+        case dict() if frozenset(value) in VECTOR_FIELDS:
             return f"({', '.join(f'{float(one):g}' for one in value.values())})"
         case dict():
             kind = value.get("type")

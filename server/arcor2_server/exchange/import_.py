@@ -26,8 +26,8 @@ from arcor2_server.exchange.validation import Known, find_problems
 
 Part = Literal["all", "scene", "project", "types", "assets"]
 """The part of an export that may overwrite items on the server."""
-Verb = Literal["new", "replaced", "same"]
-SHADOWS: Final = "hides the installed type until it is removed"
+ImportOutcome = Literal["new", "replaced", "same"]
+HIDES_INSTALLED: Final = "hides the installed type until it is removed"
 _UNTIMED: Final[dict[str, Any]] = {"created": UNSET, "modified": UNSET, "int_modified": UNSET}
 GREETING_TIMEOUT: Final = 5.0
 """Time limit for the greeting of the server, which contains the open document, s."""
@@ -36,7 +36,7 @@ GREETING_TIMEOUT: Final = 5.0
 class Step(Data, frozen=True):
     """One item of an export, and what the import does with it. `notice`: further information for the user."""
 
-    verb: Verb
+    verb: ImportOutcome
     kind: str
     name: str
     notice: str = ""
@@ -138,7 +138,7 @@ class Importer:
             if old is not None and not same:
                 self._check_overwrite("types", f"The object type {name}")
             shadows = old is None and name in self._metas
-            self._note("object type", name, same, old is None, SHADOWS if shadows else "")
+            self._note("object type", name, same, old is None, HIDES_INSTALLED if shadows else "")
 
     async def _plan_document(
         self, kind: Literal["scene", "project"], given: Scene | Project, existing: list[Listed]

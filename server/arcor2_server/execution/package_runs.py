@@ -15,7 +15,7 @@ from arcor2_server.documents import Session
 from arcor2_server.documents.changes import Kind
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
-from arcor2_server.execution.runs import How
+from arcor2_server.execution.runs import RunStart
 from arcor2_server.execution.service import Execution
 from arcor2_server.online.online_scene import OnlineScene
 
@@ -42,7 +42,7 @@ class PackageRuns:
             return False
         return not set(self._locks.owners()) & set(self._users.names())
 
-    async def run_package(self, package_id: str, how: How) -> None:
+    async def run_package(self, package_id: str, how: RunStart) -> None:
         """Run a package; return when it has started.
 
         An open document on which no connected user works is closed and opened again after the run, with its unsaved
@@ -64,7 +64,7 @@ class PackageRuns:
             raise RequestRefused("A program is running. Stop it first.")
         await asyncio.to_thread(self._execution.packages.directory, package_id)
 
-    async def _run_in_place(self, package_id: str, how: How, started: "asyncio.Future[None]") -> None:
+    async def _run_in_place(self, package_id: str, how: RunStart, started: "asyncio.Future[None]") -> None:
         execution = self._execution
         try:
             await self._require_runnable(package_id)

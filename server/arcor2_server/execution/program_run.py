@@ -16,7 +16,7 @@ from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.execution.run_statistics import RunStatisticsCollector
-from arcor2_server.execution.runs import How, Runs
+from arcor2_server.execution.runs import Runs, RunStart
 from arcor2_server.storage.package_versions import check_versions
 from arcor2_server.storage.packages import Packages
 
@@ -56,7 +56,7 @@ class ProgramRun:
         """The branches by the number of the call that each of them runs."""
         self._number = 0
 
-    def begin(self, how: How, *, temporary: bool) -> None:
+    def begin(self, how: RunStart, *, temporary: bool) -> None:
         """Add the run to the history."""
         self._number = self._runs.begin(self.package_id, how, temporary=temporary)
 

@@ -14,7 +14,7 @@ from arcor2_hw.exceptions import InvalidPackage
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.documents import read_document
 from arcor2_server.execution.breakpoints import SharedBreakpoints
-from arcor2_server.execution.runs import How
+from arcor2_server.execution.runs import RunStart
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage.setting_secrets import SettingSecrets
 from arcor2_server.workspace.host_world import HostWorld
@@ -30,7 +30,7 @@ class RunMessages:
     _host_world: HostWorld
     _identities: Callable[[], dict[str, Identity]]
 
-    def prepare(self, package_id: str, directory: Path, how: How) -> m.RunPackage:
+    def prepare(self, package_id: str, directory: Path, how: RunStart) -> m.RunPackage:
         """Return the message without the parts that may change until the host is ready.
 
         Args:

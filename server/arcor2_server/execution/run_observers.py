@@ -4,7 +4,7 @@ from collections.abc import Awaitable, Callable
 
 from arcor2_hw.data.held import HoldDecidedData
 from arcor2_hw.runtime import messages as m
-from arcor2_server.execution.runs import How
+from arcor2_server.execution.runs import RunStart
 from arcor2_server.hosts.group import HostGroup
 
 
@@ -18,13 +18,13 @@ class RunObservers:
         """Called with each run that has failed or was interrupted, the reason, and its host, which ends."""
         self.on_decided: list[Callable[[HoldDecidedData], None]] = []
         """Called with each decision about a held program."""
-        self.before_start: list[Callable[[How], None]] = []
+        self.before_start: list[Callable[[RunStart], None]] = []
         """Called before a program is started, and again when it starts; each may raise RequestRefused."""
         self.before_resume: list[Callable[[], None]] = []
         """Called before a paused program is resumed or stepped; each may raise RequestRefused."""
-        self.before_run: list[Callable[[str, How], Awaitable[How]]] = []
+        self.before_run: list[Callable[[str, RunStart], Awaitable[RunStart]]] = []
         """Called with a package and the options of its run, which it may change; may raise RequestRefused."""
-        self.on_begin: list[Callable[[int, str, str, How], None]] = []
+        self.on_begin: list[Callable[[int, str, str, RunStart], None]] = []
         """Called with the number of a new run, its package, its scene, and its options."""
         self.on_state: list[Callable[[], None]] = []
         """Called after each change of `state` and `hold`."""

@@ -89,7 +89,7 @@ class _Call:
         return entry
 
 
-class How(Struct, frozen=True):
+class RunStart(Struct, frozen=True):
     """Options of a run.
 
     Args:
@@ -126,7 +126,7 @@ class How(Struct, frozen=True):
     values: Mapping[str, str] = MappingProxyType({})
     by_plc: bool = False
 
-    def continuing(self, former: Run) -> "How":
+    def continuing(self, former: Run) -> "RunStart":
         """Return these options for a run that continues an interrupted one: it keeps its recipe, values and order."""
         order = self.order if isinstance(former.order, Unset) else former.order
         if isinstance(former.recipe, Unset):
@@ -173,7 +173,7 @@ class Runs:
             await asyncio.gather(self._writing, return_exceptions=True)
 
     # -------------------------------------------------------------------------------- a run
-    def begin(self, package_id: str, how: How, *, temporary: bool) -> int:
+    def begin(self, package_id: str, how: RunStart, *, temporary: bool) -> int:
         """Add a run that starts now; return its number."""
         number = next(reversed(self._runs), 0) + 1
         run = Run(

@@ -27,13 +27,13 @@ from arcor2_server.events import EventHub, encode, make_event
 from arcor2_server.execution.breakpoints import SharedBreakpoints
 from arcor2_server.execution.holds import ProgramHold
 from arcor2_server.execution.packages import PackageLibrary
-from arcor2_server.execution.part_books import AllPartBooks
+from arcor2_server.execution.part_inventories import PartInventories
 from arcor2_server.execution.program_run import ProgramRun
 from arcor2_server.execution.program_streams import ProgramStreams
 from arcor2_server.execution.run_message import RunMessages
 from arcor2_server.execution.run_observers import RunObservers
 from arcor2_server.execution.run_statistics import verdicts_of
-from arcor2_server.execution.runs import How, Runs
+from arcor2_server.execution.runs import Runs, RunStart
 from arcor2_server.hosts.devices import DeviceBoard, overlay_for
 from arcor2_server.hosts.group import HostGroup
 from arcor2_server.hosts.placement import Placement
@@ -76,7 +76,7 @@ class Execution(PackageLibrary, RunObservers):
         breakpoints: SharedBreakpoints,
         secrets: SettingSecrets,
         messages: RunMessages,
-        parts: AllPartBooks,
+        parts: PartInventories,
     ) -> None:
         super().__init__(hub, packages)
         RunObservers.__init__(self)
@@ -88,7 +88,7 @@ class Execution(PackageLibrary, RunObservers):
         self.hold = ProgramHold(hub, runs)
         """The hold of the present run."""
         self.parts = parts
-        """The books of parts."""
+        """The part inventory."""
         self.streams = ProgramStreams(host, types)
         """The subscriptions to the devices of the program."""
         self._host = host
@@ -126,7 +126,7 @@ class Execution(PackageLibrary, RunObservers):
         """The states of the program's devices."""
         return self._host.board
 
-    def require_permitted(self, how: How) -> None:
+    def require_permitted(self, how: RunStart) -> None:
         """Raise RequestRefused if no program may be started in this way now."""
         for check in self.before_start:
             check(how)
@@ -165,13 +165,13 @@ class Execution(PackageLibrary, RunObservers):
         if self.state not in _IDLE and package_id == self.program.package_id:
             raise RequestRefused("This package is running. Stop it first.")
 
-    async def run(self, package_id: str, how: How | None = None) -> None:
+    async def run(self, package_id: str, how: RunStart | None = None) -> None:
         """Start a package. Its state is published as PackageState."""
         self._require_not_reserved()
-        await self._run(package_id, how or How())
+        await self._run(package_id, how or RunStart())
 
     async def run_through(
-        self, package_id: str, how: How, *, temporary: bool = True, started: "asyncio.Future[None] | None" = None
+        self, package_id: str, how: RunStart, *, temporary: bool = True, started: "asyncio.Future[None] | None" = None
     ) -> None:
         """Run a package and wait for its end. Clients are not sent to the list of packages afterwards.
 
@@ -190,7 +190,7 @@ class Execution(PackageLibrary, RunObservers):
         finally:
             self._over = None
 
-    async def _run(self, package_id: str, how: How, *, temporary: bool = False) -> None:
+    async def _run(self, package_id: str, how: RunStart, *, temporary: bool = False) -> None:
         self.require_permitted(how)
         self._require_idle()
         requested_at = time.monotonic()
@@ -491,7 +491,7 @@ class Execution(PackageLibrary, RunObservers):
             self._killing.cancel()
             self._killing = None
         self._enter(S.STOPPED)
-        self._background.spawn(self.parts.publish(self.parts.end_run()), "books of parts after the run")
+        self._background.spawn(self.parts.publish(self.parts.end_run()), "part inventory after the run")
         if self._over is None:
             screen = e.ShowMainScreenData(MainScreen.PACKAGES_LIST, self.program.package_id)
             self._hub.broadcast(make_event("ShowMainScreen", screen))

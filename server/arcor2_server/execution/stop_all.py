@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 log = structlog.get_logger(__name__)
 
-SILENT: Final = Message.of("the cell host that controls the devices does not answer; go offline to end it")
+HOST_SILENT: Final = Message.of("the cell host that controls the devices does not answer; go offline to end it")
 
 
 async def _stop(host: HostGroup, board: "DeviceBoard") -> tuple[Message | None, list[DeviceStop]]:
@@ -31,8 +31,8 @@ async def _stop(host: HostGroup, board: "DeviceBoard") -> tuple[Message | None, 
     except ConnectionLost:  # before a host ends, it stops and disconnects the devices
         return None, []
     except DeviceTimeout:
-        return SILENT, [
-            DeviceStop(status.id, Message.of("{device}: {reason}", device=status.name, reason=SILENT))
+        return HOST_SILENT, [
+            DeviceStop(status.id, Message.of("{device}: {reason}", device=status.name, reason=HOST_SILENT))
             for status in board.statuses()
         ]
 

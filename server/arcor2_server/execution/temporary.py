@@ -21,7 +21,7 @@ from arcor2_server.documents.checks.project import project_problems
 from arcor2_server.documents.renamed_actions import with_present_names
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
-from arcor2_server.execution.runs import How
+from arcor2_server.execution.runs import RunStart
 from arcor2_server.execution.service import Execution
 from arcor2_server.object_types.registry import ObjectTypes
 from arcor2_server.online.online_scene import OnlineScene
@@ -43,7 +43,7 @@ def _settle(built: "asyncio.Future[None]", error: Exception | None = None) -> No
 class _Run:
     """One run, from the checks until the project is open again."""
 
-    def __init__(self, runs: "TemporaryRuns", how: How) -> None:
+    def __init__(self, runs: "TemporaryRuns", how: RunStart) -> None:
         self._runs = runs
         self._how = how
         self._package = ""
@@ -173,7 +173,7 @@ class TemporaryRuns:
     builder: BuildService
     tasks: Tasks
 
-    async def run(self, how: How) -> None:
+    async def run(self, how: RunStart) -> None:
         """Run the open project and close it for the time of the run; return when the package is built.
 
         Raises:

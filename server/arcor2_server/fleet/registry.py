@@ -11,9 +11,9 @@ from arcor2_hw.data.base import Data, Timestamp, Unset
 from arcor2_hw.exceptions import Conflict, NotFound
 from arcor2_server.fleet.records import FleetState
 
-DEAD_AFTER: Final = 1.5
+SILENT_AFTER: Final = 1.5
 """Time without a state after which a cell has no signal, s: three beats. The page shows it within 2 s."""
-TWIN_FOR: Final = 10.0
+DUPLICATE_TIMEOUT: Final = 10.0
 """Time for which two processes with the same data are shown as a conflict after the last change between them, s."""
 MAX_CELLS: Final = 1000
 """Maximum number of cells."""
@@ -119,9 +119,9 @@ class Registry:
     def check(self, at: float) -> None:
         """Mark the cells whose last state is too old."""
         for cell in self._cells.values():
-            if cell.alive and (cell.at is None or at - cell.at > DEAD_AFTER):
+            if cell.alive and (cell.at is None or at - cell.at > SILENT_AFTER):
                 self._show(cell, alive=False)
-            if cell.twin_at is not None and at - cell.twin_at > TWIN_FOR:
+            if cell.twin_at is not None and at - cell.twin_at > DUPLICATE_TIMEOUT:
                 cell.twin_at = None
         self._find_conflicts()
 

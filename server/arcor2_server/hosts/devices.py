@@ -7,7 +7,7 @@ import structlog
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import UNSET, Data
-from arcor2_hw.data.cell import Cell, overlay, strangers
+from arcor2_hw.data.cell import Cell, overlay, unknown_objects
 from arcor2_hw.data.device import Alarm, Connection, Health
 from arcor2_hw.data.events import ObjectStateData
 from arcor2_hw.data.interlocks import InterlockState, InterlockStates
@@ -72,7 +72,7 @@ def overlay_for(
         of = objects[override.id]
         laid = {each.name: HIDDEN if is_secret(of.type, each.name) else each.value for each in override.parameters}
         log.info("cell file overrides settings", object=of.name, settings=laid)
-    if unknown := strangers(cell, scene):
+    if unknown := unknown_objects(cell, scene):
         log.warning("objects of the cell file are not in the scene", objects=unknown, scene=scene.name)
     return overrides, {override.id: [parameter.name for parameter in override.parameters] for override in overrides}
 

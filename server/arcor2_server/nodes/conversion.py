@@ -33,7 +33,7 @@ STAMPED: Final = frozenset(
 _encode = msgspec.msgpack.encode
 
 
-class Outline(msgspec.Struct, frozen=True):
+class MessageOutline(msgspec.Struct, frozen=True):
     """The fields of a message that decide how it is passed on."""
 
     type: str
@@ -48,7 +48,7 @@ class Outline(msgspec.Struct, frozen=True):
         return self.type in PASSIVE or self.until == 0.0
 
 
-outline: Callable[[bytes], Outline] = msgspec.msgpack.Decoder(Outline).decode
+outline: Callable[[bytes], MessageOutline] = msgspec.msgpack.Decoder(MessageOutline).decode
 
 
 def for_host(kind: str, body: bytes, here: Callable[[float], float]) -> bytes:

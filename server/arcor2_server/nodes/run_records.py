@@ -13,7 +13,7 @@ from typing import Final
 import msgspec
 from msgspec import Struct
 
-from arcor2_hw.data.parts import PartBooks
+from arcor2_hw.data.parts import PartInventory
 from arcor2_hw.exceptions import Arcor2Error, Conflict
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.checkpoints import CheckpointFile
@@ -111,20 +111,20 @@ class RunRecords:
 
     async def _execute(self, request: m.ReadCheckpoint | m.StoreCheckpoint) -> None:
         try:
-            books = await asyncio.get_running_loop().run_in_executor(self._disk, self._checkpoint, request)
-            answer = m.CheckpointAnswer(request.number, books)
+            inventory = await asyncio.get_running_loop().run_in_executor(self._disk, self._checkpoint, request)
+            answer = m.CheckpointAnswer(request.number, inventory)
         except Arcor2Error as error:
             answer = m.CheckpointAnswer(request.number, problem=error.message)
         self._answer(_encode(answer))
 
-    def _checkpoint(self, request: m.ReadCheckpoint | m.StoreCheckpoint) -> PartBooks | None:
+    def _checkpoint(self, request: m.ReadCheckpoint | m.StoreCheckpoint) -> PartInventory | None:
         """Read or store a checkpoint. A node can change only that of the scene that it runs."""
         if self._file is None:
-            raise Conflict("The program keeps no books of parts.")
+            raise Conflict("The program keeps no part inventory.")
         if isinstance(request, m.ReadCheckpoint):
             return self._file.read()
         if request.books.scene_id != self._scene_id:
-            raise Conflict("The program keeps no books of parts.")
+            raise Conflict("The program keeps no part inventory.")
         self._file.write(request.books)
         return None
 

@@ -23,7 +23,7 @@ from arcor2_hw.runtime import messages as m, ring
 from arcor2_server.child_process import ChildProcess, describe_exit
 from arcor2_server.nodes import connections as broker
 from arcor2_server.nodes.content import WITH_FILES, ContentStore, default_store
-from arcor2_server.nodes.conversion import FRAMES, LARGE, STAMPED, Outline, for_host, outline
+from arcor2_server.nodes.conversion import FRAMES, LARGE, STAMPED, MessageOutline, for_host, outline
 from arcor2_server.nodes.credentials import Credentials, environment_without
 from arcor2_server.nodes.lanes import Header, Lane
 from arcor2_server.nodes.opening import Opened, Opening, refusal_of
@@ -236,7 +236,7 @@ class HostedSession:
         self._stream.close()
         self._failing = asyncio.create_task(self.end.finish(reason), name=f"end of session {self.id}")
 
-    def _refusal(self, header: Header, found: Outline) -> Arcor2Error | None:
+    def _refusal(self, header: Header, found: MessageOutline) -> Arcor2Error | None:
         """Return why a command must not be executed any more, None if it may be."""
         stopped = max(self._stopped.get("", 0), self._stopped.get(found.object_id, 0))
         if header.number < stopped:
@@ -246,7 +246,7 @@ class HostedSession:
             return None
         return ArrivedLate("The command reached the node {age:.2f} s after it was sent, and was not executed.", age=age)
 
-    def _refuse(self, found: Outline, error: Arcor2Error) -> None:
+    def _refuse(self, found: MessageOutline, error: Arcor2Error) -> None:
         log.warning("command refused", session=self.id, type=found.type, id=found.id, reason=str(error))
         if found.id:
             data = m.ErrorData(error.code, type(error).__name__, error.message, error.detail, found.object_id)

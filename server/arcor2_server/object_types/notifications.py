@@ -9,7 +9,7 @@ from arcor2_server.events import EventHub, make_event
 from arcor2_server.object_types.changes import Changes
 from arcor2_server.object_types.registry import ObjectTypes
 
-QUIET: Final = 0.5
+QUIET_PERIOD: Final = 0.5
 """Time without an upload after which the clients are notified of all uploads, s."""
 
 
@@ -37,7 +37,7 @@ class TypeNotifications:
         await self._types.update()
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = asyncio.get_running_loop().call_later(QUIET, self._start)
+        self._timer = asyncio.get_running_loop().call_later(QUIET_PERIOD, self._start)
 
     async def publish(self) -> None:
         """Read new and changed object types and notify the clients of them."""

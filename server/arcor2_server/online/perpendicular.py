@@ -19,7 +19,7 @@ log = structlog.get_logger(__name__)
 
 DOWN: Final = Orientation(1, 0, 0, 0)
 """Orientation of a tool whose z axis points down."""
-YAWS: Final = 360
+CHECKED_YAWS: Final = 360
 """Number of checked angles about the vertical."""
 SEARCH_TIMEOUT: Final = 10.0
 """Time limit of the search, s. A slow controller answers fifty requests per second."""
@@ -35,8 +35,8 @@ def yaw_of(tool: Orientation) -> float:
 
 def yaws(first: float) -> list[float]:
     """Return the angles to check, rad, ordered by distance from the first one."""
-    step = 2 * math.pi / YAWS
-    return [first + step * ((number + 1) // 2) * (1 if number % 2 else -1) for number in range(YAWS)]
+    step = 2 * math.pi / CHECKED_YAWS
+    return [first + step * ((number + 1) // 2) * (1 if number % 2 else -1) for number in range(CHECKED_YAWS)]
 
 
 def joint_change(before: list[Joint], after: list[Joint]) -> float:

@@ -16,7 +16,7 @@ from arcor2_hw.exceptions import Conflict
 from arcor2_hw.messages import Message, translatable
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
-from arcor2_server.execution.runs import How, Runs
+from arcor2_server.execution.runs import Runs, RunStart
 from arcor2_server.execution.service import Execution
 from arcor2_server.execution.stop_all import StopAll
 from arcor2_server.online.online_scene import OnlineScene
@@ -27,7 +27,7 @@ log = structlog.get_logger(__name__)
 
 CHANGED: Final = "CellChanged"
 """The additional event with the state of the cell."""
-_PLC_HAS_IT: Final = (
+_PLC_HAS_AUTHORITY: Final = (
     "The PLC has the authority over the cell. A technician takes it back first. Stop works at any time."
 )
 _MODES: Final[Mapping[CellMode, str]] = translatable(
@@ -223,7 +223,7 @@ class PackmlCell:
                 mode=Message.of(_MODES[self._file.record.mode]),
             )
 
-    def _check_run(self, how: How) -> None:
+    def _check_run(self, how: RunStart) -> None:
         if how.by_plc:
             if self.authority is not CellAuthority.PLC:
                 raise RequestRefused("The PLC does not have the authority over the cell.")
@@ -231,7 +231,7 @@ class PackmlCell:
             return
         match self.authority:
             case CellAuthority.PLC:
-                raise RequestRefused(_PLC_HAS_IT)
+                raise RequestRefused(_PLC_HAS_AUTHORITY)
             case CellAuthority.NOBODY:
                 raise RequestRefused(
                     "Nobody has the authority over the cell, for example because the server restarted while the PLC "
@@ -250,7 +250,7 @@ class PackmlCell:
 
     def _check_online(self) -> None:
         if self.authority is CellAuthority.PLC:
-            raise RequestRefused(_PLC_HAS_IT)
+            raise RequestRefused(_PLC_HAS_AUTHORITY)
 
     # -------------------------------------------------------------------------------- commands of the PLC
     def require(self, command: MachineCommand) -> None:

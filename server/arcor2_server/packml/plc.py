@@ -22,7 +22,7 @@ from arcor2_server.audit.trail import AuditTrail
 from arcor2_server.background import BackgroundTasks
 from arcor2_server.errors import RequestRefused
 from arcor2_server.execution.package_runs import PackageRuns
-from arcor2_server.execution.runs import How
+from arcor2_server.execution.runs import RunStart
 from arcor2_server.packml.cell import PackmlCell
 from arcor2_server.packml.modbus import ExceptionCode, ModbusRefusal, ModbusServer
 from arcor2_server.packml.record import CellFile, JobEnd, PlantRequest, RequestResult
@@ -413,7 +413,7 @@ class Plc:
         await self._set_job(number, JobEnd.RUNNING)
         try:
             with cell.starting(number):
-                await self._runs.run_package(job.package_id, How(by=by, on_error=OnError.HOLD, by_plc=True))
+                await self._runs.run_package(job.package_id, RunStart(by=by, on_error=OnError.HOLD, by_plc=True))
         except Arcor2Error as error:
             await self._set_job(*before)
             if isinstance(error, NotFound):

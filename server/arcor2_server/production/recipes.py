@@ -33,7 +33,7 @@ from arcor2_server.audit import changes as audit
 from arcor2_server.collaboration.persons import Persons
 from arcor2_server.errors import RequestRefused
 from arcor2_server.events import EventHub, make_event
-from arcor2_server.execution.runs import How
+from arcor2_server.execution.runs import RunStart
 from arcor2_server.storage.packages import Packages
 from arcor2_server.storage.persons import StoredPerson
 from arcor2_server.storage.recipes import RecipeStore, StoredChangeover
@@ -367,7 +367,7 @@ class Recipes:
                     state=Message.of(_STATES[recipe.state]),
                 )
 
-    async def prepare_run(self, package_id: str, how: How) -> How:
+    async def prepare_run(self, package_id: str, how: RunStart) -> RunStart:
         """Check the recipe of a run, and return the options of the run with its values.
 
         Raises:

@@ -10,14 +10,14 @@ from msgspec.structs import replace
 
 from arcor2_hw.data.base import UNSET, Timestamp, Unset, now
 from arcor2_hw.data.editor import TraceEntry
-from arcor2_hw.data.parts import Part, PartBooks, PlaceKind
+from arcor2_hw.data.parts import Part, PartInventory, PlaceKind
 from arcor2_hw.data.rpc import ListUnitsArgs
 from arcor2_hw.data.units import Unit, UnitRecord, UnitState, UnitStep, UsedCalibration
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
 from arcor2_hw.runtime.messages import PartStep
 from arcor2_server.background import BackgroundTasks
 from arcor2_server.events import EventHub, make_event
-from arcor2_server.execution.runs import How, Runs
+from arcor2_server.execution.runs import Runs, RunStart
 from arcor2_server.storage.calibrations import Calibrations
 from arcor2_server.storage.packages import Packages
 from arcor2_server.storage.units import UnitStore
@@ -36,7 +36,7 @@ _BOXES: Final = {
 
 
 class Units:
-    """The records of units. They follow the books of parts. Queries may raise StorageError.
+    """The records of units. They follow the part inventory. Queries may raise StorageError.
 
     Args:
         hub: publishes UnitChanged.
@@ -60,8 +60,8 @@ class Units:
         self.on_left: list[Callable[[Unit], None]] = []
         """Called with each unit that has left the cell, without its steps."""
         self._next = 1
-        self._books: dict[str, PartBooks] = {}
-        """The last known books of each scene."""
+        self._inventories: dict[str, PartInventory] = {}
+        """The last known inventory of each scene."""
         self._run: dict[str, Any] = {}
         """What new units get from the present run."""
         self._run_number = 0
@@ -75,16 +75,16 @@ class Units:
         self._background = BackgroundTasks()
         self._describing = asyncio.Lock()
 
-    async def open(self, all_books: Callable[[], Awaitable[list[PartBooks]]]) -> None:
-        """Read the records of units in the cell, and compare them with the books of parts.
+    async def open(self, inventories: Callable[[], Awaitable[list[PartInventory]]]) -> None:
+        """Read the records of units in the cell, and compare them with the part inventory.
 
         Raises:
             StorageError: the records cannot be read.
         """
         self._in_cell = {(record.scene_id, record.part): record for record in await self._store.in_cell()}
         self._next = await self._store.newest_number() + 1
-        for books in await all_books():
-            self.follow(books)
+        for inventory in await inventories():
+            self.follow(inventory)
 
     async def close(self) -> None:
         """Store the remaining changes."""
@@ -105,7 +105,7 @@ class Units:
         return len(self._in_cell)
 
     # -------------------------------------------------------------------------------- a run
-    def begin_run(self, number: int, package_id: str, scene_id: str, how: How) -> None:
+    def begin_run(self, number: int, package_id: str, scene_id: str, how: RunStart) -> None:
         """Handle the start of a run."""
         self._run_number, self._scene_id = number, scene_id
         self._concerned.clear()
@@ -175,17 +175,17 @@ class Units:
                 return each
         return None
 
-    # -------------------------------------------------------------------------------- books of parts
-    def follow(self, books: PartBooks) -> None:
-        """Handle the present books of a scene."""
-        scene = books.scene_id
-        present = {part.number: part for part in books.parts}
+    # -------------------------------------------------------------------------------- part inventory
+    def follow(self, inventory: PartInventory) -> None:
+        """Handle the present inventory of a scene."""
+        scene = inventory.scene_id
+        present = {part.number: part for part in inventory.parts}
         for (of, number), record in list(self._in_cell.items()):
             if of == scene and number not in present:
-                self._leave(record, books)
-        for part in books.parts:
+                self._leave(record, inventory)
+        for part in inventory.parts:
             self._update(scene, part)
-        self._books[scene] = books
+        self._inventories[scene] = inventory
 
     def _update(self, scene: str, part: Part) -> None:
         record = self._in_cell.get((scene, part.number))
@@ -206,19 +206,19 @@ class Units:
         elif (part.serial, part.good) != (record.serial, record.verdict):
             self._put(replace(record, serial=part.serial, verdict=part.good), publish=True)
 
-    def _leave(self, record: UnitRecord, books: PartBooks) -> None:
+    def _leave(self, record: UnitRecord, inventory: PartInventory) -> None:
         """Handle that a part is no longer in the cell."""
-        before = self._books.get(record.scene_id)
+        before = self._inventories.get(record.scene_id)
         shown = record.serial or f"#{record.part}"
         state = UnitState.UNKNOWN
-        for place in books.places:
+        for place in inventory.places:
             if place.kind.is_box and shown in Counter(place.parts) - Counter(_parts_in(before, place.id)):
                 state = _BOXES[place.kind]
         if state is UnitState.UNKNOWN and before is not None:
             # A person has taken it out; a part without a serial number may also never have existed.
-            if books.counts.rejected > before.counts.rejected or record.serial:
+            if inventory.counts.rejected > before.counts.rejected or record.serial:
                 state = UnitState.REJECTED
-            elif books.counts.fed < before.counts.fed:
+            elif inventory.counts.fed < before.counts.fed:
                 self._delete(record)
                 return
         del self._in_cell[record.scene_id, record.part]
@@ -293,8 +293,8 @@ def _without_steps(record: UnitRecord) -> Unit:
     return Unit(**{name: getattr(record, name) for name in Unit.__struct_fields__})
 
 
-def _parts_in(books: PartBooks | None, place_id: str) -> list[str]:
-    return [] if books is None else next((place.parts for place in books.places if place.id == place_id), [])
+def _parts_in(inventory: PartInventory | None, place_id: str) -> list[str]:
+    return [] if inventory is None else next((place.parts for place in inventory.places if place.id == place_id), [])
 
 
 def _step(entry: TraceEntry) -> UnitStep:

@@ -29,9 +29,9 @@ from arcor2_server.storage.recordings import RecordingFiles, SavedRing, not_foun
 
 log = structlog.get_logger(__name__)
 
-BEFORE: Final = 60.0
+TIME_BEFORE: Final = 60.0
 """Recorded time before the event, s."""
-AFTER: Final = 5.0
+TIME_AFTER: Final = 5.0
 """Recorded time after the event, s."""
 MAX_PER_ALARM: Final = 5
 """Maximum number of recordings of one record of an alarm, whose condition keeps returning."""
@@ -50,7 +50,7 @@ class _Open:
 
 
 class Recordings:
-    """Stores recordings. Alarms that follow within AFTER belong to the same one.
+    """Stores recordings. Alarms that follow within TIME_AFTER belong to the same one.
 
     Args:
         hub: publishes RecordingChanged.
@@ -89,7 +89,7 @@ class Recordings:
         for ring in rings:
             if not any(info.run == ring.run and info.run_failed for info in self._stored.values()):
                 info = RecordingInfo(
-                    self._take_number(), _time(ring.wall), ring.monotonic, round(-BEFORE * 1000), 0, run=ring.run
+                    self._take_number(), _time(ring.wall), ring.monotonic, round(-TIME_BEFORE * 1000), 0, run=ring.run
                 )
                 info = _failed(info, error_of(ring.run))
                 await self._store(info, ring.segments, ring.monotonic)
@@ -109,7 +109,7 @@ class Recordings:
         if before == record.count or not isinstance(record.shelved_until, Unset):
             return
         ring = self._ring()
-        if ring is None or self._closed or time.monotonic() - stamp > BEFORE:
+        if ring is None or self._closed or time.monotonic() - stamp > TIME_BEFORE:
             return
         opened = self._continue(ring) or self._begin(ring, stamp, record.run)
         if any(alarm.number == record.number for alarm in opened.info.alarms):
@@ -146,7 +146,7 @@ class Recordings:
 
     def _begin(self, ring: Ring, stamp: float, run: int | Unset) -> _Open:
         wall = time.time() - time.monotonic() + stamp
-        begin, end = round(-BEFORE * 1000), round((time.monotonic() - stamp) * 1000)
+        begin, end = round(-TIME_BEFORE * 1000), round((time.monotonic() - stamp) * 1000)
         info = RecordingInfo(self._take_number(), _time(wall), stamp, begin, end, complete=False, run=run)
         if self._open is not None:
             self._open.over.set()
@@ -164,7 +164,7 @@ class Recordings:
         await asyncio.sleep(0)  # alarms that are raised together
         await self._write(opened)
         try:
-            async with asyncio.timeout(AFTER):
+            async with asyncio.timeout(TIME_AFTER):
                 await opened.over.wait()
         except TimeoutError:
             opened.over.set()
@@ -191,7 +191,7 @@ class Recordings:
 
     def _convert(self, info: RecordingInfo, source: "Ring | list[bytes]", end: float) -> RecordingInfo:
         segments = source.segments() if isinstance(source, Ring) else source
-        values, begin = converted(segments, info.stamp, info.stamp - BEFORE, end)
+        values, begin = converted(segments, info.stamp, info.stamp - TIME_BEFORE, end)
         return self._files.put(replace(info, begin=begin, end=round((end - info.stamp) * 1000)), values)
 
     def _superfluous(self, newest: RecordingInfo) -> list[int]:

@@ -19,7 +19,7 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.messages import translatable
 from arcor2_server.events import EventHub, make_event
 from arcor2_server.execution.package_runs import PackageRuns
-from arcor2_server.execution.runs import How
+from arcor2_server.execution.runs import RunStart
 from arcor2_server.execution.service import Execution
 from arcor2_server.rest.build import ZIP
 from arcor2_server.rest.operations import MIB, Binary, Upload, operation
@@ -180,7 +180,7 @@ class ExecutionOperations:
     async def start_package(self, id: str, query: StartQuery, person: str) -> None:  # noqa: A002
         """Run a package. A document left open by users who disconnected does not prevent it."""
         await self._package_runs.run_package(
-            id, How(by=person, on_error=query.on_error, recipe_id=query.recipe_id, order=query.order)
+            id, RunStart(by=person, on_error=query.on_error, recipe_id=query.recipe_id, order=query.order)
         )
 
     @operation("PUT", "/packages/{id}/breakpoints", EXECUTION, Role.OPERATOR)
@@ -199,7 +199,7 @@ class ExecutionOperations:
     async def debug_package(self, id: str, query: DebugQuery, person: str) -> None:  # noqa: A002
         """Run a package with its breakpoints."""
         breakpoints = await ProjectTables(self._storage).breakpoints(id)
-        how = How(
+        how = RunStart(
             query.break_on_first_action,
             breakpoints,
             by=person,

@@ -10,7 +10,7 @@ from arcor2_hw.messages import Message
 from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.rest.general import SERVER
 from arcor2_server.rest.operations import operation
-from arcor2_server.workspace.robot_calibrations import InForce, RobotCalibrations
+from arcor2_server.workspace.robot_calibrations import ActiveKinematics, RobotCalibrations
 from arcor2_server.workspace.robots import SceneRobots
 
 
@@ -23,7 +23,7 @@ class RobotKinematics(TranslatableData, frozen=True):
 
     object_id: str
     name: str
-    in_force: InForce
+    in_force: ActiveKinematics
     read: Timestamp | Unset = UNSET
     checksum: str | Unset = UNSET
     refused: str | Unset = UNSET
@@ -42,12 +42,14 @@ class KinematicsOperations:
         """Return the kinematic calibration used for a robot of the open scene."""
         robot = self._online.robot(object_id)
         if self._robots.model_of_type(robot.type) is None:
-            return RobotKinematics(robot.id, robot.name, InForce.NONE)
+            return RobotKinematics(robot.id, robot.name, ActiveKinematics.NONE)
         stored = self._robot_calibrations.stored(robot)
         if stored is None:
-            return RobotKinematics(robot.id, robot.name, InForce.NOMINAL)
-        found = RobotKinematics(robot.id, robot.name, InForce.MEASURED, stored.read, stored.calibration.checksum)
+            return RobotKinematics(robot.id, robot.name, ActiveKinematics.NOMINAL)
+        found = RobotKinematics(
+            robot.id, robot.name, ActiveKinematics.MEASURED, stored.read, stored.calibration.checksum
+        )
         if not stored.refused:
             return found
         why = stored.refused if isinstance(stored.refused, Message) else Message.of(stored.refused)
-        return replace(found, in_force=InForce.NOMINAL, refused=why.text, **why.translation())
+        return replace(found, in_force=ActiveKinematics.NOMINAL, refused=why.text, **why.translation())

@@ -9,7 +9,7 @@ from arcor2_hw.data.editor import TaskKind
 from arcor2_hw.data.events import ActionExecutionData, ChangeType
 from arcor2_hw.data.held import OnError
 from arcor2_hw.data.package import PackageSummary
-from arcor2_hw.data.parts import PartBooks
+from arcor2_hw.data.parts import PartInventory
 from arcor2_hw.data.position import ProgramPosition
 from arcor2_hw.data.rpc import (
     ConfirmPartsArgs,
@@ -29,7 +29,7 @@ from arcor2_server.collaboration.tasks import Tasks
 from arcor2_server.documents import Session
 from arcor2_server.errors import RequestRefused
 from arcor2_server.execution.package_runs import PackageRuns
-from arcor2_server.execution.runs import How
+from arcor2_server.execution.runs import RunStart
 from arcor2_server.execution.service import Execution
 from arcor2_server.execution.temporary import TemporaryRuns
 from arcor2_server.object_types.registry import ObjectTypes
@@ -38,11 +38,11 @@ from arcor2_server.online.online_scene import OnlineScene
 from arcor2_server.rpc.registry import Context, rpc
 
 
-def _run_options(context: Context, args: RunPackageArgs | TemporaryPackageArgs) -> How:
+def _run_options(context: Context, args: RunPackageArgs | TemporaryPackageArgs) -> RunStart:
     breakpoints = frozenset[str]() if isinstance(args.breakpoints, Unset) else args.breakpoints
     on_error = OnError.END if isinstance(args.on_error, Unset) else args.on_error
     shared, checkpoints = args.shared_breakpoints is True, args.checkpoints is not False
-    how = How(
+    how = RunStart(
         args.start_paused, breakpoints, shared, context.client.name, on_error, checkpoints, role=context.client.role
     )
     if isinstance(args, TemporaryPackageArgs):
@@ -204,8 +204,8 @@ class ExecutionRequests:
         await self._execution.decide(args, context.client.name)
 
     @rpc("GetParts")
-    async def get_parts(self, context: Context, args: None) -> list[PartBooks]:
-        """Return the books of parts of all scenes."""
+    async def get_parts(self, context: Context, args: None) -> list[PartInventory]:
+        """Return the part inventories of all scenes."""
         return await self._execution.parts.all()
 
     @rpc("ConfirmParts")

@@ -16,7 +16,7 @@ from arcor2_hw.data.alarms import AlarmRecord
 from arcor2_hw.data.base import now
 from arcor2_hw.exceptions import StorageError
 from arcor2_hw.messages import Message
-from arcor2_server.files import aside, ensure_private
+from arcor2_server.files import damaged_copy_path, ensure_private
 from arcor2_server.storage.models import AlarmRow
 from arcor2_server.storage.outbox import OutboxKind, Waiting, next_numbers
 from arcor2_server.storage.store import Storage
@@ -100,7 +100,7 @@ class AlarmStore:
             raise
         except sqlite3.DatabaseError as error:
             self._close()
-            stored = aside(self._path, now())
+            stored = damaged_copy_path(self._path, now())
             for ending in ("", "-wal", "-shm"):
                 if (part := self._path.with_name(self._path.name + ending)).exists():
                     part.rename(stored.with_name(stored.name + ending))

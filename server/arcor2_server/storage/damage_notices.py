@@ -12,7 +12,7 @@ from arcor2_hw.data.events import Event, NotificationData, NotificationLevel
 from arcor2_hw.exceptions import StorageError
 from arcor2_hw.messages import Message
 from arcor2_server.events import make_event
-from arcor2_server.files import aside, write_private
+from arcor2_server.files import damaged_copy_path, write_private
 
 if TYPE_CHECKING:
     from arcor2_server.events import EventHub
@@ -96,7 +96,7 @@ class DataDamage:
         """
         target: Path | None = None
         try:
-            target = path.rename(aside(path, now()))
+            target = path.rename(damaged_copy_path(path, now()))
         except OSError as error:
             log.error("damaged file cannot be renamed", file=str(path), reason=str(error))
         notice = (

@@ -19,7 +19,7 @@ from arcor2_hw.data.base import now
 from arcor2_hw.data.history import HistoryPoint, PastRun
 from arcor2_hw.data.points import PointUse
 from arcor2_hw.exceptions import NotFound, StorageError
-from arcor2_server.files import DIRECTORY_MODE, aside, ensure_private
+from arcor2_server.files import DIRECTORY_MODE, damaged_copy_path, ensure_private
 
 log = structlog.get_logger(__name__)
 
@@ -78,7 +78,7 @@ class HistoryFile:
                 self.close()
                 if isinstance(error, sqlite3.OperationalError):
                     raise
-                stored = aside(self.directory, now())
+                stored = damaged_copy_path(self.directory, now())
                 self.directory.rename(stored)
                 log.error("the history was damaged; a new one is started", stored=stored.name, reason=str(error))
                 self._open()

@@ -13,7 +13,9 @@ from arcor2_server.storage.models import Base
 
 REVISION: Final = "0011"
 """The newest revision in `migrations/versions`."""
-KNOWN: Final = frozenset({"0001", "0002", "0003", "0004", "0005", "0006", "0007", "0008", "0009", "0010", REVISION})
+KNOWN_REVISIONS: Final = frozenset(
+    {"0001", "0002", "0003", "0004", "0005", "0006", "0007", "0008", "0009", "0010", REVISION}
+)
 """All revisions from which a database can be migrated."""
 MIGRATIONS: Final = Path(__file__).parent / "migrations"
 CHECKED_SIZE: Final = 64 * 1024 * 1024
@@ -56,7 +58,7 @@ def _create_or_migrate(connection: Connection, place: str) -> None:
     found = _examine(connection)
     if found is None:
         _create(connection)
-    elif found not in KNOWN | {REVISION}:
+    elif found not in KNOWN_REVISIONS | {REVISION}:
         raise StorageError(
             "The database {place} has the schema {found!r}, which this version does not know. Update arcor2-hw.",
             place=place,

@@ -20,7 +20,7 @@ from arcor2_server.web.websocket_transport import WireProtocol
 
 log = structlog.get_logger(__name__)
 
-GRACE: Final = 2
+CLOSE_TIMEOUT: Final = 2
 """Time limit for open requests when the server stops, s. The whole stop must take at most 5 s."""
 ACCEPTED_AT_ONCE: Final = 100
 """Number of connections accepted before the event loop continues."""
@@ -32,7 +32,7 @@ sends a request on a connection that the server is closing, and gets no answer.
 """
 TLS_HANDSHAKE: Final = b"\x16"
 """First byte of a TLS connection (RFC 8446, 5.1). No HTTP request starts with it."""
-PAUSE: Final = 0.5
+ACCEPT_PAUSE: Final = 0.5
 """Time without accepting connections after the file descriptors were used up, s."""
 
 
@@ -53,7 +53,7 @@ def configuration(
         ws_ping_timeout=settings.ping_interval,
         ws_per_message_deflate=False,
         timeout_keep_alive=KEEP_ALIVE,
-        timeout_graceful_shutdown=GRACE,
+        timeout_graceful_shutdown=CLOSE_TIMEOUT,
         ssl_certfile=certificate[0] if certificate else None,
         ssl_keyfile=certificate[1] if certificate else None,
     )
@@ -123,7 +123,7 @@ class Listener:
                 log.error("no connection can be accepted", reason=error.strerror, connections=len(self._limits))
                 self._limits.make_room()
                 self._loop.remove_reader(self._socket)
-                self._loop.call_later(PAUSE, self._accept_again)
+                self._loop.call_later(ACCEPT_PAUSE, self._accept_again)
                 return
             accepted.setblocking(False)
             with contextlib.suppress(OSError):  # the client has disconnected already

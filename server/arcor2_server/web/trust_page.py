@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from arcor2_server.access.origin import HostNames, host_of
 from arcor2_server.settings import ServerSettings
-from arcor2_server.web.response_headers import EVERYWHERE
+from arcor2_server.web.response_headers import COMMON_HEADERS
 from arcor2_server.web.trust_texts import TEXTS, TrustTexts
 
 CERTIFICATE: Final = "/authority.crt"
@@ -53,7 +53,7 @@ class TrustPage:
             return
         headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
         status, content, media_type, more = self._response(scope, headers)
-        sent = EVERYWHERE | {
+        sent = COMMON_HEADERS | {
             "Content-Type": media_type,
             "Content-Length": str(len(content)),
             "Content-Security-Policy": _POLICY,

@@ -16,7 +16,7 @@ from arcor2_server.compute.process import ProgressCallback
 from arcor2_server.compute.workers import Compute
 from arcor2_server.workspace.markers import Markers
 
-EXPECTED_WITHIN = (0.3, 0.5)
+EXPECTED_POSE_DEVIATION = (0.3, 0.5)
 """Standard deviations of the pose that a camera has in the scene, m and rad, to choose between two solutions."""
 
 
@@ -65,7 +65,7 @@ class Calibration:
         except CalibrationRefused as error:
             if expected is None or error.reason != Reason.AMBIGUOUS:
                 raise
-        distance, angle = EXPECTED_WITHIN
+        distance, angle = EXPECTED_POSE_DEVIATION
         hinted = replace(task.options, expected=expected, expected_position=distance, expected_orientation=angle)
         found = await run(replace(task, options=hinted), on_progress=on_progress)
         chosen = Message.of("Of two solutions, the one near the present pose was chosen.")

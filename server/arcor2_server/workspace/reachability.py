@@ -40,7 +40,7 @@ log = structlog.get_logger(__name__)
 NAME: Final = "ReachabilityChanged"
 DELAY: Final = 0.05
 """Delay after an edit, s; successive edits are computed once."""
-AT_LATEST: Final = 0.3
+MAX_DELAY: Final = 0.3
 """Maximum delay while further edits arrive, s."""
 ANSWER_TIMEOUT: Final = 1.0
 """Time that a request waits for running computations, s."""
@@ -189,7 +189,7 @@ class ReachabilityBoard:
         while True:
             await self._changed()
             since = loop.time()
-            while self._wake.is_set() and loop.time() < since + AT_LATEST:
+            while self._wake.is_set() and loop.time() < since + MAX_DELAY:
                 self._wake.clear()
                 await asyncio.sleep(DELAY)
             self._wake.clear()

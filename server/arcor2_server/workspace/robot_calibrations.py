@@ -61,7 +61,7 @@ class RobotCalibration(Data, frozen=True):
     refused: Message | str = ""
 
 
-class InForce(enum.StrEnum):
+class ActiveKinematics(enum.StrEnum):
     """The origin of the kinematics of a robot."""
 
     NONE = "none"

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from arcor2_drivers.two_axis_robot import kinematics
-from arcor2_drivers.two_axis_robot.motion import STANDING
+from arcor2_drivers.two_axis_robot.motion import STALL_TIME
 from arcor2_drivers.two_axis_robot.settings import TwoAxisRobotSettings
 from arcor2_drivers.two_axis_robot.two_axis_robot import TwoAxisRobot
 from arcor2_hw.data.device import Connection, Health
@@ -267,7 +267,7 @@ def test_a_late_state_does_not_count_as_standstill(
         calls += 1
         snapshot = fresh()
         if calls == 3:  # the first state after the servos accepted their goals
-            time.sleep(1.5 * STANDING)
+            time.sleep(1.5 * STALL_TIME)
         return snapshot
 
     monkeypatch.setattr(observer, "fresh", late)

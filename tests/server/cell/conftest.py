@@ -27,7 +27,7 @@ from arcor2_server.compute.workers import Compute
 from arcor2_server.documents import Session
 from arcor2_server.execution.breakpoints import SharedBreakpoints
 from arcor2_server.execution.package_runs import PackageRuns
-from arcor2_server.execution.part_books import AllPartBooks
+from arcor2_server.execution.part_inventories import PartInventories
 from arcor2_server.execution.run_message import RunMessages
 from arcor2_server.execution.runs import Runs
 from arcor2_server.execution.service import Execution
@@ -192,9 +192,9 @@ async def running_server(data_dir: Path) -> AsyncIterator[Server]:
     breakpoints = SharedBreakpoints(hub, none, session, none)
     packages = Packages(settings.packages_dir, secrets.hide_in_package)
     messages = RunMessages(settings, secrets, breakpoints, world, lambda: (parts.identities or dict)())
-    books = AllPartBooks(hub, settings.checkpoints_dir)
+    inventory = PartInventories(hub, settings.checkpoints_dir)
     execution = Execution(
-        packages, program_host, online, settings, hub, known, runs, breakpoints, secrets, messages, books
+        packages, program_host, online, settings, hub, known, runs, breakpoints, secrets, messages, inventory
     )
     presence = PresenceBoard(hub, users)
     takeover = LockTakeover(locks, users, session.name_of)

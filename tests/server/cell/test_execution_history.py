@@ -14,7 +14,7 @@ from arcor2_hw.exceptions import ConnectionLost, NotFound
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_server.execution import runs
-from arcor2_server.execution.runs import How, Runs
+from arcor2_server.execution.runs import Runs, RunStart
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
 from arcor2_server.storage.shared_data import SharedData
@@ -197,7 +197,7 @@ async def test_the_newest_runs_and_actions_are_stored(tmp_path: Any, monkeypatch
         history = Runs(Hub())
         await history.open(SharedData(storage))
         for _ in range(8):
-            number = history.begin("pkg", How(), temporary=False)
+            number = history.begin("pkg", RunStart(), temporary=False)
             for action in range(1, 6):
                 history.announced(m.ProgramEvent("ActionStateBefore", BEFORE, action, "a", time.time()))
                 history.announced(m.ProgramEvent("ActionStateAfter", AFTER, action, time=0.1))
@@ -232,7 +232,7 @@ async def test_the_newest_runs_and_actions_are_stored(tmp_path: Any, monkeypatch
                 await again.run_trace(missing)
         failed = again.find(ListRunsArgs(limit=100))[1]
         assert (failed.error, failed.key, failed.values) == (LOST.text, LOST.key, LOST.values)
-        assert again.begin("pkg", How(), temporary=False) == 9
+        assert again.begin("pkg", RunStart(), temporary=False) == 9
         await again.close()
     finally:
         await storage.close()

@@ -13,7 +13,7 @@ from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.collaboration.persons import LogOnRefused
 from arcor2_server.errors import RequestRefused
-from arcor2_server.execution.runs import How
+from arcor2_server.execution.runs import RunStart
 
 from .conftest import Recorder
 from .production import PARAMETERS, SCRIPT, production
@@ -149,7 +149,7 @@ async def test_operators_run_only_released_recipes_where_this_is_set(tmp_path: P
 async def test_a_plc_starts_only_released_packages_where_this_is_set(tmp_path: Path) -> None:
     async with production(tmp_path, released_only=True) as made:
         made.package()
-        by_plc = How(by="PLC", on_error=OnError.HOLD, by_plc=True)
+        by_plc = RunStart(by="PLC", on_error=OnError.HOLD, by_plc=True)
         recipe = await made.ask("PutRecipe", {"product": "board", "package_id": "pkg_1"})
         with pytest.raises(RequestRefused, match="only released recipes"):
             await made.services.execution.run("pkg_1", by_plc)

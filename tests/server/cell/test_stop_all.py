@@ -12,7 +12,7 @@ from arcor2_hw.data.project import Action, ActionPoint, Flow, Project
 from arcor2_hw.data.rpc import StopAllData, StopKind
 from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_server.errors import RequestRefused
-from arcor2_server.execution.stop_all import SILENT
+from arcor2_server.execution.stop_all import HOST_SILENT
 from arcor2_server.rpc import operation as _operation  # noqa: F401 - for its handlers
 from tests.runtime.conftest import Package, scene_object
 from tests.server.core.serving import until
@@ -223,7 +223,7 @@ async def test_a_frozen_host_is_named(server: Server) -> None:
         os.kill(host.pid, signal.SIGCONT)
     assert set(missed(data)) == {"timer", "screwdriver_1"}
     timer = next(outcome for outcome in data.outcomes if outcome.name == "timer")
-    assert (timer.key, timer.values) == ("{device}: {reason}", {"device": "timer", "reason": SILENT})
+    assert (timer.key, timer.values) == ("{device}: {reason}", {"device": "timer", "reason": HOST_SILENT})
     assert all("does not answer" in reason for reason in missed(data).values())
 
 

@@ -11,7 +11,7 @@ from arcor2_hw.analysis import module_name
 from arcor2_hw.client import Client
 from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.main import app
-from arcor2_server.exchange.import_ import SHADOWS
+from arcor2_server.exchange.import_ import HIDES_INSTALLED
 from tests.runtime.older_sources import SOURCES
 from tests.server.core.serving import ServerProcess
 
@@ -106,7 +106,7 @@ def test_related_types_are_uploaded_together_and_separately(
     assert object_type(server, "export", "FlowActions", "--output", exported).returncode == 0
     assert object_type(server, "remove", "FlowActions").returncode == 0
     imported = object_type(server, "import", exported)
-    assert imported.stdout == f"object type FlowActions: new, {SHADOWS}\n", imported.stderr
+    assert imported.stdout == f"object type FlowActions: new, {HIDES_INSTALLED}\n", imported.stderr
 
 
 def test_invalid_types_are_refused(sources: Path, object_type: Cli) -> None:

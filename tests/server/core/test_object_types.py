@@ -553,7 +553,7 @@ def parsed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 async def test_a_huge_source_is_parsed_by_another_process(
     types: ObjectTypes, storage: Storage, parsed: list[int]
 ) -> None:
-    assert len(HUGE) > worker.HUGE
+    assert len(HUGE) > worker.SEPARATE_PROCESS_SIZE
     meta = await types.add(ObjectTypeSource("Huge", HUGE))
     assert not meta.disabled
     assert len(types.actions("Huge")) == 1000
@@ -561,7 +561,7 @@ async def test_a_huge_source_is_parsed_by_another_process(
     await types.update()
     assert "Lamp" in types.names()
     assert len(types.type_code("Huge").source) == len(HUGE)
-    assert not [length for length in parsed if length > worker.HUGE]
+    assert not [length for length in parsed if length > worker.SEPARATE_PROCESS_SIZE]
 
 
 async def test_a_huge_source_that_takes_too_long_is_disabled(
@@ -579,7 +579,7 @@ async def test_a_huge_source_that_takes_too_long_is_disabled(
     await types.update()
     assert not types.meta("Lamp").disabled
     assert stored.read_bytes() == before, "a failed analysis is repeated at the next start"
-    assert not [length for length in parsed if length > worker.HUGE]
+    assert not [length for length in parsed if length > worker.SEPARATE_PROCESS_SIZE]
 
 
 async def test_a_failed_analysis_process_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:

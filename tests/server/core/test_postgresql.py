@@ -195,7 +195,7 @@ def test_migrations_lead_to_the_models_and_back(settings: ServerSettings) -> Non
         config.attributes["connection"] = connection
         command.downgrade(config, "base")
         assert inspect(connection).get_table_names() == ["alembic_version"]
-        for revision in sorted(schema.KNOWN):
+        for revision in sorted(schema.KNOWN_REVISIONS):
             schema.migrate(connection, revision)
         assert compare_metadata(MigrationContext.configure(connection), Base.metadata) == []
     engine.dispose()

@@ -21,7 +21,7 @@ from arcor2_hw.messages import Message
 from arcor2_hw.runtime.recorder import Recorder
 from arcor2_hw.runtime.ring import Ring
 from arcor2_server.execution.run_message import RunMessages
-from arcor2_server.execution.runs import How
+from arcor2_server.execution.runs import RunStart
 from arcor2_server.recordings.export import as_csv
 from arcor2_server.recordings.service import MAX_PER_ALARM, Recordings
 from arcor2_server.settings import ServerSettings
@@ -253,6 +253,6 @@ def test_a_program_gets_absolute_paths_because_it_changes_its_directory(tmp_path
     world: Any = SimpleNamespace(shape_files=dict)
     unused: Any = None
     messages = RunMessages(ServerSettings(data_dir=Path("data")), unused, unused, world, dict)
-    message = messages.prepare("pkg_1", tmp_path, How())
+    message = messages.prepare("pkg_1", tmp_path, RunStart())
     assert message.recordings == str(Path.cwd() / "data" / "recordings")
     assert message.records == str(Path.cwd() / "data" / "checkpoints")

@@ -272,7 +272,7 @@ async def test_created_schema_is_the_migrated_one(tmp_path: Path) -> None:
 def test_revision_is_the_newest_migration() -> None:
     script = ScriptDirectory.from_config(schema.alembic_config())
     assert script.get_current_head() == schema.REVISION
-    assert {revision.revision for revision in script.walk_revisions()} == schema.KNOWN
+    assert {revision.revision for revision in script.walk_revisions()} == schema.KNOWN_REVISIONS
 
 
 async def test_migrations_run_only_on_an_older_schema(

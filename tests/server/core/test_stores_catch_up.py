@@ -10,7 +10,7 @@ from arcor2_hw.exceptions import DatabaseUnreachable
 from arcor2_hw.messages import Message
 from arcor2_server.alarms.kinds import AlarmKinds
 from arcor2_server.alarms.service import Alarms
-from arcor2_server.execution.runs import How, Runs
+from arcor2_server.execution.runs import Runs, RunStart
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
 from arcor2_server.storage.alarms import AlarmStore
@@ -33,12 +33,12 @@ async def test_alarms_and_runs_of_an_outage_are_stored(
         outage.setattr(store, "_put", Mock(side_effect=OSError("full")))
         alarms.system("disk_nearly_full", True, Message.of("The disk is full."))
         await alarms.flush()
-        run = runs.begin("pkg", How(), temporary=True)
+        run = runs.begin("pkg", RunStart(), temporary=True)
         await runs.close()
     assert (await store.all(), await SharedData(storage).runs(10)) == ([], [])
     if not ended:
         alarms.system("server_overloaded", True)
-        runs.begin("pkg", How(), temporary=True)
+        runs.begin("pkg", RunStart(), temporary=True)
     await alarms.close()
     await runs.close()
     assert [each.code for each in await store.all()] == [

@@ -6,7 +6,7 @@ import pytest
 from arcor2_hw.data.base import now
 from arcor2_hw.exceptions import Conflict, InvalidData, NotFound
 from arcor2_server.fleet import records
-from arcor2_server.fleet.registry import DEAD_AFTER, MAX_PER_NAME, TWIN_FOR, FleetCard, Registry, StoredCell
+from arcor2_server.fleet.registry import DUPLICATE_TIMEOUT, MAX_PER_NAME, SILENT_AFTER, FleetCard, Registry, StoredCell
 from tests.server.fleet.cells import state_of
 
 A, B = "a" * 32, "b" * 32
@@ -20,15 +20,15 @@ def only(registry: Registry) -> FleetCard:
 def test_a_cell_without_states_has_no_signal_and_returns() -> None:
     registry = Registry()
     registry.accept("press", state_of(number=1), now(), 100.0)
-    registry.check(100.0 + DEAD_AFTER)
+    registry.check(100.0 + SILENT_AFTER)
     assert only(registry).alive
     revision = registry.revision
-    registry.check(100.1 + DEAD_AFTER)
+    registry.check(100.1 + SILENT_AFTER)
     assert not only(registry).alive
     assert [card.alive for card in registry.cards(revision)] == [False]
     registry.accept("press", state_of(number=2), now(), 110.0)
     assert only(registry).alive
-    assert DEAD_AFTER + 2 * 0.1 < 2.0  # the check and the update of the page come on top
+    assert SILENT_AFTER + 2 * 0.1 < 2.0  # the check and the update of the page come on top
 
 
 def test_a_beat_changes_nothing_on_the_page() -> None:
@@ -46,7 +46,7 @@ def test_a_state_that_is_delivered_late_is_ignored() -> None:
     registry.accept("press", state_of(number=5, good=5), now(), 1.0)
     registry.accept("press", state_of(number=4, good=4), now(), 3.0)
     assert only(registry).state.good == 5
-    registry.check(1.1 + DEAD_AFTER)
+    registry.check(1.1 + SILENT_AFTER)
     assert not only(registry).alive
 
 
@@ -80,7 +80,7 @@ def test_two_servers_with_the_same_data_are_a_conflict_but_a_restart_is_none() -
     registry.accept("press", state_of(boot="1", number=901), now(), 2.1)
     registry.check(2.2)
     assert only(registry).conflict
-    registry.check(2.2 + TWIN_FOR)
+    registry.check(2.2 + DUPLICATE_TIMEOUT)
     assert not only(registry).conflict
 
 

@@ -1,4 +1,4 @@
-"""Runs on a node are stored by the server as those of hosts on its computer: books, checkpoints and recordings."""
+"""Runs on a node are stored by the server as those of hosts on its computer: inventory, checkpoints and recordings."""
 
 import asyncio
 import os
@@ -17,7 +17,7 @@ from msgspec import UNSET
 from msgspec.structs import replace
 
 from arcor2_hw.data.held import HeldData, HoldChoice
-from arcor2_hw.data.parts import ConfirmedPart, Part, PartBooks, RunCheckpoint
+from arcor2_hw.data.parts import ConfirmedPart, Part, PartInventory, RunCheckpoint
 from arcor2_hw.data.recordings import SignalKind
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.runtime import messages as m
@@ -34,7 +34,7 @@ from tests.runtime.test_host_parts import ONE, STEPS, write_package
 from tests.runtime.test_host_recording import check, running
 from tests.server.cell.conftest import running_server
 from tests.server.cell.test_execution_history import subscribe
-from tests.server.cell.test_part_books import CONFIRMED, CONTINUE
+from tests.server.cell.test_part_inventories import CONFIRMED, CONTINUE
 from tests.server.core.serving import ServerProcess, running as running_process, talking
 from tests.server.nodes.conftest import NODE, PATIENCE, Broker, Listener, Node
 from tests.server.nodes.test_node_hosts import AN_HOUR_AHEAD
@@ -61,15 +61,15 @@ class Cell:
         self.host.send(m.RunPackage("pkg_1", str(path), streaming_period=0, **more))
 
     @property
-    def books(self) -> PartBooks:
+    def inventory(self) -> PartInventory:
         found = CheckpointFile(self.records, "scn_1").read()
         assert found is not None
         return found
 
     @property
     def run(self) -> RunCheckpoint:
-        assert self.books.run is not UNSET
-        return self.books.run  # type: ignore[return-value]
+        assert self.inventory.run is not UNSET
+        return self.inventory.run  # type: ignore[return-value]
 
     def notes(self) -> list[str]:
         path = self.directory / "notes"
@@ -124,7 +124,7 @@ async def test_a_run_that_a_fault_interrupts_continues(
     await cell.ended()
     os.kill(broker.process.pid, signal.SIGCONT)
     assert (cell.run.ended, cell.run.last, cell.run.results["act_scan"]) == (False, "act_scan", ['"A-1"'])
-    assert cell.books.parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm")]
+    assert cell.inventory.parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm")]
 
     await cell.start(STEPS, broker.url, continues=True)
     held = await cell.held()
@@ -133,7 +133,12 @@ async def test_a_run_that_a_fault_interrupts_continues(
     await cell.host.decide(held.number, HoldChoice.RETRY, [], "")
     await cell.ended()
     assert cell.notes() == ["pick", "pick", "place", "pick", "place"]
-    assert (cell.run.ended, cell.books.counts.fed, cell.books.counts.good, cell.books.parts) == (True, 1, 1, [])
+    assert (cell.run.ended, cell.inventory.counts.fed, cell.inventory.counts.good, cell.inventory.parts) == (
+        True,
+        1,
+        1,
+        [],
+    )
 
 
 async def test_clients_inspect_and_continue_a_run_of_a_killed_node(
@@ -150,8 +155,8 @@ async def test_clients_inspect_and_continue_a_run_of_a_killed_node(
             on_node(package)
             await server.ask("RunPackage", {"id": "pkg_1", "on_error": "hold"})
             await until((tmp_path / "notes").exists, "the arm picks the part")
-            (books,) = await server.ask("GetParts")
-            assert (books.parts[0].serial, books.parts[0].moving_to) == ("A-1", "obj_arm")
+            (inventory,) = await server.ask("GetParts")
+            assert (inventory.parts[0].serial, inventory.parts[0].moving_to) == ("A-1", "obj_arm")
             with pytest.raises(Arcor2Error, match="while an action runs: pick"):
                 await server.ask("ConfirmParts", CONFIRMED)
             node.end()
@@ -172,21 +177,21 @@ async def test_clients_inspect_and_continue_a_run_of_a_killed_node(
             await server.ask("DecideHeld", {"number": held["number"], "choice": "skip"})  # the part is in the gripper
             await server.client.state("stopped", "PackageState")
             assert (tmp_path / "notes").read_text().split() == ["pick", "place"]
-            (books,) = await server.ask("GetParts")
-            assert [(part.serial, part.place) for part in books.parts] == [("A-1", "obj_nest")]
+            (inventory,) = await server.ask("GetParts")
+            assert [(part.serial, part.place) for part in inventory.parts] == [("A-1", "obj_nest")]
     finally:
         node.end()
 
 
-async def test_books_are_published_and_confirmed_during_a_run(cell: Cell, broker: Broker, node: Node) -> None:
+async def test_the_inventory_is_published_and_confirmed_during_a_run(cell: Cell, broker: Broker, node: Node) -> None:
     (cell.directory / "fault").touch()
     await cell.start(ONE, broker.url)
     held = await cell.held()
-    assert cell.books.parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm", confirmed=False)]
-    assert (await cell.message(m.PartsChanged)).books.parts == cell.books.parts
+    assert cell.inventory.parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm", confirmed=False)]
+    assert (await cell.message(m.PartsChanged)).inventory.parts == cell.inventory.parts
     assert (await cell.message(m.PartStep)).part == 1
     await cell.host.confirm_parts([ConfirmedPart(1, "obj_nest")])
-    assert cell.books.parts == [Part(1, "obj_nest", "A-1")]
+    assert cell.inventory.parts == [Part(1, "obj_nest", "A-1")]
     await cell.host.decide(held.number, HoldChoice.END, [], "")
     await cell.ended()
     assert cell.run.ended
@@ -319,26 +324,26 @@ async def test_a_run_on_a_node_survives_killed_servers_and_nodes(broker: Broker,
             async with asyncio.timeout(PATIENCE):
                 while not any(each["run"] == 2 and each.get("run_failed") for each in await recordings(server)):
                     await asyncio.sleep(0.1)
-            (books,) = await client.granted("GetParts")
-            assert [each["action_name"] for each in books["run"]["actions"]] == ["pick"]
-            assert (books["counts"]["fed"], len(books["parts"])) == (1, 1)
+            (inventory,) = await client.granted("GetParts")
+            assert [each["action_name"] for each in inventory["run"]["actions"]] == ["pick"]
+            assert (inventory["counts"]["fed"], len(inventory["parts"])) == (1, 1)
     finally:
         node.end()
 
 
 # ------------------------------------------------------------------------------------------------ without a broker
-async def test_a_node_cannot_change_the_books_of_another_scene(tmp_path: Path) -> None:
+async def test_a_node_cannot_change_the_inventory_of_another_scene(tmp_path: Path) -> None:
     (tmp_path / "data").mkdir()
     (tmp_path / "data" / "project.json").write_text('{"scene_id": "scn_1"}')
     answers: list[m.CheckpointAnswer] = []
     records = RunRecords(None, lambda body: answers.append(m.decode_host_bound(body)), lambda moment: moment)
     records.begin(m.RunPackage("pkg_1", str(tmp_path), records=str(tmp_path / "records")))
     for number, scene in enumerate(("scn_2", "../scn_1", "scn_1")):
-        records.handle("StoreCheckpoint", msgspec.msgpack.encode(m.StoreCheckpoint(number, PartBooks(scene))))
+        records.handle("StoreCheckpoint", msgspec.msgpack.encode(m.StoreCheckpoint(number, PartInventory(scene))))
     records.handle("ReadCheckpoint", msgspec.msgpack.encode(m.ReadCheckpoint(3)))
     await records.close()
     assert [each.number for each in answers if each.problem is not None] == [0, 1]
-    assert [each.books for each in answers if each.number == 3] == [PartBooks("scn_1")]
+    assert [each.books for each in answers if each.number == 3] == [PartInventory("scn_1")]
     assert sorted(each.name for each in (tmp_path / "records").iterdir()) == ["scn_1.0", "scn_1.1"]
 
 

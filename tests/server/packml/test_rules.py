@@ -14,11 +14,11 @@ from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import Conflict
 from arcor2_server.audit.changes import collecting
 from arcor2_server.errors import RequestRefused
-from arcor2_server.execution.runs import How
+from arcor2_server.execution.runs import RunStart
 from arcor2_server.packml.cell import PackmlCell
 from arcor2_server.packml.record import CellFile
 
-PLC, OPERATOR, TECHNICIAN = How(by_plc=True), How(role=Role.OPERATOR), How(role=Role.TECHNICIAN)
+PLC, OPERATOR, TECHNICIAN = RunStart(by_plc=True), RunStart(role=Role.OPERATOR), RunStart(role=Role.TECHNICIAN)
 A, M = CellAuthority, CellMode
 
 
@@ -49,7 +49,7 @@ class Parts:
         for notify in self.on_state:
             notify()
 
-    def permits(self, how: How) -> bool:
+    def permits(self, how: RunStart) -> bool:
         try:
             for check in self.before_start:
                 check(how)
@@ -78,7 +78,7 @@ def new_cell(tmp_path: Path) -> tuple[PackmlCell, Parts]:
     ],
 )
 async def test_mode_and_authority_decide_who_starts(
-    tmp_path: Path, authority: CellAuthority, mode: CellMode, allowed: list[How]
+    tmp_path: Path, authority: CellAuthority, mode: CellMode, allowed: list[RunStart]
 ) -> None:
     cell, parts = new_cell(tmp_path)
     with collecting() as changes:

@@ -9,7 +9,7 @@ import pytest
 
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.robot import Joint
-from arcor2_server.online.perpendicular import DOWN, YAWS, joint_change, yaw_of, yaws
+from arcor2_server.online.perpendicular import CHECKED_YAWS, DOWN, joint_change, yaw_of, yaws
 from tests.server.protocol.stage import happens, open_stage, refused
 
 
@@ -19,7 +19,7 @@ def test_angles_start_with_the_nearest_and_cover_one_turn(yaw: float) -> None:
     assert math.remainder(yaw_of(tool) - yaw, 2 * math.pi) == pytest.approx(0, abs=1e-9)
     angles = yaws(yaw)
     assert angles[0] == yaw
-    assert len({round(math.remainder(angle, 2 * math.pi), 6) for angle in angles}) == YAWS
+    assert len({round(math.remainder(angle, 2 * math.pi), 6) for angle in angles}) == CHECKED_YAWS
     distances = [round(abs(angle - yaw), 9) for angle in angles]
     assert distances == sorted(distances)
 

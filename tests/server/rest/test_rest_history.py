@@ -14,7 +14,7 @@ from arcor2_hw.data.events import Event
 from arcor2_hw.data.points import LivePoint, ObjectPointsData, PointUse
 from arcor2_hw.runtime.messages import DeviceChanged, StreamEvent
 from arcor2_server.app import Server, running_server
-from arcor2_server.execution.runs import How
+from arcor2_server.execution.runs import RunStart
 from arcor2_server.settings import ServerSettings
 from tests.runtime.conftest import scene_object
 from tests.server.rest.asking import asking, granted
@@ -39,7 +39,7 @@ async def test_points_and_runs_are_read_before_and_after_they_are_moved(tmp_path
             report(server, value)
             clock[0] += 60.0
         board.clear()
-        server.runs.end(server.runs.begin("pkg_1", How(by="ann"), temporary=False), RunEnd.FINISHED)
+        server.runs.end(server.runs.begin("pkg_1", RunStart(by="ann"), temporary=False), RunEnd.FINISHED)
 
         (point,) = granted(await http.get("/api/history/points", params={"object_id": "obj_oven"}))
         assert (point["object_name"], point["name"], point["unit"], point["digital"]) == (

@@ -4,7 +4,7 @@ import { t } from "@lingui/core/macro";
 import { addBranch, dissolveParallel, removeBranch } from "../../commands/parallel";
 import { notEditable } from "../../commands/program";
 import { byName } from "../../formats";
-import { MIN_BRANCHES, lanesOf, MAX_BRANCHES, whyNotAtOnce } from "../../program/lanes";
+import { lanesOf, MAX_BRANCHES, MIN_BRANCHES, whyNotAtOnce } from "../../program/lanes";
 import { CALL, calledBy } from "../../program/operands";
 import { callsIn } from "../../program/parallel";
 import { valuesOf } from "../../program/step";

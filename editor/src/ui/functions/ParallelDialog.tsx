@@ -5,7 +5,7 @@ import { useState } from "react";
 import { addParallel, parallelName } from "../../commands/parallel";
 import { byName } from "../../formats";
 import type { Slot } from "../../program/chain";
-import { devicesOf, MIN_BRANCHES, MAX_BRANCHES, whyNotAtOnce } from "../../program/lanes";
+import { devicesOf, MAX_BRANCHES, MIN_BRANCHES, whyNotAtOnce } from "../../program/lanes";
 import { CALL } from "../../program/operands";
 import { useEditor } from "../../store/store";
 import { Window } from "../kit/dialogs";

@@ -18,7 +18,7 @@ import PartsCard from "../parts/PartsCard";
 import { ValueField } from "../program/ValueField";
 import "./held.css";
 
-/** Errors that say that the cell and the books of parts do not agree. */
+/** Errors that say that the cell and the part inventory do not agree. */
 const PART_ERRORS: readonly string[] = ["place_occupied", "place_empty", "wrong_part", "part_unconfirmed"];
 /** Errors after which a device has to be connected again. */
 const LOST: readonly string[] = ["connection_lost", "not_connected"];

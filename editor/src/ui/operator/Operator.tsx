@@ -29,7 +29,7 @@ import { Icon, type IconName } from "../kit/icons";
 import { Button, Waiting } from "../kit/kit";
 import { lazyComponent } from "../kit/lazy";
 import { Notices } from "../notices/Notices";
-import PartsCard, { useBooks } from "../parts/PartsCard";
+import PartsCard, { useInventories } from "../parts/PartsCard";
 import { People } from "../people/People";
 import type { Chosen } from "../production/Product";
 import { endName, History } from "../run/History";
@@ -87,13 +87,15 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   const [starting, setStarting] = useState(false);
   const [listing, setListing] = useState(false);
   const listed = useAlarms("retained");
-  const books = useBooks();
+  const inventories = useInventories();
   const cell = useCell();
   const note = cell && noteText(cell);
   const alarms = listed ?? [];
   // The cards are shown together with what is below them: buttons do not move when something is loaded.
   const loaded =
-    (listed || !serves("ListAlarms")) && (books || !serves("GetParts")) && (cell !== undefined || !serves("GetCell"));
+    (listed || !serves("ListAlarms")) &&
+    (inventories || !serves("GetParts")) &&
+    (cell !== undefined || !serves("GetCell"));
   // Until a package is chosen, Start produces the product.
   const made = product && !packages.some((each) => each.id === chosen) ? product : null;
   const before = useRef("");
@@ -110,7 +112,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   // The card of an alarm says more than the error of the run.
   const explained = alarms.some((each) => !each.acknowledged && each.run === run?.number);
   // The card about the parts says that the run was interrupted.
-  const asked = result?.tone === "warn" && books?.some((each) => each.run);
+  const asked = result?.tone === "warn" && inventories?.some((each) => each.run);
   useTicking();
   // The shown screen is not part of the state, so the session does not notice the change by itself.
   useEffect(() => {
@@ -128,7 +130,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
         ? t`No packages yet. Build one in the editor.`
         : opened && users.length > 0
           ? t`${opened} is open in the editor (${users.join(", ")}). Ask them to close it.`
-          : books?.some((each) => each.run?.package_id === known.id && !each.run.confirmed)
+          : inventories?.some((each) => each.run?.package_id === known.id && !each.run.confirmed)
             ? t`First confirm where the parts are.`
             : refused || (made?.problem ?? "");
   const start = async () => {

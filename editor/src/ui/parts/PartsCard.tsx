@@ -5,7 +5,7 @@ import { useEffect, useState } from "react";
 import { ask } from "../../commands/requests";
 import { runPackage } from "../../commands/run";
 import { translate } from "../../i18n/serverMessages";
-import type { ConfirmedPart, Part, PartBooks, Place } from "../../protocol/types";
+import type { ConfirmedPart, Part, PartInventory, Place } from "../../protocol/types";
 import { call, serves } from "../../session/connection";
 import { whyUnavailable } from "../../store/permissions";
 import { isRunning } from "../../store/selectors";
@@ -15,55 +15,57 @@ import { Button } from "../kit/kit";
 import "../held/held.css";
 import "./parts.css";
 
-/** Return books with changed ones. */
-export function withBooks(known: readonly PartBooks[], changed: PartBooks): PartBooks[] {
+/** Return inventories with a changed one. */
+export function withInventory(known: readonly PartInventory[], changed: PartInventory): PartInventory[] {
   return [...known.filter((each) => each.scene_id !== changed.scene_id), changed];
 }
 
 /** Return the parts about which the card asks: those that are not confirmed, or all of them. */
-export const askedParts = (books: PartBooks, all: boolean): Part[] =>
-  books.parts.filter((part) => all || !part.confirmed);
+export const askedParts = (inventory: PartInventory, all: boolean): Part[] =>
+  inventory.parts.filter((part) => all || !part.confirmed);
 
 /** Return the places where a part may be, the likely ones first. */
-export function answersFor(part: Part, books: PartBooks): Place[] {
+export function answersFor(part: Part, inventory: PartInventory): Place[] {
   const rank = (place: Place) => (place.id === part.place ? 0 : place.id === part.moving_to ? 1 : 2);
   const taken = new Set(
-    books.parts.filter((each) => each.number !== part.number && each.confirmed).map((e) => e.place),
+    inventory.parts.filter((each) => each.number !== part.number && each.confirmed).map((e) => e.place),
   );
-  return books.places.filter((place) => place.capacity === 0 || !taken.has(place.id)).sort((a, b) => rank(a) - rank(b));
+  return inventory.places
+    .filter((place) => place.capacity === 0 || !taken.has(place.id))
+    .sort((a, b) => rank(a) - rank(b));
 }
 
 declare module "../../store/runtime" {
   interface Runtime {
-    /** The books as last shown: another card shows them at once, and moves nothing when they are loaded. */
-    parts?: PartBooks[];
+    /** The inventories as last shown: another card shows them at once, and moves nothing when they are loaded. */
+    parts?: PartInventory[];
   }
 }
 
-/** Return the books of parts, null until they are loaded. */
-export function useBooks(): PartBooks[] | null {
+/** Return the part inventories, null until they are loaded. */
+export function useInventories(): PartInventory[] | null {
   const ready = useEditor((state) => state.connection.status === "ready");
   const phase = useEditor((state) => state.program.state);
   const { runtime } = now();
-  const [books, setBooks] = useState<PartBooks[] | null>(runtime.parts ?? null);
-  if (books) runtime.parts = books;
+  const [inventories, setInventories] = useState<PartInventory[] | null>(runtime.parts ?? null);
+  if (inventories) runtime.parts = inventories;
   useEffect(() => {
     if (!ready || !serves("GetParts")) return;
     let current = true;
     runtime.takeParts ??= new Set();
     const listeners = runtime.takeParts;
-    const take = (changed: PartBooks) => setBooks((known) => withBooks(known ?? [], changed));
+    const take = (changed: PartInventory) => setInventories((known) => withInventory(known ?? [], changed));
     listeners.add(take);
     call("GetParts").then(
-      (answer) => current && setBooks(answer),
-      () => current && setBooks((known) => known ?? []), // offline: loaded again after the reconnect
+      (answer) => current && setInventories(answer),
+      () => current && setInventories((known) => known ?? []), // offline: loaded again after the reconnect
     );
     return () => {
       current = false;
       listeners.delete(take);
     };
   }, [ready, phase, runtime]);
-  return books;
+  return inventories;
 }
 
 /**
@@ -80,45 +82,53 @@ export default function PartsCard({
   folded?: boolean;
   whyNoStart?: string;
 }) {
-  const books = useBooks() ?? [];
+  const inventories = useInventories() ?? [];
   const runs = useEditor(isRunning);
-  const open = books.find((each) => askedParts(each, all).length > 0 || each.run !== undefined);
+  const open = inventories.find((each) => askedParts(each, all).length > 0 || each.run !== undefined);
   if (open) {
     const asks = !folded || askedParts(open, false).length > 0;
-    return asks ? <Books books={open} all={all} whyNoStart={whyNoStart} /> : <Folded books={open} />;
+    return asks ? <Inventory inventory={open} all={all} whyNoStart={whyNoStart} /> : <Folded inventory={open} />;
   }
   if (runs) return null;
-  return books
+  return inventories
     .filter((each) => each.parts.length > 0)
     .map((each) => (
       <Folded
         key={each.scene_id}
-        books={each}
+        inventory={each}
         note={t`A stopped program does not continue. It starts from its beginning.`}
       />
     ));
 }
 
-function Folded({ books, note }: { books: PartBooks; note?: string }) {
+function Folded({ inventory, note }: { inventory: PartInventory; note?: string }) {
   return (
     <details>
       <summary>{t`Parts in the cell`}</summary>
       {note && <p>{note}</p>}
-      <Books books={books} all />
+      <Inventory inventory={inventory} all />
     </details>
   );
 }
 
-function Books({ books, all, whyNoStart = "" }: { books: PartBooks; all: boolean; whyNoStart?: string }) {
+function Inventory({
+  inventory,
+  all,
+  whyNoStart = "",
+}: {
+  inventory: PartInventory;
+  all: boolean;
+  whyNoStart?: string;
+}) {
   const [chosen, setChosen] = useState<number>();
   const why = useEditor((state) => whyUnavailable(state, "ConfirmParts"));
   const whyContinue = useEditor((state) => whyUnavailable(state, "RunPackage")) || whyNoStart;
-  const parts = askedParts(books, all);
+  const parts = askedParts(inventory, all);
   const part = parts.find((each) => each.number === chosen) ?? (all ? undefined : parts[0]);
   const packages = useEditor((state) => state.lists.packages) ?? [];
   const confirm = (found: ConfirmedPart[], dismiss = false) =>
-    ask("ConfirmParts", { scene_id: books.scene_id, parts: found, dismiss }).then(() => setChosen(undefined));
-  const { run } = books;
+    ask("ConfirmParts", { scene_id: inventory.scene_id, parts: found, dismiss }).then(() => setChosen(undefined));
+  const { run } = inventory;
   const found = packages.find((each) => each.id === run?.package_id);
   const program = found?.package_meta.name ?? t`The program`;
   const continues = found !== undefined && run?.continues === true;
@@ -143,7 +153,7 @@ function Books({ books, all, whyNoStart = "" }: { books: PartBooks; all: boolean
           </p>
         </div>
       )}
-      {(!run || parts.length > 0) && <Places books={books} />}
+      {(!run || parts.length > 0) && <Places inventory={inventory} />}
       {all && !part && (
         <div className="held-choices">
           {parts.map((each) => (
@@ -158,7 +168,7 @@ function Books({ books, all, whyNoStart = "" }: { books: PartBooks; all: boolean
           <h2>{t`Where is part ${shown(part)}?`}</h2>
           {/* With a key, a press never answers for a part that took this place meanwhile. */}
           <div key={part.number} className="held-choices">
-            {answersFor(part, books).map((place) => (
+            {answersFor(part, inventory).map((place) => (
               <Button
                 key={place.id}
                 look={[part.place, part.moving_to].includes(place.id) ? "primary" : ""}
@@ -231,11 +241,11 @@ export function whyNot(missing: string, present: boolean): string {
 const shown = (part: Part): string => part.serial || `#${part.number}`;
 
 /** The places that contain a part or may contain it, or whose sensors detect one: expected next to sensed. */
-function Places({ books }: { books: PartBooks }) {
-  const rows = books.places
+function Places({ inventory }: { inventory: PartInventory }) {
+  const rows = inventory.places
     .map((place) => {
-      const sure = books.parts.filter((part) => part.place === place.id).map(shown);
-      const maybe = books.parts
+      const sure = inventory.parts.filter((part) => part.place === place.id).map(shown);
+      const maybe = inventory.parts
         .filter((part) => part.moving_to === place.id)
         .map((part) => t`${shown(part)} (or here)`);
       return { place, expected: [...sure, ...maybe].join(", ") };

@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
-import type { Part, PartBooks, Place } from "../../protocol/types";
-import { answersFor, askedParts, whyNot, withBooks } from "./PartsCard";
+import type { Part, PartInventory, Place } from "../../protocol/types";
+import { answersFor, askedParts, whyNot, withInventory } from "./PartsCard";
 
 const place = (id: string, capacity = 1): Place => ({ id, name: id, kind: "holder", capacity, parts: [] });
 const part = (number: number, where: string, confirmed: boolean, moving_to?: string): Part => ({
@@ -10,7 +10,7 @@ const part = (number: number, where: string, confirmed: boolean, moving_to?: str
   confirmed,
   ...(moving_to ? { moving_to } : {}),
 });
-const books: PartBooks = {
+const inventory: PartInventory = {
   scene_id: "scn_1",
   parts: [part(1, "nest", true), part(2, "robot", false, "tester")],
   places: [place("box", 0), place("nest"), place("tester"), place("robot")],
@@ -19,19 +19,19 @@ const books: PartBooks = {
 
 describe("the question about a part", () => {
   test("is about parts that are not confirmed, or about all", () => {
-    expect(askedParts(books, false).map((each) => each.number)).toEqual([2]);
-    expect(askedParts(books, true).map((each) => each.number)).toEqual([1, 2]);
+    expect(askedParts(inventory, false).map((each) => each.number)).toEqual([2]);
+    expect(askedParts(inventory, true).map((each) => each.number)).toEqual([1, 2]);
   });
 
   test("offers the likely places first, and no occupied one", () => {
-    const answers = answersFor(part(2, "robot", false, "tester"), books);
+    const answers = answersFor(part(2, "robot", false, "tester"), inventory);
     expect(answers.map((each) => each.id)).toEqual(["robot", "tester", "box"]);
   });
 
-  test("follows changed books", () => {
-    const changed = { ...books, parts: [] };
-    expect(withBooks([books], changed)).toEqual([changed]);
-    expect(withBooks([], books)).toEqual([books]);
+  test("follows changed inventory", () => {
+    const changed = { ...inventory, parts: [] };
+    expect(withInventory([inventory], changed)).toEqual([changed]);
+    expect(withInventory([], inventory)).toEqual([inventory]);
   });
 
   test("says why an interrupted program cannot continue", () => {

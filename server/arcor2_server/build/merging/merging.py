@@ -16,7 +16,7 @@ from arcor2_hw.exceptions import Arcor2Error
 from arcor2_server.build.frame import DOCSTRING, Frame, OwnNames, References, TypeFacts
 from arcor2_server.build.merging.matching import Matching
 from arcor2_server.build.merging.meaning import Declared
-from arcor2_server.build.merging.patching import Edit, NotPatched, Patches, apply
+from arcor2_server.build.merging.patching import CannotPatch, Edit, Patches, apply
 from arcor2_server.build.merging.text import Lines, Statement, Text
 from arcor2_server.build.merging.writing import MergingWriter
 from arcor2_server.build.reading import completed_from_script
@@ -84,7 +84,7 @@ def merged(scene: Scene, project: Project, types: Mapping[str, TypeFacts], tree_
     for way in (_patched, _rewritten):
         try:
             found = way(text, parts, tree, frame)
-        except (NotPatched, RecursionError):
+        except (CannotPatch, RecursionError):
             continue
         try:
             read = completed_from_script(found, scene, project, types)

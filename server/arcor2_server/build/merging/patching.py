@@ -19,7 +19,7 @@ class Edit(NamedTuple):
     lines: Lines
 
 
-class NotPatched(Exception):
+class CannotPatch(Exception):
     """The statements of a script cannot be changed one by one."""
 
 
@@ -34,12 +34,12 @@ class _Heads(Writer):
 
 
 def apply(lines: Sequence[str], edits: Sequence[Edit]) -> Lines:
-    """Return the edited lines. Raise NotPatched if two edits concern the same lines."""
+    """Return the edited lines. Raise CannotPatch if two edits concern the same lines."""
     found: Lines = []
     place = 0
     for edit in sorted(edits, key=lambda one: (one.start, one.end)):
         if edit.start < place:
-            raise NotPatched
+            raise CannotPatch
         found += lines[place : edit.start]
         found += edit.lines
         place = edit.end
@@ -56,7 +56,7 @@ class Patches:
         declared: the parameters of an action.
 
     Raises:
-        NotPatched: the structure of the generated function differs.
+        CannotPatch: the structure of the generated function differs.
     """
 
     def __init__(self, text: Text, matching: Matching, writer: MergingWriter, declared: DeclaredOf) -> None:
@@ -75,7 +75,7 @@ class Patches:
             return
         indent = statement.block.indent
         if not statement.alone:
-            raise NotPatched
+            raise CannotPatch
         heads = _Heads({}).statements([node], indent)
         if self._text.lines[statement.start].startswith(f"{indent}elif"):
             heads[0] = f"{indent}el{heads[0][len(indent) :]}"
@@ -87,7 +87,7 @@ class Patches:
         removed = [statement for statement in block.statements if self._is_removed(statement)]
         for statement in removed:
             if not statement.alone:
-                raise NotPatched
+                raise CannotPatch
             self.edits.append(Edit(statement.above, statement.end, []))
         if removed and len(removed) == len(block.statements):
             last = removed[-1]
@@ -108,7 +108,7 @@ class Patches:
             return any(action_name(one.node) for one in inside)
         if isinstance(node, ast.If):
             return False
-        raise NotPatched
+        raise CannotPatch
 
     # ------------------------------------------------------------------------------------------------ addition
     def _add(self, owner: ast.stmt) -> None:
@@ -131,7 +131,7 @@ class Patches:
             return bool(names_in(node))
         if isinstance(node, ast.If):
             return False
-        raise NotPatched
+        raise CannotPatch
 
     def _insert(self, group: Sequence[ast.stmt], before: ast.stmt | None, after: ast.stmt | None) -> None:
         if not group:
@@ -149,9 +149,9 @@ class Patches:
             statement = written[after]
             place, lines = statement.above, writer.statements(group, statement.block.indent)
         else:
-            raise NotPatched
+            raise CannotPatch
         if not statement.alone:
-            raise NotPatched
+            raise CannotPatch
         self.edits.append(Edit(place, place, lines))
 
 

@@ -11,5 +11,5 @@ NAMES: Final = {
     "stop": "feeder", "belt": "feeder", "gripper": "robot", "tester": "tester", "label": "label_place",
     "good": "good_boards", "bad": "bad_boards",
 }  # fmt: skip
-"""The place in the books for each physical place; all others are outside of the cell."""
+"""The place in the inventory for each physical place; all others are outside of the cell."""
 REPORTS: Final = ("report", "report_unread")

@@ -14,12 +14,12 @@ from arcor2_hw.data import rpc
 from arcor2_hw.data.alarms import AlarmFilter
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.held import HeldData, HoldChoice
-from arcor2_hw.data.parts import ConfirmedPart, Part, PartBooks
+from arcor2_hw.data.parts import ConfirmedPart, Part, PartInventory
 from arcor2_hw.exceptions import Arcor2Error
-from benchmarks.books.cell import Cell, waiting
-from benchmarks.books.checks import Checks
-from benchmarks.books.faults import Faults
-from benchmarks.books.places import NAMES, PICKS, PLACES, REPORTS
+from benchmarks.parts.cell import Cell, waiting
+from benchmarks.parts.checks import Checks
+from benchmarks.parts.faults import Faults
+from benchmarks.parts.places import NAMES, PICKS, PLACES, REPORTS
 from tests.e2e.harness import until
 
 DELIVERY_TIMEOUT: Final = 60.0
@@ -31,7 +31,7 @@ TRIES: Final = 6
 
 
 class Operator:
-    """Resolves each fault: removes its cause, corrects the books, acknowledges and decides."""
+    """Resolves each fault: removes its cause, corrects the inventory, acknowledges and decides."""
 
     def __init__(self, cell: Cell, faults: Faults, checks: Checks, say: Callable[[str], None]) -> None:
         self._cell, self._faults, self._checks, self._say = cell, faults, checks, say
@@ -42,10 +42,10 @@ class Operator:
         self.parallel = False
         """Whether the program tests a board while it fetches the next one."""
         self._gone: set[str] = set()
-        """Boards that have left the books by hand, or without a serial number."""
+        """Boards that have left the inventory by hand, or without a serial number."""
 
     async def resolve(self, client: Client, held: HeldData) -> None:
-        """Remove the cause, look at the cell, correct the books, acknowledge, and decide."""
+        """Remove the cause, look at the cell, correct the inventory, acknowledge, and decide."""
         self._checks.result.holds += 1
         still = await self._cell.joints()
         self.tries[held.action_id] += 1
@@ -137,20 +137,20 @@ class Operator:
         return newest["code"] in {result["serial"] for result in results}
 
     async def _done(self, client: Client, held: HeldData, target: str) -> tuple[HoldChoice, list[str]]:
-        """Return that the movement counts as done if the books agree, otherwise end the program."""
-        (books,) = await client.get_parts()
-        there = {books.name_of(part.place) for part in books.parts}
+        """Return that the movement counts as done if the inventory agrees, otherwise end the program."""
+        (inventory,) = await client.get_parts()
+        there = {inventory.name_of(part.place) for part in inventory.parts}
         # A part that was moved into a box is no longer tracked.
         arrived = NAMES["gripper"] not in there if target in ("good", "bad") else NAMES[target] in there
         return (HoldChoice.SKIP if arrived and HoldChoice.SKIP in held.choices else HoldChoice.END), []
 
     async def _take_out(self, client: Client, code: str) -> None:
-        """Take a board out of the cell, and confirm that in the books."""
+        """Take a board out of the cell, and confirm that in the inventory."""
         await self._remove(code)
         self._gone.add(code)
-        for books in await client.get_parts():
-            if found := [ConfirmedPart(part.number, "") for part in books.parts if part.serial == code]:
-                await self._send_confirmation(client, books.scene_id, found)
+        for inventory in await client.get_parts():
+            if found := [ConfirmedPart(part.number, "") for part in inventory.parts if part.serial == code]:
+                await self._send_confirmation(client, inventory.scene_id, found)
 
     async def _send_confirmation(self, client: Client, scene_id: str, found: list[ConfirmedPart]) -> None:
         """Confirm parts. Actions of other branches may still run; the server refuses it until they have ended."""
@@ -174,28 +174,28 @@ class Operator:
             await self._cell.command("world", "remove_board", code=code)
 
     async def confirm(self, client: Client, *, every: bool = False) -> None:
-        """Compare the books with the cell, and confirm where each part is. Boards on the table are taken out.
+        """Compare the inventory with the cell, and confirm where each part is. Boards on the table are taken out.
 
         every: also take out the boards that are in the way of a new start.
         """
-        all_books = await client.get_parts()
+        inventories = await client.get_parts()
         for board in await self._cell.boards():
             if board["place"] == "lost":
                 self._say(f"    on the table: {board['code']}: {[event['why'] for event in board['history'][-2:]]}")
             if board["place"] == "lost" or (every and board["place"] in ("gripper", "tester", "label")):
                 await self._remove(board["code"])
-        for books in all_books:
+        for inventory in inventories:
             boards = await self._cell.boards()
-            found = [one for part in books.parts if (one := self._found(part, books, boards)) is not None]
-            if found or not isinstance(books.run, Unset):
-                await self._send_confirmation(client, books.scene_id, found)
+            found = [one for part in inventory.parts if (one := self._found(part, inventory, boards)) is not None]
+            if found or not isinstance(inventory.run, Unset):
+                await self._send_confirmation(client, inventory.scene_id, found)
                 self._say(f"    confirmed {[(one.number, one.place) for one in found]}")
-        await self._checks.books(client)
+        await self._checks.inventory(client)
 
-    def _found(self, part: Part, books: PartBooks, boards: list[dict[str, Any]]) -> ConfirmedPart | None:
-        """Return where a part is, None if the books state it correctly."""
-        board = self._board_of(part, books, boards)
-        ids = {place.name: place.id for place in books.places}
+    def _found(self, part: Part, inventory: PartInventory, boards: list[dict[str, Any]]) -> ConfirmedPart | None:
+        """Return where a part is, None if the inventory states it correctly."""
+        board = self._board_of(part, inventory, boards)
+        ids = {place.name: place.id for place in inventory.places}
         place = "" if board is None else ids.get(NAMES.get(board["place"], ""), "")
         if part.confirmed and isinstance(part.moving_to, Unset) and part.place == place:
             return None
@@ -203,11 +203,11 @@ class Operator:
             self._gone.add(board["code"])
         return ConfirmedPart(part.number, place, exists=board is not None)
 
-    def _board_of(self, part: Part, books: PartBooks, boards: list[dict[str, Any]]) -> dict[str, Any] | None:
-        """Return the board that a part of the books is."""
+    def _board_of(self, part: Part, inventory: PartInventory, boards: list[dict[str, Any]]) -> dict[str, Any] | None:
+        """Return the board that a part of the inventory is."""
         if part.serial:
             return next(board for board in boards if board["code"] == part.serial)
-        known = {one.serial for one in books.parts} | {code for place in books.places for code in place.parts}
+        known = {one.serial for one in inventory.parts} | {code for place in inventory.places for code in place.parts}
         rest = [board for board in boards if board["code"] not in known | self._gone]
         moved = [board for board in rest if board["place"] not in ("stop", "belt", "feeder")]
         return next(iter(moved or [board for board in rest if board["place"] == "stop"]), None)

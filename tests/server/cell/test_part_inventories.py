@@ -1,4 +1,4 @@
-"""The books of parts after an interruption, as clients see them."""
+"""The part inventory after an interruption, as clients see it."""
 
 import os
 import signal
@@ -13,8 +13,8 @@ from arcor2_hw.data.parts import (
     ConfirmedPart,
     DoneAction,
     Part,
-    PartBooks,
     PartCounts,
+    PartInventory,
     Place,
     PlaceKind,
     RunCheckpoint,
@@ -23,7 +23,7 @@ from arcor2_hw.data.rpc import ConfirmPartsArgs
 from arcor2_hw.exceptions import Arcor2Error
 from arcor2_hw.runtime.checkpoints import CheckpointFile
 from arcor2_server.errors import RequestRefused
-from arcor2_server.execution.part_books import AllPartBooks
+from arcor2_server.execution.part_inventories import PartInventories
 from tests.e2e.harness import until
 from tests.runtime.test_host_parts import ONE, write_package
 
@@ -43,8 +43,8 @@ async def test_after_an_interruption_a_person_confirms_where_parts_are(tmp_path:
         write_package(server.services.settings.packages_dir / "pkg_1", tmp_path, ONE)
         await server.ask("RunPackage", {"id": "pkg_1", "on_error": "hold"})
         await server.client.event("PartsChanged", lambda data: data["parts"] and "moving_to" in data["parts"][0])
-        (books,) = await server.ask("GetParts")
-        assert (books.parts[0].serial, books.run) == ("A-1", UNSET)
+        (inventory,) = await server.ask("GetParts")
+        assert (inventory.parts[0].serial, inventory.run) == ("A-1", UNSET)
         with pytest.raises(Arcor2Error, match="while an action runs: pick"):
             await server.ask("ConfirmParts", CONFIRMED)
         await until((tmp_path / "notes").exists, "the arm picks the part")
@@ -60,9 +60,9 @@ async def test_after_an_interruption_a_person_confirms_where_parts_are(tmp_path:
 
     async with running_server(tmp_path / "data") as server:  # as after a power cut
         subscribe(server, "PartsChanged", "Held")
-        (books,) = await server.ask("GetParts")
-        assert books.run.package_id == "pkg_1"
-        assert [part.confirmed for part in books.parts] == [False]
+        (inventory,) = await server.ask("GetParts")
+        assert inventory.run.package_id == "pkg_1"
+        assert [part.confirmed for part in inventory.parts] == [False]
         with pytest.raises(RequestRefused, match=r"Confirm where these parts are .*: A-1 \(feeder\)"):
             await server.ask("RunPackage", {"id": "pkg_1"})
         with pytest.raises(RequestRefused, match=r"Confirm where these parts are"):
@@ -81,30 +81,30 @@ async def test_after_an_interruption_a_person_confirms_where_parts_are(tmp_path:
         await server.ask("DecideHeld", {"number": held["number"], "choice": "skip"})  # the part is in the gripper
         await server.client.state("stopped", "PackageState")
         assert (tmp_path / "notes").read_text().split() == ["pick", "place"]
-        (books,) = await server.ask("GetParts")
-        assert [(part.serial, part.place) for part in books.parts] == [("A-1", "obj_nest")]
+        (inventory,) = await server.ask("GetParts")
+        assert [(part.serial, part.place) for part in inventory.parts] == [("A-1", "obj_nest")]
         with pytest.raises(RequestRefused, match="was not interrupted"):
             await server.ask("RunPackage", CONTINUE)
 
 
 async def test_parts_are_confirmed_one_after_the_other(tmp_path: Path) -> None:
     hub = SimpleNamespace(broadcast=lambda event: None)
-    books = AllPartBooks(hub, tmp_path)  # type: ignore[arg-type]
+    inventory = PartInventories(hub, tmp_path)  # type: ignore[arg-type]
     places = [Place(each, each, PlaceKind.HOLDER) for each in ("nest", "arm")]
     run = RunCheckpoint(1, "pkg_1", "", now(), cycle=1, complete=True)
     file = CheckpointFile(tmp_path, "scn_1")
-    file.write(PartBooks("scn_1", [Part(1, "nest"), Part(2, "arm")], places, PartCounts(2, in_cell=2), run))
+    file.write(PartInventory("scn_1", [Part(1, "nest"), Part(2, "arm")], places, PartCounts(2, in_cell=2), run))
     file.close()
     for part, left in ((ConfirmedPart(1, "nest"), [2]), (ConfirmedPart(2, "arm"), [])):
-        await books.confirm(None, ConfirmPartsArgs("scn_1", [part]), "ann")
-        (found,) = await books.all()
+        await inventory.confirm(None, ConfirmPartsArgs("scn_1", [part]), "ann")
+        (found,) = await inventory.all()
         assert [each.number for each in found.unconfirmed] == left
         assert found.run.confirmed is (not left)  # type: ignore[union-attr]
-    await books.confirm(None, ConfirmPartsArgs("scn_1", [], dismiss=True), "ann")
-    (found,) = await books.all()
+    await inventory.confirm(None, ConfirmPartsArgs("scn_1", [], dismiss=True), "ann")
+    (found,) = await inventory.all()
     assert (found.run, len(found.parts)) == (UNSET, 2)
     with pytest.raises(RequestRefused, match="was not interrupted"):
-        await books.require_continues("scn_1", "pkg_1")
+        await inventory.require_continues("scn_1", "pkg_1")
 
 
 def test_a_run_names_the_result_because_of_which_it_cannot_continue() -> None:
@@ -114,7 +114,7 @@ def test_a_run_names_the_result_because_of_which_it_cannot_continue() -> None:
 
 
 async def test_a_person_chooses_where_an_interrupted_program_continues(tmp_path: Path) -> None:
-    books = AllPartBooks(SimpleNamespace(broadcast=lambda event: None), tmp_path)  # type: ignore[arg-type]
+    inventory = PartInventories(SimpleNamespace(broadcast=lambda event: None), tmp_path)  # type: ignore[arg-type]
     places = [Place("feeder", "feeder", PlaceKind.FEEDER, 0)]
     places += [Place(each, each, PlaceKind.HOLDER) for each in ("arm", "nest")]
     done = [
@@ -127,14 +127,14 @@ async def test_a_person_chooses_where_an_interrupted_program_continues(tmp_path:
     ]
     run = RunCheckpoint(1, "pkg_1", "", now(), cycle=1, complete=True, done=done)
     file = CheckpointFile(tmp_path, "scn_1")
-    file.write(PartBooks("scn_1", [Part(1, "nest"), Part(2, "arm")], places, PartCounts(2, in_cell=2), run))
+    file.write(PartInventory("scn_1", [Part(1, "nest"), Part(2, "arm")], places, PartCounts(2, in_cell=2), run))
     file.close()
     with pytest.raises(RequestRefused, match="Confirm first"):
-        await books.require_continues("scn_1", "pkg_1", 0)
+        await inventory.require_continues("scn_1", "pkg_1", 0)
 
     async def confirmed(*parts: ConfirmedPart) -> dict[str, str]:
-        await books.confirm(None, ConfirmPartsArgs("scn_1", list(parts)), "ann")
-        (found,) = await books.all()
+        await inventory.confirm(None, ConfirmPartsArgs("scn_1", list(parts)), "ann")
+        (found,) = await inventory.all()
         return {each.name: each.text for each in found.run.restarts}  # type: ignore[union-attr]
 
     assert await confirmed(ConfirmedPart(1, "nest"), ConfirmedPart(2, "arm")) == {
@@ -145,9 +145,9 @@ async def test_a_person_chooses_where_an_interrupted_program_continues(tmp_path:
         "test": "The result of look is not stored, or it would have to be repeated.",
     }
     with pytest.raises(RequestRefused, match="insert needs room at nest"):
-        await books.require_continues("scn_1", "pkg_1", 3)
+        await inventory.require_continues("scn_1", "pkg_1", 3)
     with pytest.raises(RequestRefused, match="no action 2"):
-        await books.require_continues("scn_1", "pkg_1", 2)
+        await inventory.require_continues("scn_1", "pkg_1", 2)
     found = await confirmed(ConfirmedPart(1, ""), ConfirmedPart(2, "nest"))
     assert found["insert"] == "insert needs a part at arm, and there is none."
-    assert await books.require_continues("scn_1", "pkg_1", 0) == 1
+    assert await inventory.require_continues("scn_1", "pkg_1", 0) == 1

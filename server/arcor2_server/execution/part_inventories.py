@@ -1,4 +1,4 @@
-"""The books of parts of all scenes: their publication, their state after an interruption, and corrections by people."""
+"""Part inventories of all scenes: their publication, state after an interruption, and corrections by people."""
 
 import asyncio
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from msgspec import UNSET
 from msgspec.structs import replace
 
 from arcor2_hw.data.base import Unset
-from arcor2_hw.data.parts import PartBooks, PlaceKind, Restart, RunCheckpoint
+from arcor2_hw.data.parts import PartInventory, PlaceKind, Restart, RunCheckpoint
 from arcor2_hw.data.position import MAIN_BRANCH
 from arcor2_hw.data.rpc import ConfirmPartsArgs
 from arcor2_hw.messages import Message
@@ -24,15 +24,15 @@ from arcor2_server.hosts.group import HostGroup
 log = structlog.get_logger(__name__)
 
 PARTS: Final = "PartsChanged"
-"""The additional event with the books of a scene."""
+"""The additional event with the inventory of a scene."""
 
 
 class _SceneId(msgspec.Struct):
     id: str
 
 
-class AllPartBooks:
-    """The books of parts. During a run the cell host keeps those of its scene, otherwise they are read from disk.
+class PartInventories:
+    """The part inventory. During a run the cell host keeps that of its scene, otherwise it is read from disk.
 
     Args:
         hub: publishes them.
@@ -42,12 +42,12 @@ class AllPartBooks:
     def __init__(self, hub: EventHub, directory: Path) -> None:
         self._hub = hub
         self.directory = directory
-        self._live: PartBooks | None = None
+        self._live: PartInventory | None = None
         self._scene_id = ""
         """The scene of the present run; empty if no program runs."""
         self._using_files = asyncio.Lock()
-        self.on_change: list[Callable[[PartBooks], None]] = []
-        """Called with books that have changed."""
+        self.on_change: list[Callable[[PartInventory], None]] = []
+        """Called with an inventory that has changed."""
 
     # -------------------------------------------------------------------------------- runs
     async def require_confirmed(self, package: Path) -> str:
@@ -61,9 +61,9 @@ class AllPartBooks:
             scene_id = msgspec.json.decode(content, type=_SceneId).id
         except (OSError, msgspec.MsgspecError):
             return ""
-        books = await self._stored(scene_id)
-        if books is not None and books.unconfirmed:
-            names = ", ".join(f"{part.shown} ({books.name_of(part.place)})" for part in books.unconfirmed)
+        inventory = await self._stored(scene_id)
+        if inventory is not None and inventory.unconfirmed:
+            names = ", ".join(f"{part.shown} ({inventory.name_of(part.place)})" for part in inventory.unconfirmed)
             raise RequestRefused(
                 "Confirm where these parts are before the program starts: {parts}. "
                 "The operator's screen and the panel Run ask for it.",
@@ -82,14 +82,14 @@ class AllPartBooks:
         Raises:
             RequestRefused: it cannot. The message names the missing condition.
         """
-        books = await self._stored(scene_id)
-        run = UNSET if books is None else books.run
+        inventory = await self._stored(scene_id)
+        run = UNSET if inventory is None else inventory.run
         if isinstance(run, Unset) or run.package_id != package_id:
             raise RequestRefused("This program was not interrupted. Start it from its beginning.")
         if not run.confirmed:
             raise RequestRefused("Confirm first where the parts are, then continue the program.")
-        if at is not None and books is not None:
-            found = next((one for one in _restarts(books, run) if one.at == at), None)
+        if at is not None and inventory is not None:
+            found = next((one for one in _restarts(inventory, run) if one.at == at), None)
             if found is None:
                 raise RequestRefused("The interrupted cycle has no action {at} at which it could continue.", at=at)
             if found.text:
@@ -108,13 +108,13 @@ class AllPartBooks:
         return run.run
 
     def begin_run(self, scene_id: str) -> None:
-        """Handle the start of a run. The cell host keeps the books of its scene."""
+        """Handle the start of a run. The cell host keeps the inventory of its scene."""
         self._scene_id, self._live = scene_id, None
 
-    def changed(self, books: PartBooks) -> None:
-        """Handle the books from the cell host."""
-        self._live = books
-        self._publish(books)
+    def changed(self, inventory: PartInventory) -> None:
+        """Handle the inventory from the cell host."""
+        self._live = inventory
+        self._publish(inventory)
 
     def end_run(self) -> str:
         """Handle the end of the run, and return its scene."""
@@ -122,25 +122,25 @@ class AllPartBooks:
         return scene_id
 
     async def publish(self, scene_id: str) -> None:
-        """Publish the stored books of a scene."""
-        books = await self._stored(scene_id) if scene_id else None
-        if books is not None and (books.places or not isinstance(books.run, Unset)):
-            self._publish(_published(books))
+        """Publish the stored inventory of a scene."""
+        inventory = await self._stored(scene_id) if scene_id else None
+        if inventory is not None and (inventory.places or not isinstance(inventory.run, Unset)):
+            self._publish(_published(inventory))
 
-    def _publish(self, books: PartBooks) -> None:
-        self._hub.broadcast(make_event(PARTS, books))
+    def _publish(self, inventory: PartInventory) -> None:
+        self._hub.broadcast(make_event(PARTS, inventory))
         for notify in self.on_change:
-            notify(books)
+            notify(inventory)
 
     # -------------------------------------------------------------------------------- people
-    async def all(self) -> list[PartBooks]:
-        """Return the books of all scenes; `run` only of a run that was interrupted."""
+    async def all(self) -> list[PartInventory]:
+        """Return the inventories of all scenes; `run` only of a run that was interrupted."""
         scenes = await asyncio.to_thread(stored_scenes, self.directory)
         found = [self._live if scene == self._scene_id else await self._stored(scene) for scene in scenes]
         return [
-            _published(books)
-            for books in found
-            if books is not None and (books.places or not isinstance(books.run, Unset))
+            _published(inventory)
+            for inventory in found
+            if inventory is not None and (inventory.places or not isinstance(inventory.run, Unset))
         ]
 
     async def confirm(self, host: HostGroup | None, args: ConfirmPartsArgs, by: str) -> None:
@@ -152,7 +152,7 @@ class AllPartBooks:
             by: name of the user.
 
         Raises:
-            RequestRefused: there are no books of this scene, or an action is running.
+            RequestRefused: this scene has no inventory, or an action is running.
             NotFound: there is no such part or place.
             Conflict: the parts contradict each other.
         """
@@ -171,79 +171,79 @@ class AllPartBooks:
 
     async def _confirm_stored(self, args: ConfirmPartsArgs) -> None:
         async with self._using_files:
-            books = await asyncio.to_thread(self._read, args.scene_id)
-            if books is None:
+            inventory = await asyncio.to_thread(self._read, args.scene_id)
+            if inventory is None:
                 raise RequestRefused("No parts are recorded for the scene {scene}.", scene=args.scene_id)
-            ledger = Ledger(books)
+            ledger = Ledger(inventory)
             ledger.confirm(args.parts)
-            corrected = ledger.books
+            corrected = ledger.inventory
             if args.dismiss:
                 corrected = replace(corrected, run=UNSET)
-            elif not isinstance(books.run, Unset):  # it can continue once all parts are confirmed
-                run = replace(books.run, interrupted=True, confirmed=not corrected.unconfirmed)
+            elif not isinstance(inventory.run, Unset):  # it can continue once all parts are confirmed
+                run = replace(inventory.run, interrupted=True, confirmed=not corrected.unconfirmed)
                 corrected = replace(corrected, run=run)
             await asyncio.to_thread(self._write, corrected)
         self._publish(_published(corrected))
 
     # -------------------------------------------------------------------------------- files
-    async def _stored(self, scene_id: str) -> PartBooks | None:
+    async def _stored(self, scene_id: str) -> PartInventory | None:
         async with self._using_files:
             return await asyncio.to_thread(self._read, scene_id)
 
-    def _read(self, scene_id: str) -> PartBooks | None:
-        """Read the books of a scene without a run. After an interrupted run, no place of a part is confirmed."""
-        books = CheckpointFile(self.directory, scene_id).read()
-        if books is None or isinstance(books.run, Unset):
-            return books
-        if books.run.ended:
-            return replace(books, run=UNSET)
-        if books.run.interrupted:  # a person has confirmed some of the parts
-            return books
-        ledger = Ledger(books)
+    def _read(self, scene_id: str) -> PartInventory | None:
+        """Read the inventory of a scene without a run. After an interrupted run, no place of a part is confirmed."""
+        inventory = CheckpointFile(self.directory, scene_id).read()
+        if inventory is None or isinstance(inventory.run, Unset):
+            return inventory
+        if inventory.run.ended:
+            return replace(inventory, run=UNSET)
+        if inventory.run.interrupted:  # a person has confirmed some of the parts
+            return inventory
+        ledger = Ledger(inventory)
         ledger.interrupt()
-        return replace(ledger.books, run=books.run)
+        return replace(ledger.inventory, run=inventory.run)
 
-    def _write(self, books: PartBooks) -> None:
-        file = CheckpointFile(self.directory, books.scene_id)
+    def _write(self, inventory: PartInventory) -> None:
+        file = CheckpointFile(self.directory, inventory.scene_id)
         try:
-            file.write(books)
+            file.write(inventory)
         finally:
             file.close()
 
 
-def _published(books: PartBooks) -> PartBooks:
-    """Return books as clients see them."""
-    if isinstance(books.run, Unset):
-        return books
-    return replace(books, run=replace(books.run.published(), restarts=_restarts(books, books.run)))
+def _published(inventory: PartInventory) -> PartInventory:
+    """Return an inventory as clients see it."""
+    if isinstance(inventory.run, Unset):
+        return inventory
+    return replace(inventory, run=replace(inventory.run.published(), restarts=_restarts(inventory, inventory.run)))
 
 
-def _restarts(books: PartBooks, run: RunCheckpoint) -> list[Restart]:
+def _restarts(inventory: PartInventory, run: RunCheckpoint) -> list[Restart]:
     """Return the actions of the program that the interrupted cycle has done, and why it cannot continue there."""
     if not run.complete or not run.confirmed or run.cycle < 1:
         return []
     found = []
     for at, done in enumerate(run.done):
         if done.branch == MAIN_BRANCH:
-            why = _why_not(books, run, at)
+            why = _why_not(inventory, run, at)
             texts = {} if why is None else {"text": why.text, **why.translation()}
             found.append(Restart(at, done.action_id, done.name, **texts))
     return found
 
 
-def _why_not(books: PartBooks, run: RunCheckpoint, at: int) -> Message | None:
+def _why_not(inventory: PartInventory, run: RunCheckpoint, at: int) -> Message | None:
     """Return why an interrupted program cannot continue at an action of its cycle; None if it can."""
     if name := run.until(at).why_not():
         return Message.of("The result of {action} is not stored, or it would have to be repeated.", action=name)
-    places = {place.id: place for place in books.places}
+    places = {place.id: place for place in inventory.places}
     move = next((done for done in run.done[at:] if done.moved), None)
     if move is None or not {move.source, move.target} <= places.keys():
         return None
     source, target = places[move.source], places[move.target]
-    there = [part for part in books.parts if part.place == source.id]
+    there = [part for part in inventory.parts if part.place == source.id]
     if not there and source.kind is not PlaceKind.FEEDER:
         return Message.of("{action} needs a part at {place}, and there is none.", action=move.name, place=source.name)
-    others = [part.shown for part in books.parts if part.place == target.id and part not in there]
+    others = [part.shown for part in inventory.parts if part.place == target.id and part not in there]
     if target.capacity and len(others) >= target.capacity:
         return Message.of("{action} needs room at {place}, where part {part} is.", action=move.name,
                           place=target.name, part=others[0])  # fmt: skip

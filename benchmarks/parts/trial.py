@@ -14,10 +14,10 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.held import HeldData, OnError
 from arcor2_hw.data.package import PackageStateEnum
 from arcor2_hw.exceptions import Arcor2Error
-from benchmarks.books.cell import Cell, waiting
-from benchmarks.books.checks import Checks, Result
-from benchmarks.books.faults import Faults
-from benchmarks.books.operator import DECISION_TIMEOUT, DELIVERY_TIMEOUT, Operator
+from benchmarks.parts.cell import Cell, waiting
+from benchmarks.parts.checks import Checks, Result
+from benchmarks.parts.faults import Faults
+from benchmarks.parts.operator import DECISION_TIMEOUT, DELIVERY_TIMEOUT, Operator
 from tests.e2e.harness import until
 
 SILENT_AFTER: Final = 60.0
@@ -62,7 +62,7 @@ class Trial:
         async with Client(cell.url, "operator", reconnect=False) as client:
             await client.subscribe_events({"ProgramPosition", "Held"})
             await self._faults.cure()
-            interrupted = any(not isinstance(books.run, Unset) for books in await client.get_parts())
+            interrupted = any(not isinstance(inventory.run, Unset) for inventory in await client.get_parts())
             await self._operator.confirm(client, every=not interrupted and not waiting(await cell.boards()))
             await self._start(client)
             self._checks.result.starts += 1
@@ -82,7 +82,7 @@ class Trial:
         deadline = time.monotonic() + DECISION_TIMEOUT
         while True:
             try:
-                runs = [books.run for books in await client.get_parts()]
+                runs = [inventory.run for inventory in await client.get_parts()]
                 continues = any(not isinstance(run, Unset) and run.continues and run.confirmed for run in runs)
                 args = rpc.RunPackageArgs(self._cell.package_id, on_error=OnError.HOLD, continues=continues)
                 await client.call("RunPackage", args)

@@ -1,6 +1,6 @@
-"""The books of parts under faults: the demo cell with random faults, and an operator who resolves each of them.
+"""The part inventory under faults: the demo cell with random faults, and an operator who resolves each of them.
 
-The truth is that of the simulated world and of the simulated planning service, never that of the books. The operator
+The truth is that of the simulated world and of the simulated planning service, never the inventory. The operator
 sends only the requests that the operator's screen sends, and acts at the simulated cell by hand: removes a cause, takes
 a board out, opens a door.
 """
@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from benchmarks.books.checks import Result
-from benchmarks.books.trial import Trial
 from benchmarks.metrics import Metric, Report
+from benchmarks.parts.checks import Result
+from benchmarks.parts.trial import Trial
 
 SEEDS: Final = 10
 BOARDS: Final = 20
@@ -45,7 +45,7 @@ async def run(report: Report, folder: Path, size: Size) -> None:
 
     async def measure(seed: int) -> None:
         async with free:
-            began, to = time.monotonic(), folder / f"books-{seed}"
+            began, to = time.monotonic(), folder / f"inventory-{seed}"
             try:
                 result = await trial(to, seed, size.boards, size.faults)
             except Exception:  # noqa: BLE001 - the other seeds are measured
@@ -76,10 +76,10 @@ def _report(report: Report, results: list[Result]) -> None:
     kills, decisions = sum(result.kills for result in results), sum(result.holds for result in results)
     note = f"{faults} faults, {kills} of them kills; {decisions} decisions"
     found = "; ".join([note, *(problem for result in results for problem in result.problems())])
-    report.add(Metric("books_unaccounted", sum(len(each.unaccounted) for each in results), n, found))
-    report.add(Metric("books_results_not_once", sum(len(each.not_once) for each in results), n))
-    report.add(Metric("books_moved_alone", sum(len(each.moved) for each in results), n))
-    report.add(Metric("books_unresolved", sum(len(each.unresolved) for each in results), n))
+    report.add(Metric("parts_unaccounted", sum(len(each.unaccounted) for each in results), n, found))
+    report.add(Metric("parts_results_not_once", sum(len(each.not_once) for each in results), n))
+    report.add(Metric("parts_moved_alone", sum(len(each.moved) for each in results), n))
+    report.add(Metric("parts_unresolved", sum(len(each.unresolved) for each in results), n))
 
 
 async def trial(folder: Path, seed: int, boards: int, faults: int) -> Result:

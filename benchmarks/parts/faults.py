@@ -5,9 +5,9 @@ import random
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
-from benchmarks.books.cell import Cell, Do
-from benchmarks.books.checks import Result
-from benchmarks.books.places import PICKS, PLACES, REPORTS
+from benchmarks.parts.cell import Cell, Do
+from benchmarks.parts.checks import Result
+from benchmarks.parts.places import PICKS, PLACES, REPORTS
 
 
 def do(fake: str, command: str, **arguments: Any) -> Do:

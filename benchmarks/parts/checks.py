@@ -1,4 +1,4 @@
-"""What was found for a seed: the books, the results and the motion compared with the truth."""
+"""What was found for a seed: the inventory, the results and the motion compared with the truth."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -7,7 +7,7 @@ from typing import Any
 
 from arcor2_hw.client import Client
 from arcor2_hw.data.parts import PartCounts
-from benchmarks.books.cell import Cell
+from benchmarks.parts.cell import Cell
 
 
 @dataclass
@@ -45,17 +45,19 @@ class Checks:
         problems.append(text)
         self._say(f"WRONG: {text}")
 
-    async def books(self, client: Client) -> None:
-        """Compare the counts of the books with the boards of the world."""
+    async def inventory(self, client: Client) -> None:
+        """Compare the counts of the inventory with the boards of the world."""
         boards = await self._cell.boards()
-        for books in await client.get_parts():
+        for inventory in await client.get_parts():
             truth = Counter(board["place"] for board in boards)
-            known = sum(books.name_of(part.place) == "feeder" for part in books.parts)
+            known = sum(inventory.name_of(part.place) == "feeder" for part in inventory.parts)
             in_cell = truth["gripper"] + truth["tester"] + truth["label"] + known
             fed = in_cell + truth["good"] + truth["bad"] + truth["removed"]
             wanted = PartCounts(fed, truth["good"], truth["bad"], truth["removed"], in_cell)
-            if books.counts != wanted or truth["lost"] or known > truth["stop"] + truth["belt"]:
-                self.found(self.result.unaccounted, f"books {books.counts}, cell {wanted}, lost {truth['lost']}")
+            if inventory.counts != wanted or truth["lost"] or known > truth["stop"] + truth["belt"]:
+                self.found(
+                    self.result.unaccounted, f"inventory {inventory.counts}, cell {wanted}, lost {truth['lost']}"
+                )
 
     async def results(self) -> None:
         """Compare the results that the planning service has received with the boards of the world."""

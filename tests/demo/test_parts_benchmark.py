@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.books import trial
+from benchmarks.parts import trial
 
 pytestmark = [pytest.mark.asyncio, pytest.mark.timeout(300)]
 SEED = 4
