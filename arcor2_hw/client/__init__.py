@@ -2,25 +2,27 @@
 
 from arcor2_hw.client.connection import Client
 from arcor2_hw.client.errors import (
-    AnswerLate,
-    AnswerUnknown,
+    AnswerLost,
+    AnswerTimeout,
     BadRequest,
     DeviceFailed,
     EventsMissed,
     Forbidden,
-    InTheWay,
     LockedByOther,
     NotAdmitted,
-    NothingThere,
     NotOffered,
     RequestFailed,
+    ResourceNotFound,
     ServerFault,
+    StateConflict,
 )
 from arcor2_hw.client.rest import Rest
 from arcor2_hw.client.stream import EventStream, TypedEvent
 
 __all__ = [
     "AnswerLate",
+    "AnswerLost",
+    "AnswerTimeout",
     "AnswerUnknown",
     "BadRequest",
     "Client",
@@ -34,7 +36,12 @@ __all__ = [
     "NotOffered",
     "NothingThere",
     "RequestFailed",
+    "ResourceNotFound",
     "Rest",
     "ServerFault",
+    "StateConflict",
     "TypedEvent",
 ]
+
+# Names before version 0.2, which scripts import.
+AnswerLate, AnswerUnknown, InTheWay, NothingThere = AnswerTimeout, AnswerLost, StateConflict, ResourceNotFound

@@ -10,7 +10,7 @@ from typing import Any, Final, Self
 
 import msgspec
 
-from arcor2_hw.client.errors import AnswerLate, AnswerUnknown, EventsMissed, NotAdmitted, RequestFailed, refusal
+from arcor2_hw.client.errors import AnswerLost, AnswerTimeout, EventsMissed, NotAdmitted, RequestFailed, refusal
 from arcor2_hw.client.requests import Requests
 from arcor2_hw.client.rest import TOKEN_VARIABLE, Rest
 from arcor2_hw.client.stream import EventStream
@@ -47,7 +47,7 @@ class Client(Requests):
     Every request is a method (`await client.open_scene(id)`); `events()` and `follow(...)` return streams of events.
     When the connection is lost, the client reconnects: it registers its user, subscribes to the same events, and every
     stream raises EventsMissed. Requests wait for the connection within their time limit. A request that was sent but
-    not answered raises AnswerUnknown; only those of READING and dry runs are sent again.
+    not answered raises AnswerLost; only those of READING and dry runs are sent again.
 
     Args:
         url: ws, wss, http or https.
@@ -271,8 +271,8 @@ class Client(Requests):
 
         Raises:
             RequestFailed: The server refused it, with a subclass for each kind of reason.
-            AnswerUnknown: The connection broke after it was sent.
-            AnswerLate: No answer came in time.
+            AnswerLost: The connection broke after it was sent.
+            AnswerTimeout: No answer came in time.
             NotConnected: The connection was not established in time. Nothing was sent.
             ConnectionLost: The connection is closed. Nothing was sent.
             NotAdmitted: The token is not valid. Nothing was sent.
@@ -290,9 +290,9 @@ class Client(Requests):
                 await wire.closed.wait()
                 harmless = name in READING or (dry_run and name in RPCS and RPCS[name].dry_run)
                 if not (self._reconnect and harmless):
-                    raise AnswerUnknown(name, self._url) from None
-            except AnswerLate:
-                raise AnswerLate(name, limit) from None
+                    raise AnswerLost(name, self._url) from None
+            except AnswerTimeout:
+                raise AnswerTimeout(name, limit) from None
             await asyncio.sleep(0)  # so that the reconnecting task runs
         data = self._data(name, message)
         if not message.result:
@@ -377,3 +377,7 @@ class Client(Requests):
                 "No event {names} within {timeout:g} s.", names=" or ".join(names) or "at all", timeout=timeout
             ) from None
         raise ConnectionLost("The connection to {url} is closed.", url=self._url)
+
+
+# Names before version 0.2.
+LONGEST_PAUSE = MAX_PAUSE

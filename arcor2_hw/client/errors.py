@@ -43,13 +43,13 @@ class BadRequest(RequestFailed, InvalidData):
     code = "bad_request"
 
 
-class NothingThere(RequestFailed, NotFound):
+class ResourceNotFound(RequestFailed, NotFound):
     """An item named in the request does not exist."""
 
     code = "nothing_there"
 
 
-class InTheWay(RequestFailed, Conflict):
+class StateConflict(RequestFailed, Conflict):
     """The request conflicts with the present state."""
 
     code = "in_the_way"
@@ -85,7 +85,7 @@ class NotAdmitted(Arcor2Error):
     code = "not_admitted"
 
 
-class AnswerUnknown(ConnectionLost):
+class AnswerLost(ConnectionLost):
     """The connection broke before the answer. The request may or may not have been executed; it is not repeated."""
 
     code = "answer_unknown"
@@ -97,7 +97,7 @@ class AnswerUnknown(ConnectionLost):
         self.request = request
 
 
-class AnswerLate(DeviceTimeout):
+class AnswerTimeout(DeviceTimeout):
     """No answer came in time. The request may or may not have been executed; a late answer is discarded."""
 
     code = "answer_late"
@@ -147,8 +147,8 @@ _KINDS: Final[dict[type[RequestFailed], tuple[str, ...]]] = {
         *("invalid_arguments", "invalid_data", "invalid_project", "invalid_package", "unsound", "too_long"),
         "address_changed",
     ),
-    NothingThere: ("not_found",),
-    InTheWay: ("conflict",),
+    ResourceNotFound: ("not_found",),
+    StateConflict: ("conflict",),
     LockedByOther: ("locked",),
     NotOffered: ("unknown_request", "not_available", "not_implemented"),
     DeviceFailed: (
@@ -164,8 +164,8 @@ STATUSES: Final[dict[int, type[RequestFailed]]] = {
     400: BadRequest,
     401: Forbidden,
     403: Forbidden,
-    404: NothingThere,
-    409: InTheWay,
+    404: ResourceNotFound,
+    409: StateConflict,
     413: BadRequest,
     415: BadRequest,
     500: ServerFault,

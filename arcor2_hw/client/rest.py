@@ -217,7 +217,7 @@ class Rest:
         """Return the handwritten script of a project.
 
         Raises:
-            NothingThere: The project has none.
+            ResourceNotFound: The project has none.
         """
         return (await self.request("GET", f"/projects/{_part(key)}/sources", _Sources)).script
 
@@ -338,7 +338,7 @@ class Rest:
                 overwrite_collision_models, update_project_from_script.
 
         Raises:
-            InTheWay: Saved items differ; the message names all of them.
+            StateConflict: Saved items differ; the message names all of them.
         """
         query = {name: str(value).lower() for name, value in overwrite.items()}
         ids: ImportedIds = await self._upload(

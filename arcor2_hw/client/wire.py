@@ -13,7 +13,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidHandshake, InvalidURI
 from websockets.protocol import State
 
-from arcor2_hw.client.errors import AnswerLate, EventsMissed, NotAdmitted
+from arcor2_hw.client.errors import AnswerTimeout, EventsMissed, NotAdmitted
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.events import EVENTS, ChangeType, Event
 from arcor2_hw.exceptions import ConnectionLost
@@ -159,7 +159,7 @@ class Wire:
         Raises:
             Unsent: Nothing was sent.
             Unanswered: The connection broke before the answer.
-            AnswerLate: No answer was received within `limit` s.
+            AnswerTimeout: No answer was received within `limit` s.
         """
         if self._socket.state is not State.OPEN or self.closed.is_set():
             raise Unsent
@@ -177,7 +177,7 @@ class Wire:
                 await self._socket.send(text)
                 return await future
         except TimeoutError:
-            raise AnswerLate(name, limit) from None
+            raise AnswerTimeout(name, limit) from None
         except ConnectionClosed:
             raise Unanswered from None
         finally:

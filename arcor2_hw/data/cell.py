@@ -196,3 +196,7 @@ def _kind(value: Any) -> str:
 def write_cell(cell: Cell) -> bytes:
     """Return the text of a cell.yaml, as `read_cell` reads it."""
     return msgspec.yaml.encode(cell)
+
+
+# Names before version 0.2.
+LARGEST_BAND, strangers = MAX_DEAD_BAND, unknown_objects

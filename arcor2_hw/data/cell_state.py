@@ -79,3 +79,7 @@ class CellStatus(Data, frozen=True):
     job: int | Unset = UNSET
     plc: PlcLink | Unset = UNSET
     opcua: bool | Unset = UNSET
+
+
+# Names before version 0.2.
+MOST_JOBS = MAX_JOBS

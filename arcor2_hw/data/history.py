@@ -128,3 +128,7 @@ class HistoryState(Data, frozen=True):
     rows: int = 0
     dropped: int = 0
     problem: str = ""
+
+
+# Names before version 0.2.
+MOST_BUCKETS, MOST_VALUES = MAX_BUCKETS, MAX_VALUES

@@ -95,3 +95,7 @@ class InterlockStates(Data, frozen=True):
     """The states of all interlocks of the online scene, or of the running program; none while it is offline."""
 
     interlocks: list[InterlockState]
+
+
+# Names before version 0.2.
+LONGEST_WAIT = MAX_WAIT

@@ -201,3 +201,7 @@ class Point(Data, frozen=True, forbid_unknown_fields=True):
         packed = struct.pack(self._format, number)
         words = [int.from_bytes(packed[at : at + 2]) for at in range(0, len(packed), 2)]
         return words[::-1] if self.word_order == "low_first" else words
+
+
+# Names before version 0.2.
+LONGEST_DEBOUNCE = MAX_DEBOUNCE_TIME

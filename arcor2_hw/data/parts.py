@@ -232,3 +232,7 @@ class ConfirmedPart(Data, frozen=True):
     place: str
     serial: str | Unset = UNSET
     exists: bool = True
+
+
+# Names before version 0.2.
+PartBooks = PartInventory

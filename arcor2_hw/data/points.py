@@ -91,3 +91,7 @@ class ForcesChangedData(Data, frozen=True):
     """Data of the event ForcesChanged: all forced outputs."""
 
     forces: list[ForcedPoint]
+
+
+# Names before version 0.2.
+LONGEST_FORCE_MS, SHORTEST_FORCE_MS = MAX_FORCE_MS, MIN_FORCE_MS

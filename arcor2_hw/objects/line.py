@@ -274,3 +274,7 @@ class _Serial:
 
     def close(self) -> None:
         self._serial.close()
+
+
+# Names before version 0.2.
+LONGEST_ANSWER = MAX_ANSWER

@@ -156,3 +156,7 @@ class LineDevice(Connected):
     def on_lost(self, error: DeviceError) -> None:
         """Break the line with the error by which the connection was lost."""
         self.line.broken(error)
+
+
+# Names before version 0.2.
+LAST_REQUEST_TIME = CLOSING_REQUEST_TIME

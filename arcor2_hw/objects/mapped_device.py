@@ -337,3 +337,7 @@ def blocks(points: Mapping[str, Point]) -> list[Block]:
 
 def _has(state: Mapping[str, Any], values: Values) -> bool:
     return all(state[name] == value for name, value in values.items())
+
+
+# Names before version 0.2.
+LONGEST_READ = MAX_READ_COUNT

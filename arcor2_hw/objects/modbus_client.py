@@ -182,3 +182,7 @@ def _timeval(seconds: float) -> bytes:
 
 
 Client = TcpClient | SerialClient
+
+
+# Names before version 0.2.
+LONGEST_FRAME, SHORTEST_SILENCE = MAX_FRAME, MIN_SILENCE

@@ -51,3 +51,7 @@ class ModbusDevice(PolledControl[T]):
         """Release control during disconnecting."""
         with self.link.limited(RELEASE_REQUEST_TIMEOUT):
             super().leave()
+
+
+# Names before version 0.2.
+LAST_REQUEST, SHORTEST_REQUEST = RELEASE_REQUEST_TIMEOUT, MIN_REQUEST_TIMEOUT

@@ -257,3 +257,7 @@ class Observing:
             if self._enter(Connection.BACK, stopping):
                 log.warning("The connection to %s is restored after %.1f s", self.what, time.monotonic() - since)
             return
+
+
+# Names before version 0.2.
+LONGEST_PAUSE, STOP_WITHIN = MAX_PAUSE, STOP_TIMEOUT

@@ -225,3 +225,7 @@ class PointActions(abc.ABC):
         within(f"{self.who}: timeout", timeout, 0.0, MAX_WAIT, "s")
         self.require_point(name, PointKind.DIGITAL)
         self.await_point(name, value, timeout)
+
+
+# Names before version 0.2.
+LONGEST_WAIT = MAX_WAIT

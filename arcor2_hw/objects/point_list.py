@@ -118,3 +118,7 @@ def _number(text: str, key: str, name: str, parameter: str) -> float:
             text=text,
         )
     return value
+
+
+# Names before version 0.2.
+LONGEST_DEBOUNCE = MAX_DEBOUNCE_TIME

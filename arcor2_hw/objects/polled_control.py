@@ -312,3 +312,7 @@ class _Observer(StateObserver[T]):
 
     def on_lost(self, error: DeviceError) -> None:
         self._device.on_lost(error)
+
+
+# Names before version 0.2.
+STANDS_WITHIN, US = STANDSTILL_TIMEOUT, OWNED_BY_US

@@ -225,3 +225,7 @@ class SafeMoves(RobotKinematics):
         names = {joint.name for joint in goal}
         arms = [tools.arm(name) for name in tools.model.end_effectors]
         return max(arms, key=lambda arm: len(names.intersection(arm.joint_names)))
+
+
+# Names before version 0.2.
+FAILURES, MOST_TIME, WITHIN = MAX_REMEMBERED_FAILURES, MAX_TIME_FACTOR, PLANNING_TIMEOUT

@@ -389,3 +389,7 @@ class Printer(Generic):
     @abc.abstractmethod
     def counter(self) -> int:
         """Return the number of labels printed."""
+
+
+# Names before version 0.2.
+MOST_POINTS = MAX_POINTS

@@ -165,3 +165,7 @@ class UrdfRobot(Robot):
                 end_effector=end_effector,
                 known=", ".join(known),
             )
+
+
+# Names before version 0.2.
+SLACK = LIMIT_TOLERANCE

@@ -116,3 +116,15 @@ class BackgroundCall:
             self._thread.join(POLL)
         assert self.over, f"{what} has not ended within {within:g} s"
         return self.error
+
+
+# Names before version 0.2.
+GRACE, SLACK, held, left_behind, raised, stays, timed = (
+    CLEAN_UP_TIMEOUT,
+    TIME_TOLERANCE,
+    open_resources,
+    leaked_resources,
+    require_error,
+    require_throughout,
+    require_in_time,
+)

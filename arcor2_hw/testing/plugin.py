@@ -336,3 +336,7 @@ def arcor2_verdict(request: pytest.FixtureRequest, arcor2_running_bench: Bench) 
 def _test_folders(config: pytest.Config, claims: Quality) -> Sequence[Path]:
     named = [claims.tests] if isinstance(claims.tests, str) else config.getini("testpaths")
     return [config.rootpath / each for each in named] or [config.invocation_params.dir]
+
+
+# Names before version 0.2.
+RELEASE_WITHIN = RELEASE_TIMEOUT

@@ -93,3 +93,15 @@ def stop_of(device: Generic) -> Callable[[], object]:
     stop = device.halt if isinstance(device, Axis) else getattr(device, "stop", None)
     assert callable(stop), "a device with run_long must have a stop()"
     return stop
+
+
+# Names before version 0.2.
+GONE, UP, WATCHED, back, goes_on, lose, seen_again = (
+    LOSS_ERRORS,
+    CONNECTED_STATES,
+    WATCH_TIME,
+    await_connection,
+    require_continuation,
+    cut_and_await_loss,
+    await_reading,
+)

@@ -90,3 +90,7 @@ def _call_of(frames: list[FrameType]) -> str:
         if not outside and not code.co_filename.startswith(SUITE):
             outside = f"{code.co_qualname}() {place}"
     return outside or "the call"
+
+
+# Names before version 0.2.
+LOOK_EVERY = CHECK_PERIOD

@@ -10,18 +10,18 @@ from pathlib import Path
 import pytest
 
 from arcor2_hw.client import (
-    AnswerUnknown,
+    AnswerLost,
     BadRequest,
     Client,
     EventsMissed,
     Forbidden,
-    InTheWay,
     LockedByOther,
     NotAdmitted,
-    NothingThere,
     NotOffered,
     RequestFailed,
+    ResourceNotFound,
     Rest,
+    StateConflict,
 )
 from arcor2_hw.data.events import ChangeType, SceneStateData
 from arcor2_hw.data.geometry import Pose, Position
@@ -82,7 +82,7 @@ async def test_a_project_is_edited_by_methods_with_typed_events(server: ServerPr
             assert [item.end for item in saved.logic] == [action.id]  # a dry run adds nothing
 
             # Refusals state their kind.
-            with pytest.raises(NothingThere, match="nowhere") as missing:
+            with pytest.raises(ResourceNotFound, match="nowhere") as missing:
                 await ann.get_scene("nowhere")
             assert isinstance(missing.value, NotFound)
             assert missing.value.reason == "not_found"
@@ -107,11 +107,11 @@ async def test_documents_assets_and_packages_over_http(server: ServerProcess, tm
         source.write_bytes(mesh)
         asset = await rest.upload_asset("part mesh", source)
         assert (asset.id, asset.file_name) == ("part mesh", "part.stl")
-        with pytest.raises(InTheWay):
+        with pytest.raises(StateConflict):
             await rest.upload_asset("part mesh", b"other")
         await rest.download_asset("part mesh", tmp_path / "back.stl")
         assert (tmp_path / "back.stl").read_bytes() == mesh
-        with pytest.raises(NothingThere):
+        with pytest.raises(ResourceNotFound):
             await rest.download_asset("none", tmp_path / "none.stl")
         assert not (tmp_path / "none.stl").exists()
         assert [one.id for one in await rest.assets()] == ["part mesh"]
@@ -137,7 +137,7 @@ async def test_documents_assets_and_packages_over_http(server: ServerProcess, tm
         await rest.publish(project_id, tmp_path / "package.zip", "first")
         await rest.put_project_script(project_id, "def main():\n    print()\n")
         await client.close_project()
-        with pytest.raises(InTheWay, match="overwriteProjectSources"):
+        with pytest.raises(StateConflict, match="overwriteProjectSources"):
             await rest.import_package(tmp_path / "package.zip", overwrite_project=True)
         ids = await rest.import_package(tmp_path / "package.zip", overwrite_project_sources=True)
         assert await rest.project_script(project_id) == "def main():\n    pass\n"
@@ -150,12 +150,12 @@ async def test_documents_assets_and_packages_over_http(server: ServerProcess, tm
         assert await client.get_scene(scene_id) == scene
         await rest.put_scene(Scene("empty", id="scn_1"))
         assert {one.name for one in await rest.scenes()} == {"store", "empty"}
-        with pytest.raises(NothingThere):
+        with pytest.raises(ResourceNotFound):
             await rest.scene("a/b?c")
     async with Rest("ws://127.0.0.1:9") as nobody:
         with pytest.raises(ConnectionLost, match=r"127\.0\.0\.1:9"):
             await nobody.scenes()
-    assert issubclass(InTheWay, Conflict)
+    assert issubclass(StateConflict, Conflict)
 
 
 async def test_a_token_grants_only_its_role(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -227,7 +227,7 @@ async def test_a_killed_server_loses_at_most_one_answer(tmp_path: Path) -> None:
                     try:
                         await client.add_action_point(name=name, position=Position(0.0, 0.0, 0.0))
                         acknowledged.append(name)
-                    except AnswerUnknown:
+                    except AnswerLost:
                         unknown.append(name)
 
             editing = asyncio.create_task(edit())

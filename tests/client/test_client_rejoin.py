@@ -7,8 +7,8 @@ import pytest
 from websockets.asyncio.server import ServerConnection
 
 from arcor2_hw.client import (
-    AnswerLate,
-    AnswerUnknown,
+    AnswerLost,
+    AnswerTimeout,
     Client,
     DeviceFailed,
     EventsMissed,
@@ -36,7 +36,7 @@ INFO = {"version": "1", "api_version": "1"}
 async def test_an_edit_without_an_answer_is_not_repeated() -> None:
     async with scripted() as server, Client(server.url, "ann") as client:
         server.script["AddActionPoint"] = [cut]
-        with pytest.raises(AnswerUnknown, match="may or may not have been executed") as unknown:
+        with pytest.raises(AnswerLost, match="may or may not have been executed") as unknown:
             await client.add_action_point(name="a", position=Position(0.0, 0.0, 0.0))
         assert unknown.value.request == "AddActionPoint"
         await client.save_project()  # waits for the connection
@@ -139,7 +139,7 @@ async def test_a_revoked_token_closes_the_client() -> None:
 async def test_without_reconnect_the_first_loss_closes_the_client() -> None:
     async with scripted() as server, Client(server.url, reconnect=False) as client:
         server.script["SystemInfo"] = [cut]
-        with pytest.raises(AnswerUnknown):
+        with pytest.raises(AnswerLost):
             await client.system_info()
         with pytest.raises(ConnectionLost, match="closed"):
             await client.system_info()
@@ -159,7 +159,7 @@ async def test_time_limits_hold_for_late_answers_and_missing_servers() -> None:
         await client.open()
         server.data = {"SystemInfo": INFO, "GetEndEffectors": ["a"]}
         server.script["GetEndEffectors"] = [silent]
-        with pytest.raises(AnswerLate, match=r"GetEndEffectors within 0\.1 s"):
+        with pytest.raises(AnswerTimeout, match=r"GetEndEffectors within 0\.1 s"):
             await client.get_end_effectors("r", timeout=0.1)
         # The late answer is not used for another request.
         await server.answer(server.sockets[-1], requests[0])

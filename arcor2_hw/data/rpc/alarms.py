@@ -69,3 +69,7 @@ ALARM_RPCS: Final = (
     Rpc("ShelveAlarm", ShelveAlarmArgs, None, Role.TECHNICIAN, additional=True),
 )
 """Requests about alarms."""
+
+
+# Names before version 0.2.
+LONGEST_SHELVING = MAX_SHELVING_TIME

@@ -135,3 +135,7 @@ OPERATION_RPCS: Final = (
     Rpc("StreamRobot", StreamRobotArgs, None, Role.OPERATOR, additional=True),
 )
 """Requests that operate devices."""
+
+
+# Names before version 0.2.
+LONGEST_LEASE_MS = MAX_LEASE_MS

@@ -64,3 +64,7 @@ POINT_RPCS: Final = (
     Rpc("StreamPoints", StreamPointsArgs, None, Role.OPERATOR, additional=True),
 )
 """Requests about points."""
+
+
+# Names before version 0.2.
+MOST_RENEWED = MAX_RENEWED

@@ -371,3 +371,7 @@ def real_bench(entry: CellDevice, file: Path) -> type[RealBench]:
             "{name}: the bench {bench} does not derive from CellBench", name=entry.name, bench=entry.bench
         )
     return type(base.__name__, (base, RealBench), {"day": day, "file": file, "guessed": True})
+
+
+# Names before version 0.2.
+STOP_WITHIN = STOP_TIMEOUT

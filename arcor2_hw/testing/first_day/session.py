@@ -396,3 +396,7 @@ def _reason(error: Exception) -> str:
     place: Sequence[traceback.FrameSummary] = traceback.extract_tb(error.__traceback__)[-1:]
     where = "".join(f" ({Path(frame.filename).name}, line {frame.lineno}: {frame.line})" for frame in place)
     return f"{type(error).__name__}: {text}{where}"
+
+
+# Names before version 0.2.
+RELEASE_WITHIN = RELEASE_TIMEOUT

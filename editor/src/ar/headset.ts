@@ -31,7 +31,7 @@ const WIDTH = 0.004;
 const LENGTH = 3;
 const CONE = 0.02;
 /** Movement of the tip during a touch above which the touch does not count, m, and the fewest frames of one. */
-const STILL = 0.01;
+const MAX_TOUCH_MOVEMENT = 0.01;
 const FRAMES = 3;
 
 /** Moves an item that a ray holds: pose of the point at which it is held, in the workplace. */
@@ -214,7 +214,7 @@ export class Headset {
     const tips = press?.tips ?? [];
     if (!touching || tips.length < FRAMES) return;
     const middle = mean(tips);
-    if (Math.max(...tips.map((each) => norm(sub(each, middle)))) > STILL) return;
+    if (Math.max(...tips.map((each) => norm(sub(each, middle)))) > MAX_TOUCH_MOVEMENT) return;
     const { points, known, next, done } = touching;
     points.push(middle);
     if (points.length < known.length) return next(points.length);

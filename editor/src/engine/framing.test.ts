@@ -1,8 +1,8 @@
 import { Box3, PerspectiveCamera, Vector3 } from "three";
 import { expect, it } from "vitest";
-import { bestDirection, corners, filled, fitted, marginsOf, type Opening } from "./framing";
+import { bestDirection, corners, type FramedView, filled, fitted, marginsOf } from "./framing";
 
-const opening = (width: number, height: number): Opening => ({
+const opening = (width: number, height: number): FramedView => ({
   width,
   height,
   fov: 50,
@@ -22,7 +22,7 @@ const CELL = [
 ];
 
 /** Place the points by the camera of three.js, pixels. */
-function pixels(points: Vector3[], view: Opening): Vector3[] {
+function pixels(points: Vector3[], view: FramedView): Vector3[] {
   const camera = new PerspectiveCamera(view.fov, view.width / view.height, 0.01, 100);
   camera.up.set(0, 0, 1);
   const placed = fitted(points, new Vector3(1, -1, 0.7), view);

@@ -3,7 +3,7 @@
 import { type Box3, Vector3 } from "three";
 
 /** A view: its size, the margins covered by controls, pixels, and the vertical opening angle, degrees. */
-export interface Opening {
+export interface FramedView {
   width: number;
   height: number;
   fov: number;
@@ -34,7 +34,7 @@ const ELEVATIONS = [
 ] as const;
 
 /** Controls at the edges of a view, pixels. */
-export function marginsOf(width: number, height: number): Opening["margins"] {
+export function marginsOf(width: number, height: number): FramedView["margins"] {
   const side = Math.min(28, width * 0.05);
   return { left: side, right: side, top: Math.min(72, height * 0.16), bottom: Math.min(24, height * 0.05) };
 }
@@ -44,7 +44,7 @@ export function marginsOf(width: number, height: number): Opening["margins"] {
  * points to the camera. Each side of the view is a plane through the camera, so the place follows from the outermost
  * points without iteration.
  */
-export function fitted(points: readonly Vector3[], back: Vector3, opening: Opening): Placed {
+export function fitted(points: readonly Vector3[], back: Vector3, opening: FramedView): Placed {
   const z = back.clone().normalize();
   const x = new Vector3().crossVectors(UP, z);
   if (x.lengthSq() < 1e-9) x.set(1, 0, 0);
@@ -82,7 +82,7 @@ export function fitted(points: readonly Vector3[], back: Vector3, opening: Openi
 }
 
 /** Return the part of the free view inside the rectangle around the points, 0 to 1. */
-export function filled(points: readonly Vector3[], { position, target }: Placed, opening: Opening): number {
+export function filled(points: readonly Vector3[], { position, target }: Placed, opening: FramedView): number {
   const z = new Vector3().subVectors(position, target).normalize();
   const x = new Vector3().crossVectors(UP, z).normalize();
   const y = new Vector3().crossVectors(z, x);
@@ -102,7 +102,7 @@ export function filled(points: readonly Vector3[], { position, target }: Placed,
 }
 
 /** Return the direction, among those of a person in front of the workplace, in which the points fill the view best. */
-export function bestDirection(points: readonly Vector3[], opening: Opening): Vector3 {
+export function bestDirection(points: readonly Vector3[], opening: FramedView): Vector3 {
   let best = new Vector3();
   let most = 0;
   for (const [elevation, one] of ELEVATIONS)

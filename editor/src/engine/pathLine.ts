@@ -74,12 +74,12 @@ export class PathLine {
 }
 
 /** Tolerance, m: the pose reported by a robot at standstill varies a little. */
-const STILL = 2e-4;
+const POSE_TOLERANCE = 2e-4;
 
 function same(a: StraightPath | null, b: StraightPath | null): boolean {
   if (!a || !b) return a === b;
   const apart = (p: Position, q: Position) => Math.hypot(p.x - q.x, p.y - q.y, p.z - q.z);
-  return a.state === b.state && apart(a.from, b.from) < STILL && apart(a.to, b.to) < STILL;
+  return a.state === b.state && apart(a.from, b.from) < POSE_TOLERANCE && apart(a.to, b.to) < POSE_TOLERANCE;
 }
 
 /** Along y, from the origin; a sphere at its end. */

@@ -1,7 +1,7 @@
 /** What the home screen proposes first. Pure functions. */
 
 import type { Lists } from "../store/state";
-import type { Opened } from "./opened";
+import type { RecentIds } from "./opened";
 
 /** Continue with a document, start with the newest one of other users, or create the first one. */
 export type Proposal =
@@ -9,7 +9,7 @@ export type Proposal =
   | { kind: "empty" };
 
 /** Return what to propose; null until the lists are loaded. */
-export function proposalOf({ scenes, projects }: Lists, opened: Opened): Proposal | null {
+export function proposalOf({ scenes, projects }: Lists, opened: RecentIds): Proposal | null {
   if (!scenes || !projects) return null;
   const all = [
     ...projects.map((each) => ({ ...each, document: "project" as const })),

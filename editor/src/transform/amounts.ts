@@ -10,7 +10,7 @@ export const LENGTH_UNITS: readonly LengthUnit[] = ["mm", "cm", "m", "in"];
 export const ANGLE_UNITS: readonly AngleUnit[] = ["°", "rad"];
 
 /** The value of one unit in m or rad. */
-export const WORTH: Record<Unit, number> = { m: 1, cm: 0.01, mm: 0.001, in: 0.0254, "°": Math.PI / 180, rad: 1 };
+export const UNIT_FACTORS: Record<Unit, number> = { m: 1, cm: 0.01, mm: 0.001, in: 0.0254, "°": Math.PI / 180, rad: 1 };
 /** Useful number of decimals: 10 µm, 0.001°. */
 export const DIGITS: Record<Unit, number> = { m: 5, cm: 3, mm: 2, in: 4, "°": 3, rad: 5 };
 
@@ -21,7 +21,7 @@ const MINUTE = "′";
 const SECOND = "″";
 
 export function show(value: number, unit: Unit): string {
-  return decimal(value / WORTH[unit], DIGITS[unit]);
+  return decimal(value / UNIT_FACTORS[unit], DIGITS[unit]);
 }
 
 /**
@@ -64,12 +64,12 @@ function term(text: string, unit: Unit): number | null {
 
 /** Return the value of a typed unit; null if it is unknown or of another quantity. */
 function worthOf(named: string, unit: Unit): number | null {
-  if (!named) return WORTH[unit];
+  if (!named) return UNIT_FACTORS[unit];
   const angle = isAngle(unit);
-  if (angle && (named === MINUTE || named === "'")) return WORTH["°"] / 60;
-  if (angle && (named === SECOND || named === '"')) return WORTH["°"] / 3600;
+  if (angle && (named === MINUTE || named === "'")) return UNIT_FACTORS["°"] / 60;
+  if (angle && (named === SECOND || named === '"')) return UNIT_FACTORS["°"] / 3600;
   const written = ALIASES[named.toLowerCase()] ?? (named.toLowerCase() as Unit);
-  return written in WORTH && isAngle(written) === angle ? WORTH[written] : null;
+  return written in UNIT_FACTORS && isAngle(written) === angle ? UNIT_FACTORS[written] : null;
 }
 
 export function isAngle(unit: Unit): unit is AngleUnit {

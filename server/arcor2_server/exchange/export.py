@@ -7,7 +7,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from arcor2_hw.analysis import BUILT_IN
-from arcor2_hw.client import Client, NothingThere
+from arcor2_hw.client import Client, ResourceNotFound
 from arcor2_hw.client.rest import Listed
 from arcor2_hw.data.base import Unset
 from arcor2_hw.data.object_type import ObjectModel, ObjectTypeSource
@@ -54,7 +54,7 @@ class Exporter:
         project = await rest.project(key)
         try:
             scene = await rest.scene(project.scene_id)
-        except NothingThere:
+        except ResourceNotFound:
             raise NotFound(
                 "the scene {scene_id} of the project {name} does not exist any more",
                 scene_id=project.scene_id,
@@ -64,7 +64,7 @@ class Exporter:
         if not project.has_logic:
             try:
                 script = await rest.project_script(key)
-            except NothingThere:
+            except ResourceNotFound:
                 script = ""
         archive = Archive(
             "project",

@@ -11,7 +11,7 @@ from msgspec import UNSET
 from msgspec.structs import replace
 
 from arcor2_hw.analysis import SourceFile
-from arcor2_hw.client import Client, NothingThere
+from arcor2_hw.client import Client, ResourceNotFound
 from arcor2_hw.client.rest import Asset, Listed
 from arcor2_hw.data.base import Data, Unset, new_id
 from arcor2_hw.data.object_type import Models, ObjectTypeMeta, ObjectTypeSource
@@ -165,7 +165,7 @@ class Importer:
             try:
                 if await rest.project_script(key) != archive.script:
                     return False
-            except NothingThere:
+            except ResourceNotFound:
                 if archive.script:
                     return False
         stored = await rest.kept_parameters(key), await rest.kept_overrides(key)
@@ -266,7 +266,7 @@ class Importer:
         else:
             what = f"project {old.name}"
             parameters, overrides = await rest.kept_parameters(key), await rest.kept_overrides(key)
-            with contextlib.suppress(NothingThere):
+            with contextlib.suppress(ResourceNotFound):
                 script = await rest.project_script(key)
             rollback.before_step(what, lambda: rest.put_kept_overrides(key, overrides))
             rollback.before_step(what, lambda: rest.put_kept_parameters(key, parameters))

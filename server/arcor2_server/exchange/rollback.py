@@ -3,7 +3,7 @@
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from arcor2_hw.client import NothingThere
+from arcor2_hw.client import ResourceNotFound
 from arcor2_hw.exceptions import Arcor2Error
 
 
@@ -25,7 +25,7 @@ class Rollback:
             succeeded = True
             try:
                 await undo()
-            except NothingThere:
+            except ResourceNotFound:
                 pass  # the step was not done, or its parent is undone
             except Arcor2Error:
                 succeeded = False

@@ -13,7 +13,7 @@ from msgspec import UNSET
 from msgspec.structs import replace
 
 from arcor2_hw.analysis import module_name
-from arcor2_hw.client import Client, NothingThere, RequestFailed, Rest
+from arcor2_hw.client import Client, RequestFailed, ResourceNotFound, Rest
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.data.object_type import Box, Mesh, ObjectModel
 from arcor2_hw.data.parameter import Parameter
@@ -306,7 +306,7 @@ async def _whole(client: Client, directory: Path) -> Any:
         assets[asset.id] = (directory / "asset").read_bytes(), asset.file_name
     scripts = {}
     for one in await client.rest.projects():
-        with contextlib.suppress(NothingThere):
+        with contextlib.suppress(ResourceNotFound):
             scripts[one.name] = await client.rest.project_script(one.id)
     return await _picture(client), assets, scripts, sorted(one.name for one in await client.rest.scenes())
 

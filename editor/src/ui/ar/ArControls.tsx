@@ -17,7 +17,7 @@ const SelectList = lazyComponent(() => import("./SelectList"));
 /** Time after which a rest is suggested, ms. */
 const REST = 30 * 60_000;
 /** Time after which a missing sight is worth a word, ms. */
-const NOTICED = 1000;
+const STALE_AFTER = 1000;
 
 /** The word of a button; on a phone, only its icon is visible. */
 function Word({ children }: { children: string }) {
@@ -27,7 +27,7 @@ function Word({ children }: { children: string }) {
 export default function ArControls({ engine, ar }: { engine: Engine; ar: Ar }) {
   const { word, shape, look } = gradeOf(ar);
   const registered = ar.seenAt > 0 && ar.phase !== "hand";
-  const stale = ar.phase === "bridging" && Date.now() - ar.seenAt < NOTICED;
+  const stale = ar.phase === "bridging" && Date.now() - ar.seenAt < STALE_AFTER;
   const advice = stale || ar.frozen ? "" : adviceOf(ar);
   return (
     <>

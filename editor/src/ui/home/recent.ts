@@ -1,21 +1,21 @@
 /** Documents opened recently by the user, and templates shared by all users. Both are stored on the server. */
 
 import { storeGeneralState } from "../../commands/viewstate";
-import { type Opened, openedOf, toForget } from "../../home/opened";
+import { idsToForget, type RecentIds, recentIds } from "../../home/opened";
 import { memoized } from "../../store/memo";
 import type { State } from "../../store/state";
 import { now } from "../../store/store";
 
-const openedMemo = memoized(openedOf);
+const openedMemo = memoized(recentIds);
 
 /** Return the documents that the user opened, newest first; the same list while it does not change. */
-export function recentOf(state: State): Opened {
+export function recentOf(state: State): RecentIds {
   return openedMemo(state.view.general);
 }
 
 /** Store that the user opened a document; each has its own key, so that two devices do not conflict. */
 export function storeOpened(id: string): void {
-  const forgotten = toForget(recentOf(now()), id).map((each) => [`opened/${each}`, null] as const);
+  const forgotten = idsToForget(recentOf(now()), id).map((each) => [`opened/${each}`, null] as const);
   storeGeneralState({ ...Object.fromEntries(forgotten), [`opened/${id}`]: Date.now() });
 }
 

@@ -4,7 +4,7 @@ import { plural, t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
 import { addMesh, freeObjectName } from "../../commands/scene";
 import type { MeshFile } from "../../scene/meshes";
-import { LENGTH_UNITS, type LengthUnit, show, WORTH } from "../../transform/amounts";
+import { LENGTH_UNITS, type LengthUnit, show, UNIT_FACTORS } from "../../transform/amounts";
 import { Field } from "../kit/Field";
 import { OneOf } from "../kit/fields";
 import { Button } from "../kit/kit";
@@ -36,7 +36,7 @@ export function AddMesh({ why, onBack }: { why: string; onBack: () => void }) {
     if (!mesh || why) return;
     const upload = async () => {
       const { inMetres } = await import("../../scene/meshes");
-      return addMesh(name.trim(), inMetres(mesh, WORTH[unit]));
+      return addMesh(name.trim(), inMetres(mesh, UNIT_FACTORS[unit]));
     };
     void ask(upload());
   };
@@ -66,7 +66,7 @@ export function AddMesh({ why, onBack }: { why: string; onBack: () => void }) {
             onChange={setUnit}
           />
           <p className="small">
-            {t`Size: ${mesh.size.map((each) => show(each * WORTH[unit], "mm")).join(" × ")} mm.`}{" "}
+            {t`Size: ${mesh.size.map((each) => show(each * UNIT_FACTORS[unit], "mm")).join(" × ")} mm.`}{" "}
             <span className="quiet">{plural(mesh.triangles, { one: "# triangle", other: "# triangles" })}</span>
           </p>
           <Field label={t`Name`} value={name} onChange={setName} autoComplete="off" />
