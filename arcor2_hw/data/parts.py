@@ -65,7 +65,7 @@ class Part(Data, frozen=True):
 
 
 class PartCounts(Data, frozen=True):
-    """What was counted since the scene exists: fed = good + bad + rejected + in_cell."""
+    """Counts since the scene was created: fed = good + bad + rejected + in_cell."""
 
     fed: int = 0
     good: int = 0

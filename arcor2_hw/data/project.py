@@ -213,8 +213,8 @@ def parse_link(link: str) -> tuple[str, str, int]:
 class LogicItem(Data, frozen=True):
     """A step from one action to the next, taken when its condition holds.
 
-    `when` is a condition that compares several values; next to it, there is no `condition`. With `error_kinds` it is an
-    error exit: it is taken when the action fails with an error of one of these kinds.
+    `when` is a condition that compares several values; `condition` is then unset. With `error_kinds` it is an error
+    exit: it is taken when the action fails with an error of one of these kinds.
     """
 
     start: str

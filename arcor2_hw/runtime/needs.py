@@ -129,9 +129,3 @@ def shown_need(need: Need) -> str:
 
 def _shown(value: str) -> str:
     return value.strip('"')
-
-
-def first_unmet(verdicts: "list[Verdict]") -> Verdict:
-    """Return the first verdict that is not met; the first if all are."""
-    unmet = (one for one in verdicts if one.state is not InterlockCondition.MET)
-    return next(unmet, Verdict(InterlockCondition.MET))

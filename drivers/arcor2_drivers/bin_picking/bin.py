@@ -96,7 +96,7 @@ class Bin(Connected, GenericWithPose):
 
     @action
     def grip_pose(self, part: Pose, above: float = 0.0, *, an: str | None = None) -> Pose:
-        """Return the pose of the tool for gripping a part: z down into its top, x along its length.
+        """Return the pose of the tool for gripping a part: z points down into its top, x along its length.
 
         :param part: pose from next_part
         :param above: distance above the grip pose, for approach and departure, m

@@ -96,7 +96,7 @@ class Blister(Connected, GenericWithPose):
 
     @action(quick=True)
     def grip_pose(self, part: Pose, above: float = 0.0, *, an: str | None = None) -> Pose:
-        """Return the pose of the tool for gripping a part or reaching a place: z down into it.
+        """Return the pose of the tool for gripping a part or reaching a place: z points down into it.
 
         :param part: pose from next_part or next_free
         :param above: distance above the grip pose, for approach and departure, m

@@ -51,7 +51,7 @@ class Port:
             control: Control byte.
             parameters: Parameters of the command.
             timeout: Time for the answer, s.
-            first: Fail with DeviceTimeout if another answer comes first: the arm lags behind.
+            first: Fail with DeviceTimeout if another answer comes first: the arm answers too late.
 
         Raises:
             DeviceTimeout: No answer came in time.
@@ -69,7 +69,7 @@ class Port:
                         return frame.parameters
                     if first:
                         raise DeviceTimeout(
-                            "{device} lags behind.", f"{frame.command} came before {command}", device=self.who
+                            "{device} answers too late.", f"{frame.command} came before {command}", device=self.who
                         )
                 if clock() >= timeout:
                     raise DeviceTimeout(

@@ -182,8 +182,8 @@ class Outbox:
                 raise self._broken(e) from e
 
     # -------------------------------------------------------------------------------- messages
-    def add(self, path: str, order_id: str, body: bytes, *, piece: bool = False, last: bool = False) -> str:
-        """Store a message and return its key.
+    def add(self, path: str, order_id: str, body: bytes, *, piece: bool = False, last: bool = False) -> None:
+        """Store a message.
 
         Args:
             path: Path of the request, from the service's URL.
@@ -192,18 +192,16 @@ class Outbox:
             piece: Whether it reports a piece of the order.
             last: Whether the order ends with it.
         """
-        key = uuid.uuid4().hex
         with self._writing() as database:
             database.execute(
                 "INSERT INTO message (key, order_id, path, body, stored) VALUES (?, ?, ?, ?, ?)",
-                (key, order_id, path, body, now()),
+                (uuid.uuid4().hex, order_id, path, body, now()),
             )
             if piece:
                 database.execute("UPDATE open_order SET reported = reported + 1 WHERE id = ?", (order_id,))
                 database.execute("DELETE FROM open_order WHERE id = ? AND reported >= quantity", (order_id,))
             if last:
                 database.execute("DELETE FROM open_order WHERE id = ?", (order_id,))
-        return key
 
     def heads(self) -> list[Message]:
         """Return the first waiting message of each order, oldest first."""

@@ -112,12 +112,12 @@ class Control:
             if newest is not None and not newest.standing:
                 self._observer.do(self.brake, urgent=True, timeout=timeout)
                 self.wait_rest(timeout)
-            self._observer.do(self._disarm, timeout=timeout)
+            self._observer.do(partial(self._write_all, reg.BUS_WATCHDOG, 0), timeout=timeout)
         self.drop(Phrase.of("it was released."))
 
-    def _disarm(self, bus: Bus) -> None:
+    def _write_all(self, register: reg.Register, value: int, bus: Bus) -> None:
         for number in self._ids:
-            bus.write(number, reg.BUS_WATCHDOG, 0)
+            bus.write(number, register, value)
 
     def leave(self) -> None:
         """Release control because we disconnect."""
@@ -191,13 +191,9 @@ class Control:
     def set_teaching(self, enabled: bool) -> None:
         """Switch torque off, or on again at the present position."""
         self.require()
-        self._observer.do(self._enable if enabled is False else self._relax)
+        self._observer.do(partial(self._write_all, reg.TORQUE, 0) if enabled else self._enable)
         self._observer.fresh()  # an older state would look as if another client had switched torque
         self.teaching = enabled
-
-    def _relax(self, bus: Bus) -> None:
-        for number in self._ids:
-            bus.write(number, reg.TORQUE, 0)
 
     # -------------------------------------------------------------------------------- hardware errors
     def alarms(self) -> list[Alarm]:

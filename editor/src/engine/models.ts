@@ -139,7 +139,7 @@ const MOVERS: Record<string, Mover[]> = {
   gripper: [finger(1), finger(-1)],
 };
 
-/** Colours of lamps from the lowest to the highest, and how much of it is left of one that is not lit. */
+/** Colours of the lamps, from the lowest to the highest. */
 const LAMPS: Record<string, number> = {
   white: 0xffffff,
   blue: 0x3d8bff,
@@ -147,6 +147,7 @@ const LAMPS: Record<string, number> = {
   amber: 0xffb020,
   red: 0xff3a2c,
 };
+/** Brightness of a lamp that is off, relative to one that is lit. */
 const UNLIT = 0.3;
 const USUAL = ["white", "green", "amber", "red"];
 

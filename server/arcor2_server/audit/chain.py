@@ -52,7 +52,6 @@ Row = tuple[int, str, str, str, str, str, str, str, str, str]
 """The fields of an entry, with its changes as JSON."""
 _decode_changes = msgspec.json.Decoder(list[AuditChange]).decode
 _INSERT: Final = f"insert into entry ({_COLUMNS}, digest) values ({', '.join('?' * (len(_FIELDS) + 1))})"  # noqa: S608
-_SEARCHED: Final = "lower(user || ' ' || request || ' ' || target || ' ' || address || ' ' || reason)"
 
 
 def row_of(entry: AuditEntry) -> Row:

@@ -265,7 +265,7 @@ class Frame:
     ) -> ParameterUse | None:
         """Return the first use of a parameter of a function, None if no action uses it.
 
-        callers: ids of functions around this one, which ends the search in functions that call themselves.
+        callers: ids of the functions that call this one, at which the search ends.
         """
         if function.id in callers:
             return None

@@ -145,7 +145,7 @@ class Loss(msgspec.Struct, frozen=True):
 
     @property
     def message(self) -> Message:
-        """All of it, as sentences."""
+        """The reason, what was lost, and where the damaged file is, as sentences."""
         damaged = Message.of("The journal of unsaved changes is damaged: {reason}.", reason=self.reason)
         stored = [Message.of("The damaged file is stored as {path}.", path=self.stored_as)] if self.stored_as else []
         return Message.joined([damaged, self.lost, *stored])

@@ -15,8 +15,6 @@ from arcor2_server.nodes.claims import Rights
 from arcor2_server.nodes.credentials import Credentials, check_name, require_tls
 from arcor2_server.settings import ServerSettings
 
-SITE_PORT: Final = 7422
-"""Default port for the brokers of sites."""
 HUB_FILE: Final = "hub.creds"
 """File with which the broker of a site connects to that of the hub, in the directory of the broker."""
 HUB_AUTHORITY: Final = "hub.pem"

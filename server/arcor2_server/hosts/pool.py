@@ -69,7 +69,7 @@ class CellHosts:
         def derives(name: str, base: str) -> bool:
             try:
                 return self._derives(name, base)
-            except NotFound:  # a type that only a package contains; its host reports what cannot work
+            except NotFound:  # only the package contains this type; its host reports errors
                 return False
 
         return place(self._cell, objects, derives)

@@ -47,7 +47,7 @@ ALPHABET: Final = "23456789ABCDEFGHJKLMNPQRSTUVWXYZ"
 CODE_SIZE: Final = 8
 """Number of characters of a code: 40 bits."""
 _COST: Final = 1 << 16
-"""Cost of a guess (scrypt): 64 MiB and some 0.2 s. All codes take 7,000 years of processor time."""
+"""Cost of a guess (scrypt): 64 MiB and some 0.2 s. Trying all codes takes 7,000 years of processor time."""
 _MEMORY: Final = 1 << 27
 _LARGEST: Final = 64 * 1024
 """Maximum size of a message, bytes."""

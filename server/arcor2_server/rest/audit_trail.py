@@ -30,7 +30,7 @@ class AuditOperations:
     @operation("GET", "/api/audit/export", SERVER, Role.TECHNICIAN, media_type="text/csv")
     async def export_audit(self) -> Binary:
         """Return all entries of the audit trail as CSV, oldest first."""
-        from arcor2_server.audit.export import csv_chunks  # with a module that is not needed at the start of the server
+        from arcor2_server.audit.export import csv_chunks  # imports csv, which the start does not need
 
         chunks = csv_chunks(self._audit.all())
 

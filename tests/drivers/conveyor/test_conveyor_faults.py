@@ -78,7 +78,7 @@ def test_a_loss_during_a_run_stops_the_belt_and_only_observation_returns(
     fake.control.do("mute", on=False)
     wait_for(lambda: belt.connection, lambda state: state is Connection.BACK)
     assert not belt.homed
-    with pytest.raises(NotInControl, match="nobody has control"):
+    with pytest.raises(NotInControl, match="the connection was lost"):
         belt.run(0.1)
     assert fake.truth()["velocity"] == 0.0
     belt.take_control()

@@ -3,14 +3,12 @@
 import ast
 from collections import defaultdict
 from collections.abc import Hashable, Iterator, Sequence
-from typing import Final
 
 from arcor2_server.build.frame import NEXT_ACTION
 from arcor2_server.build.merging.meaning import action_name, condition, negated
 from arcor2_server.build.merging.text import Block, Statement
 
 Parts = list[tuple[object, list[ast.stmt]]]
-_LEAVING: Final = (ast.Continue, ast.Return, ast.Pass)
 
 
 def parts_of(node: ast.stmt) -> Parts:
