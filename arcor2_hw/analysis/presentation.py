@@ -1,4 +1,4 @@
-"""Display name of a type, category and icon of a type and its actions in the editor."""
+"""Display names, categories and icons of types and their actions in the editor."""
 
 import ast
 import re

@@ -13,7 +13,7 @@ from arcor2_hw.mqtt.messages import Broker, LinkChanged
 
 FIRST_PAUSE: Final = 1.0
 MAX_PAUSE: Final = 30.0
-"""Shortest and longest time between two attempts to connect, s. It doubles until a connection lasts longer than it."""
+"""Shortest and longest pause between two attempts to connect, s. The pause doubles after each failed attempt."""
 KEEP_ALIVE: Final = 10
 """Time without a message after which the broker is asked for a sign of life, s. It publishes the will after 1.5 times
 this time without one of ours."""
