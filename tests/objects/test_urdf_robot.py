@@ -285,7 +285,7 @@ BEFORE, BEHIND = (0.8, *READY[1:]), (0.8 + np.pi, *READY[1:])
 
 
 def test_a_move_without_a_path_is_refused(arm: Any, around: Around, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(safe_moves, "WITHIN", 0.3)
+    monkeypatch.setattr(safe_moves, "PLANNING_TIMEOUT", 0.3)
     fences(around)
     arm.now = joints(BEFORE)
     with pytest.raises(arm.KinematicsException, match=r"plain found no .* within 0\.3 s; .* and fence"):
@@ -296,7 +296,7 @@ def test_a_move_without_a_path_is_refused(arm: Any, around: Around, monkeypatch:
 def test_a_repeat_after_no_path_has_more_time_and_another_seed(
     arm: Any, around: Around, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(safe_moves, "WITHIN", 0.05)
+    monkeypatch.setattr(safe_moves, "PLANNING_TIMEOUT", 0.05)
     seeds: list[int] = []
     plan = planner.Planner.to_any
 
@@ -337,7 +337,7 @@ def test_a_repeat_finds_a_path_that_was_not_found_in_time(
 ) -> None:
     """Seed 0 needs 152 steps and seed 1 needs 50: the repeat needs another seed as well as more time."""
     monkeypatch.setattr(planner, "time", Steps())
-    monkeypatch.setattr(safe_moves, "WITHIN", 42.0)
+    monkeypatch.setattr(safe_moves, "PLANNING_TIMEOUT", 42.0)
     around.box("wall", *WALL)
     start, goal = joints((2.3, -1.2, *READY[2:])), joints(READY)
     plan = planner.Planner.to_any
@@ -358,7 +358,7 @@ def test_a_repeat_finds_a_path_that_was_not_found_in_time(
 
 
 def test_a_stop_ends_planning(arm: Any, around: Around, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(safe_moves, "WITHIN", 60.0)
+    monkeypatch.setattr(safe_moves, "PLANNING_TIMEOUT", 60.0)
     fences(around)
     arm.now = joints(BEFORE)
     ended: list[BaseException] = []

@@ -166,7 +166,7 @@ async def test_reasons_are_redacted_and_large_changes_are_counted(path: Path) ->
 
 async def test_entries_wait_while_the_file_cannot_be_written(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trail, "RETRY_AFTER", 0.01)
-    monkeypatch.setattr(trail, "WRITTEN_WITHIN", 0.0)
+    monkeypatch.setattr(trail, "COLLECTION_TIME", 0.0)
     monkeypatch.setattr(trail, "MAX_WAITING", 2)
     write, attempts, full = AuditFile.append, [], True
 

@@ -321,7 +321,7 @@ class NoFiles(socket.socket):
 async def test_accepting_resumes_after_running_out_of_file_descriptors(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(http_server, "PAUSE", 0.02)
+    monkeypatch.setattr(http_server, "ACCEPT_PAUSE", 0.02)
     async with (
         served(tmp_path, listener=NoFiles()) as here,
         httpx.AsyncClient(timeout=60, base_url=f"http://127.0.0.1:{here.port}") as http,

@@ -352,11 +352,11 @@ async def test_a_series_of_uploads_is_announced_once(
     async def end_of(*bodies: dict[str, Any]) -> None:
         """Send all requests, none of which may be announced at once, and wait until they are announced."""
         before = len(announced)
-        monkeypatch.setattr(notifications, "QUIET", 600)
+        monkeypatch.setattr(notifications, "QUIET_PERIOD", 600)
         for body in bodies:
             granted(await http.put("/object-types", json=body))
         assert len(announced) == before
-        monkeypatch.setattr(notifications, "QUIET", 0.01)
+        monkeypatch.setattr(notifications, "QUIET_PERIOD", 0.01)
         granted(await http.put("/object-types", json=bodies[-1]))
         await until(lambda: len(announced) > before)
 
@@ -367,7 +367,7 @@ async def test_a_series_of_uploads_is_announced_once(
     await end_of(lamp("LampA"), lamp("LampB"), lamp("LampC"), lamp("LampB"))
     assert announced == [("add", ["LampA", "LampB", "LampC"])]
 
-    monkeypatch.setattr(notifications, "QUIET", 600)
+    monkeypatch.setattr(notifications, "QUIET_PERIOD", 600)
     granted(await http.delete("/object-types/LampC"))
     granted(await http.put("/object-types", json=lamp("LampD")))
     granted(await http.delete("/object-types/LampD"))
@@ -376,7 +376,7 @@ async def test_a_series_of_uploads_is_announced_once(
     assert announced[1:] == [("remove", ["LampC"]), ("update", ["LampA"])], "LampD was added and deleted: no change"
 
     # Requests that open a scene or list types announce the changes first: nothing is left for the timer.
-    monkeypatch.setattr(notifications, "QUIET", 0.05)
+    monkeypatch.setattr(notifications, "QUIET_PERIOD", 0.05)
     granted(await http.put("/object-types", json=lamp("LampE")))
     changes = await services.types.refresh()
     assert [meta.type for meta in changes.added] == ["LampE"]
