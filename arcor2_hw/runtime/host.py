@@ -144,6 +144,7 @@ class Host:
                     if not self._open_scene(self._scene.open, message, message.scene.interlocks):
                         break
                 case m.RunPackage() as message if not message.main:
+                    self._package = message
                     if not self._open_scene(self._scene.serve, message):
                         break
                 case m.RunPackage() as message:
@@ -423,7 +424,7 @@ class Host:
         self._work.put(m.CloseScene())
         if interrupted and self._package is not None and self._package.recordings:
             with contextlib.suppress(OSError):  # such as a full disk
-                self._recorder.save(Path(self._package.recordings), self._package.run)
+                self._recorder.save(Path(self._package.recordings), self._package.run, main=self._package.main)
         self._saved.set()
 
     def _stop_program(self) -> None:

@@ -115,9 +115,9 @@ class Recorder:
 
     def device_changed(self, report: DeviceChanged) -> None:
         """Record connection and shown values of a device, except those that its observations contain."""
-        if self._ring is None:
-            return
         stamp, device = time.monotonic(), self._device(report.object_id)
+        if self._ring is None or (device is not None and device.remote):
+            return  # the host of the object records it
         name = report.object_id if device is None else device.name
         if device is None or overrides(device.recipe.cls, "connection"):
             connected = report.connection in (Connection.ONLINE, Connection.BACK)
@@ -216,13 +216,13 @@ class Recorder:
             self._ring.append(encode(running))
         self._ring.append(encoded)
 
-    def save(self, directory: Path, run: int) -> None:
-        """Store the ring of a run that the end of the server interrupts. Raises OSError."""
+    def save(self, directory: Path, run: int, *, main: bool = True) -> None:
+        """Store the ring of a run that the end of the server interrupts, as `ring.save`. Raises OSError."""
         if self._ring is None:
             return
         with self._lock:
             segments = self._ring.segments()
-        save(segments, directory, run)
+        save(segments, directory, run, main=main)
 
 
 def _equal(a: Any, b: Any) -> bool:

@@ -5,6 +5,7 @@ It consists of segments that are written in turn. Each starts with all present v
 
 import mmap
 import os
+import secrets
 import struct
 import time
 from collections.abc import Iterator
@@ -18,8 +19,8 @@ SEGMENT_SIZE: Final = 512 * 1024
 """Size of a segment, bytes. If values need more space, the ring contains a shorter time."""
 SIZE: Final = SEGMENTS * SEGMENT_SIZE
 
-INTERRUPTED: Final = "run-{run}.ring"
-"""Name of the file with the ring of a run that the end of the server interrupted."""
+INTERRUPTED: Final = "run-{run}{other}.ring"
+"""Name of the file with the ring of a run that the end of the server interrupted. other: differs by host."""
 
 _HEAD: Final = struct.Struct("<QQ")
 """Generation of a segment, 0 for an unused one, and the length of its records."""
@@ -103,19 +104,24 @@ class Ring:
                     yield found, content
 
 
-def save(segments: list[bytes], directory: Path, run: int) -> None:
+Rings = list[Ring]
+"""The rings of the hosts of a scene or program, the main one first. A host that joins them adds its ring."""
+
+
+def save(segments: list[bytes], directory: Path, run: int, *, main: bool = True) -> None:
     """Store the ring of a run that the end of the server interrupts. The next server makes a recording of it.
 
     Args:
         segments: the segments of the ring.
         directory: the directory of recordings.
         run: number of the run.
+        main: whether it is the ring of the main host.
 
     Raises:
         OSError: the file cannot be written.
     """
     directory.mkdir(parents=True, exist_ok=True, mode=0o700)
-    path = directory / INTERRUPTED.format(run=run)
+    path = directory / INTERRUPTED.format(run=run, other="" if main else f"-{secrets.token_hex(4)}")
     fresh = path.with_suffix(".new")
     fresh.touch(0o600)
     with fresh.open("wb") as file:

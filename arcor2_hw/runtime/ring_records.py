@@ -1,7 +1,7 @@
 """The records of the ring of recent values, and their conversion to the content of a recording."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import msgspec
@@ -113,40 +113,38 @@ class _Action:
         self.ended: ActionEnded | None = None
 
 
-def converted(segments: Iterable[bytes], event: float, begin: float, end: float) -> tuple[RecordedValues, int]:
+def converted(rings: Sequence[Iterable[bytes]], event: float, begin: float, end: float) -> tuple[RecordedValues, int]:
     """Return the content of a recording, and when it begins, ms after the event.
 
     Args:
-        segments: the segments of the ring, oldest first.
+        rings: the segments of the ring of each host, oldest first. Each host records its own objects.
         event: the event to which times are relative, on the monotonic clock, s.
         begin: start of the recorded time, on the same clock; the values of a full ring may start later.
         end: end of the recorded time.
     """
-    sources: dict[int, Names] = {}
     columns: dict[tuple[SignalKind, str, str], tuple[Signal, _Column]] = {}
     actions: dict[int, _Action] = {}
-    rows: dict[int, list[_Column]] = {}
-    first: float | None = None
-    for segment in segments:
-        for encoded in records(segment):
-            try:
-                record = _decode(encoded)
-            except msgspec.MsgspecError:
-                continue  # overwritten while it was copied
-            match record:
-                case Names():
-                    sources[record.source] = record
-                    rows[record.source] = _columns_of(record, columns)
-                case Values():
-                    first = record.stamp if first is None else first
-                    time = round((record.stamp - event) * 1000)
-                    for column, value in zip(rows.get(record.source, ()), record.values, strict=False):
-                        column.add(time, value)
-                case ActionStarted():
-                    actions.setdefault(record.number, _Action(record))
-                case ActionEnded() if record.number in actions:
-                    actions[record.number].ended = record
-    starts = round((max(begin, first if first is not None else begin) - event) * 1000)
+    rows: dict[tuple[int, int], list[_Column]] = {}
+    first: dict[int, float] = {}
+    for host, encoded in ((host, each) for host, ring in enumerate(rings) for part in ring for each in records(part)):
+        try:
+            record = _decode(encoded)
+        except msgspec.MsgspecError:
+            continue  # overwritten while it was copied
+        match record:
+            case Names():
+                rows[host, record.source] = _columns_of(record, columns)
+            case Values():
+                first.setdefault(host, record.stamp)
+                time = round((record.stamp - event) * 1000)
+                for column, value in zip(rows.get((host, record.source), ()), record.values, strict=False):
+                    column.add(time, value)
+            case ActionStarted():
+                number = _number(record, host, len(rings))
+                actions.setdefault(number, _Action(replace(record, number=number)))
+            case ActionEnded() if (number := _number(record, host, len(rings))) in actions:
+                actions[number].ended = record
+    starts = round((max(begin, min(first.values(), default=begin)) - event) * 1000)
     ends = round((end - event) * 1000)
     signals = []
     for signal, column in columns.values():
@@ -154,6 +152,11 @@ def converted(segments: Iterable[bytes], event: float, begin: float, end: float)
         if column.times:
             signals.append(msgspec.structs.replace(signal, times=column.times, values=column.values))
     return RecordedValues(signals, _actions(actions, event, starts, ends)), starts
+
+
+def _number(record: ActionStarted | ActionEnded, host: int, hosts: int) -> int:
+    """Return a number that no action of another host has. Only the main host has actions of a program."""
+    return record.number if record.number > 0 else record.number * hosts - host
 
 
 def _columns_of(names: Names, columns: dict[tuple[SignalKind, str, str], tuple[Signal, _Column]]) -> list[_Column]:

@@ -110,7 +110,7 @@ def test_the_ring_of_a_killed_host_is_complete(host: HostProcess, package: Packa
     host.process.kill()
     host.gone()
     moment = time.monotonic()
-    found, begin = converted(host.ring.segments(), moment, moment - 60.0, moment)
+    found, begin = converted([host.ring.segments()], moment, moment - 60.0, moment)
     assert begin > -60_000
     check(found)
     assert not (tmp_path / "recordings").exists()
@@ -126,7 +126,7 @@ def test_a_host_stores_the_run_that_the_end_of_the_server_interrupts(
     [saved] = RecordingFiles(recordings).saved_rings()
     assert saved.run == 3
     assert saved.monotonic <= time.monotonic()
-    check(converted(saved.segments, saved.monotonic, saved.monotonic - 60.0, saved.monotonic)[0])
+    check(converted(saved.rings, saved.monotonic, saved.monotonic - 60.0, saved.monotonic)[0])
 
 
 def test_a_run_that_has_ended_is_not_stored_by_its_host(host: HostProcess, package: Package, tmp_path: Path) -> None:
@@ -147,7 +147,7 @@ def test_commands_of_users_in_an_online_scene_are_recorded(host: HostProcess) ->
         host.send(m.Call(number, "obj_lift", method, arguments, control=method != "robot_joints"))
         host.answer(number)
     moment = time.monotonic()
-    found, _ = converted(host.ring.segments(), moment, moment - 60.0, moment)
+    found, _ = converted([host.ring.segments()], moment, moment - 60.0, moment)
     assert [(each.number, each.name, each.error) for each in found.actions] == [
         (-1, "lift: nap", UNSET),
         (-2, "lift: fail", "the lift is full"),

@@ -87,6 +87,24 @@ def test_another_mapping_of_the_memory_reads_what_was_written_also_while_it_is_w
         thread.join()
 
 
+def test_hosts_may_use_the_same_numbers(clock: Time) -> None:
+    """The main host runs a program; users call a device of each host."""
+    hosts = [Recorder(Ring(), lambda: Cell()), Recorder(Ring(), lambda: Cell())]
+    for name, recorder in zip(("near", "far"), hosts, strict=True):
+        clock.now += 1.0
+        recorder.observed(thing(name), [Observation("level", 1.0)], clock.now)
+        recorder.action_started(-1, name, f"obj_{name}")
+    hosts[0].action_started(1, "pick", "obj_near")
+    clock.now += 1.0
+    hosts[1].action_ended(-1)
+    found, begin = converted([each._ring.segments() for each in hosts if each._ring], clock.now, 0.0, clock.now)
+    assert begin == -2000
+    assert [(each.object_name, each.times) for each in found.signals] == [("near", [-2000]), ("far", [-1000])]
+    assert len({each.number for each in found.actions}) == 3
+    assert [(each.name, each.end) for each in found.actions] == [("near", UNSET), ("far", 0), ("pick", UNSET)]
+    assert next(each.number for each in found.actions if each.name == "pick") == 1
+
+
 def test_values_joints_and_actions_become_columns(clock: Time) -> None:
     ring = Ring()
     recorder = Recorder(ring)
@@ -104,7 +122,7 @@ def test_values_joints_and_actions_become_columns(clock: Time) -> None:
     clock.now += 1.0
     recorder.action_ended(2, error=Message.of("{what} is full", what="box"))
     recorder.action_ended(99)  # its start is not known
-    found, begin = converted(ring.segments(), clock.now, clock.now - 60.0, clock.now)
+    found, begin = converted([ring.segments()], clock.now, clock.now - 60.0, clock.now)
     assert begin == -3000
     columns = {(each.object_name, each.name): (each.times, each.values, each.unit, each.kind) for each in found.signals}
     assert columns == {
@@ -135,7 +153,7 @@ def test_values_that_have_not_changed_for_long_are_known_and_older_changes_are_c
     for second in range(600):
         clock.now += 1.0
         recorder.observed(moving, [Observation("count", float(second))], clock.now)
-    found, begin = converted(ring.segments(), clock.now, clock.now - 60.0, clock.now)
+    found, begin = converted([ring.segments()], clock.now, clock.now - 60.0, clock.now)
     assert begin == -60_000
     on, count = sorted(found.signals, key=lambda each: each.object_name, reverse=True)
     assert on.values == [True]
@@ -152,7 +170,7 @@ def test_more_values_than_fit_shorten_the_recorded_time(clock: Time) -> None:
     for step in range(6000):
         clock.now += 0.01
         recorder.observed(source, [Observation(name, step + 0.5) for name in names], clock.now)
-    found, begin = converted(ring.segments(), clock.now, clock.now - 60.0, clock.now)
+    found, begin = converted([ring.segments()], clock.now, clock.now - 60.0, clock.now)
     assert -60_000 < begin < -1000
     assert len(found.signals) == 200
     assert all(each.values[-1] == 5999.5 for each in found.signals)
@@ -164,7 +182,7 @@ def test_a_damaged_record_hides_no_other(clock: Time) -> None:
     recorder.observed(thing("a"), [Observation("x", 1.0)], clock.now)
     ring.append(b"\xc1 not a record")
     recorder.observed(thing("b"), [Observation("y", float("nan"))], clock.now)
-    found, _ = converted(ring.segments(), clock.now, clock.now - 60.0, clock.now)
+    found, _ = converted([ring.segments()], clock.now, clock.now - 60.0, clock.now)
     assert [(each.name, each.values) for each in found.signals] == [("x", [1.0]), ("y", [None])]
 
 
@@ -174,7 +192,7 @@ def test_shown_values_that_are_observations_are_recorded_once(clock: Time) -> No
     recorder.observed(thing("belt"), [Observation("Velocity", 0.1, "m/s")], clock.now)
     values = {"velocity": 0.1, "door": 1.0}
     recorder.device_changed(DeviceChanged("obj_belt", Connection.LOST, Health.NORMAL, values=values))
-    found, _ = converted(ring.segments(), clock.now, clock.now - 60.0, clock.now)
+    found, _ = converted([ring.segments()], clock.now, clock.now - 60.0, clock.now)
     assert [(each.name, each.values) for each in found.signals] == [
         ("Velocity", [0.1]),
         ("connected", [False]),

@@ -5,7 +5,7 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from arcor2_hw.data.events import Event
-from arcor2_hw.runtime.ring import Ring
+from arcor2_hw.runtime.ring import Rings
 from arcor2_server.access.admission import Access
 from arcor2_server.alarms.kinds import AlarmKinds
 from arcor2_server.alarms.service import Alarms
@@ -349,18 +349,18 @@ class Server:
         self.devices.start()
         self.parameters = Parameters(self.devices, self._maintenance_store, self.online, self.execution)
 
-        def ring() -> Ring | None:
+        def rings() -> Rings | None:
             host = self.program_host.host or self.scene_host.host
-            return None if host is None else host.ring
+            return None if host is None else host.rings
 
         recordings = self.recordings = self._closed(
-            Recordings(self.hub, RecordingFiles(self.settings.recordings_dir), ring)
+            Recordings(self.hub, RecordingFiles(self.settings.recordings_dir), rings)
         )
         await recordings.open(self.runs.error_of)
         alarms.on_raised.append(recordings.alarm)
         self.execution.on_failed.append(
             lambda run, error, host: recordings.run_failed(
-                run, None if error is None else error.message, None if host is None else host.ring
+                run, None if error is None else error.message, None if host is None else host.rings
             )
         )
         system_alarms = self.system_alarms = self._closed(

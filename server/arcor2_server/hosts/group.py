@@ -17,7 +17,7 @@ from arcor2_hw.data.parts import ConfirmedPart
 from arcor2_hw.exceptions import Arcor2Error, Cancelled, OutcomeUnknown
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
-from arcor2_hw.runtime.ring import Ring
+from arcor2_hw.runtime.ring import Rings
 from arcor2_server.background import BackgroundTasks
 from arcor2_server.hosts.placement import Placement, shown
 from arcor2_server.hosts.process import EXIT_TIMEOUT, CellError, CellHost
@@ -79,6 +79,8 @@ class HostGroup:
         """Why it has ended."""
         self._members = {host.node: _Member(host) for host in hosts}
         self._main = self._members[placement.main]
+        self.rings: Rings = [host.ring for host in hosts]
+        """The recent values of the devices of each host, the main one first."""
         self._nodes = dict(placement.nodes)
         self._owners: dict[str, _Member] = {key: self._members[node] for key, node in self._nodes.items()}
         self._interlocked: frozenset[str] = frozenset()
@@ -98,11 +100,6 @@ class HostGroup:
     def pid(self) -> int:
         """Return the process id of the main host."""
         return self._main.host.pid
-
-    @property
-    def ring(self) -> Ring:
-        """Return the recent values of the devices of the main host."""
-        return self._main.host.ring
 
     @property
     def others(self) -> list[_Member]:
@@ -165,7 +162,7 @@ class HostGroup:
         message = replace(message, assets={}, bodies=[], calibrations={})
         if isinstance(message, m.OpenScene):
             return replace(message, scene=replace(message.scene, interlocks=UNSET))
-        return replace(message, records="", recordings="", continues=False, breakpoints=[], shared_breakpoints=[])
+        return replace(message, records="", continues=False, breakpoints=[], shared_breakpoints=[])
 
     def _note_stop(self, object_id: str) -> None:
         """Note a stop that is also sent to the main host, which counts them."""

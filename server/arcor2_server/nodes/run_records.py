@@ -133,7 +133,7 @@ class RunRecords:
         run, self._run = self._run, None
         if run is not None and run.recordings and self._ring is not None:
             with contextlib.suppress(OSError):  # such as a full disk
-                await asyncio.to_thread(save, self._ring.segments(), Path(run.recordings), run.run)
+                await asyncio.to_thread(save, self._ring.segments(), Path(run.recordings), run.run, main=run.main)
 
     async def close(self) -> None:
         """Wait until everything is stored."""

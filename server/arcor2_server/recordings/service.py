@@ -21,7 +21,7 @@ from arcor2_hw.data.recordings import (
 )
 from arcor2_hw.exceptions import StorageError
 from arcor2_hw.messages import Message
-from arcor2_hw.runtime.ring import Ring
+from arcor2_hw.runtime.ring import Rings
 from arcor2_hw.runtime.ring_records import converted
 from arcor2_server.background import BackgroundTasks
 from arcor2_server.events import EventHub, make_event
@@ -42,8 +42,8 @@ RECORDING: Final = "RecordingChanged"
 class _Open:
     """A recording that continues."""
 
-    def __init__(self, info: RecordingInfo, ring: Ring) -> None:
-        self.info, self.ring = info, ring
+    def __init__(self, info: RecordingInfo, rings: Rings) -> None:
+        self.info, self.rings = info, rings
         self.ended: float | None = None
         """When the host has ended, on the monotonic clock, s."""
         self.over = asyncio.Event()
@@ -55,13 +55,13 @@ class Recordings:
     Args:
         hub: publishes RecordingChanged.
         files: stores the recordings.
-        ring: returns the ring of the program, or of the online scene; None if no host runs.
+        rings: returns the rings of the program, or of the online scene; None if no host runs.
     """
 
-    def __init__(self, hub: EventHub, files: RecordingFiles, ring: Callable[[], Ring | None]) -> None:
+    def __init__(self, hub: EventHub, files: RecordingFiles, rings: Callable[[], Rings | None]) -> None:
         self._hub = hub
         self._files = files
-        self._ring = ring
+        self._rings = rings
         self._stored: dict[int, RecordingInfo] = {}
         self._next = 1
         self._open: _Open | None = None
@@ -83,17 +83,18 @@ class Recordings:
             self._background.spawn(self._adopt(rings, error_of), "recordings of interrupted runs")
 
     def _read(self) -> tuple[list[RecordingInfo], int, list[SavedRing]]:
-        return self._files.all(), self._files.next_number(), list(self._files.saved_rings())
+        return self._files.all(), self._files.next_number(), self._files.saved_rings()
 
     async def _adopt(self, rings: list[SavedRing], error_of: Callable[[int], Message | None]) -> None:
-        for ring in rings:
-            if not any(info.run == ring.run and info.run_failed for info in self._stored.values()):
+        for saved in rings:
+            if not any(info.run == saved.run and info.run_failed for info in self._stored.values()):
                 info = RecordingInfo(
-                    self._take_number(), _time(ring.wall), ring.monotonic, round(-TIME_BEFORE * 1000), 0, run=ring.run
+                    self._take_number(), _time(saved.wall), saved.monotonic, round(-TIME_BEFORE * 1000), 0, run=saved.run
                 )
-                info = _failed(info, error_of(ring.run))
-                await self._store(info, ring.segments, ring.monotonic)
-            await asyncio.to_thread(self._files.discard, ring.path)
+                info = _failed(info, error_of(saved.run))
+                await self._store(info, saved, saved.monotonic)
+            for path in saved.paths:
+                await asyncio.to_thread(self._files.discard, path)
 
     async def close(self) -> None:
         """Store the recording that continues. Nothing is recorded afterwards."""
@@ -108,10 +109,10 @@ class Recordings:
         before, self._counts[record.number] = self._counts.get(record.number), record.count
         if before == record.count or not isinstance(record.shelved_until, Unset):
             return
-        ring = self._ring()
-        if ring is None or self._closed or time.monotonic() - stamp > TIME_BEFORE:
+        rings = self._rings()
+        if rings is None or self._closed or time.monotonic() - stamp > TIME_BEFORE:
             return
-        opened = self._continue(ring) or self._begin(ring, stamp, record.run)
+        opened = self._continue(rings) or self._begin(rings, stamp, record.run)
         if any(alarm.number == record.number for alarm in opened.info.alarms):
             return
         opened.info = replace(
@@ -130,27 +131,27 @@ class Recordings:
             ],
         )
 
-    def run_failed(self, run: int, error: Message | None, ring: Ring | None) -> None:
-        """Record that a run has failed. Its host ends. ring: of its host."""
-        if ring is None or self._closed:
+    def run_failed(self, run: int, error: Message | None, rings: Rings | None) -> None:
+        """Record that a run has failed. Its hosts end. rings: of its hosts."""
+        if rings is None or self._closed:
             return
         moment = time.monotonic()
-        opened = self._continue(ring) or self._begin(ring, moment, run)
+        opened = self._continue(rings) or self._begin(rings, moment, run)
         opened.ended = moment
         opened.info = _failed(replace(opened.info, run=run), error)
         opened.over.set()
 
-    def _continue(self, ring: Ring) -> _Open | None:
+    def _continue(self, rings: Rings) -> _Open | None:
         opened = self._open
-        return opened if opened is not None and opened.ring is ring and not opened.over.is_set() else None
+        return opened if opened is not None and opened.rings is rings and not opened.over.is_set() else None
 
-    def _begin(self, ring: Ring, stamp: float, run: int | Unset) -> _Open:
+    def _begin(self, rings: Rings, stamp: float, run: int | Unset) -> _Open:
         wall = time.time() - time.monotonic() + stamp
         begin, end = round(-TIME_BEFORE * 1000), round((time.monotonic() - stamp) * 1000)
         info = RecordingInfo(self._take_number(), _time(wall), stamp, begin, end, complete=False, run=run)
         if self._open is not None:
             self._open.over.set()
-        opened = self._open = _Open(info, ring)
+        opened = self._open = _Open(info, rings)
         self._background.spawn(self._record(opened), f"recording {info.number}")
         return opened
 
@@ -174,9 +175,9 @@ class Recordings:
             self._open = None
 
     async def _write(self, opened: _Open) -> None:
-        await self._store(opened.info, opened.ring, opened.ended or time.monotonic())
+        await self._store(opened.info, opened.rings, opened.ended or time.monotonic())
 
-    async def _store(self, info: RecordingInfo, source: "Ring | list[bytes]", end: float) -> None:
+    async def _store(self, info: RecordingInfo, source: Rings | SavedRing, end: float) -> None:
         try:
             async with self._writing:
                 stored = await asyncio.to_thread(self._convert, info, source, end)
@@ -189,9 +190,9 @@ class Recordings:
             self._stored.pop(number, None)
         self._hub.broadcast(make_event(RECORDING, RecordingChangedData(stored, deleted)))
 
-    def _convert(self, info: RecordingInfo, source: "Ring | list[bytes]", end: float) -> RecordingInfo:
-        segments = source.segments() if isinstance(source, Ring) else source
-        values, begin = converted(segments, info.stamp, info.stamp - TIME_BEFORE, end)
+    def _convert(self, info: RecordingInfo, source: Rings | SavedRing, end: float) -> RecordingInfo:
+        rings = source.rings if isinstance(source, SavedRing) else [ring.segments() for ring in source]
+        values, begin = converted(rings, info.stamp, info.stamp - TIME_BEFORE, end)
         return self._files.put(replace(info, begin=begin, end=round((end - info.stamp) * 1000)), values)
 
     def _superfluous(self, newest: RecordingInfo) -> list[int]:

@@ -9,7 +9,6 @@ import re
 import shutil
 import struct
 import zlib
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -36,20 +35,25 @@ _HEADER: Final = struct.Struct("<8sIIII")
 """Magic number; length and CRC-32 of the information, length and CRC-32 of the content."""
 _MAGIC: Final = b"A2HWREC1"
 _NAME: Final = re.compile(r"(\d{1,9})\.rec")
-_RING: Final = re.compile(re.escape(INTERRUPTED).replace(r"\{run\}", r"(\d{1,9})"))
+_RING: Final = re.compile(
+    re.escape(INTERRUPTED).replace(r"\{run\}", r"(\d{1,9})").replace(r"\{other\}", "(-[0-9a-f]{8})?")
+)
 _encode: Final = msgspec.msgpack.Encoder().encode
 _decode_info: Final = msgspec.msgpack.Decoder(RecordingInfo).decode
 _decode_values: Final = msgspec.msgpack.Decoder(RecordedValues).decode
 
 
 class SavedRing(NamedTuple):
-    """The ring of a run that the end of the server interrupted. monotonic, wall: when it was stored, s."""
+    """The rings of a run that the end of the server interrupted.
 
-    path: Path
+    paths: their files. monotonic, wall: when the main host has stored its ring, s. rings: the segments of each host.
+    """
+
+    paths: list[Path]
     run: int
     monotonic: float
     wall: float
-    segments: list[bytes]
+    rings: list[list[bytes]]
 
 
 class RecordingFiles:
@@ -145,9 +149,13 @@ class RecordingFiles:
         except OSError as error:
             log.warning("recording not deleted", number=number, reason=str(error))
 
-    def saved_rings(self) -> Iterator[SavedRing]:
-        """Yield the rings that hosts have stored because the server ended. A damaged file is deleted."""
-        for path in sorted(self._directory.glob("*.ring")):
+    def saved_rings(self) -> list[SavedRing]:
+        """Return the rings that hosts have stored because the server ended, by run.
+
+        Damaged files, and those of runs whose main host has stored none, because they had ended, are deleted.
+        """
+        found: dict[int, SavedRing] = {}
+        for path in sorted(self._directory.glob("*.ring"), key=lambda each: (len(each.name), each.name)):
             name = _RING.fullmatch(path.name)
             try:
                 kind = tuple[float, float, list[bytes]]
@@ -156,8 +164,17 @@ class RecordingFiles:
                 log.warning("recording of an interrupted run left out", file=path.name, reason=str(error))
                 self.discard(path)
                 continue
-            if name is not None:
-                yield SavedRing(path, int(name[1]), monotonic, wall, segments)
+            if name is None:
+                continue
+            run = int(name[1])
+            if name[2] is None:
+                found[run] = SavedRing([path], run, monotonic, wall, [segments])
+            elif run in found:
+                found[run].paths.append(path)
+                found[run].rings.append(segments)
+            else:
+                self.discard(path)
+        return list(found.values())
 
     def discard(self, path: Path) -> None:
         """Delete the file of a ring."""

@@ -58,8 +58,8 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         self.events: list[Any] = []
         self.folder = folder
-        self.ring: Ring | None = Ring()
-        self.recorder = Recorder(self.ring)
+        self.ring: list[Ring] | None = [Ring()]
+        self.recorder = Recorder(self.ring[0])
         source: Any = SimpleNamespace(id="obj_io", name="io")
         self.recorder.observed(source, [Observation("part", True)], time.monotonic())
         self.recordings = self.server()
@@ -203,6 +203,10 @@ async def test_a_full_disk_stops_no_alarm(bench: Bench, monkeypatch: pytest.Monk
 
 
 async def test_the_ring_of_an_interrupted_run_becomes_a_recording_once(bench: Bench) -> None:
+    other = Recorder(Ring())
+    other.observed(SimpleNamespace(id="obj_far", name="far"), [Observation("part", False)], time.monotonic())  # type: ignore[arg-type]
+    other.save(bench.folder, 12, main=False)
+    other.save(bench.folder, 15, main=False)  # its program has ended, so that the main host stores nothing
     bench.recorder.save(bench.folder, 12)
     bench.recorder.save(bench.folder, 13)
     (bench.folder / "run-14.ring").write_bytes(b"\xff")
@@ -218,7 +222,7 @@ async def test_the_ring_of_an_interrupted_run_becomes_a_recording_once(bench: Be
     assert set(found) == {12, 13}
     assert not list(bench.folder.glob("*.ring"))
     recording = await server.get(found[12].number)
-    assert [(each.name, each.values) for each in recording.signals] == [("part", [True])]
+    assert [(each.object_name, each.values) for each in recording.signals] == [("io", [True]), ("far", [False])]
     again = bench.server()
     await again.open(lambda _: None)
     assert len(again.find(RecordingQuery())) == 2

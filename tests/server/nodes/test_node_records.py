@@ -219,7 +219,7 @@ async def start_lift(start_host: Callable[..., Any], folder: Path, name: str = N
 
 def recorded(ring: Ring) -> Any:
     moment = time.monotonic()
-    return converted(ring.segments(), moment, moment - 60.0, moment)[0]
+    return converted([ring.segments()], moment, moment - 60.0, moment)[0]
 
 
 async def test_the_server_has_the_recording_of_a_killed_node(
@@ -272,7 +272,7 @@ async def test_the_relay_stores_the_recording_of_a_run_that_the_end_of_the_serve
     await host.close()
     [saved] = RecordingFiles(tmp_path / "recordings").saved_rings()
     assert saved.run == 3
-    check(converted(saved.segments, saved.monotonic, saved.monotonic - 60.0, saved.monotonic)[0])
+    check(converted(saved.rings, saved.monotonic, saved.monotonic - 60.0, saved.monotonic)[0])
 
 
 def on_node(package: Path) -> None:
