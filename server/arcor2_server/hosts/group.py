@@ -14,7 +14,7 @@ from arcor2_hw.data.held import HoldChoice
 from arcor2_hw.data.interlocks import Interlock
 from arcor2_hw.data.operation import HoldKind
 from arcor2_hw.data.parts import ConfirmedPart
-from arcor2_hw.exceptions import Arcor2Error, Cancelled, OutcomeUnknown
+from arcor2_hw.exceptions import Arcor2Error, Cancelled, ConnectionLost, DeviceTimeout, OutcomeUnknown
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.ring import Rings
@@ -26,6 +26,9 @@ log = structlog.get_logger(__name__)
 
 CLOSE_TIMEOUT: Final = 3.0
 """Time limit for the other hosts to close their devices after the end of a program, s; a host allows 1.2 s."""
+
+JOINED_WITHIN: Final = 10.0
+"""Time limit for another host to open a scene of which it has no objects, s."""
 
 
 class GroupUser(Protocol):
@@ -109,6 +112,29 @@ class HostGroup:
     def has(self, node: str) -> bool:
         """Return whether a host runs on a node; empty for this computer."""
         return node in self._members
+
+    async def join(self, host: CellHost, opening: m.OpenScene) -> None:
+        """Open the scene in another host, which has no objects yet, and add it.
+
+        Args:
+            host: the host.
+            opening: the scene.
+
+        Raises:
+            ConnectionLost: the host or the scene has ended meanwhile.
+            DeviceTimeout: the host does not open the scene.
+        """
+        member = _Member(host, opened=True)
+        host.send(self._part(opening, member))
+        try:
+            await host.expect(m.SceneOpened, JOINED_WITHIN)
+        except TimeoutError as error:
+            raise DeviceTimeout("{computer} does not open the scene", computer=shown(host.node)) from error
+        if self.reason is not None or self._main.leaving or self.has(host.node):
+            raise ConnectionLost("The scene went offline meanwhile.")
+        self._members[host.node] = member
+        self.rings.append(host.ring)
+        host.user = self
 
     def _owner(self, object_id: str) -> _Member:
         return self._owners.get(object_id, self._main)
@@ -250,6 +276,7 @@ class HostGroup:
         (added,) = opening.scene.objects
         member = self._owners[added.id] = self._members[node]
         self._nodes[added.id] = node
+        self.placement.names[added.id] = added.name
         await member.host.add(opening)
         if member is not self._main:
             remote = {added.id: shown(node)}

@@ -39,7 +39,12 @@ class Placement:
         return ", ".join(self.names[key] for key, each in self.nodes.items() if each == node)
 
 
-def place(cell: Cell | None, objects: Iterable[SceneObject], derives: Callable[[str, str], bool]) -> Placement:
+def place(
+    cell: Cell | None,
+    objects: Iterable[SceneObject],
+    derives: Callable[[str, str], bool],
+    running: str | None = None,
+) -> Placement:
     """Return where the objects of a scene run.
 
     Robots and grippers decide where the main host is; without them, the place of most objects does, the computer of
@@ -49,6 +54,7 @@ def place(cell: Cell | None, objects: Iterable[SceneObject], derives: Callable[[
         cell: the cell file, which overrides the nodes of the scene.
         objects: the objects.
         derives: returns whether a type derives from a base class.
+        running: where the main host already runs, so that the number of objects does not matter.
 
     Raises:
         SeveralNodes: robots and grippers are on different computers.
@@ -62,7 +68,7 @@ def place(cell: Cell | None, objects: Iterable[SceneObject], derives: Callable[[
         raise SeveralNodes(
             "The robots and grippers of a scene must run on one computer: {devices}.", devices=Message.listed(where)
         )
-    counted = [nodes[each.id] for each in bound] or list(nodes.values())
+    counted = [nodes[each.id] for each in bound] or ([*nodes.values()] if running is None else [running])
     main = max(sorted(set(counted)), key=counted.count, default="")
     return Placement(
         main, {each.id: nodes.get(each.id, main) for each in objects}, {each.id: each.name for each in objects}

@@ -15,6 +15,7 @@ from arcor2_hw.data.device import DEVICE_FILES
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, ConnectionLost, NotFound
 from arcor2_hw.messages import Message
+from arcor2_hw.runtime import messages as m
 from arcor2_server.hosts.group import GroupUser, HostGroup
 from arcor2_server.hosts.placement import Placement, place
 from arcor2_server.hosts.process import CellHost, HostUser
@@ -63,8 +64,13 @@ class CellHosts:
         """Return the node that an object names; empty for this computer."""
         return node_of(self._cell, scene_object)
 
-    def place(self, objects: Iterable[SceneObject]) -> Placement:
-        """Return where the objects of a scene run. Raise SeveralNodes if they cannot work together like this."""
+    def place(self, objects: Iterable[SceneObject], running: str | None = None) -> Placement:
+        """Return where the objects of a scene run. Raise SeveralNodes if they cannot work together like this.
+
+        Args:
+            objects: the objects.
+            running: where the main host already runs.
+        """
 
         def derives(name: str, base: str) -> bool:
             try:
@@ -72,7 +78,7 @@ class CellHosts:
             except NotFound:  # only the package contains this type; its host reports errors
                 return False
 
-        return place(self._cell, objects, derives)
+        return place(self._cell, objects, derives, running)
 
     async def take_all(self, user: GroupUser, placement: Placement) -> HostGroup:
         """Return hosts for a scene or program, which are started together.
@@ -101,6 +107,26 @@ class CellHosts:
                 raise error.with_message(Message.of(text, reason=error.message, names=placement.on(node)))
             raise error
         return HostGroup(user, placement, hosts, self._retire)
+
+    async def extend(self, group: HostGroup, node: str, opening: m.OpenScene) -> None:
+        """Add a host to those of an online scene, unless one runs on this node.
+
+        Args:
+            group: the hosts of the scene.
+            node: where the new one runs.
+            opening: the scene, none of whose objects is there.
+
+        Raises:
+            Arcor2Error: the host cannot be started, or the scene went offline meanwhile.
+        """
+        if group.has(node):
+            return
+        host = await self._take(node)
+        try:
+            await group.join(host, opening)
+        except BaseException:
+            await host.close()
+            raise
 
     def _retire(self, host: CellHost) -> None:
         """Close a host in the background, because another one of its group has ended."""

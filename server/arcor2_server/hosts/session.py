@@ -76,8 +76,13 @@ class HostSession:
         return await self._pool.take_all(self, placement)
 
     def place(self, objects: Iterable[SceneObject]) -> Placement:
-        """Return where the objects of a scene run. Raise SeveralNodes if they cannot work together like this."""
-        return self._pool.place(objects)
+        """Return where the objects of a scene run. While it is online, the main host stays where it is.
+
+        Raises:
+            SeveralNodes: they cannot work together like this.
+        """
+        running = self.host.placement.main if self.online and self.host is not None else None
+        return self._pool.place(objects, running)
 
     def node_of(self, scene_object: SceneObject) -> str:
         """Return the node that an object names; empty for this computer."""
@@ -193,6 +198,10 @@ class HostSession:
     async def add(self, opening: m.OpenScene, node: str) -> None:
         """Create and connect the only object of a scene in addition to the present ones, on the node of a host."""
         await self.require_online().add(opening, node)
+
+    async def extend(self, node: str, opening: m.OpenScene) -> None:
+        """Start another host for the scene as `CellHosts.extend`."""
+        await self._pool.extend(self.require_online(), node, opening)
 
     async def stop_motion(self, object_id: str) -> None:
         """Stop a device, also while it executes a call."""

@@ -239,18 +239,31 @@ class OnlineScene:
         self._done(SceneStateEnum.STOPPED, message)
         self.host.prepare()
 
-    def require_connectable(self, obj: SceneObject) -> None:
-        """Raise RequestRefused or SeveralNodes if an added object cannot be connected while the scene is online."""
+    async def prepare_addition(self, obj: SceneObject, *, dry_run: bool = False) -> None:
+        """Start a host where an object will run that will be added to the online scene, unless there is one.
+
+        Args:
+            obj: the object.
+            dry_run: only check whether it may be added.
+
+        Raises:
+            SeveralNodes: robots and grippers would be on different computers.
+            RequestRefused: the program and the interlocks would have to move to another computer.
+            Arcor2Error: the host cannot be started.
+        """
         if not self.online or (hosts := self.host.host) is None:
             return
-        placement = self.host.place([*self._session.require_scene().objects, obj])
-        node = placement.nodes[obj.id]
-        if placement.main != hosts.placement.main or not hosts.has(node):
+        scene = self._session.require_scene()
+        placement = self.host.place([*scene.objects, obj])
+        if placement.main != hosts.placement.main:
             raise RequestRefused(
-                "{name} runs on {computer}, where the scene is not online. Go offline first.",
+                "The program and the interlocks of the scene must move to {computer} with {name}. "
+                "Go offline, add {name}, and go online again.",
                 name=obj.name,
-                computer=shown(node),
+                computer=shown(placement.main),
             )
+        if not dry_run:
+            await self.host.extend(placement.nodes[obj.id], self._opening.without_objects(scene))
 
     def connect_added(self, obj: SceneObject) -> None:
         """Create and connect an object that was added to the online scene. ObjectState reports the result."""

@@ -62,6 +62,10 @@ class SceneOpening:
         await self._secrets.store.flush()
         return message, overlaid
 
+    def without_objects(self, scene: Scene) -> m.OpenScene:
+        """Return the message for a host that has none of the objects yet."""
+        return m.OpenScene(scene, [], streaming_period=self._settings.streaming_period, keep_going=True)
+
     def with_workspace(self, message: m.OpenScene, scene: Scene) -> m.OpenScene:
         """Add the present collision models and calibrations. Send the message immediately."""
         return self._host_world.with_world(message, self._host_world.calibrations(scene.objects))

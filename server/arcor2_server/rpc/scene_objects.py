@@ -94,7 +94,7 @@ class SceneObjectRequests:
         """Add an object also while a project is open or the scene is online; then it is connected, too."""
         async with self._locks.auto(context.user, SCENE):
             self._session.require_scene_open()
-            self._online.require_connectable(SceneObject(args.name, args.type))
+            await self._online.prepare_addition(SceneObject(args.name, args.type), dry_run=context.dry_run)
             obj = await self._add_object(context, args)
         if not context.dry_run and self._online.online:
             self._online.connect_added(obj)

@@ -1,0 +1,67 @@
+"""Objects are added to an online scene on a computer where none of its objects runs yet."""
+
+from pathlib import Path
+
+import pytest
+
+from arcor2_hw.data.cell import Cell, CellDevice
+from arcor2_hw.data.scene import Scene, SceneObject
+from arcor2_hw.exceptions import Arcor2Error
+from tests.server.cell.conftest import Server, robot_meta, running_server
+from tests.server.cell.test_execution_history import subscribe
+from tests.server.nodes.conftest import NODE, Broker, Node
+
+pytestmark = pytest.mark.xdist_group("nodes")
+
+CLOCK = """
+class Clock(Generic):
+    _ABSTRACT = False
+
+    def stop(self):
+        pass
+
+    def pid(self) -> int:
+        return os.getpid()
+"""
+
+
+async def added(server: Server, name: str, kind: str = "Clock") -> str:
+    """Add an object; return its id when it is online."""
+    await server.ask("AddSceneObject", {"name": name, "type": kind})
+    state = await server.client.event("ObjectState", lambda data: data["state"] in ("online", "failed"))
+    assert state["state"] == "online", state
+    return str(state["object_id"])
+
+
+async def test_a_host_is_started_where_an_added_object_runs(
+    broker: Broker, node: Node, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first object, and so the program, is on a node. The cell file has the nodes of later ones."""
+    monkeypatch.setenv("ARCOR2_HW_NATS_URL", broker.url)
+    async with running_server(tmp_path / "data") as server:
+        subscribe(server, "ObjectState")
+        server.types.add("Clock", CLOCK)
+        server.types.add("Arm", CLOCK.replace("Clock", "Arm"), robot=robot_meta("Arm"))
+        pool = server.services.hosts
+        pool._cell, pool._derives = Cell([CellDevice("away", "Clock", node="saw")]), server.types.derives_from
+        await server.open(Scene("scene", id="scn_1", objects=[SceneObject("first", "Clock", id="obj_1", node=NODE)]))
+        await server.start()
+        online = server.services.online
+
+        here = [await added(server, name) for name in ("second", "third")]
+        pids = [await online.call(each, "pid", deadline=5.0) for each in ("obj_1", *here)]
+        assert pids[0] != pids[1] == pids[2]
+        assert len(online.host.host.rings) == 2
+        assert {each.object_id for each in await online.host.host.stop_all()} == {"obj_1", *here}
+
+        for name, kind, reason in (
+            ("away", "Clock", r"The node saw is not connected\."),
+            ("arm", "Arm", "Go offline, add arm, and go online again"),
+        ):
+            with pytest.raises(Arcor2Error, match=reason):
+                await server.ask("AddSceneObject", {"name": name, "type": kind})
+        assert len(server.services.session.require_scene().objects) == 3
+        assert online.online
+        await server.ask("StopScene")
+        stopped = await server.client.state("stopped")
+        assert "message" not in stopped
