@@ -6,6 +6,7 @@ from typing import Annotated, Final
 from msgspec import Meta, field
 
 from arcor2_hw.data.base import UNSET, Data, Timestamp, TranslatableData, Unset
+from arcor2_hw.messages import Message
 
 NAME: Final = r"[a-z0-9][a-z0-9_-]{0,62}"
 """Pattern of a name of a node. It is part of subjects, in which dots, spaces and wildcards have a meaning."""
@@ -80,9 +81,11 @@ class NodesData(TranslatableData, frozen=True):
         nodes: The nodes by name: those that announced themselves, and those that the open scene or the cell file names.
         assigned: The nodes that the cell file of the server sets, by name of the object. They override those of scenes.
         problem: Why the state of the nodes is unknown; `key` and `values` translate it.
+        apart: Why the objects of the open scene cannot work together where they run (`several_nodes`).
     """
 
     configured: bool
     nodes: list[NodeStatus] = field(default_factory=list)
     assigned: dict[str, str] = field(default_factory=dict)
     problem: str | Unset = UNSET
+    apart: Message | Unset = UNSET

@@ -22,35 +22,42 @@ _CHUNK: Final = 65536
 _PREFIX: Final = "arcor2-hw-child-"
 
 
-class _Folder:
-    """A directory for the temporary files of a process, locked by the server and by the process until both have ended.
+class LockedFolder:
+    """A temporary directory, locked by this process and by those that inherit `lock`, until all of them have ended.
 
-    If the server is killed, the next server removes the directory as soon as nobody has locked it.
+    If they are killed, `remove_leftovers` removes the directory as soon as nobody has locked it.
+
+    Args:
+        directory: contains the new one.
+        prefix: of its name.
+
+    Raises:
+        OSError: it cannot be created.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, directory: Path, prefix: str) -> None:
         while True:
-            self.path = Path(tempfile.mkdtemp(prefix=_PREFIX))
+            self.path = Path(tempfile.mkdtemp(prefix=prefix, dir=directory))
             try:
                 self.lock = os.open(self.path, os.O_RDONLY)
             except FileNotFoundError:
-                continue  # another server has removed it already
+                continue  # another process has removed it already
             fcntl.flock(self.lock, fcntl.LOCK_EX)
             if self.path.exists():
                 return
             os.close(self.lock)
 
     def remove(self) -> None:
+        """Remove it."""
         shutil.rmtree(self.path, ignore_errors=True)
         if self.lock >= 0:
             os.close(self.lock)
             self.lock = -1
 
 
-@functools.cache
-def _remove_leftovers() -> None:
-    """Remove the directories of processes that have ended and whose server was killed; once per process."""
-    for path in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
+def remove_leftovers(directory: Path, prefix: str) -> None:
+    """Remove the locked folders of processes that were killed. Arguments as of LockedFolder."""
+    for path in directory.glob(f"{prefix}*"):
         with contextlib.suppress(OSError):  # in use, or of another user
             lock = os.open(path, os.O_RDONLY)
             try:
@@ -58,6 +65,11 @@ def _remove_leftovers() -> None:
                 shutil.rmtree(path, ignore_errors=True)
             finally:
                 os.close(lock)
+
+
+@functools.cache
+def _remove_leftovers_once() -> None:
+    remove_leftovers(Path(tempfile.gettempdir()), _PREFIX)
 
 
 class ChildProcess:
@@ -68,7 +80,7 @@ class ChildProcess:
         folder: the directory for its temporary files. It is removed after the end of the process, even a killed one.
     """
 
-    def __init__(self, process: asyncio.subprocess.Process, folder: _Folder) -> None:
+    def __init__(self, process: asyncio.subprocess.Process, folder: LockedFolder) -> None:
         self._process, self._folder = process, folder
 
     @classmethod
@@ -92,8 +104,8 @@ class ChildProcess:
             OSError: the process cannot be started.
         """
         try:
-            await asyncio.to_thread(_remove_leftovers)
-            folder = _Folder()
+            await asyncio.to_thread(_remove_leftovers_once)
+            folder = LockedFolder(Path(tempfile.gettempdir()), _PREFIX)
             try:
                 process = await asyncio.create_subprocess_exec(
                     sys.executable, *command, "--fd", str(connection.fileno()),

@@ -74,7 +74,8 @@ async def test_a_device_is_set_on_a_node_that_is_lost(node: Node, served: Cell, 
         assert refused.value.reason == "several_nodes"
         await tools.get_by_role("button", name=texts.OBJECTS, exact=True).click()
         await page.get_by_role("treegrid", name="Without a pose").get_by_role("row").filter(has_text="clock").click()
-        await expect(page.get_by_text("left (press), right (computer of the server)")).to_be_visible()
+        hint = "must run on one computer: left (node press), right (the computer of the server)."
+        await expect(page.get_by_text(hint)).to_be_visible()
         await screen.picture("robots-apart")
         for _ in range(2):
             await client.call("Undo")

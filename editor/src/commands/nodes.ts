@@ -26,12 +26,3 @@ export function objectsByNode(nodes: NodesData | null, objects: readonly SceneOb
   }
   return found;
 }
-
-/** Return the robots with their computers if these are different, for a message; an empty string if they are not. */
-export function robotsApart({ doc, nodes, types }: State): string {
-  const robots = Object.values(doc?.objects ?? {})
-    .filter(({ type }) => types.robots[type])
-    .map(({ name, node }) => ({ name, on: nodes?.assigned[name] ?? node ?? "" }));
-  if (new Set(robots.map(({ on }) => on)).size < 2) return "";
-  return robots.map(({ name, on }) => `${name} (${on || t`computer of the server`})`).join(", ");
-}

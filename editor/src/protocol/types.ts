@@ -2156,12 +2156,14 @@ export interface NodeStatus {
  *     nodes: The nodes by name: those that announced themselves, and those that the open scene or the cell file names.
  *     assigned: The nodes that the cell file of the server sets, by name of the object. They override those of scenes.
  *     problem: Why the state of the nodes is unknown; `key` and `values` translate it.
+ *     apart: Why the objects of the open scene cannot work together where they run (`several_nodes`).
  */
 export interface NodesData {
   configured: boolean;
   nodes: NodeStatus[];
   assigned: Record<string, string>;
   problem?: string;
+  apart?: Message;
   key?: string;
   values?: Record<string, string | Message>;
 }

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from arcor2_hw.data.audit import AuditOutcome
 from arcor2_hw.data.cell import BROKER_CREDENTIALS, BROKER_URL, assigned_nodes, objects_by_node
+from arcor2_hw.exceptions import SeveralNodes
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime.messages import ToHost
 from arcor2_server.alarms.service import Alarms
@@ -15,6 +16,7 @@ from arcor2_server.documents import Session
 from arcor2_server.documents.edit_notifications import EditNotifications
 from arcor2_server.execution.breakpoints import SharedBreakpoints
 from arcor2_server.execution.service import Execution
+from arcor2_server.hosts.pool import CellHosts
 from arcor2_server.hosts.session import HostSession
 from arcor2_server.maintenance.devices import Devices
 from arcor2_server.nodes.board import NodeBoard
@@ -39,7 +41,7 @@ def stored_name(types: ObjectTypes, storage: Storage) -> Callable[[str], Awaitab
     return find
 
 
-def board_of_nodes(settings: ServerSettings, hub: Hub, session: Session) -> NodeBoard:
+def board_of_nodes(settings: ServerSettings, hub: Hub, session: Session, hosts: CellHosts) -> NodeBoard:
     """Return the board of nodes, which follows the open scene."""
     assigned = assigned_nodes(settings.cell)
 
@@ -47,13 +49,20 @@ def board_of_nodes(settings: ServerSettings, hub: Hub, session: Session) -> Node
         scene = session.document.scene
         return {} if scene is None else objects_by_node(settings.cell, scene.objects)
 
+    def apart() -> Message | None:
+        try:
+            hosts.place([] if session.document.scene is None else session.document.scene.objects)
+        except SeveralNodes as error:
+            return error.message
+        return None
+
     environment = {BROKER_CREDENTIALS: str(settings.broker_credentials)} | os.environ
     credentials = Path(environment[BROKER_CREDENTIALS])
 
     def configured() -> bool:
         return bool(environment.get(BROKER_URL) or assigned or needed()) or credentials.is_file()
 
-    return NodeBoard(hub, assigned, needed, configured, environment)
+    return NodeBoard(hub, assigned, needed, configured, environment, apart=apart)
 
 
 def connect_alarms(

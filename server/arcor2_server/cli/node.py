@@ -81,7 +81,7 @@ def run(
             os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
         os.umask(0o077)  # only the user may read the files of the node and its hosts
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-            runner.run(_serve(name, credentials))
+            runner.run(_serve(name, credentials, file.parent / "sessions"))
 
     return _run(work)
 
@@ -106,12 +106,12 @@ def pair(name: str, *, server: str, data_dir: DataDir = None) -> int:
 
         found, key = members.pair("node", name, server)
         found.save(node_file(_data_dir(data_dir), name))
-        sys.stdout.write(f"paired {name}, key {key}\nStart it: arcor2-hw node run {name}\n")
+        sys.stdout.write(f"paired {name}, key {key}\nStart it: systemctl enable --now arcor2-hw-node@{name}, or without the service arcor2-hw node run {name}\n")
 
     return _run(work)
 
 
-async def _serve(name: str, credentials: "Callable[[], Credentials]") -> None:
+async def _serve(name: str, credentials: "Callable[[], Credentials]", sessions: Path) -> None:
     from arcor2_server.nodes.service import NodeService
 
     def ready() -> None:
@@ -119,7 +119,7 @@ async def _serve(name: str, credentials: "Callable[[], Credentials]") -> None:
         sys.stdout.flush()
 
     manager = ServiceManager.from_environment()  # first: hosts must not report to it
-    serving = asyncio.create_task(NodeService(name, credentials, ready=ready).run())
+    serving = asyncio.create_task(NodeService(name, credentials, sessions, ready=ready).run())
     for number in (signal.SIGTERM, signal.SIGINT):
         asyncio.get_running_loop().add_signal_handler(number, serving.cancel)
     manager.ready()  # also without a broker, to which the service connects again and again

@@ -71,6 +71,7 @@ class NodeBoard:
         configured: returns whether there is a broker; the server may get its credentials while it runs.
         environment: names address or credentials of the broker.
         clock: the monotonic clock, s.
+        apart: returns why the objects of the open scene cannot work together where they run; None if they can.
     """
 
     def __init__(
@@ -81,12 +82,13 @@ class NodeBoard:
         configured: Callable[[], bool],
         environment: Mapping[str, str] = os.environ,
         clock: Callable[[], float] = time.monotonic,
+        apart: Callable[[], Message | None] = lambda: None,
     ) -> None:
         self._hub = hub
         self._assigned = assigned
         self._needed = needed
         self._is_configured, self._environment = configured, environment
-        self._clock = clock
+        self._clock, self._apart = clock, apart
         self._known: dict[str, _Known] = {}
         self._missing_since: dict[str, float] = {}
         self._problem: Message | None = None
@@ -193,7 +195,7 @@ class NodeBoard:
         if self._problem is not None:
             problem = {"problem": self._problem.text, **self._problem.translation()}
         nodes = [self._status(name, needed.get(name, []), moment) for name in sorted(names)]
-        return NodesData(True, nodes, dict(self._assigned), **problem)
+        return NodesData(True, nodes, dict(self._assigned), apart=self._apart() or UNSET, **problem)
 
     def lost(self) -> dict[str, list[str]]:
         """Return the nodes that the open scene needs and that cannot be used, each with its objects.

@@ -5,7 +5,6 @@ import contextlib
 import os
 import secrets
 import socket
-import tempfile
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -20,7 +19,7 @@ from nats.errors import Error as NatsError
 from arcor2_hw.exceptions import Arcor2Error, ArrivedLate, Cancelled, ConnectionLost, InvalidData, NotFound
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m, ring
-from arcor2_server.child_process import ChildProcess, describe_exit
+from arcor2_server.child_process import ChildProcess, LockedFolder, describe_exit, remove_leftovers
 from arcor2_server.nodes import connections as broker
 from arcor2_server.nodes.content import WITH_FILES, ContentStore, default_store
 from arcor2_server.nodes.conversion import FRAMES, LARGE, STAMPED, MessageOutline, for_host, outline
@@ -53,6 +52,7 @@ RETRY_PERIOD: Final = 0.5
 """Period of the attempts to connect to the broker, s."""
 REFUSED_PERIOD: Final = 2.0
 """Period of the attempts to connect while the broker refuses the credentials, s."""
+_FOLDER: Final = "session-"
 _encode = msgspec.msgpack.encode
 
 
@@ -64,6 +64,7 @@ class HostedSession:
         node: name of this node.
         opening: the request.
         store: the files that the node has received.
+        folder: for copies of the files that the session uses.
         failed: called with each error.
     """
 
@@ -73,6 +74,7 @@ class HostedSession:
         node: str,
         opening: Opening,
         store: ContentStore,
+        folder: LockedFolder,
         failed: Callable[[Message], None] = lambda _: None,
     ) -> None:
         self.id = opening.session
@@ -80,7 +82,7 @@ class HostedSession:
         self._started = time.monotonic()
         self._runs = ("", "")
         self._store = store
-        self._folder = tempfile.TemporaryDirectory(prefix="arcor2-hw-session-", ignore_cleanup_errors=True)
+        self._folder = folder
         self.end = SessionEnd(
             connections,
             broker.session_subject(node, opening.session),
@@ -148,7 +150,7 @@ class HostedSession:
         finally:
             self.end.end(Message.of("the session has ended"))
             await self.end.close()
-            self._folder.cleanup()
+            self._folder.remove()
 
     async def _start(self, environment: Mapping[str, str]) -> ChildProcess:
         ours, theirs = socket.socketpair()
@@ -156,7 +158,7 @@ class HostedSession:
         try:
             await asyncio.get_running_loop().create_unix_connection(lambda: self._stream, sock=ours)
             process = await ChildProcess.start(
-                (*COMMAND, "--ring", str(memory)), theirs, environment, inherited=[memory]
+                (*COMMAND, "--ring", str(memory)), theirs, environment, inherited=[memory, self._folder.lock]
             )
         except BaseException:
             os.close(memory)
@@ -218,7 +220,7 @@ class HostedSession:
             self._runs = _runs(found.type, body)
         if found.type in WITH_FILES:
             try:
-                body = self._store.unpacked(body, Path(self._folder.name))
+                body = self._store.unpacked(body, self._folder.path)
             except (NotFound, InvalidData) as error:
                 self._fail(error.message)
                 return
@@ -288,6 +290,7 @@ class NodeService:
     Args:
         name: name of the node.
         credentials: returns those for the broker; called before each attempt to connect.
+        sessions: directory for the files of sessions.
         environment: the environment of cell hosts.
         ready: called each time when the node can be used.
     """
@@ -296,11 +299,13 @@ class NodeService:
         self,
         name: str,
         credentials: Callable[[], Credentials],
+        sessions: Path,
         environment: Mapping[str, str] = os.environ,
         ready: Callable[[], None] = lambda: None,
     ) -> None:
         self._name, self._credentials, self._ready = name, credentials, ready
         self._environment = environment_without(environment)
+        self._folders = sessions.absolute()
         self._store = ContentStore(default_store())
         self._connections: Connections = {}
         self._sessions: set[HostedSession] = set()
@@ -313,6 +318,7 @@ class NodeService:
     async def run(self) -> None:
         """Serve until cancelled. Connect again when the connection to the broker is lost."""
         self._store.prune()
+        self._remove_leftovers()
         reported = ""
         while True:
             refused = False
@@ -324,6 +330,10 @@ class NodeService:
                     log.warning("broker not reached", reason=str(error), detail=error.detail)
                 reported, refused = str(error), isinstance(error, broker.CredentialsRefused)
             await asyncio.sleep(REFUSED_PERIOD if refused else RETRY_PERIOD)
+
+    def _remove_leftovers(self) -> None:
+        """Remove the files of sessions of services that were killed."""
+        remove_leftovers(self._folders, _FOLDER)
 
     async def _serve(self) -> None:
         """Serve until the connection is lost. Raise ConnectionLost if there is none."""
@@ -395,8 +405,18 @@ class NodeService:
             return
         refusal = refusal_of(self._name, opening)
         if refusal is None:
-            session = HostedSession(self._connections, self._name, opening, self._store, self._note)
-            await session.open()
+            try:
+                self._folders.mkdir(mode=0o700, parents=True, exist_ok=True)
+                folder = LockedFolder(self._folders, _FOLDER)
+            except OSError as error:  # such as a full disk
+                refusal = Message.of("The node {node} cannot store files: {reason}", node=self._name, reason=error)
+        if refusal is None:
+            session = HostedSession(self._connections, self._name, opening, self._store, folder, self._note)
+            try:
+                await session.open()
+            except BaseException:  # the connection was lost
+                folder.remove()
+                raise
         await message.respond(msgspec.json.encode(Opened(refusal)))
         if refusal is not None:
             log.warning("session refused", reason=str(refusal))
@@ -407,6 +427,7 @@ class NodeService:
         task = asyncio.create_task(session.run(self._environment), name=f"session {session.id}")
         self._tasks.add(task)
         task.add_done_callback(lambda _: self._forget(task, session))
+        await asyncio.to_thread(self._remove_leftovers)  # also of hosts that ended only after the start of this service
 
     def _forget(self, task: asyncio.Task[None], session: HostedSession) -> None:
         self._tasks.discard(task)

@@ -14,6 +14,7 @@ import pytest
 
 from arcor2_hw.data.nodes import NodeState
 from arcor2_hw.data.operation import HoldKind
+from arcor2_hw.data.project import Project
 from arcor2_hw.exceptions import Arcor2Error, OutcomeUnknown
 from arcor2_hw.runtime import messages as m
 from arcor2_server.hosts.process import CellError, CellHost
@@ -213,6 +214,28 @@ async def test_a_host_that_dies_on_the_node_is_reported(node: Node, start_host: 
     async with asyncio.timeout(PATIENCE):
         await asyncio.shield(host.ended)
     assert listener.reasons == ["the cell host was killed by SIGKILL"]
+
+
+async def test_a_killed_node_leaves_no_files(broker: Broker, start_host: Callable[..., Any], tmp_path: Path) -> None:
+    sessions = tmp_path / "arcor2-hw" / "node" / "sessions"
+    package = Package(tmp_path / "package").write({}, [], Project("p", "scn_1", id="pro_1"), "time.sleep(60)")
+    node = Node(broker.url, tmp_path, name="lathe")
+    try:
+        host, _ = await start_host(broker.url, "lathe")
+        host.send(m.RunPackage("pkg_1", str(package)))
+        await asyncio.to_thread(wait_for, lambda: list(sessions.rglob("script.py")))
+        node.end()
+        assert list(sessions.rglob("script.py"))
+        async with asyncio.timeout(PATIENCE):
+            await asyncio.shield(host.ended)
+
+        node = Node(broker.url, tmp_path, name="lathe")
+        host, _ = await start_host(broker.url, "lathe")  # removes also what a host had still used
+        await asyncio.to_thread(wait_for, lambda: len(list(sessions.iterdir())) <= 1)
+        await host.close()
+        await asyncio.to_thread(wait_for, lambda: not list(sessions.iterdir()))
+    finally:
+        node.end()
 
 
 async def test_a_closed_scene_ends_the_host(node: Node, start_host: Callable[..., Any], tmp_path: Path) -> None:

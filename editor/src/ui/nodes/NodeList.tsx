@@ -2,6 +2,8 @@
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
+import { Trans } from "@lingui/react/macro";
+import type { ReactNode } from "react";
 import { ago, clock, decimal } from "../../formats";
 import { translate } from "../../i18n/serverMessages";
 import type { NodeState, NodeStatus } from "../../protocol/types";
@@ -26,7 +28,9 @@ export default function NodeList() {
       <h3>{t`Nodes`}</h3>
       {problem && <p className="small alarm">{problem}</p>}
       {nodes.nodes.length === 0 && (
-        <p className="quiet small">{t`No other computer is connected. Start there: arcor2-hw node run NAME`}</p>
+        <p className="quiet small">
+          {t`No other computer is connected.`} {startIt("NAME")}
+        </p>
       )}
       <ul className="devices">
         {nodes.nodes.map((each) => (
@@ -52,7 +56,7 @@ function Node({ node }: { node: NodeStatus }) {
       {state === "silent" && (
         <p className="small">
           {node.seen ? t`Last signal ${ago(node.seen)}.` : t`No signal since the server was started.`}{" "}
-          {t`Switch the computer on, check its network cable, and start arcor2-hw node run ${name} on it.`}
+          {t`Switch the computer on and check its network cable.`} {startIt(name)}
         </p>
       )}
       {state === "other_version" && (
@@ -79,6 +83,14 @@ function Node({ node }: { node: NodeStatus }) {
     </>
   );
 }
+
+/** How to start a node on its computer: with the service of systemd, or by hand. */
+const startIt = (name: string): ReactNode => (
+  <Trans>
+    Then start the node there: <code>systemctl restart arcor2-hw-node@{name}</code>, or without the service{" "}
+    <code>arcor2-hw node run {name}</code>.
+  </Trans>
+);
 
 /** Computer, load and disk of a connected node. */
 function Health({ node: { computer, since, load = 0, free = 0 } }: { node: NodeStatus }) {

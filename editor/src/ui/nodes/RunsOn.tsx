@@ -1,7 +1,8 @@
 /** On which computer the selected object runs. A separate chunk. */
 
 import { t } from "@lingui/core/macro";
-import { notMovable, objectsByNode, robotsApart, setNode } from "../../commands/nodes";
+import { notMovable, objectsByNode, setNode } from "../../commands/nodes";
+import { translate } from "../../i18n/serverMessages";
 import { heldBy } from "../../store/selectors";
 import { useEditor } from "../../store/store";
 import { Pick } from "../kit/fields";
@@ -10,7 +11,6 @@ import type { Section } from "../workplace/section";
 
 const Body: Section["Body"] = ({ selection: { id } }) => {
   const object = useEditor((state) => state.doc?.objects[id]);
-  const apart = useEditor(robotsApart);
   const objects = useEditor((state) => state.doc?.objects);
   const nodes = useEditor((state) => state.nodes);
   const holder = useEditor((state) => heldBy(state, id));
@@ -34,7 +34,7 @@ const Body: Section["Body"] = ({ selection: { id } }) => {
         onChange={(node) => void ask(setNode(id, node))}
       />
       {silent && <p className="small alarm">{t`The node ${chosen} is not connected.`}</p>}
-      {apart && <p className="small alarm">{t`All robots of a scene must run on one computer: ${apart}.`}</p>}
+      {nodes.apart && <p className="small alarm">{translate(nodes.apart)}</p>}
       <RefusedText>{refused}</RefusedText>
     </>
   );
