@@ -2,8 +2,6 @@
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";
-import { Trans } from "@lingui/react/macro";
-import type { ReactNode } from "react";
 import { ago, clock, decimal } from "../../formats";
 import { translate } from "../../i18n/serverMessages";
 import type { NodeState, NodeStatus } from "../../protocol/types";
@@ -85,12 +83,8 @@ function Node({ node }: { node: NodeStatus }) {
 }
 
 /** How to start a node on its computer: with the service of systemd, or by hand. */
-const startIt = (name: string): ReactNode => (
-  <Trans>
-    Then start the node there: <code>systemctl restart arcor2-hw-node@{name}</code>, or without the service{" "}
-    <code>arcor2-hw node run {name}</code>.
-  </Trans>
-);
+const startIt = (name: string): string =>
+  t`Then start the node there: systemctl restart arcor2-hw-node@${name}, or without the service arcor2-hw node run ${name}.`;
 
 /** Computer, load and disk of a connected node. */
 function Health({ node: { computer, since, load = 0, free = 0 } }: { node: NodeStatus }) {
