@@ -184,7 +184,7 @@ class Server:
         session = self.session = Session(self.settings, self.storage, self.types, self.damage, self.secrets)
         await session.open()
         self._closed(session)
-        nodes = self.nodes = self._closed(board_of_nodes(self.settings, self.hub, session, hosts))
+        nodes = self.nodes = self._closed(board_of_nodes(self.settings, self.hub, session, self.hosts))
         nodes.start()
         self.dependents = Dependents(self.storage, self.types, session)
         self.saved_problems = self._closed(SavedProblems(self.storage, self.types, self.settings.problems_file))
