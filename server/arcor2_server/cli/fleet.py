@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING, Annotated, Final, cast
 import uvloop
 from cyclopts import App, Parameter, validators
 
-from arcor2_hw.data.cell import LOCAL_BROKER
 from arcor2_hw.data.role import Role
 from arcor2_hw.exceptions import InvalidData, StorageError
 from arcor2_server.access.addresses import server_addresses
 from arcor2_server.access.admission import PARAMETER, Access, is_local
 from arcor2_server.access.tokens import TokenFile
 from arcor2_server.audit.command_line import note_command
-from arcor2_server.cli import fleet_members
+from arcor2_server.cli import fleet_members, members
 from arcor2_server.cli.certificates import certificate_of, renew_certificate
 from arcor2_server.cli.exit_status import CannotServe, ExitStatus, fail
 from arcor2_server.cli.serve import data_directory, listen
@@ -82,8 +81,6 @@ def serve(
         return fail("fleet", "install the extra `nodes` of arcor2-hw", ExitStatus.FAILED)
     os.umask(0o077)  # only the user may read the files of the server
     try:
-        from arcor2_server.nodes.credentials import load, of_address
-
         settings = ServerSettings.from_environment(
             host=host,
             port=port,
@@ -91,11 +88,7 @@ def serve(
             insecure=insecure,
             default_role=Role.TECHNICIAN,
         )
-        if broker is None and settings.broker_credentials.exists():
-            credentials = load(settings.broker_credentials)
-        else:
-            credentials = of_address(broker or LOCAL_BROKER, str(ca or ""))
-        credentials.options()  # report errors before the start
+        credentials = members.credentials_for(settings.broker_credentials, broker, ca)
         server_logging.set_up(log_level)
     except (InvalidData, KeyError, StorageError) as error:
         return fail("fleet", error, ExitStatus.USAGE)

@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 
 from rich.table import Table
 
+from arcor2_hw.data.cell import LOCAL_BROKER
 from arcor2_hw.exceptions import Arcor2Error, InvalidData, StorageError
 from arcor2_server.access.authority import AUTHORITY
 from arcor2_server.audit.command_line import note_command
@@ -40,6 +41,19 @@ def run(group: str, work: Callable[[], Any]) -> int:
     except OSError as error:
         return fail(group, error, ExitStatus.PORT_TAKEN)
     return ExitStatus.OK
+
+
+def credentials_for(file: Path, broker: str | None, ca: Path | None) -> "Credentials":
+    """Return the credentials for a broker: of a file if it exists and no address is given.
+
+    Raises:
+        Arcor2Error: they are invalid.
+    """
+    from arcor2_server.nodes.credentials import load, of_address
+
+    found = load(file) if broker is None and file.exists() else of_address(broker or LOCAL_BROKER, str(ca or ""))
+    found.options()  # report errors before the start
+    return found
 
 
 def trusted_authority(settings: ServerSettings, ca: Path | None) -> str:

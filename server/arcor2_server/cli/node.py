@@ -6,13 +6,14 @@ import os
 import signal
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import uvloop
 from cyclopts import App, Parameter
 
-from arcor2_hw.data.cell import BROKER_AUTHORITY, BROKER_URL, LOCAL_BROKER
+from arcor2_hw.data.cell import BROKER_AUTHORITY, BROKER_URL
 from arcor2_hw.exceptions import InvalidData
 from arcor2_server.cli import members
 from arcor2_server.deployment.service_manager import ServiceManager
@@ -62,17 +63,12 @@ def run(
     """
 
     def work() -> None:
-        from arcor2_server.nodes.credentials import check_name, load, node_file, of_address
+        from arcor2_server.nodes.credentials import check_name, node_file
 
         check_name(name)
         file = node_file(_data_dir(data_dir), name)
-
-        def credentials() -> "Credentials":
-            if broker is None and file.exists():
-                return load(file)
-            return of_address(broker or LOCAL_BROKER, str(ca or ""))
-
-        credentials().options()  # report errors before the start
+        credentials = partial(members.credentials_for, file, broker, ca)
+        credentials()  # report errors before the start
         try:
             server_logging.set_up(log_level)
         except (KeyError, ValueError) as error:
@@ -106,7 +102,9 @@ def pair(name: str, *, server: str, data_dir: DataDir = None) -> int:
 
         found, key = members.pair("node", name, server)
         found.save(node_file(_data_dir(data_dir), name))
-        sys.stdout.write(f"paired {name}, key {key}\nStart it: systemctl enable --now arcor2-hw-node@{name}, or without the service arcor2-hw node run {name}\n")
+        sys.stdout.write(f"paired {name}, key {key}\n")
+        sys.stdout.write(f"Start it: systemctl enable --now arcor2-hw-node@{name}\n")
+        sys.stdout.write(f"Without the service: arcor2-hw node run {name}\n")
 
     return _run(work)
 

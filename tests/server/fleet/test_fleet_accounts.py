@@ -24,7 +24,7 @@ from arcor2_server.storage import Storage
 from tests.server.fleet.broker import free_port, listens
 from tests.server.fleet.cells import unit
 from tests.server.fleet.test_results import CELL, FleetProcess, SmallCell, until
-from tests.server.nodes.conftest import CLI, NATS_SERVER
+from tests.server.nodes.conftest import NATS_SERVER, paired_by_commands
 from tests.waiting import WITHIN, wait_for
 
 pytestmark = pytest.mark.xdist_group("fleet")
@@ -207,24 +207,11 @@ async def test_a_site_delivers_states_and_results_and_is_revoked(hub: Hub, tmp_p
 
 # ---------------------------------------------------------------------------------------------------- command line
 def test_a_technician_pairs_lists_and_revokes(hub: Hub, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    data = ("--data-dir", str(hub.settings.data_dir))
     for name, options, saved in (
         (CELL, (), "fleet/press-3.json"),
         ("brno", ("--site",), "broker/hub.creds"),
     ):
-        accepting = subprocess.Popen(
-            [*CLI, "fleet", "accept", name, *options, "--host", "127.0.0.1", "--port", "0", *data],
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        with accepting:
-            assert accepting.stdout is not None
-            command, code = accepting.stdout.readline().split(), accepting.stdout.readline().removeprefix("Code: ")
-            pairing = [*CLI, *command[command.index("fleet") :], "--data-dir", str(tmp_path / name)]
-            pair = subprocess.run(pairing, input=code.lower(), capture_output=True, text=True, check=False)
-            assert pair.returncode == 0, pair.stderr
-            accepted = accepting.stdout.readline()
-        assert accepted.removeprefix("accepted ") == pair.stdout.splitlines()[0].removeprefix("paired ") + "\n"
+        paired_by_commands("fleet", name, hub.settings.data_dir, tmp_path / name, *options)
         assert (tmp_path / name / saved).stat().st_mode & 0o077 == 0
     assert ServerSettings(data_dir=tmp_path / CELL, cell_name=CELL).in_fleet
     assert not ServerSettings(data_dir=tmp_path / CELL, cell_name="press-4").in_fleet

@@ -60,6 +60,26 @@ class Broker:
         self.process.wait()
 
 
+def paired_by_commands(group: str, name: str, server: Path, member: Path, *options: str) -> tuple[str, str]:
+    """Pair a member with the broker of a server as a technician does.
+
+    `server` and `member` are their data directories, `options` those of `accept`. Return what `accept` asks to run, and
+    what `pair` prints.
+    """
+    accept = (*CLI, group, "accept", name, *options, "--host", "127.0.0.1", "--port", "0", "--data-dir", str(server))
+    with subprocess.Popen(accept, stdout=subprocess.PIPE, text=True) as accepting:
+        assert accepting.stdout is not None
+        run, code = accepting.stdout.readline(), accepting.stdout.readline().removeprefix("Code: ")
+        words = run.split()
+        pairing = [*CLI, *words[words.index("arcor2-hw") + 1 :], "--data-dir", str(member)]
+        pair = subprocess.run(pairing, input=code.lower(), capture_output=True, text=True, check=False)
+        assert pair.returncode == 0, pair.stderr
+        accepted = accepting.stdout.readline()
+    assert accepting.returncode == 0
+    assert accepted.removeprefix("accepted ") == pair.stdout.splitlines()[0].removeprefix("paired ") + "\n"
+    return run, pair.stdout
+
+
 def tls_configuration(folder: Path, host: str) -> tuple[Path, Path]:
     """Write the configuration of a broker with TLS; return it and the certificate to trust."""
     authority = Authority(folder, lambda: [host])

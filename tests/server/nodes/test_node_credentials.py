@@ -29,7 +29,7 @@ from arcor2_server.nodes.credentials import Credentials, load, node_file, requir
 from arcor2_server.nodes.nkeys import Kind, SigningKey, is_user_key
 from arcor2_server.nodes.presence import own_version
 from arcor2_server.settings import ServerSettings
-from tests.server.nodes.conftest import CLI, NODE, PATIENCE, Node, Server, followed
+from tests.server.nodes.conftest import CLI, NODE, PATIENCE, Node, Server, followed, paired_by_commands
 from tests.server.nodes.test_node_hosts import moving, online
 from tests.waiting import wait_for
 
@@ -52,20 +52,9 @@ def command(*words: str, code: str = "") -> "subprocess.CompletedProcess[str]":
 
 def pair_by_command(server: Server, folder: Path) -> str:
     """Pair a node as a technician does; return what the node prints."""
-    data = ("--data-dir", str(server.settings.data_dir))
-    accepting = subprocess.Popen(
-        [*CLI, "node", "accept", NODE, "--host", "127.0.0.1", "--port", "0", *data], stdout=subprocess.PIPE, text=True
-    )
-    with accepting:
-        assert accepting.stdout is not None
-        run, code = accepting.stdout.readline(), accepting.stdout.readline().removeprefix("Code: ")
-        assert run.startswith(f"Run on the node: arcor2-hw node pair {NODE} --server 127.0.0.1:")
-        pair = command("pair", NODE, "--server", run.split()[-1], "--data-dir", str(folder), code=code.lower())
-        assert pair.returncode == 0, pair.stderr
-        accepted = accepting.stdout.readline()
-    assert accepting.returncode == 0
-    assert accepted.removeprefix("accepted ") == pair.stdout.splitlines()[0].removeprefix("paired ") + "\n"
-    return pair.stdout
+    run, printed = paired_by_commands("node", NODE, server.settings.data_dir, folder)
+    assert run.startswith(f"Run on the node: arcor2-hw node pair {NODE} --server 127.0.0.1:")
+    return printed
 
 
 async def test_a_node_is_paired_works_is_revoked_and_paired_again(
