@@ -130,8 +130,9 @@ class Passing:
             """Everything is sent."""
 
         client: Any = SimpleNamespace(flush=flush)
+        folder: Any = None  # the messages of these tests name no files
         self.session = HostedSession(
-            {Lane.CALLS: client}, "press", Opening("1", own_version()), ContentStore(Path("/nowhere"))
+            {Lane.CALLS: client}, "press", Opening("1", own_version()), ContentStore(Path("/nowhere")), folder
         )
         self.host: list[Any] = []
         self.server: list[Any] = []

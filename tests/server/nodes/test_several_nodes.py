@@ -19,6 +19,7 @@ from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error, SeveralNodes
 from arcor2_hw.messages import Message
 from arcor2_hw.runtime import messages as m
+from arcor2_hw.runtime.ring import Ring
 from arcor2_server.hosts.group import HostGroup
 from arcor2_server.hosts.placement import place
 from arcor2_server.hosts.pool import CellHosts
@@ -440,7 +441,7 @@ class Recorded:
     """In place of a host: stores what it is sent."""
 
     def __init__(self, node: str) -> None:
-        self.node, self.sent, self.reason = node, list[Any](), None
+        self.node, self.sent, self.reason, self.ring = node, list[Any](), None, Ring()
 
     def send(self, message: m.ToHost) -> None:
         self.sent.append(message)
