@@ -4,7 +4,6 @@ import hashlib
 import os
 import random
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -154,10 +153,8 @@ class Passing:
 
 
 @pytest.fixture
-def passing() -> Iterator[Passing]:
-    found = Passing()
-    yield found
-    found.session._folder.cleanup()
+def passing() -> Passing:
+    return Passing()
 
 
 def test_a_command_that_a_stop_has_overtaken_is_not_executed(passing: Passing) -> None:
