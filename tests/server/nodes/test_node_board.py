@@ -7,11 +7,14 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
+from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.cell import Cell, CellDevice, assigned_nodes, node_of, objects_by_node
 from arcor2_hw.data.events import Event
 from arcor2_hw.data.nodes import NodesData, NodeState
 from arcor2_hw.data.scene import SceneObject
+from arcor2_hw.exceptions import SeveralNodes
 from arcor2_hw.messages import Message
+from arcor2_server.hosts.placement import place
 from arcor2_server.nodes.board import FORGOTTEN_AFTER, LOAD_PERIOD, SILENT_AFTER, NodeBoard
 from arcor2_server.nodes.presence import Announcement, LastError, RunningSession, own_version
 
@@ -94,6 +97,24 @@ def test_nodes_that_the_scene_needs_are_lost_after_a_while() -> None:
     assert board.board.lost() == {"press": ["arm", "belt"]}
     board.needed = {}
     assert board.board.lost() == {}
+
+
+def test_objects_that_cannot_work_together_are_shown() -> None:
+    """The board asks the rule by which scenes start."""
+
+    def apart() -> Message | None:
+        try:
+            place(None, objects, lambda name, base: (name, base) == ("Gripper", "HoldsParts"))
+        except SeveralNodes as error:
+            return error.message
+        return None
+
+    hub: Any = SimpleNamespace(broadcast=lambda _: None)
+    board = NodeBoard(hub, {}, dict, lambda: True, apart=apart)
+    objects = [SceneObject("left", "Gripper", id="1", node="press"), SceneObject("right", "Gripper", id="2")]
+    assert "left (node press), right (the computer of the server)" in str(board.data().apart)
+    del objects[1]
+    assert board.data().apart is UNSET
 
 
 def test_a_node_cannot_pretend_to_be_another_one() -> None:

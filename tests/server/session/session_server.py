@@ -179,7 +179,7 @@ class FakeCell:
         if not self.online:
             raise RequestRefused("The scene is offline.")
 
-    def require_connectable(self, obj: SceneObject) -> None: ...
+    async def prepare_addition(self, obj: SceneObject, *, dry_run: bool) -> None: ...
 
     async def end_effector_pose(self, robot_id: str, end_effector: str, arm_id: str | None) -> Pose:
         return self.pose
