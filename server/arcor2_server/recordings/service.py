@@ -89,7 +89,12 @@ class Recordings:
         for saved in rings:
             if not any(info.run == saved.run and info.run_failed for info in self._stored.values()):
                 info = RecordingInfo(
-                    self._take_number(), _time(saved.wall), saved.monotonic, round(-TIME_BEFORE * 1000), 0, run=saved.run
+                    self._take_number(),
+                    _time(saved.wall),
+                    saved.monotonic,
+                    round(-TIME_BEFORE * 1000),
+                    0,
+                    run=saved.run,
                 )
                 info = _failed(info, error_of(saved.run))
                 await self._store(info, saved, saved.monotonic)
