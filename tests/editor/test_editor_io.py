@@ -17,6 +17,14 @@ pytestmark = pytest.mark.asyncio(loop_scope="session")
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "io.md"
 
+TREND_PIXELS = """(canvas) => {
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  const colour = getComputedStyle(canvas).getPropertyValue("--trend-1");
+  const wanted = colour.match(/\\w\\w/g).map((each) => parseInt(each, 16));
+  return data.filter((_, n) => n % 4 === 0 && wanted.every((each, part) => data[n + part] === each)).length;
+}"""
+"""Number of pixels in the colour of the first line."""
+
 
 async def with_lamp(client: Client, cell: Cell) -> None:
     """Add a lamp of the type in the how-to guide to the scene, and go online."""
@@ -64,6 +72,7 @@ async def shows_the_history(screen: Screen) -> None:
     await screen.settle()
     assert await screen.faults() == []
     assert await screen.barriers() == []
+    assert await dialog.locator(".trend-chart canvas").evaluate(TREND_PIXELS), "a single part is a dot"
     await screen.picture("point-history")
     await dialog.get_by_role("button", name="Close").click()
 

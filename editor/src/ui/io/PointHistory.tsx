@@ -13,7 +13,7 @@ import { Button, Waiting } from "../kit/kit";
 import { RefusedText, useRefusal } from "../points/Refusal";
 import { useTheme } from "../settings/Settings";
 import { useVisible } from "../useVisible";
-import { BUCKETS, columnsOf, overall, pauseOf, SPANS, type Span } from "./history";
+import { aloneIn, BUCKETS, columnsOf, overall, pauseOf, SPANS, type Span } from "./history";
 import { valueText } from "./points";
 import "uplot/dist/uPlot.min.css";
 import "../trends/trends.css";
@@ -22,6 +22,8 @@ import { plotStyle } from "../trends/plotStyle";
 
 const HEIGHT = 260;
 const DAY = 86_400;
+/** Diameter of a value without a neighbour, pixels. */
+const DOT = 6;
 
 interface PointHistoryProps {
   objectId: string;
@@ -152,6 +154,12 @@ function Chart({ summary, digital, unit, label }: ContentProps) {
     if (!current) return;
     const { colour, axis } = plotStyle(current);
     const line = { points: { show: false }, spanGaps: false };
+    const dots = {
+      show: false,
+      filter: (plot: UPlot, n: number) => aloneIn(plot.data[n] ?? []),
+      size: DOT,
+      fill: colour("--trend-1"),
+    };
     const edge = { ...line, show: !digital, stroke: `${colour("--trend-1")}66`, width: 1 };
     const made = new UPlot(
       {
@@ -173,7 +181,7 @@ function Chart({ summary, digital, unit, label }: ContentProps) {
             ...(unitShown && { label: unitShown, labelSize: 20, labelFont: axis.font }),
           },
         ],
-        series: [{}, { ...line, stroke: colour("--trend-1"), width: 2 }, edge, edge],
+        series: [{}, { ...line, stroke: colour("--trend-1"), width: 2, points: dots }, edge, edge],
         bands: digital ? [] : [{ series: [3, 2], fill: `${colour("--trend-1")}33` }],
       },
       columnsOf(shown.current, factor) as UPlot.AlignedData,

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { columnsOf, overall, pauseOf } from "./history";
+import { aloneIn, columnsOf, overall, pauseOf } from "./history";
 
 const SUMMARY = {
   since: 0,
@@ -17,6 +17,12 @@ test("a chart has a gap where nothing is known", () => {
     [10, 20, null, 0],
     [30, 20, null, 40],
   ]);
+});
+
+test("values without a neighbour are alone", () => {
+  expect(aloneIn([7])).toEqual([0]);
+  expect(aloneIn([1, 2, null, 0, null, undefined, 4])).toEqual([3, 6]);
+  expect(aloneIn([])).toEqual([]);
 });
 
 test("the whole period has a lowest, a mean and a highest value", () => {

@@ -42,6 +42,12 @@ export function columnsOf(
   return [seconds, ...columns];
 }
 
+/** Return the indices of values without a known neighbour: no line leads to them. */
+export function aloneIn(column: ArrayLike<number | null | undefined>): number[] {
+  const known = (n: number) => (column[n] ?? null) !== null;
+  return Array.from(column, (_, n) => n).filter((n) => known(n) && !known(n - 1) && !known(n + 1));
+}
+
 /** Return the lowest, the mean and the highest value of the whole period; null if nothing is known. */
 export function overall({ mean, lowest, highest }: PointSummary): [number, number, number] | null {
   if (mean.length === 0) return null;
