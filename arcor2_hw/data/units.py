@@ -4,7 +4,7 @@ import enum
 
 from msgspec import field
 
-from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
+from arcor2_hw.data.base import UNSET, Data, Timestamp, TranslatableData, Unset
 from arcor2_hw.data.recipes import UsedRecipe
 
 
@@ -22,11 +22,11 @@ class UnitState(enum.StrEnum):
     UNKNOWN = "unknown"
 
 
-class UnitStep(Data, frozen=True):
+class UnitStep(TranslatableData, frozen=True):
     """An action that concerned a unit.
 
     run, number: run, and number of the action in it. duration: s. parameters, results: each as JSON in a string. error:
-    why it failed. attempt: number of the attempt, if not the first one.
+    why it failed, with `key` and `values`. attempt: number of the attempt, if not the first one.
     """
 
     run: int

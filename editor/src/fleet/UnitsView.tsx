@@ -5,6 +5,7 @@ import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
 import { Input, Label, SearchField } from "react-aria-components";
 import { dateAndTime, decimal } from "../formats";
+import { translate } from "../i18n/serverMessages";
 import type { FleetProduction, FleetUnit } from "../protocol/types";
 import { Window } from "../ui/kit/dialogs";
 import { OnOff } from "../ui/kit/fields";
@@ -201,7 +202,7 @@ function Units({ choice }: { choice: Choice }) {
 /** Return why a unit is bad, as far as its record says it. */
 export function reasonOf({ unit }: Pick<FleetUnit, "unit">): string {
   if (unit.state !== "bad" && unit.state !== "rejected") return "";
-  if (unit.error) return `${unit.step}: ${unit.error}`;
+  if (unit.error) return `${unit.step}: ${translate(unit.message ?? { text: unit.error }, unit.translations)}`;
   if (unit.step) return t`${unit.step}: failed`;
   return unit.verdict === false ? t`Test failed` : "–";
 }
@@ -212,7 +213,7 @@ function OpenedUnit({ unit, onClose }: { unit: FleetUnit; onClose: () => void })
     <Window title={`${nameOf(unit.unit)} · ${unit.cell}`} onClose={onClose}>
       {!data && !failed && <Waiting>{t`Loading…`}</Waiting>}
       <RefusedText>{failed}</RefusedText>
-      {data && <UnitDetails unit={data} />}
+      {data && <UnitDetails unit={data} translations={unit.unit.translations} />}
       <div className="actions">
         <Button look="primary" onPress={onClose}>{t`Close`}</Button>
       </div>

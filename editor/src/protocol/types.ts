@@ -3874,7 +3874,7 @@ export type UnitState = "in_cell" | "good" | "bad" | "rejected" | "unknown";
  * An action that concerned a unit.
  *
  * run, number: run, and number of the action in it. duration: s. parameters, results: each as JSON in a string. error:
- * why it failed. attempt: number of the attempt, if not the first one.
+ * why it failed, with `key` and `values`. attempt: number of the attempt, if not the first one.
  */
 export interface UnitStep {
   run: number;
@@ -3887,12 +3887,15 @@ export interface UnitStep {
   results?: string[];
   error?: string;
   attempt?: number;
+  key?: string;
+  values?: Record<string, string | Message>;
 }
 
 /**
  * A unit without its steps.
  *
- * step, error: the action that explains why it is bad, and the error of this action; empty if there is none.
+ * step, error: the action that explains why it is bad, and the error of this action; empty if there is none. message:
+ * the error as a message, unless it is too long. translations: of the errors of all steps by the cell.
  */
 export interface UnitSummary {
   number: number;
@@ -3907,6 +3910,8 @@ export interface UnitSummary {
   program: string;
   step: string;
   error: string;
+  message?: Message;
+  translations: Record<string, Record<string, string>>;
 }
 
 /** What an action does while a condition is not met: wait, then hold the program; or hold it at once. */

@@ -254,7 +254,7 @@ def _received(name: str, message: Msg) -> ReceivedResult:
     received = message.metadata.timestamp.timestamp()
     if isinstance(result, r.UnitResult):
         kind, since = "unit", result.record.entered
-        columns = of_unit(result.record, int(received))
+        columns = of_unit(result.record, result.translations, int(received))
     else:
         kind, since = "alarm", result.record.raised
         columns = of_alarm(result.record, result.translations, int(received))

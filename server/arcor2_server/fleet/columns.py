@@ -1,4 +1,4 @@
-"""The columns of stored results that reports use, and counts of units for each quarter of an hour."""
+"""The columns of stored results that reports use, counts of units by quarter of an hour, and an index for searching."""
 
 import sqlite3
 from typing import Final
@@ -50,7 +50,6 @@ _REPORTS: Final = (
       slot integer not null, cell text not null, program text not null, product text not null,
       good integer not null, bad integer not null, rejected integer not null, primary key (slot, cell, program, product)
     ) without rowid""",
-    "create index unit_at on result (at, id, label, cell) where kind = 'unit'",
     "create index bad_unit_at on result (at, id, cell) where kind = 'unit' and state in ('bad', 'rejected')",
     "create index bad_unit_of_cell on result (cell, at, id) where kind = 'unit' and state in ('bad', 'rejected')",
     "create index alarm_at on result (at, id, cell, label, times, until) where kind = 'alarm'",
@@ -59,19 +58,62 @@ _REPORTS: Final = (
     "create trigger unit_changed after update of at, state, program, product on result when new.kind = 'unit' "
     f"begin {_counted('old', '-')} {_counted('new', '+')} end",
 )
-_ALL: Final = (
+COUNT_ALL: Final = (
     f"insert into unit_count select at / {SLOT}, cell, program, product, "  # noqa: S608 (a number from above)
     "sum(state = 'good'), sum(state = 'bad'), sum(state = 'rejected') "
     "from result where kind = 'unit' group by 1, 2, 3, 4"
 )
+SHORTEST: Final = 3
+"""Minimum number of characters of a text that `unit_text` finds."""
+_TEXT: Final = "{row}.id, {row}.label, '/' || {row}.cell || '/'"
+_INDEXED: Final = f"insert into unit_text (rowid, serial, cell) values ({_TEXT.format(row='new')});"  # noqa: S608
+_NOT_INDEXED: Final = (
+    f"insert into unit_text (unit_text, rowid, serial, cell) values ('delete', {_TEXT.format(row='old')});"  # noqa: S608
+)
+INDEX_ALL: Final = (
+    f"insert into unit_text (rowid, serial, cell) select {_TEXT.format(row='result')} from result "  # noqa: S608
+    "where kind = 'unit' order by id"
+)
+_SEARCH: Final = (
+    "drop index if exists unit_at",
+    "create index unit_by_id on result (id, label, cell) where kind = 'unit'",
+    "create virtual table unit_text using fts5(serial, cell, content='', columnsize=0, tokenize='trigram')",
+    INDEX_ALL,
+    f"create trigger unit_text_added after insert on result when new.kind = 'unit' begin {_INDEXED} end",
+    f"create trigger unit_text_removed after delete on result when old.kind = 'unit' begin {_NOT_INDEXED} end",
+    "create trigger unit_text_changed after update of label on result when new.kind = 'unit' "
+    f"and new.label is not old.label begin {_NOT_INDEXED} {_INDEXED} end",
+)
 
 
-def add_to(connection: sqlite3.Connection) -> None:
-    """Add the columns, counts and indexes to a file of version 1. A million results take about a minute.
+def add_to(connection: sqlite3.Connection, version: int) -> None:
+    """Add what a file of an older version lacks. A million results of version 1 take about a minute.
 
     Raises:
         sqlite3.Error: the file cannot be changed.
     """
+    if version < 2:
+        _add_reports(connection)
+    for statement in _SEARCH:
+        connection.execute(statement)
+
+
+def texts_match(serial: str, cell: str) -> str:
+    """Return the expression with which `unit_text` finds units by a part of their serial number.
+
+    Args:
+        serial: at least SHORTEST characters.
+        cell: name of a cell; empty for all.
+    """
+    found = f"serial : {_quoted(serial)}"
+    return f"{found} AND cell : {_quoted(f'/{cell}/')}" if cell else found
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace('"', '""') + '"'
+
+
+def _add_reports(connection: sqlite3.Connection) -> None:
     for name, kind in _COLUMNS.items():
         connection.execute(f"alter table result add column {name} {kind}")
     change = f"update result set {', '.join(f'{name} = ?' for name in _COLUMNS)} where id = ?"  # noqa: S608 (names)
@@ -82,12 +124,12 @@ def add_to(connection: sqlite3.Connection) -> None:
         last = rows[-1][0]
     for statement in _REPORTS:
         connection.execute(statement)
-    connection.execute(_ALL)
+    connection.execute(COUNT_ALL)
 
 
 def columns_of(kind: str, stamp: int, document: bytes) -> Columns:
     """Return the columns of a stored record."""
     received = stamp // 1_000_000
     if kind == "unit":
-        return of_unit(msgspec.json.decode(document, type=UnitRecord), received)
+        return of_unit(msgspec.json.decode(document, type=UnitRecord), {}, received)
     return of_alarm(msgspec.json.decode(document, type=AlarmRecord), {}, received)

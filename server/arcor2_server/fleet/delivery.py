@@ -32,6 +32,8 @@ POLL_PERIOD: Final = 5.0
 """Period in which the outbox is checked, also without an event, and time before a failed batch is sent again, s."""
 CREATE_TIMEOUT: Final = 0.5
 """Time between two checks whether the stream of this cell exists, s."""
+_ERROR: Final = b'"error":'
+"""Part of each record of a unit with a failed step."""
 HEADERS: Final = 4096
 """Size that is left for the headers of a message, bytes."""
 
@@ -43,7 +45,7 @@ class Delivery:
         outboxes: the results.
         name: of the cell.
         identity: of the cell.
-        texts: translations of the texts of alarms.
+        texts: translations of the texts of alarms and units.
     """
 
     def __init__(self, outboxes: Sequence[Outbox], name: str, identity: str, texts: DriverTexts) -> None:
@@ -105,7 +107,7 @@ class Delivery:
         sent: list[int] = []
         pending: list[asyncio.Future[PubAck]] = []
         for waiting in await outbox.first(BATCH):
-            if waiting.kind is OutboxKind.ALARM:  # reads files of drivers
+            if waiting.kind is OutboxKind.ALARM or _ERROR in waiting.document:  # reads files of drivers
                 encoded = await asyncio.to_thread(self._encoded, waiting, limit)
             else:
                 encoded = self._encoded(waiting, limit)
@@ -135,6 +137,8 @@ class Delivery:
         if waiting.kind is OutboxKind.ALARM:
             alarm = msgspec.json.decode(waiting.document, type=AlarmRecord)
             head["translations"] = self._texts.of_alarm(alarm)
+        elif _ERROR in waiting.document:
+            head["translations"] = self._texts.of_unit(msgspec.json.decode(waiting.document, type=UnitRecord))
         encoded = r.encode(head | {"record": msgspec.Raw(waiting.document)})
         if len(encoded) <= limit or waiting.kind is not OutboxKind.UNIT:
             return encoded

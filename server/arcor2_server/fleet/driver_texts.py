@@ -1,4 +1,4 @@
-"""Translations that the drivers of a cell have of texts of alarms. The server of the page knows only its own."""
+"""Translations that the drivers of a cell have of its alarms and units. The server of the page knows only its own."""
 
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -8,6 +8,7 @@ import structlog
 from arcor2_hw.analysis.translations import FOLDER, is_language, read
 from arcor2_hw.data.alarms import AlarmRecord
 from arcor2_hw.data.base import Unset
+from arcor2_hw.data.units import UnitRecord
 from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.messages import Message
 from arcor2_server.fleet.records import Translations
@@ -44,6 +45,11 @@ class DriverTexts:
     def of_alarm(self, alarm: AlarmRecord) -> Translations:
         """Return the translations of all texts of an alarm. It reads files."""
         return self.of(texts_of(alarm))
+
+    def of_unit(self, unit: UnitRecord) -> Translations:
+        """Return the translations of the errors of the steps of a unit. It reads files if there are errors."""
+        errors = [step.as_message(step.error) for step in unit.steps if not isinstance(step.error, Unset)]
+        return self.of(errors) if errors else {}
 
     def _read(self, file: Path) -> dict[str, str]:
         try:

@@ -22,7 +22,7 @@ FILE: Final = "fleet.sqlite"
 """Name in the data directory."""
 MAX_RESULTS: Final = 1_000_000
 """Maximum number of stored results. Beyond it the oldest are deleted."""
-_VERSION: Final = 2
+_VERSION: Final = 3
 _SCHEMA: Final = """
 create table if not exists cell (
   name text not null, identity text not null, document blob not null, primary key (name, identity)
@@ -83,7 +83,7 @@ class FleetFile:
             if version < _VERSION:
                 with self._connection:
                     self._connection.execute("begin immediate")
-                    columns.add_to(self._connection)
+                    columns.add_to(self._connection, version)
                     self._connection.execute(f"pragma user_version={_VERSION}")
 
     def close(self) -> None:

@@ -95,10 +95,11 @@ class FleetState(Data, frozen=True, kw_only=True):
 
 
 class UnitResult(Data, frozen=True, tag="unit", tag_field="kind"):
-    """The record of a unit that has left the cell. identity: of the cell."""
+    """The record of a unit that has left the cell. identity, translations: as of AlarmResult, of errors of steps."""
 
     identity: Id
     record: UnitRecord
+    translations: Translations = field(default_factory=dict)
 
 
 class AlarmResult(Data, frozen=True, tag="alarm", tag_field="kind"):

@@ -12,7 +12,7 @@ import msgspec
 from arcor2_hw.data.base import Data
 from arcor2_hw.data.units import UnitRecord
 from arcor2_hw.exceptions import NotFound, StorageError
-from arcor2_server.fleet.columns import SLOT
+from arcor2_server.fleet.columns import SHORTEST, SLOT, texts_match
 from arcor2_server.fleet.summaries import AlarmSummary, UnitSummary
 
 HOUR: Final = 3600
@@ -21,6 +21,8 @@ _LONG: Final = 49 * HOUR
 _MAX_CAUSES: Final = 50
 """Maximum number of causes of alarms."""
 _BAD: Final = "state in ('bad', 'rejected')"
+_FOUND: Final = "unit_text join result on result.id = unit_text.rowid where unit_text match ?"
+_SCANNED: Final = "result indexed by unit_by_id where kind = 'unit' and label like ? escape '\\'"
 _unit = msgspec.json.Decoder(UnitSummary).decode
 _alarm = msgspec.json.Decoder(AlarmSummary).decode
 _record = msgspec.json.Decoder(UnitRecord).decode
@@ -143,23 +145,22 @@ class FleetReports:
     def bad_units(self, period: Period, before: tuple[int, int] | None, limit: int) -> list[FleetUnit]:
         """Return bad and rejected units of a period, the newest first. Arguments as of `alarms`."""
         of_cell, values = _of_cell(period)
-        return self._units(
-            f"{_BAD} and at >= ? and at < ?{of_cell}", (period.since, period.until, *values), before, limit
-        )
+        where = f"{_BAD} and at >= ? and at < ?{of_cell}"
+        return _units(self._listed("unit", where, (period.since, period.until, *values), before, limit))
 
     def find_units(self, serial: str, cell: str, before: tuple[int, int] | None, limit: int) -> list[FleetUnit]:
-        """Return all units whose serial number contains a text, the newest first. Arguments as of `alarms`."""
-        pattern = serial.replace("\\", "\\\\").replace("%", "\\%").replace("_", "\\_")
-        where = "label like ? escape '\\'"
-        if cell:
-            return self._units(f"{where} and cell = ?", (f"%{pattern}%", cell), before, limit)
-        return self._units(where, (f"%{pattern}%",), before, limit)
-
-    def _units(
-        self, where: str, values: tuple[object, ...], before: tuple[int, int] | None, limit: int
-    ) -> list[FleetUnit]:
-        rows = self._listed("unit", where, values, before, limit)
-        return [FleetUnit(row[0], row[1], row[2], _unit(row[4])) for row in rows]
+        """Return all units whose serial number contains a text, the last stored first. Arguments as of `alarms`."""
+        if "\0" in serial + cell:
+            return []  # no serial number contains it, and SQLite would end the text there
+        indexed = len(serial) >= SHORTEST
+        values: list[object] = [texts_match(serial, cell) if indexed else f"%{_escaped(serial)}%"]
+        where = f"{_FOUND if indexed else _SCANNED}{' and result.cell = ?' if cell else ''}"
+        values += [cell] if cell else []
+        number = "unit_text.rowid" if indexed else "id"
+        if before is not None:
+            where, values = f"{where} and {number} < ?", [*values, before[1]]
+        query = f"select id, at, result.cell, until, summary from {where} order by {number} desc limit ?"  # noqa: S608 (only texts from above)
+        return _units(self._rows(query, *values, limit))
 
     def unit(self, number: int) -> UnitRecord:
         """Return the whole record of a unit by the id of its result. Raise NotFound if there is none."""
@@ -217,6 +218,15 @@ class FleetReports:
             "order by at desc, id desc limit ?"
         )
         return self._rows(query, *values, limit)
+
+
+def _units(rows: list[Any]) -> list[FleetUnit]:
+    return [FleetUnit(number, at, cell, _unit(summary)) for number, at, cell, _, summary in rows]
+
+
+def _escaped(text: str) -> str:
+    """Return a text that the operator `like` takes literally."""
+    return text.replace("\\", "\\\\").replace("%", "\\%").replace("_", "\\_")
 
 
 def _of_cell(period: Period) -> tuple[str, tuple[str, ...]]:

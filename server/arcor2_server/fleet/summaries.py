@@ -9,6 +9,7 @@ from msgspec import field
 from arcor2_hw.data.alarms import AlarmRecord
 from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 from arcor2_hw.data.units import UnitRecord, UnitState, UnitStep
+from arcor2_hw.messages import Message
 from arcor2_server.fleet.records import Translations
 
 BAD: Final = (UnitState.BAD, UnitState.REJECTED)
@@ -22,7 +23,8 @@ _LONGEST: Final = 1000
 class UnitSummary(Data, frozen=True):
     """A unit without its steps.
 
-    step, error: the action that explains why it is bad, and the error of this action; empty if there is none.
+    step, error: the action that explains why it is bad, and the error of this action; empty if there is none. message:
+    the error as a message, unless it is too long. translations: of the errors of all steps by the cell.
     """
 
     number: int
@@ -37,6 +39,8 @@ class UnitSummary(Data, frozen=True):
     program: str = ""
     step: str = ""
     error: str = ""
+    message: Message | Unset = UNSET
+    translations: Translations = field(default_factory=dict)
 
 
 class Columns(NamedTuple):
@@ -57,12 +61,23 @@ class Columns(NamedTuple):
     summary: bytes
 
 
-def of_unit(record: UnitRecord, received: int) -> Columns:
-    """Return the columns of a unit. `received`: when it was stored first, s; used if its time cannot be read."""
+def of_unit(record: UnitRecord, translations: Translations, received: int) -> Columns:
+    """Return the columns of a unit.
+
+    Args:
+        record: the unit.
+        translations: of its texts by its cell.
+        received: when it was stored first, s; used if its time cannot be read.
+    """
     product = "" if isinstance(record.recipe, Unset) else record.recipe.product
     left = record.entered if isinstance(record.left, Unset) else record.left
     step = _reason(record)
-    error = "" if step is None or isinstance(step.error, Unset) else step.error[:_LONGEST]
+    error = ""
+    message: Message | Unset = UNSET
+    if step is not None and not isinstance(step.error, Unset):
+        error = step.error[:_LONGEST]
+        if step.error == error and not isinstance(step.key, Unset):
+            message = step.as_message(error)
     summary = UnitSummary(
         record.number,
         record.serial,
@@ -76,6 +91,8 @@ def of_unit(record: UnitRecord, received: int) -> Columns:
         record.package_name,
         "" if step is None else step.name,
         error,
+        message,
+        translations,
     )
     at = _seconds(left, received)
     return Columns(at, None, record.state, record.serial, record.package_name, product, 1, _encode(summary))

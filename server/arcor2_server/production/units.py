@@ -310,4 +310,6 @@ def _step(entry: TraceEntry) -> UnitStep:
         entry.results,
         entry.error,
         attempt,
+        key=entry.key,
+        values=entry.values,
     )

@@ -16,12 +16,13 @@ from msgspec.structs import replace
 from arcor2_hw.data.alarms import AlarmCategory, AlarmRecord, Priority
 from arcor2_hw.data.recipes import RecipeState, UsedRecipe
 from arcor2_hw.data.units import UnitRecord, UnitState
+from arcor2_hw.messages import Message
 from arcor2_server.fleet import file as fleet_file
 from arcor2_server.fleet.columns import SLOT, columns_of
 from arcor2_server.fleet.driver_texts import DriverTexts, texts_of
 from arcor2_server.fleet.file import FILE, FleetFile, ReceivedResult
 from arcor2_server.fleet.reports import FleetReports, Period
-from arcor2_server.fleet.summaries import of_alarm
+from arcor2_server.fleet.summaries import UnitSummary, of_alarm, of_unit
 from tests.server.fleet.broker import free_port
 from tests.server.fleet.cells import unit
 from tests.server.fleet.test_results import FleetProcess
@@ -122,6 +123,7 @@ def test_a_file_of_the_first_version_gets_its_counts(tmp_path: Path) -> None:
     assert counts(reports) == [("press-3", "", "sorting", 4, 1, 0)]
     assert [each.unit.number for each in reports.bad_units(DAY, None, 10)] == [3]
     assert len(reports.alarms(DAY, None, 10)) == 1
+    assert [each.unit.number for each in reports.find_units("0003", "press-3", None, 10)] == [3]
     reports.close()
 
 
@@ -151,17 +153,36 @@ def test_bad_units_are_listed_with_their_reason(file: FleetFile, reports: FleetR
     assert [step.name for step in whole.steps] == ["measure", "weld", "test"]
 
 
-def test_units_are_found_by_a_part_of_their_serial_number(file: FleetFile, reports: FleetReports) -> None:
-    file.put_results([received(replace(left(n, n), serial=serial)) for n, serial in enumerate(("Ab_1", "ab-1", "x%"))])
-    file.put_results([received(replace(left(7, 7), serial="AB_1"), "oven")])
+def test_units_are_found_by_a_part_of_their_serial_number(
+    file: FleetFile, reports: FleetReports, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    serials = ("Ab_12", "ab-12", 'x%"*)', "řř-Ř9")
+    file.put_results([received(replace(left(n, n), serial=serial)) for n, serial in enumerate(serials)])
+    file.put_results([received(replace(left(7, 0), serial="AB_12"), "oven"), received(alarm(1, 1))])
 
-    def found(text: str, cell: str = "") -> list[str]:
-        return [each.unit.serial for each in reports.find_units(text, cell, None, 10)]
+    def found(text: str, cell: str = "", before: tuple[int, int] | None = None) -> list[str]:
+        return [each.unit.serial for each in reports.find_units(text, cell, before, 10)]
 
-    assert found("B_") == ["AB_1", "Ab_1"]
-    assert found("b", "press-3") == ["ab-1", "Ab_1"]
-    assert found("%") == ["x%"]
-    assert found("\\") == []
+    # A text of less than three characters is searched without the index.
+    for text, last in (("B_12", 5), ("B_", 5)):
+        assert found(text) == ["AB_12", "Ab_12"]
+        assert found(text, "press-3") == ["Ab_12"]
+        assert found(text, before=(0, last)) == ["Ab_12"]
+        assert found(text, "press-33") == []
+        assert found(text, "PRESS-3") == []
+    assert found("b", "press-3") == ["ab-12", "Ab_12"]
+    assert found("%") == found('%"*') == ['x%"*)']
+    assert found("ŘŘ-") == ["řř-Ř9"]
+    for nothing in ("\\", "\\\\\\", "___", "gripper", "press-3", "AB_\0", "serial : 12"):
+        assert found(nothing) == [], nothing
+    # A newer version may have another serial number. The oldest results are deleted.
+    file.put_results([received(replace(left(0, 0), serial="ZZ_99"), stamp=NOON * 1_000_000 + 1)])
+    assert found("b_12") == ["AB_12"]
+    assert found("zz_") == ["ZZ_99"]
+    monkeypatch.setattr(fleet_file, "MOST_RESULTS", 4)
+    file.put_results([received(left(9, 80))])
+    assert found("ab-") == found("zz_") == []
+    assert found("ab_") == ["AB_12"]
 
 
 def test_pages_contain_each_result_once(file: FleetFile, reports: FleetReports) -> None:
@@ -214,6 +235,28 @@ def test_an_alarm_brings_the_translations_of_its_driver(tmp_path: Path) -> None:
     assert stored["translations"] == found
     (folder / "cs.json").write_text('{"No part.": "Žádný díl.", "Clean the jaws.": "Očistěte čelisti."}')
     assert texts.of(texts_of(record))["cs"] == {"No part.": "Žádný díl.", "Clean the jaws.": "Očistěte čelisti."}
+
+
+def test_a_bad_unit_brings_the_translations_of_its_errors(
+    tmp_path: Path, file: FleetFile, reports: FleetReports
+) -> None:
+    (tmp_path / "translations").mkdir()
+    (tmp_path / "translations" / "cs.json").write_text('{"No arc at {amps} A.": "Žádný oblouk při {amps} A."}')
+    record = left(1, 1, UnitState.BAD)
+    error = Message.of("No arc at {amps} A.", amps=40)
+    failed = replace(record.steps[0], name="weld", error=error.text, **error.translation())
+    record = replace(record, steps=[failed, *record.steps[1:]])
+    texts = DriverTexts(lambda: [tmp_path])
+    translations = texts.of_unit(record)
+    assert translations == {"cs": {error.key: "Žádný oblouk při {amps} A."}}
+    assert texts.of_unit(left(1, 1)) == {}
+    file.put_results([received(record)._replace(columns=of_unit(record, translations, NOON))])
+    unit = reports.bad_units(DAY, None, 1)[0].unit
+    assert (unit.error, unit.message, unit.translations) == ("No arc at 40 A.", error, translations)
+    # A long error is shortened, and is not translated.
+    long = replace(failed, error="x" * 5000)
+    shown = msgspec.json.decode(of_unit(replace(record, steps=[long]), {}, NOON).summary, type=UnitSummary)
+    assert (len(shown.error), shown.message) == (1000, UNSET)
 
 
 # ---------------------------------------------------------------------------------------------------- routes

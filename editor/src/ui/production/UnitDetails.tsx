@@ -4,6 +4,7 @@ import { i18n } from "@lingui/core";
 import { t } from "@lingui/core/macro";
 import { shownRecipe } from "../../commands/production";
 import { dateAndTime, duration } from "../../formats";
+import { type Translations, translate } from "../../i18n/serverMessages";
 import type { UnitRecord } from "../../protocol/types";
 import { UNIT_STATES } from "./words";
 import "./production.css";
@@ -11,7 +12,13 @@ import "./production.css";
 /** Return the name of a unit: its serial number, or the number of the part if it was never read. */
 export const nameOf = ({ serial, part }: Pick<UnitRecord, "serial" | "part">): string => serial || `#${part}`;
 
-export function UnitDetails({ unit }: { unit: UnitRecord }) {
+interface UnitDetailsProps {
+  unit: UnitRecord;
+  /** Translations of the errors that came with the unit. */
+  translations?: Translations | undefined;
+}
+
+export function UnitDetails({ unit, translations }: UnitDetailsProps) {
   const verdict = unit.verdict === undefined ? "–" : unit.verdict ? t`Passed` : t`Failed`;
   const facts: [string, string][] = [
     [t`State`, i18n._(UNIT_STATES[unit.state])],
@@ -44,7 +51,9 @@ export function UnitDetails({ unit }: { unit: UnitRecord }) {
               <strong data-name>{name}</strong> <span className="quiet small">{dateAndTime(started)}</span>{" "}
               {step.duration !== undefined && <span className="quiet small">{duration(step.duration)}</span>}{" "}
               {step.results && <span data-name>{step.results.join(", ")}</span>}
-              {step.error && <span className="error small">{step.error}</span>}
+              {step.error && (
+                <span className="error small">{translate({ ...step, text: step.error }, translations)}</span>
+              )}
             </li>
           ))}
         </ol>
