@@ -14,8 +14,9 @@ from playwright.async_api import Browser, expect
 from arcor2_hw.data.alarms import AlarmCategory, AlarmRecord, Priority
 from arcor2_hw.data.base import now
 from arcor2_hw.data.units import UnitState
+from arcor2_hw.messages import Message
 from arcor2_server.fleet.file import FILE, FleetFile, ReceivedResult
-from arcor2_server.fleet.summaries import of_alarm
+from arcor2_server.fleet.summaries import of_alarm, of_unit
 from tests.editor.screen import FONTS, Screen, screen_of
 from tests.server.core.serving import running
 from tests.server.fleet.broker import Server, free_port
@@ -33,11 +34,17 @@ def store_results(folder: Path) -> None:
     file = FleetFile(folder / FILE)
     states = (UnitState.GOOD, UnitState.BAD)
     good, bad = (replace(unit(number, state=state), left=now()) for number, state in enumerate(states, 1))
-    bad = replace(bad, steps=[replace(bad.steps[0], name="weld", error="no arc")])
+    error = Message.of("No arc at {current}.", current="1.5 A")
+    bad = replace(bad, steps=[replace(bad.steps[0], name="weld", error=error.text, **error.translation())])
+    czech = {"cs": {error.key: "Žádný oblouk při {current}."}}
     alarm = AlarmRecord(3, "d-1", "no_part", Priority.HIGH, AlarmCategory.DEVICE, "No part.", now(), 3)
     columns = of_alarm(alarm, {"cs": {"No part.": "Chybí díl."}}, 0)
     document = msgspec.json.encode(alarm)
-    results = [received(good), received(bad), ReceivedResult("oven", "b" * 32, "alarm", 3, now(), 1, document, columns)]
+    results = [
+        received(good),
+        received(bad)._replace(columns=of_unit(bad, czech, 0)),
+        ReceivedResult("oven", "b" * 32, "alarm", 3, now(), 1, document, columns),
+    ]
     file.put_results(results)
     file.close()
 
@@ -46,7 +53,7 @@ async def results_are_shown(screen: Screen) -> None:
     page = screen.page
     await page.get_by_role("link", name="Units").click()
     await expect(page.get_by_role("row", name="press-3 1 1 0 50 %")).to_be_visible()
-    await expect(page.get_by_text("weld: no arc")).to_be_visible()
+    await expect(page.get_by_text("weld: No arc at 1.5 A.")).to_be_visible()
     assert await screen.faults_with(FONTS) == []
     assert await screen.barriers() == []
     await screen.picture("fleet units phone")
@@ -65,6 +72,12 @@ async def results_are_shown(screen: Screen) -> None:
     assert await screen.faults_with(FONTS) == []
     assert await screen.barriers() == []
     await screen.picture("fleet alarms phone")
+    await page.get_by_role("link", name="Kusy").click()
+    await expect(page.get_by_text("weld: Žádný oblouk při 1,5 A.")).to_be_visible()
+    await page.get_by_role("button", name="SN-000002").press("Enter")
+    await expect(page.get_by_role("dialog")).to_contain_text("Žádný oblouk při 1,5 A.")
+    await page.keyboard.press("Escape")
+    await page.get_by_role("link", name="Alarmy").click()
     await page.get_by_text("Den", exact=True).click()
     await page.get_by_label("Den", exact=True).last.fill("2020-01-01")
     await expect(page.get_by_text("Žádné alarmy.").first).to_be_visible()
