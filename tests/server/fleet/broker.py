@@ -39,9 +39,10 @@ class Server:
         self.port = port or free_port()
         self.url = f"nats://cell:c@127.0.0.1:{self.port}"
         self.fleet_url = f"nats://fleet:f@127.0.0.1:{self.port}"
-        leafs = [f'listen: "127.0.0.1:{leaf_port}"'] if leaf_port else []
+        allowed = "authorization { user: site, password: s }"  # NATS 2.15 refuses sites without a user
+        leafs = [f'listen: "127.0.0.1:{leaf_port}"', allowed] if leaf_port else []
         if hub_port:
-            leafs += ["reconnect: 1", f'remotes: [{{ url: "nats-leaf://127.0.0.1:{hub_port}" }}]']
+            leafs += ["reconnect: 1", f'remotes: [{{ url: "nats-leaf://site:s@127.0.0.1:{hub_port}" }}]']
         self._file = folder / "nats.conf"
         self._file.write_text(
             f'server_name: {name}\nlisten: "127.0.0.1:{self.port}"\n'
