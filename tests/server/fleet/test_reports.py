@@ -179,7 +179,7 @@ def test_units_are_found_by_a_part_of_their_serial_number(
     file.put_results([received(replace(left(0, 0), serial="ZZ_99"), stamp=NOON * 1_000_000 + 1)])
     assert found("b_12") == ["AB_12"]
     assert found("zz_") == ["ZZ_99"]
-    monkeypatch.setattr(fleet_file, "MOST_RESULTS", 4)
+    monkeypatch.setattr(fleet_file, "MAX_RESULTS", 4)
     file.put_results([received(left(9, 80))])
     assert found("ab-") == found("zz_") == []
     assert found("ab_") == ["AB_12"]
