@@ -13,7 +13,7 @@ import msgspec
 import uvloop
 
 _PARENT_WATCH_PERIOD = 0.2  # s
-_AHEAD = -10  # requested niceness: like a real device, the fake should not wait for a processor
+_AHEAD = -10  # requested niceness where real-time scheduling is not permitted
 _TICK = 0.02  # s, period of `OwnTime`
 _HELD_UP = 0.1  # s, longest step of `OwnTime`
 _PARENT = os.getppid()
@@ -61,6 +61,18 @@ async def wait_for_end() -> None:
         return
 
 
+def _go_ahead() -> None:
+    """Run before other processes, if permitted: like a real device, a fake should not wait for a processor.
+
+    Niceness counts only within a session where the kernel groups processes by session (`sched_autogroup_enabled`).
+    """
+    try:
+        os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(1))
+    except OSError:
+        with contextlib.suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, 0, _AHEAD)
+
+
 def run(main: Callable[[], Awaitable[None]], name: str, *, ahead: bool = True) -> int:
     """Run a fake until its end and return the exit status.
 
@@ -69,11 +81,10 @@ def run(main: Callable[[], Awaitable[None]], name: str, *, ahead: bool = True) -
     Args:
         main: The fake.
         name: Name of the fake, for messages.
-        ahead: Whether to request a higher priority than that of other processes; not for a fake that computes much.
+        ahead: Whether to run before other processes, if permitted; not for a fake that computes much.
     """
     if ahead:
-        with contextlib.suppress(OSError):
-            os.setpriority(os.PRIO_PROCESS, 0, _AHEAD)
+        _go_ahead()
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format=f"{name}: %(message)s")
 
     async def body() -> None:

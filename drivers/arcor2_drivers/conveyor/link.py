@@ -70,8 +70,17 @@ class _Sdo(SdoClient):
     _expected = b""
 
     def __init__(self, *arguments: Any) -> None:
+        self._responses = _Responses()
         super().__init__(*arguments)  # type: ignore[no-untyped-call]
-        self.responses = _Responses()
+
+    @property
+    def responses(self) -> _Responses:
+        """The received answers. canopen replaces the queue when it is not empty."""
+        return self._responses
+
+    @responses.setter
+    def responses(self, _: object) -> None:
+        self._responses = _Responses()
 
     def send_request(self, request: Any) -> None:
         self._expected = bytes(request[1:4])

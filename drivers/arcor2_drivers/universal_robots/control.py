@@ -117,7 +117,10 @@ class Control:
     def release(self) -> None:
         """Stop the arm and release control, if we have it."""
         (session, self.session), self._retake = (self.session, None), False
-        if session is None or session.ended is not None:
+        if session is None:
+            return
+        if session.ended is not None:
+            session.await_end()
             return
         newest = self._observer.newest()
         if newest is not None and newest.moving:

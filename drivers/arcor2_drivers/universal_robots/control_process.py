@@ -20,6 +20,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Final
 
 from rtde_control import RTDEControlInterface
@@ -42,6 +43,8 @@ COMMANDS = (
     "teachMode",
 )
 SPEEDS = ("speedJ", "speedL")
+SIGNALS = frozenset({*COMMANDS, *SPEEDS, "own"})
+"""Commands that signal the watchdog, too: they write the register that it checks."""
 MOTIONS = frozenset({"moveJ", "moveL", "teachMode", "own"})
 """Commands that end a jog first: two threads of the control program must not both move the arm."""
 OUTPUTS = ("setConfigurableDigitalOut", "setStandardDigitalOut", "setToolDigitalOut")
@@ -57,6 +60,8 @@ LATE_FOR: Final = 2.0
 """Time for which a late signal may be the reason for a stopped program, s."""
 NICENESS: Final = -10
 """Requested niceness; most computers refuse it."""
+AUTOGROUP: Final = Path("/proc/self/autogroup")
+"""The session of this process, where the kernel groups processes by session."""
 LAST_STOP: Final = 0.15
 """Time for the last stop of this process, s; if it fails, the watchdog stops the arm."""
 HOST_CHECK: Final = 0.1
@@ -72,6 +77,7 @@ def main() -> None:
     answers = os.fdopen(os.dup(1), "w", buffering=1, encoding="utf-8")
     with contextlib.suppress(OSError):  # a service needs LimitNICE for it
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
+        AUTOGROUP.write_text(str(NICENESS))  # that of the process counts only within its session
     os.dup2(2, 1)  # the library prints to standard output
     arguments = json.loads(sys.argv[1])
     try:
@@ -124,13 +130,12 @@ class ControlProgram:
             flags |= RTDEControlInterface.FLAG_UPPER_RANGE_REGISTERS
         self._control = RTDEControlInterface(host, frequency, flags)
         self._frequency = watchdog
-        if not self._control.setWatchdog(watchdog):
+        self._written, self._late = time.monotonic(), -math.inf
+        if not self._armed():
             raise RuntimeError("The watchdog of the control program cannot be armed.")
         self._registers = Registers(self._io, 42 if upper else 18)
         self._own = False
         self._jog_ends = math.inf
-        self._written = time.monotonic()
-        self._late = -math.inf
         self._period = 1.0 / (KICKS_PER_PERIOD * watchdog)
         control = self._control
         self._commands: dict[str, Callable[..., Any]] = {
@@ -155,13 +160,14 @@ class ControlProgram:
             self.do("speedStop", [])
         if command == "speedStop":
             self._jog_ends = math.inf
-        try:
-            result = self._commands[command](*arguments)
-            if result is False and command in COMMANDS:
+        started = time.monotonic()
+        result = self._commands[command](*arguments)
+        if command in SIGNALS:
+            if result is False:  # the library may have sent nothing
                 self._exit_if_too_slow()  # the watchdog tripped during the command
-            return result
-        finally:
-            self._written = time.monotonic()
+            else:
+                self._signalled(started)
+        return result
 
     def keep_alive(self) -> float:
         """End an expired jog and signal the watchdog, if due. Return the time until the next call, s."""
@@ -174,6 +180,19 @@ class ControlProgram:
             self._written = now
             (self._registers.kick if self._own else self._control.kickWatchdog)()
         return max(min(self._written + self._period, self._jog_ends) - time.monotonic(), 0.0)
+
+    def _signalled(self, since: float) -> None:
+        """Note that the library sent a signal, at an unknown time between `since` and now."""
+        self._written = time.monotonic()
+        if self._written - since > NEARLY_TOO_SLOW / self._frequency:
+            self._late = self._written
+
+    def _armed(self) -> bool:
+        """Arm the watchdog of the control program; return whether the program accepted it."""
+        started = time.monotonic()
+        armed = bool(self._control.setWatchdog(self._frequency))
+        self._signalled(started)
+        return armed
 
     def _exit_if_too_slow(self) -> None:
         """Exit if the watchdog has tripped: the library would deny commands without telling why."""
@@ -236,7 +255,7 @@ class ControlProgram:
         while control.isProgramRunning() and time.monotonic() < until:
             time.sleep(0.002)
         control.reuploadScript()
-        while not (control.isProgramRunning() and control.setWatchdog(self._frequency)):
+        while not (control.isProgramRunning() and self._armed()):
             if time.monotonic() > until:
                 return False
             time.sleep(0.005)

@@ -156,7 +156,8 @@ class ControlSession:
     def await_end(self) -> None:
         """Wait until the guard of an ended session has finished: its last stop must not stop the next program."""
         if self._guard is not None:
-            self._guard.join(timing.GUARD_ENDS)
+            guard = self._guard
+            once_within(lambda: not guard.is_alive(), timing.GUARD_ENDS, timing.GUARD_PERIOD)
 
     # -------------------------------------------------------------------------------- commands, from any thread
     def call(

@@ -30,7 +30,7 @@ from arcor2_fakes.wire import Connection, TcpWire
 log = logging.getLogger("main")
 
 _POLYSCOPE_X = 10  # has no dashboard server
-_MAX_AT_ONCE = 100  # control cycles to catch up after a delay; watchdog signals that waited count as one
+_MAX_AT_ONCE = 100  # control cycles to catch up after a delay
 _CHUNK = 10  # cycles to catch up before the sockets are read again
 
 
@@ -67,8 +67,8 @@ class _Cycles:
     def _catch_up(self) -> None:
         """Run some cycles; data received meanwhile, such as a watchdog signal, is read before the next ones."""
         cycles = min(self._owed, _CHUNK)
-        for _ in range(cycles):
-            self._controller.tick()
+        for left in range(self._owed, self._owed - cycles, -1):
+            self._controller.tick(late=left > _CHUNK)
             for stream in self._streams:
                 stream.tick()
         self._owed -= cycles

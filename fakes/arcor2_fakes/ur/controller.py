@@ -56,6 +56,8 @@ class Controller:
         self.arm = Arm(self.chain, HOME)
         self.time_scale = time_scale
         self.cycles = 0
+        self.watched = 0
+        """Control cycles that the watchdog counts: not those that the fake missed and catches up."""
         self.robot_mode = RobotMode.RUNNING
         self.safety = SafetyMode.NORMAL
         self.runtime = Runtime.STOPPED
@@ -86,13 +88,14 @@ class Controller:
         self._resumes = False  # a safeguard stop holds the program, which then continues by itself
         self._suspended = False  # held without reporting it
         self._watchdog: tuple[int, float] | None = None  # input register and timeout, s
-        self._written = [0] * 48  # cycle of the last write of each integer register
+        self._written = [0] * 48  # `watched` at the last write of each integer register
         self._due: list[tuple[int, Callable[[], None]]] = []  # (cycle, function)
 
     # ------------------------------------------------------------------------------------------------ control cycle
-    def tick(self) -> None:
-        """Run one control cycle."""
+    def tick(self, late: bool = False) -> None:
+        """Run one control cycle. If it is `late`, the watchdog does not count it."""
         self.cycles += 1
+        self.watched += not late
         if self._due:
             self._run_due()
         if self._watchdog is not None:
@@ -370,12 +373,12 @@ class Controller:
     # ---------------------------------------------------------------------------------------------------- watchdog
     def integer_written(self, index: int) -> None:
         """Handle a write of an integer input register by an RTDE client."""
-        self._written[index] = self.cycles
+        self._written[index] = self.watched
 
     def set_watchdog(self, register: int, minimum_frequency: float) -> None:
         """Set the watchdog: stop the program when the register is written less often, Hz; 0 disarms it."""
         self._watchdog = (register, 1.0 / minimum_frequency) if minimum_frequency > 0.0 else None
-        self._written[register] = self.cycles
+        self._written[register] = self.watched
 
     @property
     def watchdog(self) -> float | None:
@@ -385,7 +388,7 @@ class Controller:
     def _check_watchdog(self) -> None:
         assert self._watchdog is not None
         register, silence = self._watchdog
-        if (self.cycles - self._written[register]) * self.period > silence:
+        if (self.watched - self._written[register]) * self.period > silence:
             self.watchdog_trips += 1
             self.stop_program("watchdog")
 

@@ -86,15 +86,40 @@ def test_a_starved_control_process_reports_the_reason(ready: UR5e, fake: FakeUr)
         doing.result()
 
 
+def control_program(frequency: float, **commands: Callable[[], bool]) -> ControlProgram:
+    """Return a control program without a controller."""
+    program = ControlProgram.__new__(ControlProgram)
+    program._frequency, program._written, program._jog_ends = frequency, time.monotonic(), math.inf
+    program._late = -math.inf
+    program._commands = {"was_late": program._was_late, **commands}
+    return program
+
+
 def test_a_command_that_outlasts_the_watchdog_reports_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     """The watchdog stops the control program meanwhile, and the library rejects the command without a reason."""
-    program = ControlProgram.__new__(ControlProgram)
-    program._frequency, program._written, program._jog_ends = 10.0, time.monotonic(), math.inf
-    program._commands = {"setPayload": lambda: bool(time.sleep(0.2))}
+    program = control_program(10.0, setPayload=lambda: bool(time.sleep(0.2)))
     monkeypatch.setattr(os, "_exit", sys.exit)
     with pytest.raises(SystemExit) as exit_:
         program.do("setPayload", [])
     assert exit_.value.code == TOO_SLOW
+
+
+def test_only_a_command_that_reaches_the_control_program_signals_its_watchdog() -> None:
+    program = control_program(0.01, setStandardDigitalOut=lambda: True, setTcp=lambda: False, setPayload=lambda: True)
+    written = program._written
+    program.do("setStandardDigitalOut", [])
+    program.do("setTcp", [])  # denied: the library may have sent nothing
+    assert program._written == written
+    program.do("setPayload", [])
+    assert program._written > written
+
+
+def test_a_slow_command_may_have_tripped_the_watchdog() -> None:
+    """It signals at an unknown time, perhaps long ago."""
+    program = control_program(10.0, setPayload=lambda: time.sleep(0.1) is None)
+    assert not program.do("was_late", [])
+    program.do("setPayload", [])
+    assert program._was_late()
 
 
 def test_a_frozen_owner_stops_the_arm(owner: Owner, fake: FakeUr) -> None:

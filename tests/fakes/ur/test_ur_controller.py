@@ -193,6 +193,15 @@ def test_watchdog_stops_program_and_arm(c):
     assert until(c, lambda: not c.arm.moving) < 0.3
 
 
+def test_the_watchdog_does_not_count_cycles_that_are_caught_up(c):
+    """While the fake was not scheduled, a signal may have arrived."""
+    c.start_program(ForeignProgram(c))
+    c.set_watchdog(24, 10.0)
+    for _ in range(500):
+        c.tick(late=True)
+    assert c.program is not None
+
+
 # ------------------------------------------------------------------------------------------------------------ dashboard
 def test_dashboard_answers(c):
     d = Dashboard(c)
