@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable, Coroutine
 from typing import Any
 
 from arcor2_fakes.control import ControlServer, Handler, parse_address
-from arcor2_fakes.process import announce, run, wait_for_end
+from arcor2_fakes.process import OwnTime, announce, run, wait_for_end
 from arcor2_fakes.serial_line import Line
 from arcor2_fakes.wire import TcpWire, register_faults
 
@@ -58,14 +58,15 @@ class Fake:
         self._ends.append(call)
 
     def simulate(self, advance: Callable[[float], object], period: float) -> None:
-        """Call `advance` every `period` s with the time since its last call, s, until the fake ends."""
+        """Call `advance` every `period` s with the fake's own time since its last call, s, until the fake ends."""
 
         async def repeat() -> None:
-            loop = asyncio.get_running_loop()
-            last = loop.time()
+            own_time = OwnTime()
+            own_time.run()
+            last = own_time()
             while True:
                 await asyncio.sleep(period)
-                now = loop.time()
+                now = own_time()
                 advance(now - last)
                 last = now
 

@@ -15,6 +15,7 @@ from arcor2_fakes.conveyor.pdo import Rpdo, Tpdo
 from arcor2_fakes.conveyor.sdo import SdoServer
 
 TICK = 0.0025
+HELD_UP = 0.05  # s, longest step of the simulation
 BOOT_TIME = 0.03
 _OPERATIONAL, _STOPPED, _PRE_OPERATIONAL = 5, 4, 127
 _PDO_TOO_SHORT = 0x8210
@@ -113,7 +114,10 @@ class Node:
         while True:
             await asyncio.sleep(TICK)
             now = loop.time()
-            self.drive.advance(min(now - before, 0.05) * self._time_scale)
+            passed = min(now - before, HELD_UP)
+            self.drive.advance(passed * self._time_scale)
+            if self._heard is not None:  # while this process was not scheduled, a heartbeat may have arrived
+                self._heard += now - before - passed
             before = now
             if self._booted_at and now >= self._booted_at:
                 self._booted_at, self._nmt = 0.0, _PRE_OPERATIONAL

@@ -18,6 +18,7 @@ from arcor2_fakes.control import parse_address, within
 from arcor2_fakes.opcua_plc.program import Host, Program, Step
 from arcor2_fakes.opcua_plc.proxy import Proxy
 from arcor2_fakes.opcua_plc.space import OFF_ON_LOSS, POINTS, Space
+from arcor2_fakes.process import OwnTime
 from arcor2_fakes.program import program
 from arcor2_fakes.serving import Fake
 
@@ -55,9 +56,10 @@ class Plc:
 
     async def run(self) -> None:
         """Scan periodically."""
-        loop = asyncio.get_running_loop()
+        own_time = OwnTime()
+        own_time.run()
         while True:
-            await self.scan(loop.time())
+            await self.scan(own_time())
             await asyncio.sleep(SCAN)
 
     async def scan(self, time: float) -> None:

@@ -481,10 +481,14 @@ def test_hand_teaching(ready: UR5e, fake: FakeUr) -> None:
 
 def test_a_jog_expires(ready: UR5e, fake: FakeUr) -> None:
     start = ready.get_end_effector_pose("tcp").position
-    for _ in range(5):
+
+    def jogs() -> bool:
         ready.jog((0.0, -0.1, 0.0, 0.0, 0.0, 0.0), valid_for=0.5)
         time.sleep(0.1)
-        assert fake.truth()["moving"]
+        return bool(fake.truth()["moving"])
+
+    for _ in range(5):
+        wait_for(jogs)
     await_standstill(fake)
     way = ready.get_end_effector_pose("tcp").position - start
     assert way.y < -0.03
@@ -566,9 +570,10 @@ def test_outputs_and_inputs(ready: UR5e, fake: FakeUr) -> None:
     doing.result()
     fake.do("set_input", bit=4, on=False)
     wait_for(lambda: not ready.get_digital_input(4))
-    waiting = BackgroundCall(ready.wait_for_input, 4, True, 5.0)
-    time.sleep(0.05)
-    ready.stop()
+    waiting = BackgroundCall(ready.wait_for_input, 4, True, 30.0)
+    while not waiting.over:  # a stop before the wait begins does not end it
+        ready.stop()
+        time.sleep(0.01)
     with pytest.raises(Cancelled):
         waiting.result()
 
