@@ -26,6 +26,7 @@ from arcor2_hw.data.parts import PartCounts, PlaceKind
 from arcor2_server.demo.workplace import confirm_emptied
 from tests.demo.running import Run, demo
 from tests.e2e.harness import until
+from tests.waiting import WITHIN
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 BOARDS = 2
@@ -122,8 +123,8 @@ async def cell(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Cell]:
         )
         yield Cell(run, script, order)
         run.process.send_signal(signal.SIGINT)
-        assert await asyncio.wait_for(run.process.wait(), 15) == 0, run.output
-        await asyncio.wait_for(observer, 5)  # its events end with the server
+        assert await asyncio.wait_for(run.process.wait(), WITHIN) == 0, run.output
+        await asyncio.wait_for(observer, WITHIN)  # its events end with the server
         assert run.at() is None
 
 

@@ -27,6 +27,7 @@ from tests.fakes.conftest import start_forked_fake
 from tests.forking import Forked, awaited
 from tests.leaks import outliving_the_test
 from tests.server.core.serving import fork_server, keep_analysis
+from tests.waiting import WITHIN
 
 WORKPLACE = Path(__file__).parent / "workplace" / "three_devices.toml"
 
@@ -165,7 +166,7 @@ class Cell:
         reader, writer = await asyncio.open_connection(host, int(port), limit=1 << 22)
         try:
             writer.write(msgspec.json.encode({"id": 1, "do": do, **arguments}) + b"\n")
-            answer = msgspec.json.decode(await asyncio.wait_for(reader.readline(), 5))
+            answer = msgspec.json.decode(await asyncio.wait_for(reader.readline(), WITHIN))
         finally:
             writer.close()
             with contextlib.suppress(OSError):
