@@ -98,6 +98,27 @@ def test_control_is_taken_from_a_program_that_ends_meanwhile(
     assert robot.control_owner() == "us"
 
 
+def test_disconnecting_waits_for_the_last_stop_of_an_ended_session(
+    ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Otherwise it would stop the program of whoever takes control next."""
+    stop = ControlSession._last_stop
+
+    def late(session: ControlSession) -> None:
+        if session.ended is not None:
+            time.sleep(0.3)
+        stop(session)
+
+    monkeypatch.setattr(ControlSession, "_last_stop", late)
+    session = ready._control.session
+    assert session is not None
+    fake.do("protective_stop")
+    wait_for(lambda: session.ended)
+    ready.disconnect()
+    assert session._guard is not None
+    assert not session._guard.is_alive()
+
+
 def test_control_is_taken_and_released(robot: UR5e, fake: FakeUr) -> None:
     with pytest.raises(NotInControl, match="not taken"):
         robot.move_to_joints(robot.robot_joints(), 0.5)
