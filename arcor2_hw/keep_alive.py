@@ -1,5 +1,6 @@
 """Feeding a device's watchdog from a child process, so that a busy interpreter does not stop the device."""
 
+import asyncio
 import contextlib
 import os
 import select
@@ -7,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -121,6 +122,25 @@ def result_within(future: "Future[T]", timeout: float) -> T:
         except TimeoutError:
             if future.done() or clock() >= timeout:
                 raise
+
+
+async def awaited_within(work: Coroutine[Any, Any, T], timeout: float) -> T:
+    """Return the result of a coroutine, within `timeout` s of running time.
+
+    Raises:
+        TimeoutError: It did not end in time, and was cancelled.
+    """
+    clock, task = RunningTime(), asyncio.ensure_future(work)
+    try:
+        while True:
+            late = clock() >= timeout  # then look once more: this process may have been suspended
+            await asyncio.wait({task}, timeout=LONGEST_STEP / 2.0)
+            if task.done():
+                return task.result()
+            if late:
+                raise TimeoutError
+    finally:
+        task.cancel()
 
 
 def acquire_within(lock: threading.Lock, timeout: float) -> bool:

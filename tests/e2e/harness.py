@@ -197,7 +197,7 @@ class Cell:
         return package_id
 
 
-async def scene_state(client: Client, wanted: SceneStateEnum, timeout: float = 40.0) -> Event:
+async def scene_state(client: Client, wanted: SceneStateEnum, timeout: float = 120.0) -> Event:
     """Wait for the next SceneState with this state."""
     while True:
         event = await client.next_event("SceneState", timeout=timeout)

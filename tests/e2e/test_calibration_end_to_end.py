@@ -71,7 +71,7 @@ class World:
             scene = (await other.next_event("OpenScene")).data.scene
         self.ids = {obj.name: obj.id for obj in scene.objects}
         await client.start_scene()
-        await scene_state(client, SceneStateEnum.STARTED, timeout=60.0)
+        await scene_state(client, SceneStateEnum.STARTED)
         await client.subscribe_events({"TaskState"})
 
     def show(self, *, markers: bool = True, robot: bool = True) -> None:

@@ -1,5 +1,6 @@
 """Feeding of watchdogs by a child process, and time limits in running time."""
 
+import asyncio
 import os
 import select
 import subprocess
@@ -11,7 +12,15 @@ from concurrent.futures import Future
 
 import pytest
 
-from arcor2_hw.keep_alive import KeepAlive, RunningTime, acquire_within, once_within, pulse, result_within
+from arcor2_hw.keep_alive import (
+    KeepAlive,
+    RunningTime,
+    acquire_within,
+    awaited_within,
+    once_within,
+    pulse,
+    result_within,
+)
 from arcor2_hw.keep_alive_process import FROZEN_AFTER, Parent, ParentEnd
 from tests.drivers.stall import BUSY, stall
 from tests.waiting import WITHIN
@@ -140,3 +149,24 @@ def test_a_stall_does_not_count_as_waiting() -> None:
         result_within(Future(), 0.05)
     assert not acquire_within(lock, 0.05)
     assert not once_within(lambda: False, 0.05, 0.01)
+
+
+async def test_time_limits_in_an_event_loop_do_not_count_a_stall_of_this_process() -> None:
+    async def answer() -> int:
+        await asyncio.sleep(0.05)
+        stall(0.5)
+        return 7
+
+    assert await awaited_within(answer(), 0.3) == 7
+    ended: list[bool] = []
+
+    async def never() -> None:
+        try:
+            await asyncio.Event().wait()
+        finally:
+            ended.append(True)
+
+    with pytest.raises(TimeoutError):
+        await awaited_within(never(), 0.05)
+    await asyncio.sleep(0)
+    assert ended == [True]

@@ -26,8 +26,9 @@ from .socketcand import SocketcandBus
 
 RECEIVE_TIMEOUT: Final = 0.05
 """Longest time the receiver waits for a frame before it checks whether it should end, s."""
-WRITE_TIMEOUT: Final = 1.0
-"""Time the adapter has to accept a frame, s. pyserial also raises if this process stalls that long while sending."""
+WRITE_TIMEOUT: Final = 5.0
+"""Time the adapter has to accept a frame, s. It is that long because pyserial also raises if this process stalls while
+sending. An adapter that accepts nothing is noticed earlier, by the missing answer."""
 NMT_START: Final = 1
 HEARTBEAT: Final = 0x700
 EMCY: Final = 0x80

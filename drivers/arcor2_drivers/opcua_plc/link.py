@@ -15,6 +15,7 @@ from asyncua.crypto import security_policies, uacrypto
 from cryptography import x509
 
 from arcor2_hw.exceptions import ConnectionLost, DeviceError, DeviceFault, DeviceTimeout, NotConnected, Refused
+from arcor2_hw.keep_alive import awaited_within, result_within
 from arcor2_hw.messages import Message, device_at
 
 from .settings import OpcUaPlcSettings, Security
@@ -35,6 +36,8 @@ SESSION: Final = 30_000
 """Time without a request after which the server ends the session, ms."""
 CLOSE_TIMEOUT: Final = 0.3
 """Time limit for closing the session, s."""
+LIBRARY_PATIENCE: Final = 4.0
+"""Factor on the time limit of a request, for the library: it also counts stalls of this process, then disconnects."""
 JOIN: Final = 1.0
 
 _POLICIES: Final[dict[str, Any]] = {
@@ -145,7 +148,7 @@ class Link:
 
     async def _connect(self) -> None:
         settings = self._settings
-        client = Client(settings.url, timeout=settings.request_timeout)
+        client = Client(settings.url, timeout=LIBRARY_PATIENCE * settings.request_timeout)
         client.session_timeout = SESSION
         client.name = client.description = "ARCOR2-HW"
         self._client = client
@@ -293,15 +296,14 @@ class Link:
 
     def _call(self, work: Callable[[], Coroutine[Any, Any, T]], timeout: float, what: str) -> T:
         async def limited() -> T:
-            async with asyncio.timeout(timeout):
-                return await work()
+            return await awaited_within(work(), timeout)
 
         with self._sending:
             if self._loop is None:
                 raise ConnectionLost("{device}: the connection was closed", device=self.who)
             future = asyncio.run_coroutine_threadsafe(limited(), self._loop)
         try:
-            return future.result(timeout + JOIN)
+            return result_within(future, timeout + JOIN)
         except DeviceError:
             raise
         except TimeoutError as e:  # the future's own and asyncio's are the same class

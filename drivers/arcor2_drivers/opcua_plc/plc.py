@@ -128,12 +128,14 @@ class Plc(PolledControl[Handshake]):
         if not self.handshake_nodes:
             self.link.read_standard(SERVER_STATE)
             return Handshake()
+        asked = time.monotonic()
         read = dict(zip(STATUS, self.link.read(STATUS), strict=True))
         bad = [f"{name} of the handshake is {status_name(value)}" for name, value in read.items() if is_bad(value)]
         life, owner, busy, done, error, code = map(content, read.values())
         if life != self._plc_life[0]:
             self._plc_life = (life, time.monotonic())
-        self.program_stopped = time.monotonic() - self._plc_life[1] > self._s.life_timeout
+        # The answer may be as old as the question: this process may have been delayed since.
+        self.program_stopped = asked - self._plc_life[1] > self._s.life_timeout
         return Handshake(life, int(owner or 0), bool(busy), bool(done), bool(error), int(code or 0), "; ".join(bad))
 
     def after_reading(self) -> None:

@@ -38,7 +38,7 @@ class BarcodeReaderBench(WiredBench):
         self.fake.control.wait_until(lambda t: not t["reading"])
 
     def build(self, address: str) -> BarcodeReader:
-        return BarcodeReader("reader_id", "reader", settings=BarcodeReaderSettings(address, answer_timeout=0.5))
+        return BarcodeReader("reader_id", "reader", settings=BarcodeReaderSettings(address, answer_timeout=0.8))
 
     def writes(self) -> Any:
         return [line for line in self.fake.truth()["received"] if line in ACTING]

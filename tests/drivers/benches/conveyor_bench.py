@@ -35,7 +35,9 @@ def build(address: str, **settings: Any) -> Conveyor:
     return Conveyor(
         "belt_id",
         "belt",
-        ConveyorSettings(f"socket://{address}", counts_per_metre=COUNTS, heartbeat_ms=BUSY, **settings),
+        ConveyorSettings(
+            f"socket://{address}", counts_per_metre=COUNTS, heartbeat_ms=BUSY, **{"sdo_timeout": 0.5, **settings}
+        ),
     )
 
 

@@ -53,7 +53,7 @@ def make(tmp_path: Path) -> Iterator[Callable[..., ErpService]]:
     """Return ``make("http://127.0.0.1:4000", poll=0.1)``: an unconnected driver; the fixture disconnects it."""
 
     def build(url: str, **settings: Any) -> ErpService:
-        usual = {"outbox": str(tmp_path), "request_timeout": 0.5, "longest_pause": 0.5, "poll": 0.1}
+        usual = {"outbox": str(tmp_path), "request_timeout": 1.0, "longest_pause": 0.5, "poll": 0.1}
         return ErpService("erp_id", "planning", ErpSettings(url, **{**usual, **settings}))
 
     with disconnecting(build) as make:
