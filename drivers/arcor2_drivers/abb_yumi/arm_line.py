@@ -18,7 +18,7 @@ from arcor2_hw.exceptions import (
     NotInControl,
     Refused,
 )
-from arcor2_hw.keep_alive import PULSE_PERIOD, KeepAlive
+from arcor2_hw.keep_alive import PULSE_PERIOD, KeepAlive, RunningTime
 from arcor2_hw.messages import Message
 
 from .motion_lines import LAST_SEQUENCE, LONGEST_LINE, MEANING, VERSION, Answer, Code, Status, answer, line
@@ -92,7 +92,7 @@ class ArmLine:
         self._asking = threading.Lock()
         self._over = threading.Event()
         self._keep_alive: KeepAlive | None = None
-        self._answered_at = 0.0
+        self._silent = RunningTime()
         self._thread: threading.Thread | None = None
 
     # -------------------------------------------------------------------------------- connection
@@ -173,7 +173,7 @@ class ArmLine:
         except DeviceTimeout:
             self._close()
             raise
-        self._answered_at = time.monotonic()
+        self._silent = RunningTime()
         self._thread = threading.Thread(target=self._run, name=f"watching {self.who}", daemon=True)
         self._thread.start()
 
@@ -191,9 +191,9 @@ class ArmLine:
             if self._motion is not None:
                 raise Refused("{device} is moving. Its server answers at standstill.", device=self.who)
             command = self._send(code, values)
-        until = time.monotonic() + within
+        clock = RunningTime()
         try:
-            while time.monotonic() < until:
+            while clock() < within:
                 found = self.poll(command, 0.05)
                 if found is not None:
                     return self.checked(found, command).values
@@ -257,9 +257,9 @@ class ArmLine:
             watch.send(line(sequence, Code.STOP))
         except OSError:
             return False
-        until = time.monotonic() + STOP_ANSWER
+        clock = RunningTime()
         while not stood.wait(0.02):
-            if self.ended is not None or time.monotonic() > until:
+            if self.ended is not None or clock() > STOP_ANSWER:
                 self._stopped.pop(sequence, None)
                 return False
         return True
@@ -312,7 +312,7 @@ class ArmLine:
                 if each.raw in ready:
                     for raw in each.lines():
                         self._take(answer(raw), each is watch)
-            if time.monotonic() - self._answered_at > SILENT:
+            if self._silent() > SILENT:
                 raise ConnectionLost("{device} has not answered for {silent:g} s.", device=self.who, silent=SILENT)
 
     def _take(self, found: Answer, from_watch: bool) -> None:
@@ -321,7 +321,7 @@ class ArmLine:
             if command is not None and command.code == found.code:
                 command.answers.put(found)  # any other is late: its command was dropped
             return
-        self._answered_at = time.monotonic()
+        self._silent = RunningTime()
         if found.code == Code.STOP and found.status == Status.DONE:
             stood = self._stopped.pop(found.sequence, None)
             if stood is not None:

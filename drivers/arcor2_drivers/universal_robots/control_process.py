@@ -11,7 +11,6 @@ output has one answer per line, `{"n": 1, "data": ...}` or `{"n": 1, "error": ".
 answered. When the host ends, or sends no pulse for FROZEN_AFTER s, this process stops the program and exits.
 """
 
-import contextlib
 import json
 import math
 import os
@@ -20,13 +19,12 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, Final
 
 from rtde_control import RTDEControlInterface
 from rtde_io import RTDEIOInterface
 
-from arcor2_hw.keep_alive_process import Parent, ParentEnd
+from arcor2_hw.keep_alive_process import Parent, ParentEnd, hurry
 
 COMMANDS = (
     "endTeachMode",
@@ -58,10 +56,6 @@ NEARLY_TOO_SLOW: Final = 0.8
 """Part of the period of the watchdog after which it may have tripped."""
 LATE_FOR: Final = 2.0
 """Time for which a late signal may be the reason for a stopped program, s."""
-NICENESS: Final = -10
-"""Requested niceness; most computers refuse it."""
-AUTOGROUP: Final = Path("/proc/self/autogroup")
-"""The session of this process, where the kernel groups processes by session."""
 LAST_STOP: Final = 0.15
 """Time for the last stop of this process, s; if it fails, the watchdog stops the arm."""
 HOST_CHECK: Final = 0.1
@@ -75,9 +69,7 @@ HOST_FROZEN: Final = 4
 def main() -> None:
     """Connect with the arguments of the command line, a JSON object, and execute requests."""
     answers = os.fdopen(os.dup(1), "w", buffering=1, encoding="utf-8")
-    with contextlib.suppress(OSError):  # a service needs LimitNICE for it
-        os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
-        AUTOGROUP.write_text(str(NICENESS))  # that of the process counts only within its session
+    hurry()
     os.dup2(2, 1)  # the library prints to standard output
     arguments = json.loads(sys.argv[1])
     try:
