@@ -112,7 +112,7 @@ def test_disconnecting_waits_for_the_last_stop_of_an_ended_session(
     monkeypatch.setattr(ControlSession, "_last_stop", late)
     session = ready._control.session
     assert session is not None
-    fake.do("protective_stop")
+    fake.do("safeguard_stop", on=True)
     wait_for(lambda: session.ended)
     ready.disconnect()
     assert session._guard is not None
