@@ -22,11 +22,11 @@ from .registers import LED, STATUS_ERRORS, Register
 
 POLL: Final = 0.002
 """Time a read waits for bytes, s: the library itself would poll continuously."""
-MAX_EXCHANGE_TIME: Final = 0.35
+MAX_EXCHANGE_TIME: Final = 0.5
 """Longest exchange, s; the library does not check its own limit while bytes keep arriving."""
 WRITE_TIMEOUT: Final = 1.0
 """Time to write a packet, s: long enough for a process that is not scheduled while it writes."""
-FIRST_BYTE_TIMEOUT: Final = 0.25
+FIRST_BYTE_TIMEOUT: Final = 0.4
 """Time to wait for the first byte of an answer, s; the library's 0.034 s is too short on a busy computer."""
 QUIET_TIME: Final = 0.03
 """Time without bytes after which the line is quiet, s."""

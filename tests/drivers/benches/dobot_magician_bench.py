@@ -44,7 +44,7 @@ class DobotMagicianBench(FakeBench):
         self.do("pace", factor=1.0)
 
     def build(self, address: str) -> DobotMagician:
-        return DobotMagician("arm_id", "arm", Pose(), DobotMagicianSettings(address, answer_timeout=0.6))
+        return DobotMagician("arm_id", "arm", Pose(), DobotMagicianSettings(address, answer_timeout=0.8))
 
     def writes(self) -> Any:
         truth = self.fake.truth()
