@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future
+from pathlib import Path
 
 import pytest
 
@@ -21,11 +22,12 @@ from arcor2_hw.keep_alive import (
     pulse,
     result_within,
 )
-from arcor2_hw.keep_alive_process import FROZEN_AFTER, Parent, ParentEnd
+from arcor2_hw.keep_alive_process import FROZEN_AFTER, NICENESS, Parent, ParentEnd
 from tests.drivers.stall import BUSY, stall
-from tests.waiting import WITHIN
+from tests.waiting import WITHIN, wait_for
 
 MESSAGE = b"kick\r"
+SESSION = Path("/proc/self/autogroup")
 OWNER = """
 import sys, time
 from arcor2_hw.keep_alive import KeepAlive
@@ -149,6 +151,22 @@ def test_a_stall_does_not_count_as_waiting() -> None:
         result_within(Future(), 0.05)
     assert not acquire_within(lock, 0.05)
     assert not once_within(lambda: False, 0.05, 0.01)
+
+
+@pytest.mark.skipif(not SESSION.exists(), reason="the kernel does not group processes by session")
+def test_the_child_and_its_session_have_priority() -> None:
+    reading, writing = os.pipe()
+    keep_alive = KeepAlive(writing, MESSAGE, 0.02)
+    try:
+        try:
+            os.setpriority(os.PRIO_PROCESS, keep_alive.pid, NICENESS + 1)
+        except PermissionError:
+            pytest.skip("not permitted")
+        wait_for(lambda: Path(f"/proc/{keep_alive.pid}/autogroup").read_text().endswith(f"nice {NICENESS}\n"))
+    finally:
+        keep_alive.close()
+        os.close(reading)
+        os.close(writing)
 
 
 async def test_time_limits_in_an_event_loop_do_not_count_a_stall_of_this_process() -> None:
