@@ -32,7 +32,7 @@ from .dashboard import Dashboard
 from .observer import Observer
 from .program import Registers, RunState
 from .script_port import ScriptPort
-from .states import REMEDIES, program_plays, safety_of
+from .states import MODE_RUNNING, REMEDIES, program_plays, safety_of
 
 _TOO_SLOW: Final = {
     3: "the watchdog was not signalled in time",
@@ -375,17 +375,21 @@ class ControlSession:
 
     def program_gone(self) -> DeviceError:
         """Return why our program is not playing. Wait first for a reason that the control process may report."""
+        gone = NotInControl(
+            "{device} left remote control. Check the pendant, then retry.",
+            "the program was stopped at the controller",
+            device=self.who,
+        )
+        newest = self._observer.newest()
+        if newest is not None and newest.robot_mode != MODE_RUNNING:
+            return gone  # the watchdog would leave the arm switched on
         assert self._process is not None
         response = self._process.request("was_late", ())
         if not once_within(self._ending.is_set, timing.PROCESS_ENDS, timing.GUARD_PERIOD) and not response.done():
             return self._too_slow("the control process did not respond")
         if response.done() and response.exception() is None and response.result():
             return self._too_slow("the control process was late")
-        return NotInControl(
-            "{device} left remote control. Check the pendant, then retry.",
-            "the program was stopped at the controller",
-            device=self.who,
-        )
+        return gone
 
     def _end_by_safety(self, safety_mode: int) -> None:
         """Stop the program, then end: after a safeguard stop it would continue as soon as the guard closes."""

@@ -58,7 +58,9 @@ def settings(host: str, **changed: Any) -> YumiSettings:
 
 
 def make(host: str, pose: Pose | None = None, **changed: Any) -> YuMi:
-    return YuMi("obj_1", "yumi", pose or Pose(), settings(host, **changed))
+    robot = YuMi("obj_1", "yumi", pose or Pose(), settings(host, **changed))
+    robot._observer.fresh_for = 2.0  # about ten requests, each of which a busy machine delays
+    return robot
 
 
 @pytest.fixture

@@ -5,12 +5,14 @@ import signal
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 from typing import Any
 
 import psutil
 import pytest
 
 from arcor2_drivers.universal_robots import timing
+from arcor2_drivers.universal_robots.control_client import ControlClient
 from arcor2_drivers.universal_robots.motion import Budget
 from arcor2_drivers.universal_robots.move_actions import MoveType
 from arcor2_drivers.universal_robots.observer import Sample
@@ -117,6 +119,28 @@ def test_disconnecting_waits_for_the_last_stop_of_an_ended_session(
     ready.disconnect()
     assert session._guard is not None
     assert not session._guard.is_alive()
+
+
+def test_a_late_signal_is_not_the_reason_when_the_arm_has_no_power(
+    ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    request = ControlClient.request
+
+    def late(client: ControlClient, command: str, arguments: tuple[Any, ...]) -> "Future[Any]":
+        if command != "was_late":
+            return request(client, command, arguments)
+        answer = Future[Any]()
+        answer.set_result(True)
+        return answer
+
+    monkeypatch.setattr(ControlClient, "request", late)
+    session = ready._control.session
+    assert session is not None
+    fake.do("power", on=False)
+    wait_for(lambda: session.ended)
+    fake.do("brake_release")
+    fake.control.wait_until(lambda t: t["robot_mode"] == "RUNNING")
+    assert isinstance(session.ended, NotInControl)
 
 
 def test_control_is_taken_and_released(robot: UR5e, fake: FakeUr) -> None:
