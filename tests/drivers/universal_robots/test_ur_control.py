@@ -140,7 +140,7 @@ def test_a_late_signal_is_not_the_reason_when_the_arm_has_no_power(
     wait_for(lambda: session.ended)
     fake.do("brake_release")
     fake.control.wait_until(lambda t: t["robot_mode"] == "RUNNING")
-    assert isinstance(session.ended, NotInControl)
+    assert type(session.ended) is NotInControl
 
 
 def test_control_is_taken_and_released(robot: UR5e, fake: FakeUr) -> None:
