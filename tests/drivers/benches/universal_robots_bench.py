@@ -41,7 +41,8 @@ class UR5eBench(ControllerBench):
 
     def reset(self) -> None:
         self.fake.reset()
-        if self.fake.truth()["robot_mode"] != "RUNNING":
+        truth = self.fake.control.wait_until(lambda truth: truth["robot_mode"] != "BOOTING")  # then it refuses power
+        if truth["robot_mode"] != "RUNNING":
             self.fake.do("brake_release")
             self.fake.control.wait_until(lambda truth: truth["robot_mode"] == "RUNNING")
 
