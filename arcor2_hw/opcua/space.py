@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from asyncua import Server, ua
+from asyncua.common.manage_nodes import delete_nodes
 
 NODESETS: Final = Path(__file__).parent / "nodesets"
 FILES: Final = {
@@ -250,8 +251,19 @@ class Space:
         await self.server.get_node(source).add_reference(self.server.get_node(target), kind)
 
     async def remove(self, node: ua.NodeId) -> None:
-        """Remove a node with its components."""
-        await self.server.delete_nodes([self.server.get_node(node)], recursive=True)
+        """Remove a node with its components, and all references to them.
+
+        The nodes are visited once for the references. The library would visit them once for each removed node.
+        """
+        internal = self.server.iserver
+        removed, _ = await delete_nodes(
+            internal.isession, [self.server.get_node(node)], recursive=True, delete_target_references=False
+        )
+        gone, own = {each.nodeid for each in removed}, self._index["own"]
+        for key in internal.aspace.keys():
+            references = internal.aspace[key].references
+            if any(each.NodeId.NamespaceIndex == own and each.NodeId in gone for each in references):
+                references[:] = [each for each in references if each.NodeId not in gone]
 
     async def _add(
         self,
