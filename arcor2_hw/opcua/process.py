@@ -1,6 +1,7 @@
 """The process: builds the address space, follows the updates of the server, and passes requests of clients to it."""
 
 import asyncio
+import gc
 import itertools
 import logging
 import socket
@@ -61,7 +62,10 @@ class Process:
         """
         await self._link.open()
         setup = await self._link.read()
+        gc.disable()  # it would visit the 700,000 objects of the address space repeatedly while they are created
         await self._start(setup)
+        gc.freeze()
+        gc.enable()
         watch = asyncio.create_task(self._watch())
         updates: asyncio.Queue[Update] = asyncio.Queue(MAX_WAITING)
         apply = asyncio.create_task(self._apply_all(updates))

@@ -260,7 +260,7 @@ class Space:
             internal.isession, [self.server.get_node(node)], recursive=True, delete_target_references=False
         )
         gone, own = {each.nodeid for each in removed}, self._index["own"]
-        for key in internal.aspace.keys():
+        for key in internal.aspace.keys():  # noqa: SIM118 - it is not iterable
             references = internal.aspace[key].references
             if any(each.NodeId.NamespaceIndex == own and each.NodeId in gone for each in references):
                 references[:] = [each for each in references if each.NodeId not in gone]
