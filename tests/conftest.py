@@ -6,6 +6,7 @@ from typing import Any
 import hypothesis
 import pytest
 
+gc.disable()  # until all tests are collected
 pytest_plugins = ["pytester", "tests.leaks", "tests.postgresql"]
 
 
@@ -56,9 +57,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     At the beginning of the queue are the crowded tests and those that wait for devices, at its end browser tests and
     before them long ones.
     """
-    if not config.getoption("--matrix") and (left_out := [each for each in items if each.get_closest_marker("matrix")]):
-        items[:] = [each for each in items if each not in left_out]
-        config.hook.pytest_deselected(items=left_out)
+    if not config.getoption("--matrix"):
+        parts: tuple[list[pytest.Item], list[pytest.Item]] = [], []
+        for each in items:
+            parts[each.get_closest_marker("matrix") is not None].append(each)
+        items[:], left_out = parts
+        if left_out:
+            config.hook.pytest_deselected(items=left_out)
     if hasattr(config, "workerinput"):
         items.sort(key=_order)
 
@@ -75,6 +80,7 @@ def _order(item: pytest.Item) -> int:
 def pytest_collection_finish() -> None:
     """Exclude modules and collected tests from garbage collection. Each full collection would visit 600,000 objects."""
     gc.freeze()
+    gc.enable()
 
 
 @pytest.hookimpl(optionalhook=True)
