@@ -4,11 +4,10 @@ import asyncio
 from collections.abc import Iterator
 from pathlib import Path
 
-import psutil
 import pytest
 
 from tests.postgresql import lasting
-from tests.server.core.serving import ServerProcess, until
+from tests.server.core.serving import ServerProcess
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +22,5 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
             ARCOR2_ARSERVER_LOCK_RETRY_WAIT="0.05",
         )
         runner.run(process.start())
-        # The spare host starts after `ready`. Wait for it, so that no test pays for its start.
-        runner.run(until(lambda: psutil.Process(process.process.pid).children()))
         yield process
         assert runner.run(process.stop()) == 0

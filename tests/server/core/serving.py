@@ -28,6 +28,7 @@ _MAIN = "arcor2_server.cli.main"
 _IMPORTS = (
     *("arcor2_server.cli.serve", "arcor2_server.app", "arcor2_server.web.http_server"),
     "sqlalchemy.dialects.sqlite.aiosqlite",
+    "tests.server.core.without_spare",
 )
 _ANALYSIS = "analysis.msgpack"
 _analyses: list[bytes] = []

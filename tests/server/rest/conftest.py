@@ -40,10 +40,9 @@ async def http(services: Server) -> AsyncIterator[httpx.AsyncClient]:
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
-    """Start a server in its own process, with a spare host."""
+    """Start a server in its own process."""
     process = ServerProcess(tmp_path_factory.mktemp("server") / "data")
     with asyncio.Runner() as runner:
         runner.run(process.start())
-        runner.run(until(lambda: psutil.Process(process.process.pid).children()))
         yield process
         assert runner.run(process.stop()) == 0
