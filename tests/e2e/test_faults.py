@@ -133,7 +133,9 @@ async def test_joints_are_shown_and_control_is_refused_while_another_program_run
 
 
 # ---------------------------------------------------------------------------------------------------- during a move
-@pytest.mark.parametrize("fault", ["silence", "reset", "half_frame"])
+@pytest.mark.parametrize(
+    "fault", ["silence", *(pytest.param(each, marks=pytest.mark.matrix) for each in ("reset", "half_frame"))]
+)
 async def test_a_cable_cut_during_a_move_fails_the_action_and_nothing_moves_again(running: Cell, fault: str) -> None:
     client = await running.client("operator")
     await program_in_mid_move(running, client)

@@ -178,7 +178,14 @@ def test_the_whole_day_with_an_arm_becomes_evidence(tmp_path: Path, arm: FakeUr)
     ]
 
 
-@pytest.mark.parametrize("end", [None, signal.SIGHUP, signal.SIGKILL], ids=["ctrl-c", "terminal closed", "killed"])
+@pytest.mark.parametrize(
+    "end",
+    [
+        pytest.param(None, id="ctrl-c"),
+        pytest.param(signal.SIGHUP, id="terminal closed", marks=pytest.mark.matrix),
+        pytest.param(signal.SIGKILL, id="killed"),
+    ],
+)
 def test_the_arm_is_stopped_and_the_report_is_written_when_the_session_ends(
     tmp_path: Path, arm: FakeUr, end: signal.Signals | None
 ) -> None:
