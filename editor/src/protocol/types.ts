@@ -1896,8 +1896,8 @@ export interface LogicComparison {
 /**
  * A step from one action to the next, taken when its condition holds.
  *
- * `when` is a condition that compares several values; next to it, there is no `condition`. With `error_kinds` it is an
- * error exit: it is taken when the action fails with an error of one of these kinds.
+ * `when` is a condition that compares several values; `condition` is then unset. With `error_kinds` it is an error
+ * exit: it is taken when the action fails with an error of one of these kinds.
  */
 export interface LogicItem {
   start: string;
@@ -2487,7 +2487,7 @@ export interface Part {
   confirmed: boolean;
 }
 
-/** What was counted since the scene exists: fed = good + bad + rejected + in_cell. */
+/** Counts since the scene was created: fed = good + bad + rejected + in_cell. */
 export interface PartCounts {
   fed: number;
   good: number;
