@@ -12,7 +12,7 @@ from arcor2_hw.data import rpc
 from arcor2_hw.data.cell_state import CellAuthority, CellMode
 from arcor2_hw.data.editor import ViewScope
 from tests.e2e.harness import Cell, until
-from tests.editor.screen import USERS, Screen
+from tests.editor.screen import USERS, Screen, close_abandoned
 
 START: Final = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
 """Joints of the robot at the start of a test, rad."""
@@ -24,8 +24,7 @@ async def reset(cell: Cell, browser: Browser) -> None:
     The record of runs cannot be deleted: after a run, and after a test that stopped the server, the server is started
     again on an empty data directory. The screens of a test that its time limit cut off are still open: they are closed.
     """
-    for context in browser.contexts:
-        await context.close()
+    await close_abandoned(browser)
     await cell.close_clients()
     if cell.children["server"].ended or await _has_runs(cell):
         await cell.renew_server()

@@ -9,8 +9,9 @@ from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, Final
+from weakref import WeakKeyDictionary
 
-from playwright.async_api import Browser, ConsoleMessage, Error, Page, async_playwright, expect
+from playwright.async_api import Browser, BrowserContext, ConsoleMessage, Error, Page, async_playwright, expect
 
 from tests.editor import texts
 
@@ -39,6 +40,11 @@ SERVER_GONE: Final = ("WebSocket connection to", "net::ERR_CONNECTION_", "net::E
 """What Chromium logs when the server is killed while it is connected, loads a part of the page, or receives one."""
 USERS: Final = set[str]()
 """Names of the users who have joined since the workplace was reset."""
+
+MOST_FREE: Final = 3
+"""Largest number of browser contexts kept for later screens."""
+_FREE: Final = WeakKeyDictionary[Browser, list[tuple[tuple[bool, str], BrowserContext]]]()
+"""Contexts that no screen uses, with touch and locale, of each browser that reuses contexts."""
 
 FONTS: Final = {"narrow": "62%", "wide": "125%"}
 """Two fonts for layout tests, by their width: narrower and wider than the usual fonts of machines."""
@@ -91,17 +97,23 @@ def chromium() -> str:
 
 
 @asynccontextmanager
-async def running_browser(*more: str, behind: bool = False) -> AsyncIterator[Browser]:
+async def running_browser(*more: str, behind: bool = False, reusing: bool = False) -> AsyncIterator[Browser]:
     """Run Chromium with additional arguments.
 
     Args:
         more: additional arguments.
         behind: with a low priority, so that software rendering does not delay drivers and fakes.
+        reusing: with contexts that later screens use again. Their code and process are kept, which halves the processor
+            time of loading the page. Cookies and storage are cleared. Measurements need new contexts.
     """
+    if reusing:
+        more = (*more, "--renderer-process-limit=1")  # one for each context
     async with async_playwright() as playwright:
         path = _BEHIND if behind else chromium()
         environment: dict[str, str | float | bool] = {**os.environ, "BROWSER": chromium()}
         browser = await playwright.chromium.launch(executable_path=path, args=[*ARGUMENTS, *more], env=environment)
+        if reusing:
+            _FREE[browser] = []
         try:
             yield browser
         finally:
@@ -228,6 +240,53 @@ class Screen:
         return [error for error in self.errors if not any(each in error for each in self.expected_errors)]
 
 
+async def close_abandoned(browser: Browser) -> None:
+    """Close the contexts of screens that are still open."""
+    kept = [context for _, context in _FREE.get(browser, [])]
+    for context in browser.contexts:
+        if context not in kept:
+            await context.close()
+
+
+@asynccontextmanager
+async def _new_page(browser: Browser, origin: str, *, touch: bool, locale: str) -> AsyncIterator[Page]:
+    """Open a page in a browser context that no other screen uses, with empty storage.
+
+    A context whose page failed or crashed is closed; its state is unknown.
+    """
+    free = _FREE.get(browser)
+    kind = (touch, locale)
+    found = next((each for each in free or () if each[0] == kind), None)
+    if free and found:
+        free.remove(found)
+        context = found[1]
+    else:
+        context = await browser.new_context(has_touch=touch, locale=locale, service_workers="block")
+    crashes: list[Page] = []
+    reusable = False
+    try:
+        if free is not None and not found:  # as long as this page is open, the process of the context stays
+            await (await context.new_page()).goto(f"{origin}/editor/favicon.svg")
+        page = await context.new_page()
+        page.on("crash", lambda crashed: crashes.append(crashed))
+        if found:
+            await context.clear_cookies()
+            devtools = await context.new_cdp_session(page)
+            await devtools.send("Storage.clearDataForOrigin", {"origin": origin, "storageTypes": "all"})
+            await devtools.detach()
+        yield page
+        if free is not None and not crashes:
+            for opened in context.pages[1:]:
+                await opened.close()
+            free.append((kind, context))
+            reusable = len(free) <= MOST_FREE
+            context = context if reusable else free.pop(0)[1]
+    finally:
+        if not reusable:
+            with contextlib.suppress(Error):  # the browser has crashed; the test fails already
+                await context.close()
+
+
 @asynccontextmanager
 async def screen_of(
     browser: Browser,
@@ -241,27 +300,24 @@ async def screen_of(
     text_scale: float = 1.0,
     locale: str = "en-US",
 ) -> AsyncIterator[Screen]:
-    """Open a page in a browser context of its own. `url` is that of the server, ws or http.
+    """Open a page in a browser context that no other screen uses. `url` is that of the server, ws or http.
 
     Args:
         drawn: Whether the 3D view is drawn, for tests of its picture. Without it, WebGL clears and draws nothing, which
             saves a fifth of a test's processor time. All else is the same: items, picking, labels, counted frames.
     """
-    context = await browser.new_context(
-        viewport=VIEWPORTS[viewport],  # type: ignore[arg-type]
-        color_scheme="dark" if dark else "light",
-        has_touch=touch,
-        reduced_motion="reduce" if reduced_motion else "no-preference",
-        service_workers="block",
-        locale=locale,
-    )
-    try:
+    origin = url.replace("ws", "http", 1) if url.startswith("ws") else url
+    async with _new_page(browser, origin, touch=touch, locale=locale) as page:
+        await page.set_viewport_size(VIEWPORTS[viewport])  # type: ignore[arg-type]
+        await page.emulate_media(
+            color_scheme="dark" if dark else "light", reduced_motion="reduce" if reduced_motion else "no-preference"
+        )
         if not (drawn or PICTURES):
-            await context.add_init_script(_UNDRAWN)
-        screen = Screen(await context.new_page(), url.replace("ws", "http", 1) if url.startswith("ws") else url)
+            await page.add_init_script(_UNDRAWN)
         if text_scale != 1.0:
             scaled = f"document.documentElement.style.fontSize = '{100 * text_scale}%'"
-            await screen.page.add_init_script(f"document.addEventListener('DOMContentLoaded', () => {{ {scaled} }})")
+            await page.add_init_script(f"document.addEventListener('DOMContentLoaded', () => {{ {scaled} }})")
+        screen = Screen(page, origin)
         try:
             yield screen
         except BaseException:
@@ -269,6 +325,3 @@ async def screen_of(
                 await screen.picture("failed")
             raise
         assert not (errors := screen.unexpected()), f"the page logged errors: {errors}"
-    finally:
-        with contextlib.suppress(Error):  # the browser has crashed; the test fails already
-            await context.close()
