@@ -34,7 +34,10 @@
   };
   cancelAnimationFrame(window.padWatch);
   window.padFrames = 0;
-  window.padFaults = () => [...faults];
+  window.padFaults = () => {
+    cancelAnimationFrame(window.padWatch);
+    return [...faults];
+  };
   check();
   return pad.length;
 }
