@@ -256,7 +256,7 @@ async def _new_page(browser: Browser, origin: str, *, touch: bool, locale: str) 
     """
     free = _FREE.get(browser)
     kind = (touch, locale)
-    found = next((each for each in free or () if each[0] == kind), None)
+    found = next((each for each in reversed(free or []) if each[0] == kind), None)
     if free and found:
         free.remove(found)
         context = found[1]

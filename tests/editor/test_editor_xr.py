@@ -418,7 +418,7 @@ async def check_program(screen: Screen, adam: Client, scene: str, hand: Controll
     await page.get_by_role("heading", name="From a headset", exact=True).wait_for()
     await page.get_by_role("button", name="AR", exact=True).click()
     await screen.press("Start AR")
-    disabled = "(id) => __ar.headset?.panel.content.buttons.find((each) => each.id === id)?.disabled"
+    disabled = "(id) => window.__ar?.headset?.panel.content.buttons.find((each) => each.id === id)?.disabled"
     await screen.until(f"() => ({disabled})('run') === true && ({disabled})('run paused') === true")
     assert "needs a controller" in await page.evaluate("__ar.headset.panel.content.lines.join(' ')")
     await hand.button("run")
