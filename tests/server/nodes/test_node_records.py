@@ -188,7 +188,7 @@ async def test_the_inventory_is_published_and_confirmed_during_a_run(cell: Cell,
     await cell.start(ONE, broker.url)
     held = await cell.held()
     assert cell.inventory.parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm", confirmed=False)]
-    assert (await cell.message(m.PartsChanged)).inventory.parts == cell.inventory.parts
+    assert (await cell.message(m.PartsChanged)).books.parts == cell.inventory.parts
     assert (await cell.message(m.PartStep)).part == 1
     await cell.host.confirm_parts([ConfirmedPart(1, "obj_nest")])
     assert cell.inventory.parts == [Part(1, "obj_nest", "A-1")]
