@@ -34,7 +34,7 @@ class CheckpointsAtServer:
 
     def read(self) -> PartInventory | None:
         """Return the newest checkpoint, None if there is none. Raises StorageError."""
-        return self._request(m.ReadCheckpoint).books
+        return self._request(m.ReadCheckpoint).inventory
 
     def close(self) -> None:
         """Do nothing: the server closes its files."""

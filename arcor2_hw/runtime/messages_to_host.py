@@ -297,11 +297,11 @@ class ConfirmParts(ToHost, frozen=True):
 class CheckpointAnswer(ToHost, frozen=True):
     """Answer to ReadCheckpoint or StoreCheckpoint. A checkpoint is on disk when its answer is sent.
 
-    number: of the request. books: the newest checkpoint; None if there is none. problem: why the request failed.
+    number: of the request. inventory: the newest checkpoint; None if there is none. problem: why the request failed.
     """
 
     number: int
-    books: PartInventory | None = None
+    inventory: PartInventory | None = None
     problem: Message | None = None
 
 

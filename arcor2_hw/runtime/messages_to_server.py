@@ -176,7 +176,7 @@ class HeldChanged(ToServer, frozen=True):
 class PartsChanged(ToServer, frozen=True):
     """The part inventory has changed."""
 
-    books: PartInventory
+    inventory: PartInventory
 
 
 class ReadCheckpoint(ToServer, frozen=True):
@@ -189,7 +189,7 @@ class StoreCheckpoint(ToServer, frozen=True):
     """Store a checkpoint of the run. Answer: CheckpointAnswer with this number."""
 
     number: int
-    books: PartInventory
+    inventory: PartInventory
 
 
 class PartStep(ToServer, frozen=True):

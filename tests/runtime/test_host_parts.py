@@ -185,7 +185,7 @@ def test_a_failed_movement_is_repeated_or_done_by_hand(cell: Cell) -> None:
     host = cell.start(ONE + 'arm.test(True, an="test")\narm.pick(inside, an="take")\narm.place(box, an="into_box")')
     found = held(host)
     assert cell.inventory().parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm", confirmed=False)]
-    changed = [each.books for each in host.seen if isinstance(each, m.PartsChanged)]
+    changed = [each.inventory for each in host.seen if isinstance(each, m.PartsChanged)]
     assert changed[-1].parts == cell.inventory().parts
     (cell.directory / "sensor").write_text("on")
     decide(host, found.number, HoldChoice.SKIP)  # the part is in the gripper

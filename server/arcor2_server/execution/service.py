@@ -400,7 +400,7 @@ class Execution(PackageLibrary, RunObservers):
             case m.HeldChanged():
                 self.hold.change(message.held)
             case m.PartsChanged():
-                self.parts.changed(message.books)
+                self.parts.changed(message.inventory)
             case m.PartStep():
                 for notify in self.on_part_step:
                     notify(message)

@@ -123,9 +123,9 @@ class RunRecords:
             raise Conflict("The program keeps no part inventory.")
         if isinstance(request, m.ReadCheckpoint):
             return self._file.read()
-        if request.books.scene_id != self._scene_id:
+        if request.inventory.scene_id != self._scene_id:
             raise Conflict("The program keeps no part inventory.")
-        self._file.write(request.books)
+        self._file.write(request.inventory)
         return None
 
     async def server_ended(self) -> None:

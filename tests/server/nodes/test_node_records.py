@@ -188,7 +188,7 @@ async def test_the_inventory_is_published_and_confirmed_during_a_run(cell: Cell,
     await cell.start(ONE, broker.url)
     held = await cell.held()
     assert cell.inventory.parts == [Part(1, "obj_feeder", "A-1", moving_to="obj_arm", confirmed=False)]
-    assert (await cell.message(m.PartsChanged)).books.parts == cell.inventory.parts
+    assert (await cell.message(m.PartsChanged)).inventory.parts == cell.inventory.parts
     assert (await cell.message(m.PartStep)).part == 1
     await cell.host.confirm_parts([ConfirmedPart(1, "obj_nest")])
     assert cell.inventory.parts == [Part(1, "obj_nest", "A-1")]
@@ -343,7 +343,7 @@ async def test_a_node_cannot_change_the_inventory_of_another_scene(tmp_path: Pat
     records.handle("ReadCheckpoint", msgspec.msgpack.encode(m.ReadCheckpoint(3)))
     await records.close()
     assert [each.number for each in answers if each.problem is not None] == [0, 1]
-    assert [each.books for each in answers if each.number == 3] == [PartInventory("scn_1")]
+    assert [each.inventory for each in answers if each.number == 3] == [PartInventory("scn_1")]
     assert sorted(each.name for each in (tmp_path / "records").iterdir()) == ["scn_1.0", "scn_1.1"]
 
 
