@@ -77,8 +77,9 @@ class ConveyorBench(WiredBench):
         return device.position()
 
     def ask(self, device: Generic) -> object:
+        """Read by SDO: a PDO that was on its way before the cut would answer what is reported by PDO."""
         assert isinstance(device, Conveyor)
-        return device.belt_position()
+        return device.identify()
 
     def command(self, device: Generic) -> object:
         assert isinstance(device, Conveyor)

@@ -14,10 +14,11 @@ HOME = (0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0)
 def test_receiving_at_500_hz_misses_no_sample(ur):
     seen = ur.library("""
 receive = Receive(host, 500.0, ["timestamp", "actual_q", "actual_TCP_pose", "robot_mode", "safety_mode"])
-samples = [(time.monotonic(), receive.getTimestamp())]
-while samples[-1][1] < samples[0][1] + 2.0:
+samples, single = [(time.monotonic(), receive.getTimestamp())], 0
+while samples[-1][1] < samples[0][1] + 2.0 or single <= 100:  # a busy machine delays this loop
     t = receive.getTimestamp()
     if t != samples[-1][1]:
+        single += t - samples[-1][1] < 0.003
         samples.append((time.monotonic(), t))
     time.sleep(0.0003)
 report(samples=samples, q=receive.getActualQ(), pose=receive.getActualTCPPose(), mode=receive.getRobotMode())
@@ -25,13 +26,11 @@ report(samples=samples, q=receive.getActualQ(), pose=receive.getActualTCPPose(),
     clocks, stamps = zip(*seen["samples"], strict=True)
     ticks = [round(t * 500) for t in stamps]
     assert [t * 500 for t in stamps] == pytest.approx(ticks, abs=1e-6)
-    # A busy machine delays fake and loop; the fake catches up 0.2 s at most.
+    # The fake catches up 0.2 s at most.
     assert stamps[-1] - stamps[0] < clocks[-1] - clocks[0] + 0.25
     stretches = itertools.pairwise(range(0, len(ticks), 50))
     assert max((ticks[j] - ticks[i]) / (clocks[j] - clocks[i]) for i, j in stretches) > 450
-    steps = [b - a for a, b in itertools.pairwise(ticks)]
-    assert min(steps) > 0
-    assert steps.count(1) > 100  # the other samples were overwritten before this loop read them
+    assert min(b - a for a, b in itertools.pairwise(ticks)) > 0
     assert seen["q"] == pytest.approx(HOME)
     assert seen["mode"] == 7
     assert ur.do("truth")["samples_lost"] == 0
