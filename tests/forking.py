@@ -73,25 +73,37 @@ class Forker:
         imports: Sequence[str],
         stderr: IO[Any] | int,
         environment: Mapping[str, str] | None = None,
+        inherited: Sequence[int] = (),
     ) -> "Forked | subprocess.Popen[bytes]":
         """Start `python -m MODULE ARGUMENTS` from a process that has imported some modules; standard output is a pipe.
 
         The real command is started if the environment has variables that only a new interpreter reads.
+
+        Args:
+            module: to run.
+            arguments: of the program.
+            imports: modules that it imports.
+            stderr: where it writes errors; subprocess.STDOUT is its standard output.
+            environment: of the program, by default that of this process.
+            inherited: files for the program. It has a session of its own then, as children of the server have.
         """
         own = os.environ if environment is None else environment
         if any(own[key] != os.environ.get(key) for key in own if key.startswith(BOUND_TO_THE_INTERPRETER)):
             command = [sys.executable, "-m", module, *arguments]
-            return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=stderr, env=own)
-        errors = stderr if isinstance(stderr, int) else stderr.fileno()
-        request = json.dumps([module, list(arguments), list(imports), dict(own), str(Path.cwd())])
+            return subprocess.Popen(
+                command, stdout=subprocess.PIPE, stderr=stderr, env=own,
+                pass_fds=inherited, start_new_session=bool(inherited),
+            )  # fmt: skip
+        request = json.dumps([module, list(arguments), list(imports), dict(own), str(Path.cwd()), list(inherited)])
         out, theirs = os.pipe()
         status, reported = os.pipe()
+        errors = theirs if stderr == subprocess.STDOUT else stderr if isinstance(stderr, int) else stderr.fileno()
         try:
             with self._lock:
                 if self._connection is None:
                     with leaks.outliving_the_test():
                         self._connection = self._start()
-                socket.send_fds(self._connection, [request.encode()], [theirs, errors, reported])
+                socket.send_fds(self._connection, [request.encode()], [theirs, errors, reported, *inherited])
                 pid = self._connection.recv(20)
         finally:
             os.close(theirs)
@@ -107,6 +119,7 @@ class Forker:
             process = subprocess.Popen(
                 [sys.executable, "-m", forking_process.__name__, str(theirs.fileno())],
                 pass_fds=[theirs.fileno()],
+                stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 # A pool of threads does not survive the fork.
                 env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},

@@ -2,6 +2,7 @@
 
 import atexit
 import contextlib
+import fcntl
 import gc
 import importlib
 import io
@@ -20,6 +21,10 @@ from typing import NoReturn
 
 LONGEST = 1 << 20
 """Maximum size of a request, bytes."""
+MAX_FDS = 8
+"""Maximum number of files that are passed on."""
+_FIRST_KEPT = 512
+"""Above the numbers of all files of this process, and below the usual limit."""
 
 
 def main(connection: socket.socket) -> None:
@@ -37,10 +42,10 @@ def main(connection: socket.socket) -> None:
                     os.close(report)
                     os.close(key.fd)
                     continue
-                message, fds, _, _ = socket.recv_fds(connection, LONGEST, 3)
+                message, fds, _, _ = socket.recv_fds(connection, LONGEST, MAX_FDS)
                 if not message:
                     return
-                module, arguments, imports, environment, directory = json.loads(message)
+                module, arguments, imports, environment, directory, inherited = json.loads(message)
                 with contextlib.suppress(ImportError):  # the program itself reports a missing module
                     for name in imports:
                         importlib.import_module(name)
@@ -48,18 +53,35 @@ def main(connection: socket.socket) -> None:
                 gc.freeze()
                 assert len(list(Path("/proc/self/task").iterdir())) == 1, f"{imports} start threads when imported"
                 if (pid := os.fork()) == 0:
-                    become(module, arguments, environment, directory, fds)
+                    become(module, arguments, environment, directory, fds, inherited)
                 connection.send(str(pid).encode())
-                os.close(fds[0])
-                os.close(fds[1])
+                for fd in (*fds[:2], *fds[3:]):
+                    os.close(fd)
                 selector.register(os.pidfd_open(pid), selectors.EVENT_READ, (pid, fds[2]))
 
 
-def become(module: str, arguments: list[str], environment: dict[str, str], directory: str, fds: list[int]) -> NoReturn:
-    """Run a program in this forked process as `python -m` does, and end with its exit status."""
+def become(
+    module: str, arguments: list[str], environment: dict[str, str], directory: str, fds: list[int], inherited: list[int]
+) -> NoReturn:
+    """Run a program in this forked process as `python -m` does, and end with its exit status.
+
+    Args:
+        module: to run.
+        arguments: of the program.
+        environment: of the program.
+        directory: to run it in.
+        fds: standard output and error, the pipe for the exit status, and the inherited files.
+        inherited: the numbers that the inherited files have in the program.
+    """
     os.dup2(fds[0], 1)
     os.dup2(fds[1], 2)
-    os.closerange(3, 1024)
+    kept = [fcntl.fcntl(fd, fcntl.F_DUPFD, _FIRST_KEPT) for fd in fds[3:]]
+    os.closerange(3, _FIRST_KEPT)
+    for fd, number in zip(kept, inherited, strict=True):
+        os.dup2(fd, number)
+        os.close(fd)
+    if inherited:  # as a child of the server, see arcor2_server.child_process
+        os.setsid()
     sys.stdout = sys.__stdout__ = io.TextIOWrapper(io.FileIO(1, "w", closefd=False))  # type: ignore[misc,assignment]
     sys.stderr = sys.__stderr__ = io.TextIOWrapper(  # type: ignore[misc]
         io.FileIO(2, "w", closefd=False), errors="backslashreplace", line_buffering=True
@@ -71,7 +93,9 @@ def become(module: str, arguments: list[str], environment: dict[str, str], direc
     os.chdir(directory)
     sys.path[0] = directory
     sys.argv[:] = ["-m", *arguments]
-    sys.modules.pop(f"{module}.__main__", None)  # it runs as __main__
+    for name in (module, f"{module}.__main__"):  # it runs as __main__
+        if not hasattr(sys.modules.get(name), "__path__"):
+            sys.modules.pop(name, None)
     if "arcor2_fakes.process" in sys.modules:  # fakes end with the process that was their parent when this was loaded
         sys.modules["arcor2_fakes.process"]._PARENT = os.getppid()  # type: ignore[attr-defined]
     status: object = 0

@@ -4,7 +4,6 @@ import os
 import select
 import socket
 import subprocess
-import sys
 import tempfile
 import textwrap
 import time
@@ -25,9 +24,11 @@ from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_hw.runtime import messages as m
 from arcor2_hw.runtime.creation import module_name
 from arcor2_hw.runtime.ring import Ring, create
+from tests.forking import Forker
 
 T = TypeVar("T")
-HOST = (sys.executable, "-P", "-m", "arcor2_hw.runtime.host")
+HOST = "arcor2_hw.runtime.host"
+_forker = Forker()
 PATIENCE = 20.0  # time limit, s; the machine may be busy
 
 
@@ -37,14 +38,13 @@ class HostProcess:
         memory = create()
         self.socket = ours
         self._folder = tempfile.TemporaryDirectory()  # as the server does
-        self.process = subprocess.Popen(
-            [*HOST, "--fd", str(theirs.fileno()), "--ring", str(memory)],
-            pass_fds=[theirs.fileno(), memory],
-            env=os.environ | {"TMPDIR": self._folder.name},
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
+        self.process = _forker.start(
+            HOST,
+            ["--fd", str(theirs.fileno()), "--ring", str(memory)],
+            [HOST],
+            subprocess.STDOUT,
+            os.environ | {"TMPDIR": self._folder.name},
+            inherited=[theirs.fileno(), memory],
         )
         theirs.close()
         self.ring = Ring(memory)
