@@ -11,6 +11,7 @@ SEED = 4
 BOARDS, FAULTS = 4, 10
 
 
+@pytest.mark.matrix  # the faults one by one are in tests/e2e
 async def test_every_board_is_accounted_for_and_reported_once(tmp_path: Path) -> None:
     result = await trial(tmp_path / "cell", SEED, BOARDS, FAULTS)
     assert result.problems() == []
