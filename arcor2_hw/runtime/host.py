@@ -64,8 +64,8 @@ FORCES_END_TIMEOUT: Final = 0.5
 """Time to switch forced outputs back before their devices are disconnected, s."""
 NICENESS: Final = -5
 """Niceness of this process: devices have priority over user interfaces."""
-FLUSH_TIMEOUT: Final = 0.3
-"""Time to send the last messages, s."""
+FLUSH_TIMEOUT: Final = 2.0
+"""Time without progress after which the last messages are given up, s; a busy server may read that late."""
 
 
 class _LogHandler(logging.Handler):

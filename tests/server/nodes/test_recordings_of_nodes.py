@@ -56,6 +56,8 @@ class Gauge(Generic):
 
     @action
     def fill(self, level: float, *, an: str | None = None) -> None:
+        while self.recorded is None:
+            time.sleep(0.005)
         self.observer.level = level
         while self.recorded != level:
             time.sleep(0.005)
