@@ -71,7 +71,7 @@ def find_intrinsics(
 
     Raises:
         InvalidPicture: As in `find_camera_pose`; also images of different sizes.
-        InvalidData: The board is invalid, or there are no images or more than MAX_PICTURES.
+        InvalidData: The board is invalid, or the number of images is not between 1 and MAX_PICTURES.
         CalibrationRefused: Too few images or too little coverage; degenerate (the board is seen from one direction
             only); implausible (errors are large: another board, or a bent one).
     """

@@ -26,7 +26,7 @@ class RobotSurface:
     """Triangles of all links: vertices (n, 3) in m in the robot's base frame, and triangles (m, 3) of indices.
 
     Raises:
-        InvalidData: There are no triangles or more than MAX_TRIANGLES, or numbers or indices are invalid.
+        InvalidData: The number of triangles is not between 1 and MAX_TRIANGLES, or a number or index is invalid.
     """
 
     vertices: Floats
