@@ -44,4 +44,9 @@ __all__ = [
 ]
 
 # Names before version 0.2, which scripts import.
-AnswerLate, AnswerUnknown, InTheWay, NothingThere = AnswerTimeout, AnswerLost, StateConflict, ResourceNotFound
+from arcor2_hw.client.errors import (
+    AnswerLate as AnswerLate,
+    AnswerUnknown as AnswerUnknown,
+    InTheWay as InTheWay,
+    NothingThere as NothingThere,
+)

@@ -176,3 +176,7 @@ STATUSES: Final[dict[int, type[RequestFailed]]] = {
 def refusal(request: str, messages: list[str], data: Any = None, reason: str = "") -> RequestFailed:
     """Return the error of a refused request."""
     return REASONS.get(reason, RequestFailed)(request, messages, data, reason)
+
+
+# Names before version 0.2, which scripts import.
+AnswerLate, AnswerUnknown, InTheWay, NothingThere = AnswerTimeout, AnswerLost, StateConflict, ResourceNotFound
