@@ -55,7 +55,7 @@ class Library:
         self._analyses: dict[str, TypeAnalysis] = {}
         self.stamps: dict[str, Stamp | None] = {}
         """Stamps of the files that were looked for on the disk, None for a missing one."""
-        self._forget()
+        self._forget(())
         for file in files:
             self.add(file)
 
@@ -74,15 +74,17 @@ class Library:
             self.remove(file.name)
         self._files[file.name] = file
         dotted = _dotted(file)
-        self._by_module |= {dotted: file} | {each.module: each for each in file.modules}
-        top = dotted.partition(".")[0]
+        modules = {dotted: file} | {each.module: each for each in file.modules}
+        self._by_module |= modules
+        top, roots = dotted.partition(".")[0], len(self._roots)
         if file.path and top != UPLOADED:
             up = dotted.count(".") + (1 if file.is_package else 0)
             parents = Path(file.path).parents
             if up < len(parents):
                 self._roots.setdefault(top, parents[up])
-        self._modules.clear()
-        self._forget()
+        if len(self._roots) > roots:  # more imports lead to a file
+            self._analyses.clear()
+        self._forget(modules)
 
     def remove(self, name: str) -> None:
         """Remove a source.
@@ -92,14 +94,14 @@ class Library:
         """
         file = self._file(name)
         del self._files[name]
-        for dotted in (_dotted(file), *(each.module for each in file.modules)):
+        modules = [_dotted(file), *(each.module for each in file.modules)]
+        for dotted in modules:
             self._by_module.pop(dotted, None)
         # Several types may share a module.
         for other in self._files.values():
             if _dotted(other) == _dotted(file):
                 self._by_module[_dotted(other)] = other
-        self._modules.clear()
-        self._forget()
+        self._forget(modules)
 
     def names(self) -> list[str]:
         """Return the names of all types, built-in ones first."""
@@ -127,8 +129,13 @@ class Library:
         except KeyError:
             raise NotFound("The source of object type {name} does not exist.", name=name) from None
 
-    def _forget(self) -> None:
-        self._analyses.clear()
+    def _forget(self, changed: Iterable[str]) -> None:
+        """Forget everything that depends on modules with these full names, or on a file that changed on the disk."""
+        if self._analyses and any(stamp_of(Path(path)) != stamp for path, stamp in self.stamps.items()):
+            self._analyses.clear()
+        above = {name for dotted in changed for name in _packages(dotted)}
+        self._analyses = {name: known for name, known in self._analyses.items() if not above & known.lookups}
+        self._modules.clear()
         resolver = Resolver(self._load)
         self._hierarchy = Hierarchy(resolver)
         self._actions = ActionReader(self._hierarchy)
@@ -185,8 +192,12 @@ class Library:
                 ) from None
         return None
 
-    def _needed(self, module: Module) -> list[SourceFile]:
+    def _needed(self, module: Module, lookups: set[str]) -> list[SourceFile]:
         """Return the files that a module needs, each after those it needs itself.
+
+        Args:
+            module: to start from.
+            lookups: gets the full names of the modules that are looked for.
 
         Raises:
             AnalysisStopped: A file is missing.
@@ -196,6 +207,7 @@ class Library:
 
         def visit(of: Module) -> None:
             for found in of.imports:
+                lookups.update(self._names_of(found))
                 for wanted in self._imported(of, found):
                     if wanted.dotted not in seen and not _is_ours(wanted.dotted):
                         seen.add(wanted.dotted)
@@ -204,6 +216,17 @@ class Library:
 
         visit(module)
         return list(done.values())
+
+    def _names_of(self, found: Import) -> list[str]:
+        """Return the full names of the modules that an import statement may load, and that a library may contain.
+
+        The module that it names also stands for those below it.
+        """
+        top, _, _ = found.module.partition(".")
+        if top == "arcor2_hw" or (top != UPLOADED and top not in self._roots):
+            return []
+        shared = (found.module.rpartition(".")[2], found.name) if found.relative else ()
+        return [found.module, *(f"{UPLOADED}.{name}" for name in shared)]
 
     def _imported(self, module: Module, found: Import) -> list[Module]:
         """Return those of the modules loaded by an import statement that are part of the library."""
@@ -245,23 +268,25 @@ class Library:
         file = self._file(name)
         base = ""
         needed: tuple[SourceFile, ...] = ()
+        lookups = {_dotted(file)}
         try:
             module = self._load(_dotted(file))
             assert module is not None
             info = module.bindings.get(name)
             if isinstance(info, Import | Value) or (info is None and self._declares_object_type(module)):
                 raise module.problem("the file has no class {name}", 1, name=name)
-            needed = tuple(self._needed(module))
+            needed = tuple(self._needed(module, lookups))
             if not isinstance(info, ClassInfo) or not info.node.bases or not self._is_object_type(info):
-                return TypeAnalysis(ObjectTypeMeta(name, abstract=True), modules=needed, is_object_type=False)
-            return self._of_class(name, info, needed)
+                meta = ObjectTypeMeta(name, abstract=True)
+                return TypeAnalysis(meta, modules=needed, lookups=frozenset(lookups), is_object_type=False)
+            return msgspec.structs.replace(self._of_class(name, info, needed), lookups=frozenset(lookups))
         except AnalysisStopped as error:
             problem = error.problem
         except (RecursionError, MemoryError):
             path = file.path or f"{_dotted(file).replace('.', '/')}.py"
             problem = AnalysisStopped("the source is nested too deeply", path, 1).problem
         meta = ObjectTypeMeta(name, NO_DESCRIPTION, base=base, abstract=True).disabled_because(problem.message)
-        return TypeAnalysis(meta, modules=needed, problem=problem)
+        return TypeAnalysis(meta, modules=needed, lookups=frozenset(lookups), problem=problem)
 
     def _declares_object_type(self, module: Module) -> bool:
         classes = (each for each in module.bindings.values() if isinstance(each, ClassInfo))
@@ -403,6 +428,12 @@ class Library:
 def _dotted(file: SourceFile) -> str:
     """Return the full name of a file's module; uploaded files get a package."""
     return file.module if "." in file.module else f"{UPLOADED}.{file.module}"
+
+
+def _packages(dotted: str) -> list[str]:
+    """Return the full name of a module and those of the packages that contain it."""
+    parts = dotted.split(".")
+    return [".".join(parts[: count + 1]) for count in range(len(parts))]
 
 
 def _is_ours(dotted: str) -> bool:

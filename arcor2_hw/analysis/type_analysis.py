@@ -22,6 +22,8 @@ class TypeAnalysis(Data, frozen=True):
         keyword_only: Keyword-only parameters, as (action, parameter).
         modules: The other files it needs, each after those that it needs itself; without ours, and without packages
             that only contain them.
+        lookups: Full names of the modules that were looked for, except ours and those of distributions without an
+            object type. The analysis is outdated when a module of such a name, or below it, is added or removed.
     """
 
     meta: ObjectTypeMeta
@@ -31,6 +33,7 @@ class TypeAnalysis(Data, frozen=True):
     bases: tuple[str, ...] = ()
     mixins: tuple[str, ...] = ()
     modules: tuple[SourceFile, ...] = ()
+    lookups: frozenset[str] = frozenset()
     is_object_type: bool = True
     problem: Problem | None = None
     enumerations: dict[tuple[str, str], Enumeration] = field(default_factory=dict)
