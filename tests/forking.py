@@ -23,6 +23,8 @@ from tests import forking_process, leaks
 
 BOUND_TO_THE_INTERPRETER = ("PYTHON", "LD_", "MALLOC_", "OPENBLAS_")
 """Prefixes of environment variables that take effect only when an interpreter starts."""
+_ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1"}
+"""Of the forking process. A pool of threads does not survive the fork."""
 
 
 class Forked:
@@ -60,11 +62,23 @@ class Forked:
 
 
 class Forker:
-    """Forks programs from one process, which starts with the first of them and ends with this one."""
+    """Forks programs from one process, which starts with the first of them and ends with this one.
 
-    def __init__(self) -> None:
+    Args:
+        address: of the process if another process has started it.
+    """
+
+    def __init__(self, address: str = "") -> None:
         self._connection: socket.socket | None = None
+        self._address = address
         self._lock = threading.Lock()
+
+    @property
+    def address(self) -> str:
+        """The address at which other processes reach the forking process. Start it if it does not run."""
+        with self._lock:
+            self._connect()
+        return self._address
 
     def start(
         self,
@@ -74,6 +88,7 @@ class Forker:
         stderr: IO[Any] | int,
         environment: Mapping[str, str] | None = None,
         inherited: Sequence[int] = (),
+        name: str = "",
     ) -> "Forked | subprocess.Popen[bytes]":
         """Start `python -m MODULE ARGUMENTS` from a process that has imported some modules; standard output is a pipe.
 
@@ -86,47 +101,75 @@ class Forker:
             stderr: where it writes errors; subprocess.STDOUT is its standard output.
             environment: of the program, by default that of this process.
             inherited: files for the program. It has a session of its own then, as children of the server have.
+            name: of the process in the list of processes. It runs as with `python -P` then.
         """
         own = os.environ if environment is None else environment
-        if any(own[key] != os.environ.get(key) for key in own if key.startswith(BOUND_TO_THE_INTERPRETER)):
+        fixed = {key: value for key, value in own.items() if key.startswith(BOUND_TO_THE_INTERPRETER)}
+        if any(value not in (os.environ.get(key), _ENVIRONMENT.get(key)) for key, value in fixed.items()):
             command = [sys.executable, "-m", module, *arguments]
             return subprocess.Popen(
                 command, stdout=subprocess.PIPE, stderr=stderr, env=own,
                 pass_fds=inherited, start_new_session=bool(inherited),
             )  # fmt: skip
-        request = json.dumps([module, list(arguments), list(imports), dict(own), str(Path.cwd()), list(inherited)])
+        request = {
+            "module": module,
+            "arguments": list(arguments),
+            "imports": list(imports),
+            "environment": dict(own),
+            "directory": str(Path.cwd()),
+            "umask": _umask(),
+            "inherited": list(inherited),
+            "name": name,
+        }
         out, theirs = os.pipe()
         status, reported = os.pipe()
         errors = theirs if stderr == subprocess.STDOUT else stderr if isinstance(stderr, int) else stderr.fileno()
         try:
             with self._lock:
-                if self._connection is None:
-                    with leaks.outliving_the_test():
-                        self._connection = self._start()
-                socket.send_fds(self._connection, [request.encode()], [theirs, errors, reported, *inherited])
-                pid = self._connection.recv(20)
+                connection = self._connect()
+                socket.send_fds(connection, [json.dumps(request).encode()], [theirs, errors, reported, *inherited])
+                pid = connection.recv(20)
         finally:
             os.close(theirs)
             os.close(reported)
         assert pid, "the forking process has ended"
         return Forked(int(pid), status, out)
 
-    def _start(self) -> socket.socket:
+    def _connect(self) -> socket.socket:
+        if self._connection is None:
+            if self._address:
+                self._connection = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+                self._connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, forking_process.LONGEST)
+                self._connection.connect(f"\0{self._address}")
+            else:
+                with leaks.outliving_the_test():
+                    self._start()
+            assert self._connection is not None
+        return self._connection
+
+    def _start(self) -> None:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         for end in (ours, theirs):
             end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, forking_process.LONGEST)
-        with theirs:
+        with theirs, socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
+            listener.bind("")  # the kernel chooses an abstract address
+            listener.listen()
+            self._address = listener.getsockname()[1:].decode()
             process = subprocess.Popen(
-                [sys.executable, "-m", forking_process.__name__, str(theirs.fileno())],
-                pass_fds=[theirs.fileno()],
+                [sys.executable, "-m", forking_process.__name__, str(theirs.fileno()), str(listener.fileno())],
+                pass_fds=[theirs.fileno(), listener.fileno()],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
-                # A pool of threads does not survive the fork.
-                env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+                env=os.environ | _ENVIRONMENT,
             )
         leaks.forking.add(process.pid)
         atexit.register(lambda: (ours.close(), process.wait()))
-        return ours
+        self._connection = ours
+
+
+def _umask() -> int:
+    (line,) = [line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("Umask:")]
+    return int(line.split()[1], 8)
 
 
 class AwaitedProcess:

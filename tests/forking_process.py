@@ -13,70 +13,95 @@ import selectors
 import signal
 import socket
 import sys
+import tempfile
 import threading
 import time
 import traceback
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 LONGEST = 1 << 20
 """Maximum size of a request, bytes."""
 MAX_FDS = 8
 """Maximum number of files that are passed on."""
-_FIRST_KEPT = 512
-"""Above the numbers of all files of this process, and below the usual limit."""
+_LARGEST_FILE = 512
+"""Above the numbers of all files of this process."""
 
 
-def main(connection: socket.socket) -> None:
-    """Fork a program for each request, and report how it ends, until the connection is closed."""
+def main(connection: socket.socket, listener: socket.socket) -> None:
+    """Fork a program for each request, and report how it ends, until the connection is closed.
+
+    Args:
+        connection: to the process that started this one.
+        listener: for connections of other processes.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the programs end as the test says
     with selectors.DefaultSelector() as selector:
         selector.register(connection, selectors.EVENT_READ)
+        selector.register(listener, selectors.EVENT_READ)
         while True:
             for key, _ in selector.select():
-                if key.fileobj is not connection:
+                if key.fileobj is listener:
+                    selector.register(listener.accept()[0], selectors.EVENT_READ)
+                elif isinstance(key.fileobj, socket.socket):
+                    if process := fork(key.fileobj):
+                        selector.register(os.pidfd_open(process[0]), selectors.EVENT_READ, process)
+                    elif key.fileobj is connection:
+                        return
+                    else:
+                        selector.unregister(key.fileobj)
+                        key.fileobj.close()
+                else:
                     selector.unregister(key.fileobj)
                     pid, report = key.data
                     status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-                    os.write(report, str(status).encode())
+                    with contextlib.suppress(BrokenPipeError):  # the process that started it was killed
+                        os.write(report, str(status).encode())
                     os.close(report)
                     os.close(key.fd)
-                    continue
-                message, fds, _, _ = socket.recv_fds(connection, LONGEST, MAX_FDS)
-                if not message:
-                    return
-                module, arguments, imports, environment, directory, inherited = json.loads(message)
-                with contextlib.suppress(ImportError):  # the program itself reports a missing module
-                    for name in imports:
-                        importlib.import_module(name)
-                gc.collect()
-                gc.freeze()
-                assert len(list(Path("/proc/self/task").iterdir())) == 1, f"{imports} start threads when imported"
-                if (pid := os.fork()) == 0:
-                    become(module, arguments, environment, directory, fds, inherited)
-                connection.send(str(pid).encode())
-                for fd in (*fds[:2], *fds[3:]):
-                    os.close(fd)
-                selector.register(os.pidfd_open(pid), selectors.EVENT_READ, (pid, fds[2]))
 
 
-def become(
-    module: str, arguments: list[str], environment: dict[str, str], directory: str, fds: list[int], inherited: list[int]
-) -> NoReturn:
+def fork(connection: socket.socket) -> tuple[int, int] | None:
+    """Fork a program for the next request of a connection.
+
+    Returns:
+        The process id and the pipe for the exit status. None if the connection is closed.
+    """
+    try:
+        message, fds, _, _ = socket.recv_fds(connection, LONGEST, MAX_FDS)
+    except ConnectionError:
+        return None
+    if not message:
+        return None
+    request = json.loads(message)
+    with contextlib.suppress(ImportError):  # the program itself reports a missing module
+        for name in request["imports"]:
+            importlib.import_module(name)
+    gc.collect()
+    gc.freeze()
+    assert len(list(Path("/proc/self/task").iterdir())) == 1, f"{request['imports']} start threads when imported"
+    if (pid := os.fork()) == 0:
+        become(request, fds)
+    with contextlib.suppress(BrokenPipeError):
+        connection.send(str(pid).encode())
+    for fd in (*fds[:2], *fds[3:]):
+        os.close(fd)
+    return pid, fds[2]
+
+
+def become(request: dict[str, Any], fds: list[int]) -> NoReturn:
     """Run a program in this forked process as `python -m` does, and end with its exit status.
 
     Args:
-        module: to run.
-        arguments: of the program.
-        environment: of the program.
-        directory: to run it in.
+        request: of `tests.forking.Forker`.
         fds: standard output and error, the pipe for the exit status, and the inherited files.
-        inherited: the numbers that the inherited files have in the program.
     """
+    module, inherited = request["module"], request["inherited"]
     os.dup2(fds[0], 1)
     os.dup2(fds[1], 2)
-    kept = [fcntl.fcntl(fd, fcntl.F_DUPFD, _FIRST_KEPT) for fd in fds[3:]]
-    os.closerange(3, _FIRST_KEPT)
+    first_kept = max([_LARGEST_FILE, *inherited]) + 1
+    kept = [fcntl.fcntl(fd, fcntl.F_DUPFD, first_kept) for fd in fds[3:]]
+    os.closerange(3, first_kept)
     for fd, number in zip(kept, inherited, strict=True):
         os.dup2(fd, number)
         os.close(fd)
@@ -88,11 +113,17 @@ def become(
     )
     signal.signal(signal.SIGINT, signal.default_int_handler)
     os.environ.clear()
-    os.environ.update(environment)
+    os.environ.update(request["environment"])
     time.tzset()
-    os.chdir(directory)
-    sys.path[0] = directory
-    sys.argv[:] = ["-m", *arguments]
+    tempfile.tempdir = None  # it depends on the environment
+    os.chdir(request["directory"])
+    os.umask(request["umask"])
+    if request["name"]:
+        Path("/proc/self/comm").write_text(request["name"])
+        del sys.path[0]
+    else:
+        sys.path[0] = request["directory"]
+    sys.argv[:] = ["-m", *request["arguments"]]
     for name in (module, f"{module}.__main__"):  # it runs as __main__
         if not hasattr(sys.modules.get(name), "__path__"):
             sys.modules.pop(name, None)
@@ -115,4 +146,4 @@ def become(
 
 
 if __name__ == "__main__":
-    main(socket.socket(fileno=int(sys.argv[1])))
+    main(socket.socket(fileno=int(sys.argv[1])), socket.socket(fileno=int(sys.argv[2])))

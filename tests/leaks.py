@@ -90,10 +90,14 @@ def _descendants(pid: int) -> set[int]:
 
 
 def _ancestors(pid: int) -> set[int]:
+    """Return the ancestors of a process. A forked child of a server names the server (`tests.forked_children`)."""
     try:
-        return {parent.pid for parent in psutil.Process(pid).parents()}
+        process = psutil.Process(pid)
+        parents = process.parents()
+        servers = [each.name().partition("/")[2] for each in (process, *parents)]
     except psutil.NoSuchProcess:
         return set()
+    return {each.pid for each in parents} | {int(server) for server in servers if server.isdigit()}
 
 
 _before = pytest.StashKey[Holdings]()

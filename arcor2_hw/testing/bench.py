@@ -283,7 +283,7 @@ class Bench(abc.ABC):
     def polled(self, what: str, read: Callable[[], object], real: object, within: float = 0.0) -> Check:
         """Return the check of a reading that the driver polls, when it agrees, or after `fresh_within` s."""
         began = own_time()
-        while not (check := Check(what, read(), real, within)).agrees and own_time() - began < self.fresh_within:
+        while not (check := Check(what, read(), real, within)).agrees and not began.is_past(self.fresh_within):
             time.sleep(POLL)
         return check
 

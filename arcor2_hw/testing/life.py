@@ -33,7 +33,7 @@ def open_resources() -> set[str]:
 def leaked_resources(before: set[str]) -> set[str]:
     """Return the resources that this process did not have before, after waiting for them to end."""
     began = own_time()
-    while (left := open_resources() - before) and own_time() - began < CLEAN_UP_TIMEOUT:
+    while (left := open_resources() - before) and not began.is_past(CLEAN_UP_TIMEOUT):
         gc.collect()
         time.sleep(POLL)
     return left
@@ -43,7 +43,7 @@ def wait_until(holds: Callable[[], bool], within: float, what: str) -> float:
     """Wait until a condition holds and return the time it took in s. Fail after `within` s."""
     began = own_time()
     while not holds():
-        assert own_time() - began < within, f"{what}: not within {within:g} s"
+        assert not began.is_past(within), f"{what}: not within {within:g} s"
         time.sleep(POLL)
     return own_time() - began
 
@@ -112,7 +112,7 @@ class BackgroundCall:
     def outcome(self, within: float, what: str) -> BaseException | None:
         """Wait for the end and return the raised error. Fail when the call does not end in time."""
         began = own_time()
-        while not self.over and own_time() - began < within + TIME_TOLERANCE:
+        while not self.over and not began.is_past(within + TIME_TOLERANCE):
             self._thread.join(POLL)
         assert self.over, f"{what} has not ended within {within:g} s"
         return self.error

@@ -32,6 +32,11 @@ class Instant(NamedTuple):
         elapsed = self.clock - earlier.clock
         return max(elapsed - waited, SLOWEST * elapsed)
 
+    def is_past(self, limit: float) -> bool:
+        """Return whether at least `limit` s have passed since, without the time spent waiting for a processor."""
+        # The statistics of all threads take a millisecond: read them only when the ordinary clock is past the limit.
+        return time.monotonic() - self.clock >= limit and own_time() - self >= limit
+
 
 def own_time() -> Instant:
     """Return the present moment."""

@@ -62,7 +62,7 @@ def within(limit: float, call: Callable[[], Any], what: str) -> Any:
     thread.start()
     while thread.is_alive():
         thread.join(CHECK_PERIOD)
-        if thread.is_alive() and own_time() - began > limit:
+        if thread.is_alive() and began.is_past(limit):
             raise CallHangs(what, limit, thread)
     if errors:
         raise errors.pop()  # no reference is left, so that its frames are freed

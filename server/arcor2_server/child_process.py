@@ -72,6 +72,20 @@ def _remove_leftovers_once() -> None:
     remove_leftovers(Path(tempfile.gettempdir()), _PREFIX)
 
 
+async def _start_python(
+    command: Sequence[str], inherited: Sequence[int], environment: Mapping[str, str]
+) -> asyncio.subprocess.Process:
+    return await asyncio.create_subprocess_exec(
+        *(sys.executable, *command),
+        pass_fds=inherited,
+        stdin=asyncio.subprocess.DEVNULL,
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.STDOUT,
+        env=environment,
+        start_new_session=True,  # Ctrl-C reaches only the server, which stops its processes in order
+    )
+
+
 class ChildProcess:
     """A running process.
 
@@ -107,16 +121,12 @@ class ChildProcess:
             await asyncio.to_thread(_remove_leftovers_once)
             folder = LockedFolder(Path(tempfile.gettempdir()), _PREFIX)
             try:
-                process = await asyncio.create_subprocess_exec(
-                    sys.executable, *command, "--fd", str(connection.fileno()),
-                    pass_fds=[connection.fileno(), folder.lock, *inherited],
-                    stdin=asyncio.subprocess.DEVNULL,
-                    stdout=asyncio.subprocess.PIPE,
-                    stderr=asyncio.subprocess.STDOUT,
+                process = await _start_python(
+                    [*command, "--fd", str(connection.fileno())],
+                    [connection.fileno(), folder.lock, *inherited],
                     # The processes use their own threads; a thread pool of OpenBLAS would only cost memory.
-                    env={"OPENBLAS_NUM_THREADS": "1", **environment, "TMPDIR": str(folder.path)},
-                    start_new_session=True,  # Ctrl-C reaches only the server, which stops its processes in order
-                )  # fmt: skip
+                    {"OPENBLAS_NUM_THREADS": "1", **environment, "TMPDIR": str(folder.path)},
+                )
             except BaseException:
                 folder.remove()
                 raise

@@ -5,7 +5,6 @@ import contextlib
 import os
 import signal
 import subprocess
-import time
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import IO, Any
@@ -23,6 +22,7 @@ from arcor2_hw.testing.own_time import own_time
 from arcor2_server.demo.fakes import free_loopback_address
 from arcor2_server.demo.processes import Child
 from arcor2_server.demo.workplace import Creation, Scalar, Workplace, load
+from tests import forked_children
 from tests.fakes.conftest import start_forked_fake
 from tests.forking import Forked, awaited
 from tests.leaks import outliving_the_test
@@ -41,8 +41,7 @@ async def until(ask: Callable[[], Any], what: str, timeout: float = 30.0) -> Any
             answer = await answer
         if answer:
             return answer
-        late = time.monotonic() - began.clock > timeout and own_time() - began > timeout
-        assert not late, f"not within {timeout} s: {what}"
+        assert not began.is_past(timeout), f"not within {timeout} s: {what}"
         await asyncio.sleep(0.02)
 
 
@@ -141,10 +140,7 @@ class Cell:
         """Return the cell hosts of the server, the newest last."""
         server = self.children["server"]._process
         assert server is not None
-        with contextlib.suppress(psutil.NoSuchProcess):
-            found = [p for p in psutil.Process(server.pid).children() if "arcor2_hw.runtime" in " ".join(p.cmdline())]
-            return sorted(found, key=lambda p: p.create_time())
-        return []
+        return forked_children.children(server.pid, "arcor2_hw.runtime.host")
 
     async def close_clients(self) -> None:
         await self._exit.aclose()

@@ -20,6 +20,7 @@ from arcor2_hw.data.geometry import Pose, Position
 from arcor2_hw.data.parameter import Parameter
 from arcor2_server.cli.main import app
 from arcor2_server.demo.fakes import free_loopback_address
+from tests import forked_children
 from tests.e2e.harness import scene_state, until
 from tests.e2e.seen_workplace import CAMERA, MARKERS, ROBOT, SIZE, Q, in_view, off, pose, tilted
 from tests.fakes.conftest import FakeProcess
@@ -115,8 +116,7 @@ class World:
         return found
 
     def workers(self) -> list[psutil.Process]:
-        children = psutil.Process(self.server.process.pid).children()
-        return [child for child in children if "arcor2_hw.compute" in " ".join(child.cmdline())]
+        return forked_children.children(self.server.process.pid, "arcor2_hw.compute")
 
 
 def setting(name: str, value: str | float) -> Parameter:

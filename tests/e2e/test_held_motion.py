@@ -22,6 +22,7 @@ from arcor2_hw.data.operation import RobotHoldData
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.robot import Joint
 from arcor2_hw.testing.own_time import Instant, own_time
+from tests import forked_children
 from tests.drivers.universal_robots.conftest import FakeUr
 from tests.e2e.harness import until
 from tests.server.core.serving import ServerProcess, running
@@ -84,8 +85,7 @@ class Site:
     async def rests(self, since: Instant) -> None:
         """Assert that the arm stops in time, and stays stopped."""
         while self.moving():
-            late = own_time() - since
-            assert late < RESTS_WITHIN, f"it still moves after {late:.2f} s"
+            assert not since.is_past(RESTS_WITHIN), f"it still moves after {RESTS_WITHIN:g} s"
             await asyncio.sleep(0.005)
         await self.stays()
 
@@ -105,9 +105,7 @@ class Site:
 
     def host(self) -> int:
         """Return the cell host that holds the arm."""
-        children = psutil.Process(self.server.process.pid).children()
-        hosts = [one for one in children if "arcor2_hw.runtime.host" in " ".join(one.cmdline())]
-        return min(hosts, key=lambda one: one.create_time()).pid
+        return forked_children.children(self.server.process.pid, "arcor2_hw.runtime.host")[0].pid
 
     async def jog(self, *, new: bool = False, valid_ms: int = 300, **motion: Any) -> float:
         self.hold += new

@@ -14,6 +14,7 @@ from typing import IO, Any
 
 from websockets.asyncio.client import ClientConnection, connect
 
+from tests import forked_children
 from tests.forking import Forked, Forker, ended, readable
 from tests.postgresql import variables
 
@@ -29,6 +30,7 @@ _IMPORTS = (
     *("arcor2_server.cli.serve", "arcor2_server.app", "arcor2_server.web.http_server"),
     "sqlalchemy.dialects.sqlite.aiosqlite",
     "tests.server.core.without_spare",
+    forked_children.__name__,
 )
 _ANALYSIS = "analysis.msgpack"
 _analyses: list[bytes] = []
@@ -40,13 +42,14 @@ def fork_server(
 ) -> Forked | subprocess.Popen[bytes]:
     """Start `arcor2-hw serve` on a data directory, forked from a process that has imported it.
 
-    The analysis of the installed object types takes a third of a start. A new data directory gets that of an earlier
-    server, if `keep_analysis` was called with it. The server checks that it is valid.
+    The analysis of the installed object types takes a third of a start. A data directory without an analysis gets that
+    of an earlier server, if `keep_analysis` was called with it. The server checks that it is valid.
     """
-    if _analyses and not data_dir.exists():
-        data_dir.mkdir(0o700, parents=True)
+    if _analyses and not (data_dir / _ANALYSIS).exists():
+        data_dir.mkdir(0o700, parents=True, exist_ok=True)
         (data_dir / _ANALYSIS).write_bytes(_analyses[0])
     serve = ("serve", "--data-dir", str(data_dir), *arguments)
+    environment = {**(os.environ if environment is None else environment), **forked_children.environment()}
     return _forker.start(_MAIN, serve, _IMPORTS, stderr, environment)
 
 

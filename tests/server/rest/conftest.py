@@ -1,17 +1,18 @@
 """The server's parts in this process, and their REST services without a network."""
 
 import asyncio
+import os
 from collections.abc import AsyncIterator, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import httpx
-import psutil
 import pytest
 import pytest_asyncio
 
 from arcor2_server.app import Server, running_server
 from arcor2_server.settings import ServerSettings
+from tests import forked_children
 from tests.server.core.serving import ServerProcess, until
 from tests.server.rest.asking import asking, start_workers
 
@@ -24,9 +25,8 @@ async def services(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Se
     with ThreadPoolExecutor(1) as executor:
         asyncio.get_running_loop().set_default_executor(executor)
         async with running_server(ServerSettings(data_dir=directory)) as parts:
-            before = len(psutil.Process().children())
             parts.hosts.prepare()
-            await until(lambda: len(psutil.Process().children()) > before)
+            await until(lambda: forked_children.children(os.getpid(), "arcor2_hw.runtime.host"))
             await start_workers(parts)
             yield parts
 

@@ -1,13 +1,13 @@
 """Every operation gets valid and invalid input: no status 500, nothing undocumented."""
 
 import asyncio
+import os
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-import psutil
 import pytest
 import schemathesis
 from hypothesis import HealthCheck, given, settings, strategies as st
@@ -24,6 +24,7 @@ from arcor2_server.app import create_app, running_server
 from arcor2_server.rest import OPERATIONS
 from arcor2_server.rest.operations import Operation
 from arcor2_server.settings import ServerSettings
+from tests import forked_children
 from tests.server.core.serving import until
 from tests.server.rest.asking import TRANSLATION, start_workers
 
@@ -51,9 +52,8 @@ class Loop:
         # schemathesis calls an application in this process "testserver".
         settings = ServerSettings(data_dir=self._directory, allowed_hosts=frozenset({"testserver"}))
         async with running_server(settings) as services:
-            before = len(psutil.Process().children())
             services.hosts.prepare()
-            await until(lambda: len(psutil.Process().children()) > before)
+            await until(lambda: forked_children.children(os.getpid(), "arcor2_hw.runtime.host"))
             await start_workers(services)
             self.app = create_app(services)
             self._up.set()

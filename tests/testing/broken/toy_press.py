@@ -46,7 +46,7 @@ while True:
 def dawdle(seconds: float) -> None:
     """Do nothing for some seconds of the suite's clock, which runs slower on a busy machine."""
     began = own_time()
-    while own_time() - began < seconds:
+    while not began.is_past(seconds):
         time.sleep(0.05)
 
 
