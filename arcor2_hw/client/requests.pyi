@@ -253,6 +253,7 @@ class Requests(ABC):
         type: str,
         pose: Pose | Unset = UNSET,
         parameters: Sequence[Parameter] = (),
+        node: str | Unset = UNSET,
         dry_run: bool = False,
         timeout: float | None = None,
     ) -> None:
@@ -293,6 +294,7 @@ class Requests(ABC):
         type: str,
         pose: Pose | Unset = UNSET,
         parameters: Sequence[Parameter] = (),
+        node: str | Unset = UNSET,
         dry_run: bool = False,
         timeout: float | None = None,
     ) -> None:
@@ -386,7 +388,13 @@ class Requests(ABC):
         """
 
     async def check_connection(
-        self, type: str, *, parameters: Sequence[Parameter] = (), id: str = "", timeout: float | None = None
+        self,
+        type: str,
+        *,
+        parameters: Sequence[Parameter] = (),
+        id: str = "",
+        node: str | Unset = UNSET,
+        timeout: float | None = None,
     ) -> CheckConnectionData:
         """CheckConnection: type and settings of a device, and its id if it is an object of the scene.
 

@@ -55,12 +55,31 @@ async def test_a_device_is_set_on_a_node_that_is_lost(node: Node, served: Cell, 
         page = screen.page
         await screen.join("Eva")
         tools = page.get_by_role("navigation")
+        await client.call("SubscribeEvents", rpc.SubscribeEventsArgs({"ObjectState"}))
+        await client.call("StartScene")
+        while (await client.next_event("SceneState")).data.state != "started":
+            continue
+        await tools.get_by_role("button", name=texts.ADD, exact=True).click()
+        panel = page.get_by_role("complementary")
+        await panel.locator(".kind").filter(has_text="Random").first.click()
+        await panel.get_by_label("Runs on").select_option("press")
+        await screen.picture("added-on-node")
+        await panel.locator("form button[type=submit]").click()
+        while (added := (await client.next_event("SceneObjectChanged")).data).type != "RandomActions":
+            continue
+        assert added.node == "press"
+        while (state := (await client.next_event("ObjectState")).data).state != "online":
+            assert state.state != "failed"
+        await client.call("StopScene")
+        while (await client.next_event("SceneState")).data.state != "stopped":
+            continue
+
         await tools.get_by_role("button", name=texts.OBJECTS, exact=True).click()
         await page.get_by_role("treegrid", name="Without a pose").get_by_role("row").filter(has_text="clock").click()
         await page.get_by_label("Runs on").select_option("press")
         await tools.get_by_role("button", name=texts.DEVICES, exact=True).click()
         row = page.get_by_role("region", name="Nodes").get_by_role("listitem").filter(has_text="press")
-        await expect(row).to_contain_text("Devices of this scene: clock")
+        await expect(row).to_contain_text("Devices of this scene: clock, random_actions")
         await expect(row.locator(".tag")).to_have_text("connected")
 
         for name, where in (("left", "press"), ("right", "")):

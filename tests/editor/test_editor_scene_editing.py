@@ -340,6 +340,7 @@ async def test_devices_are_added_by_a_form_and_meshes_with_their_unit(opened: Op
         await panel.get_by_label("Search").fill("scale")
         await panel.get_by_role("button", name="Mettler Toledo scale").click()
         submit = panel.locator("form button[type=submit]")
+        await expect(panel.get_by_label("Runs on")).to_have_count(0)  # a server without nodes
         await submit.click()
         await expect(panel.get_by_role("alert")).to_contain_text("Required: ")
         needed = await panel.locator(".add-form > .value-field > .value-head > label").all_inner_texts()

@@ -9,6 +9,7 @@ from arcor2_hw.data.base import UNSET, Data, Timestamp, Unset
 from arcor2_hw.data.camera import CameraParameters
 from arcor2_hw.data.device import Alarm, Health, Identity
 from arcor2_hw.data.geometry import Pose
+from arcor2_hw.data.nodes import NodeName
 from arcor2_hw.data.object_type import ObjectModel
 from arcor2_hw.data.parameter import Parameter
 from arcor2_hw.data.robot import RobotArg
@@ -21,12 +22,16 @@ from arcor2_hw.messages import Message
 
 
 class AddObjectToSceneArgs(Data, frozen=True):
-    """Arguments of AddObjectToScene."""
+    """Arguments of AddObjectToScene.
+
+    node (not in ARCOR2): name of the node on which the object runs; empty or omitted for the computer of the server.
+    """
 
     name: str
     type: str
     pose: Pose | Unset = UNSET
     parameters: list[Parameter] = field(default_factory=list)
+    node: NodeName | Unset = UNSET
 
 
 class AddVirtualCollisionObjectToSceneArgs(Data, frozen=True):
@@ -58,12 +63,14 @@ class CameraColorParametersArgs(Data, frozen=True):
 class CheckConnectionArgs(Data, frozen=True):
     """Arguments of CheckConnection: type and settings of a device, and its id if it is an object of the scene.
 
-    The id gives access to the stored secrets of the object.
+    The id gives access to the stored secrets of the object, which is checked on its node. Other devices are checked on
+    `node`; empty for the computer of the server.
     """
 
     type: str
     parameters: list[Parameter] = field(default_factory=list)
     id: str = ""
+    node: NodeName | Unset = UNSET
 
 
 class CheckConnectionData(Data, frozen=True):

@@ -7,12 +7,15 @@ import type { State } from "../store/state";
 import { refusal } from "./requests";
 import { notBuildable } from "./scene";
 
-/** Return why the node of an object cannot be changed now; an empty string if it can. */
-export function notMovable(state: State, object: SceneObject): string {
-  const assigned = state.nodes?.assigned[object.name];
-  if (assigned) return t`Set by the cell file of the server: ${assigned}.`;
-  return notBuildable(state, "SetObjectNode");
+/** Return which node the cell file sets for an object of this name, as a sentence; an empty string if none. */
+export function setByCellFile(state: State, name: string): string {
+  const assigned = state.nodes?.assigned[name];
+  return assigned ? t`Set by the cell file of the server: ${assigned}.` : "";
 }
+
+/** Return why the node of an object cannot be changed now; an empty string if it can. */
+export const notMovable = (state: State, object: SceneObject): string =>
+  setByCellFile(state, object.name) || notBuildable(state, "SetObjectNode");
 
 export const setNode = (id: string, node: string): Promise<string> =>
   refusal(() => call("SetObjectNode", { id, node }));

@@ -70,10 +70,10 @@ async function taken(name: string): Promise<void> {
   setUi({ tool: "" });
 }
 
-export function addObject(type: ObjectTypeMeta, name: string, parameters: Parameter[]): Promise<string> {
+export function addObject(type: ObjectTypeMeta, name: string, parameters: Parameter[], node = ""): Promise<string> {
   const pose = type.has_pose ? { pose: newPlace(type.object_model) } : {};
   return refusal(async () => {
-    await call("AddSceneObject", { name, type: type.type, parameters, ...pose });
+    await call("AddSceneObject", { name, type: type.type, parameters, ...pose, ...(node ? { node } : {}) });
     await taken(name);
   });
 }
@@ -86,9 +86,11 @@ export async function checkConnection(
   type: string,
   parameters: Parameter[],
   id = "",
+  node = "",
 ): Promise<{ found: CheckConnectionData } | { refused: string }> {
   try {
-    return { found: await call("CheckConnection", { type, parameters, id }, { deadline: CHECK_TIMEOUT }) };
+    const args = { type, parameters, id, ...(node ? { node } : {}) };
+    return { found: await call("CheckConnection", args, { deadline: CHECK_TIMEOUT }) };
   } catch (error) {
     return { refused: sentence(error) };
   }
@@ -153,7 +155,7 @@ export const renameObject = (id: string, new_name: string): Promise<string> =>
   refusal(() => held(id, () => call("RenameObject", { id, new_name })));
 
 /** Add a copy next to the object; the copy of a shape has its own type. */
-export async function duplicateObject({ name, type, pose, parameters }: SceneObject): Promise<void> {
+export async function duplicateObject({ name, type, pose, parameters, node }: SceneObject): Promise<void> {
   const { types } = now();
   const meta = types.byName[type];
   const copy = freeObjectName(name.replace(/_\d+$/, ""));
@@ -165,7 +167,13 @@ export async function duplicateObject({ name, type, pose, parameters }: SceneObj
         pose: beside,
         model: named(meta.object_model as ObjectModel, copy),
       })
-    : await ask("AddSceneObject", { name: copy, type, parameters, ...(beside ? { pose: beside } : {}) });
+    : await ask("AddSceneObject", {
+        name: copy,
+        type,
+        parameters,
+        ...(beside ? { pose: beside } : {}),
+        ...(node ? { node } : {}),
+      });
   if (done) await taken(copy).catch(() => {}); // another user has removed it meanwhile
 }
 

@@ -224,12 +224,17 @@ export interface AddLogicItemArgs {
   when?: LogicWhen;
 }
 
-/** Arguments of AddObjectToScene. */
+/**
+ * Arguments of AddObjectToScene.
+ *
+ * node (not in ARCOR2): name of the node on which the object runs; empty or omitted for the computer of the server.
+ */
 export interface AddObjectToSceneArgs {
   name: string;
   type: string;
   pose?: Pose;
   parameters?: Parameter[];
+  node?: string;
 }
 
 /** Arguments of AddOverride. */
@@ -674,12 +679,14 @@ export interface CheckCalibrationArgs {
 /**
  * Arguments of CheckConnection: type and settings of a device, and its id if it is an object of the scene.
  *
- * The id gives access to the stored secrets of the object.
+ * The id gives access to the stored secrets of the object, which is checked on its node. Other devices are checked on
+ * `node`; empty for the computer of the server.
  */
 export interface CheckConnectionArgs {
   type: string;
   parameters?: Parameter[];
   id?: string;
+  node?: string;
 }
 
 /** Answer to CheckConnection: what the connected device reports, and the time to connect, s. */

@@ -97,9 +97,10 @@ export interface Fit {
   worstPoint: number;
 }
 
-/** A form that is not saved: name of the new object, and JSON of each setting that differs from its default. */
+/** A form that is not saved: name and node of a new object, and JSON of each setting that differs from its default. */
 export interface FormDraft {
   name?: string;
+  node?: string;
   values: Record<string, string>;
 }
 

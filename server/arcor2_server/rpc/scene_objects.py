@@ -94,13 +94,14 @@ class SceneObjectRequests:
         """Add an object also while a project is open or the scene is online; then it is connected, too."""
         async with self._locks.auto(context.user, SCENE):
             self._session.require_scene_open()
-            await self._online.prepare_addition(SceneObject(args.name, args.type), dry_run=context.dry_run)
+            added = SceneObject(args.name, args.type, node=args.node or UNSET)
+            await self._online.prepare_addition(added, dry_run=context.dry_run)
             obj = await self._add_object(context, args)
         if not context.dry_run and self._online.online:
             self._online.connect_added(obj)
 
     async def _add_object(self, context: Context, args: AddObjectToSceneArgs) -> SceneObject:
-        obj = SceneObject(args.name, args.type, args.pose, id=new_id("obj"))
+        obj = SceneObject(args.name, args.type, args.pose, id=new_id("obj"), node=args.node or UNSET)
         obj = replace(obj, parameters=await self._editing.hide_secrets(context, obj, args.parameters))
         await self._add(context, obj)
         return obj
@@ -150,16 +151,17 @@ class SceneObjectRequests:
         if args.id and self._online.state is not SceneStateEnum.STOPPED:
             raise RequestRefused("The scene is online. Its devices are connected already.")
         pose = Pose() if self._types.meta(args.type).has_pose else UNSET
-        obj = SceneObject(args.type, args.type, pose, args.parameters, args.id or new_id("obj"), self._node_of(args.id))
+        node = self._node_of(args.id) or args.node or UNSET
+        obj = SceneObject(args.type, args.type, pose, args.parameters, args.id or new_id("obj"), node)
         if problems := object_problems(obj, self._types):
             raise InvalidData(Message.joined(problems))
         return await self._connection_check.run(obj)
 
-    def _node_of(self, object_id: str) -> str | Unset:
-        """Return the node on which an object of the open scene runs."""
+    def _node_of(self, object_id: str) -> str:
+        """Return the node on which an object of the open scene runs; empty for none."""
         scene = self._session.document.scene
         own = [each for each in (scene.objects if scene else []) if each.id == object_id]
-        return (self._online.host.node_of(own[0]) if own else "") or UNSET
+        return self._online.host.node_of(own[0]) if own else ""
 
     @rpc("FindDevices")
     async def find_devices(self, context: Context, args: FindDevicesArgs) -> list[FoundDevice]:

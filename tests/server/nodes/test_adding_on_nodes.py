@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from arcor2_hw.data.base import UNSET
 from arcor2_hw.data.cell import Cell, CellDevice
 from arcor2_hw.data.scene import Scene, SceneObject
-from arcor2_hw.exceptions import Arcor2Error
+from arcor2_hw.exceptions import Arcor2Error, SeveralNodes
 from tests.server.cell.conftest import Server, robot_meta, running_server
 from tests.server.cell.test_execution_history import subscribe
 from tests.server.nodes.conftest import NODE, Broker, Node
@@ -25,9 +26,9 @@ class Clock(Generic):
 """
 
 
-async def added(server: Server, name: str, kind: str = "Clock") -> str:
+async def added(server: Server, name: str, **more: str) -> str:
     """Add an object; return its id when it is online."""
-    await server.ask("AddSceneObject", {"name": name, "type": kind})
+    await server.ask("AddSceneObject", {"name": name, "type": "Clock", **more})
     state = await server.client.event("ObjectState", lambda data: data["state"] in ("online", "failed"))
     assert state["state"] == "online", state
     return str(state["object_id"])
@@ -65,3 +66,47 @@ async def test_a_host_is_started_where_an_added_object_runs(
         await server.ask("StopScene")
         stopped = await server.client.state("stopped")
         assert "message" not in stopped
+
+
+async def test_a_request_names_the_node_of_an_added_object(
+    broker: Broker, node: Node, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first objects, and so the program, are on the computer of the server."""
+    monkeypatch.setenv("ARCOR2_HW_NATS_URL", broker.url)
+    async with running_server(tmp_path / "data") as server:
+        subscribe(server, "ObjectState")
+        server.types.add("Clock", CLOCK)
+        server.types.add("Arm", CLOCK.replace("Clock", "Arm"), robot=robot_meta("Arm"))
+        server.services.hosts._derives = server.types.derives_from
+        await server.open(Scene("scene", id="scn_1"))
+        for name, request in (("first", "AddObjectToScene"), ("arm", "AddSceneObject")):
+            await server.ask(request, {"name": name, "type": "Arm" if name == "arm" else "Clock", "node": ""})
+        assert [each.node for each in server.services.session.require_scene().objects] == [UNSET, UNSET]
+        with pytest.raises(Arcor2Error, match=r"The node saw is not connected\."):
+            await server.ask("CheckConnection", {"type": "Clock", "node": "saw"})
+        await server.start()
+        online = server.services.online
+        hosts = online.host.host
+
+        for name, kind, where, error, reason in (
+            ("away", "Clock", "saw", Arcor2Error, r"The node saw is not connected\."),
+            ("second_arm", "Arm", NODE, SeveralNodes, r"on one computer: arm .*, second_arm \(node press\)\."),
+        ):
+            with pytest.raises(error, match=reason):
+                await server.ask("AddSceneObject", {"name": name, "type": kind, "node": where})
+        assert len(hosts.rings) == 1, "nothing was started"
+        assert len(server.services.session.require_scene().objects) == 2
+
+        far = await added(server, "far", node=NODE)
+        assert server.services.session.document.scene_object(far).node == NODE
+        assert online.host.host is hosts
+        assert len(hosts.rings) == 2
+        assert await online.call(far, "pid", deadline=5.0) != await online.call(
+            server.services.session.require_scene().objects[0].id, "pid", deadline=5.0
+        )
+        assert (await server.ask("CheckConnection", {"type": "Clock", "node": NODE})).alarms == []
+        await server.ask("StopScene")
+        assert "message" not in await server.client.state("stopped")
+
+        await server.ask("AddObjectToScene", {"name": "later", "type": "Clock", "node": "saw"})
+        assert server.services.session.require_scene().objects[-1].node == "saw"

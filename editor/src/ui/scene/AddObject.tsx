@@ -2,6 +2,7 @@
 
 import { t } from "@lingui/core/macro";
 import { type FormEvent, useState } from "react";
+import { setByCellFile } from "../../commands/nodes";
 import { addObject, freeObjectName } from "../../commands/scene";
 import { words } from "../../program/naming";
 import { missing, missingForControl, parametersOf } from "../../program/settings";
@@ -9,6 +10,7 @@ import type { ObjectTypeMeta } from "../../protocol/types";
 import { keepForm, useEditor } from "../../store/store";
 import { Field } from "../kit/Field";
 import { Button } from "../kit/kit";
+import { NodePick } from "../nodes/NodePick";
 import { RefusedText, useRefusal } from "../points/Refusal";
 import { Check } from "./Check";
 import { SettingsFields } from "./Settings";
@@ -22,12 +24,16 @@ export function AddObject({ type, why, onBack }: { type: ObjectTypeMeta; why: st
   const values = draft?.values ?? {};
   const name = draft?.name ?? proposed;
   const lacking = missing(type.settings, values);
+  const hasNodes = useEditor(({ nodes }) => nodes?.configured === true && nodes.nodes.length > 0);
+  const assigned = useEditor((state) => state.nodes?.assigned[name.trim()] ?? "");
+  const byCell = useEditor((state) => setByCellFile(state, name.trim()));
+  const node = hasNodes ? (draft?.node ?? "") : "";
   const uncontrolled = missingForControl(type.settings, values);
   const submit = (event: FormEvent) => {
     event.preventDefault();
     setTried(true);
     if (why || lacking.length > 0) return;
-    void ask(addObject(type, name.trim(), parametersOf(type.settings, values))).then(
+    void ask(addObject(type, name.trim(), parametersOf(type.settings, values), byCell ? "" : node)).then(
       (done) => done && keepForm(type.type, null),
     );
   };
@@ -49,10 +55,18 @@ export function AddObject({ type, why, onBack }: { type: ObjectTypeMeta; why: st
       <Field
         label={t`Name`}
         value={name}
-        onChange={(next) => keepForm(type.type, { values, name: next })}
+        onChange={(next) => keepForm(type.type, { ...draft, values, name: next })}
         autoComplete="off"
       />
-      {type.settings.length > 0 && <Check type={type} values={values} />}
+      {hasNodes && (
+        <NodePick
+          chosen={assigned || node}
+          isDisabled={byCell !== ""}
+          onChange={(next) => keepForm(type.type, { ...draft, values, node: next })}
+        />
+      )}
+      {hasNodes && byCell && <p className="quiet small">{byCell}</p>}
+      {type.settings.length > 0 && <Check type={type} values={values} node={assigned || node} />}
       <Button look="primary" icon="plus" type="submit" why={why} isDisabled={busy}>
         {busy ? t`Adding…` : t`Add`}
       </Button>

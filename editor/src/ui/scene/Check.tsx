@@ -17,18 +17,20 @@ interface CheckProps {
   values: Values;
   /** Id of the object if it exists. */
   id?: string;
+  /** Node of an object that is not in the scene. */
+  node?: string;
 }
 
-export function Check({ type, values, id = "" }: CheckProps) {
+export function Check({ type, values, id = "", node = "" }: CheckProps) {
   const cannot = useEditor((state) => whyUnavailable(state, "CheckConnection"));
   const connected = useEditor((state) => id !== "" && state.live.state !== "stopped");
   const [busy, setBusy] = useState(false);
   const [result, setResult] = useState<{ of: string; found?: CheckConnectionData; refused?: string } | null>(null);
-  const of = JSON.stringify(values);
+  const of = JSON.stringify([values, node]);
   const why = cannot || (missing(type.settings, values).length > 0 ? t`Fill in the required settings first.` : "");
   const check = async () => {
     setBusy(true);
-    setResult({ of, ...(await checkConnection(type.type, parametersOf(type.settings, values), id)) });
+    setResult({ of, ...(await checkConnection(type.type, parametersOf(type.settings, values), id, node)) });
     setBusy(false);
   };
   // A result is only shown for the settings that were checked.
