@@ -7,6 +7,7 @@ import signal
 import socket
 import ssl
 import sys
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, cast
@@ -29,6 +30,8 @@ from arcor2_server.log import setup as server_logging
 from arcor2_server.settings import FLEET_AUTHORITY, FLEET_BROKER, ServerSettings
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from arcor2_server.nodes.credentials import Credentials
 
 FIRST_SCREEN: Final = "first screen"
@@ -88,7 +91,8 @@ def serve(
             insecure=insecure,
             default_role=Role.TECHNICIAN,
         )
-        credentials = members.credentials_for(settings.broker_credentials, broker, ca)
+        credentials = partial(_credentials, settings, broker, ca)
+        credentials()  # report errors before the start
         server_logging.set_up(log_level)
     except (InvalidData, KeyError, StorageError) as error:
         return fail("fleet", error, ExitStatus.USAGE)
@@ -103,6 +107,14 @@ def serve(
     except StorageError as error:
         return fail("fleet", error, ExitStatus.DATA_UNUSABLE)
     return ExitStatus.OK
+
+
+def _credentials(settings: ServerSettings, broker: str | None, ca: Path | None) -> "Credentials":
+    """Return the credentials for the broker: of another computer if it was paired with it, else of the own one."""
+    from arcor2_server.fleet.accounts import paired_page
+
+    paired = paired_page(settings)
+    return members.credentials_for(paired if paired.exists() else settings.broker_credentials, broker, ca)
 
 
 def _welcome(settings: ServerSettings, port: int) -> None:
@@ -120,7 +132,7 @@ async def _run(
     settings: ServerSettings,
     listener: socket.socket,
     certificate: tuple[Path, Path] | None,
-    credentials: "Credentials",
+    credentials: "Callable[[], Credentials]",
 ) -> None:
     from arcor2_server.access.connection_limits import ConnectionLimits
     from arcor2_server.audit.trail import AuditTrail

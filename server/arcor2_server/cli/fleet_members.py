@@ -1,4 +1,4 @@
-"""`arcor2-hw fleet broker`, `accept`, `pair`, `list`, `revoke`: credentials of cells and sites."""
+"""`arcor2-hw fleet broker`, `accept`, `pair`, `list`, `revoke`: credentials of cells, sites and the page."""
 
 import sys
 from pathlib import Path
@@ -6,6 +6,7 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
+from arcor2_hw.exceptions import InvalidData
 from arcor2_server.cli import members
 from arcor2_server.settings import ServerSettings, default_data_dir
 
@@ -88,18 +89,26 @@ def broker(
 
 
 def accept(
-    name: str, *, site: bool = False, host: str | None = None, port: int | None = None, data_dir: DataDir = None
+    name: str,
+    *,
+    site: bool = False,
+    page: bool = False,
+    host: str | None = None,
+    port: int | None = None,
+    data_dir: DataDir = None,
 ) -> int:
-    """At the broker: show a code with which a cell or site gets its credentials, and wait for it.
+    """At the broker: show a code with which a cell, site or page gets its credentials, and wait for it.
 
-    The code is valid for 10 minutes, for one cell or site, and for three attempts.
+    The code is valid for 10 minutes, for one computer, and for three attempts.
 
     Parameters
     ----------
     name
-        Name of the cell or site: lower-case letters, digits, - and _.
+        Name of the cell, site or page: lower-case letters, digits, - and _.
     site
         Accept the broker of a site instead of a cell.
+    page
+        Accept the server of the page on another computer instead of a cell. There can be one.
     host
         Address to listen on. The default is all addresses.
     port
@@ -108,12 +117,17 @@ def accept(
 
     def work() -> None:
         from arcor2_server.fleet.accounts import fleet_accounts
+        from arcor2_server.nodes.credentials import MemberKind
 
+        if site and page:
+            raise InvalidData("Choose one of --site and --page.")
+        kind, place = MemberKind.MEMBER, "on the cell"
+        if site:
+            kind, place = MemberKind.SITE, "at the site"
+        elif page:
+            kind, place = MemberKind.PAGE, "on the computer of the page"
         settings = _settings(data_dir)
-        place = "at the site" if site else "on the cell"
-        members.accept(
-            settings, fleet_accounts(settings), GROUP, place, name, host, port, site=site, same_version=False
-        )
+        members.accept(settings, fleet_accounts(settings), GROUP, place, name, host, port, kind, same_version=False)
 
     return members.run(GROUP, work)
 
@@ -125,11 +139,12 @@ def pair(
     data_dir: Annotated[
         Path | None,
         Parameter(
-            help="Data directory of the cell ($XDG_DATA_HOME/arcor2-hw) or site ($XDG_DATA_HOME/arcor2-hw-fleet)."
+            help="Data directory of the cell ($XDG_DATA_HOME/arcor2-hw), or of the site or page "
+            "($XDG_DATA_HOME/arcor2-hw-fleet)."
         ),
     ] = None,
 ) -> int:
-    """On the cell or at the site: get credentials for the broker.
+    """On the cell, at the site, or on the computer of the page: get credentials for the broker.
 
     First run `arcor2-hw fleet accept NAME` at the broker. It shows a code, for which this command asks (or reads it
     from standard input).
@@ -137,16 +152,20 @@ def pair(
     Parameters
     ----------
     name
-        Name of this cell or site.
+        Name of this cell, site or page.
     server
         Address of the computer with `fleet accept` as HOST or HOST:PORT.
     """
 
     def work() -> None:
-        from arcor2_server.fleet.accounts import HUB_AUTHORITY, HUB_FILE, save_hub
+        from arcor2_server.fleet.accounts import HUB_AUTHORITY, HUB_FILE, paired_page, save_hub
+        from arcor2_server.nodes.credentials import MemberKind
 
         found, key = members.pair(GROUP, name, server, same_version=False)
-        if found.leaf:
+        if found.kind is MemberKind.PAGE:
+            found.save(paired_page(_settings(data_dir)))
+            following = "Start the server of the page: arcor2-hw fleet serve"
+        elif found.kind is MemberKind.SITE:
             settings = _settings(data_dir)
             save_hub(settings, name, found)
             files = HUB_FILE + (f" and {HUB_AUTHORITY}" if found.authority else "")
@@ -164,7 +183,7 @@ def pair(
 
 
 def list_members(*, data_dir: DataDir = None) -> int:
-    """At the broker: list the accepted cells and sites."""
+    """At the broker: list the accepted cells, sites and page."""
 
     def work() -> None:
         from arcor2_server.fleet.accounts import fleet_accounts
@@ -176,14 +195,14 @@ def list_members(*, data_dir: DataDir = None) -> int:
 
 
 def revoke(name: str, *, data_dir: DataDir = None) -> int:
-    """At the broker: revoke the credentials of a cell or site.
+    """At the broker: revoke the credentials of a cell, site or page.
 
     The broker disconnects it at once. Pair it again to use it again.
 
     Parameters
     ----------
     name
-        Name of the cell or site.
+        Name of the cell, site or page.
     """
 
     def work() -> None:

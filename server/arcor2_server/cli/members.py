@@ -1,4 +1,4 @@
-"""Commands for the members of a broker: nodes of a server, and cells and sites of the fleet."""
+"""Commands for the members of a broker: nodes of a server, and cells, sites and the page of the fleet."""
 
 import asyncio
 import logging
@@ -22,7 +22,7 @@ from arcor2_server.settings import ServerSettings
 
 if TYPE_CHECKING:
     from arcor2_server.nodes.accounts import Accounts
-    from arcor2_server.nodes.credentials import Credentials
+    from arcor2_server.nodes.credentials import Credentials, MemberKind
 
 
 def run(group: str, work: Callable[[], Any]) -> int:
@@ -83,8 +83,8 @@ def accept(
     name: str,
     host: str | None,
     port: int | None,
+    kind: "MemberKind",
     *,
-    site: bool = False,
     same_version: bool = True,
 ) -> None:
     """Show a code, wait for a member that knows it, and accept it.
@@ -97,7 +97,7 @@ def accept(
         name: of the member.
         host: address to listen on; None for all.
         port: port to listen on; None for the default one.
-        site: whether it is the broker of a site.
+        kind: what it is.
         same_version: whether its version must be that of this computer.
 
     Raises:
@@ -106,11 +106,11 @@ def accept(
     """
     from arcor2_server.nodes import pairing
 
-    accounts.check_new(name, site=site)
+    accounts.check_new(name, kind)
     where = urlsplit(accounts.url()).hostname
 
     def accepted(key: str, address: str) -> "Credentials":
-        return accounts.accept(name, key, address, site=site)
+        return accounts.accept(name, key, address, kind)
 
     async def waiting() -> str:
         invitation = pairing.Invitation(name, accepted, same_version=same_version)
@@ -151,11 +151,12 @@ def show(accounts: "Accounts", empty: str, *, kinds: bool = False) -> None:
     Args:
         accounts: have accepted them.
         empty: text if there are none.
-        kinds: whether to show which ones are sites.
+        kinds: whether to show what each one is.
 
     Raises:
         StorageError: the file cannot be used.
     """
+    from arcor2_server.nodes.credentials import MemberKind
     from arcor2_server.nodes.pairing import short_key
 
     members = accounts.members()
@@ -165,7 +166,7 @@ def show(accounts: "Accounts", empty: str, *, kinds: bool = False) -> None:
     kind = ("kind",) if kinds else ()
     table = Table("name", *kind, "key", "accepted", "from", box=None, pad_edge=False)
     for name, member in sorted(members.items()):
-        shown = ("site" if member.site else "cell",) if kinds else ()
+        shown = ("cell" if member.kind is MemberKind.MEMBER else member.kind,) if kinds else ()
         table.add_row(name, *shown, short_key(member.key), member.accepted[:16], member.address)
     console().print(table)
 

@@ -195,8 +195,10 @@ def accept(
     """
 
     def work() -> None:
+        from arcor2_server.nodes.credentials import MemberKind
+
         settings = _settings(data_dir)
-        members.accept(settings, _accounts(settings), "node", "on the node", name, host, port)
+        members.accept(settings, _accounts(settings), "node", "on the node", name, host, port, MemberKind.MEMBER)
 
     return _run(work)
 

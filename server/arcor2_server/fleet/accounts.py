@@ -1,8 +1,10 @@
 """Who may connect to the broker of the fleet, and the broker's configuration. It needs the extra `nodes`.
 
-Cells and brokers of sites are members of the account, as nodes are of that of a server.
+Cells, brokers of sites, and the server of the page on another computer are members of the account, as nodes are of that
+of a server.
 """
 
+from pathlib import Path
 from typing import Final
 
 import msgspec
@@ -12,7 +14,7 @@ from arcor2_server.files import DIRECTORY_MODE, write_private
 from arcor2_server.fleet.records import PREFIX, STATES, answer_subject, stream_name
 from arcor2_server.nodes.accounts import Accounts, Members, listening_address
 from arcor2_server.nodes.claims import Rights
-from arcor2_server.nodes.credentials import Credentials, check_name, require_tls
+from arcor2_server.nodes.credentials import Credentials, MemberKind, check_name, require_tls
 from arcor2_server.settings import ServerSettings
 
 HUB_FILE: Final = "hub.creds"
@@ -30,15 +32,23 @@ _CREDENTIALS: Final = """-----BEGIN NATS USER JWT-----
 """Content of a file of credentials, as nats-server reads it."""
 _ANSWERS: Final = "_INBOX.>"
 """Subjects of answers to the server of the page, which no cell may publish."""
+SERVER: Final = Rights(
+    [f"$JS.{api}.{what}" for api in ("API", "*.API") for what in ("CONSUMER.>", "STREAM.CREATE.>", "STREAM.INFO.>")]
+    + ["$JS.ACK.>"],
+    [STATES, _ANSWERS],
+)
+"""Rights of the server of the page. It can create the streams of cells and read them, and publish nothing to cells."""
 
 
-def member_rights(name: str, site: bool) -> Rights:
-    """Return the rights of a cell or of the broker of a site.
+def member_rights(name: str, kind: MemberKind) -> Rights:
+    """Return the rights of a cell, of the broker of a site, or of the server of the page on another computer.
 
     A cell may ask JetStream only for the domain and for its own stream. It may not create the stream: the configuration
     of a stream can name subjects of other cells. A site may publish states of any cell, and is asked for its results.
     """
-    if site:
+    if kind is MemberKind.PAGE:
+        return SERVER
+    if kind is MemberKind.SITE:
         return Rights([STATES, _ANSWERS], [f"$JS.{name}.API.>", f"$JS.ACK.{name}.>"], leaf=True)
     own = f"{PREFIX}.{name}"
     return Rights(
@@ -46,18 +56,17 @@ def member_rights(name: str, site: bool) -> Rights:
     )
 
 
-SERVER: Final = Rights(
-    [f"$JS.{api}.{what}" for api in ("API", "*.API") for what in ("CONSUMER.>", "STREAM.CREATE.>", "STREAM.INFO.>")]
-    + ["$JS.ACK.>"],
-    [STATES, _ANSWERS],
-)
-"""Rights of the server of the page. It can create the streams of cells and read them, and publish nothing to cells."""
 FLEET: Final = Members("fleet", member_rights, SERVER)
 
 
 def fleet_accounts(settings: ServerSettings) -> Accounts:
-    """Return the accounts in the data directory of the server of the page, or of a site."""
+    """Return the accounts in the data directory of the computer of the broker."""
     return Accounts(settings, FLEET)
+
+
+def paired_page(settings: ServerSettings) -> Path:
+    """Return the file with the credentials of a page's server that was paired with a broker on another computer."""
+    return settings.broker_dir / "page.json"
 
 
 def set_up(

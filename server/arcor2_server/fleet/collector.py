@@ -63,11 +63,11 @@ class Collector:
     """The states and results of all cells.
 
     Args:
-        broker: address and credentials of the broker.
+        broker: returns address and credentials of the broker, before each attempt to connect.
         file: stores cells and results.
     """
 
-    def __init__(self, broker: Credentials, file: FleetFile) -> None:
+    def __init__(self, broker: Callable[[], Credentials], file: FleetFile) -> None:
         self._broker, self._file = broker, file
         self.registry = Registry(file.cells())
         self.connected = False
@@ -84,7 +84,7 @@ class Collector:
 
     def start(self) -> None:
         """Start to receive."""
-        connecting = keep_connected(lambda: self._broker, "arcor2-hw fleet", self._receive, self._lost)
+        connecting = keep_connected(self._broker, "arcor2-hw fleet", self._receive, self._lost)
         self._background.spawn(connecting, "connection to the broker")
         self._background.spawn(self._watch(), "cells without a signal")
         self._background.spawn(self._save(), "stored cells")

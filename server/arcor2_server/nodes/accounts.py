@@ -1,4 +1,4 @@
-"""The keys of the server, and the members that it has accepted: nodes, or cells and sites of the fleet.
+"""The keys of the server, and the members that it has accepted: nodes, or cells, sites and the page of the fleet.
 
 The broker trusts one operator key. The operator signs two accounts: one in which the server, its members and other
 services exchange messages, and one of the broker itself, over which the server revokes users.
@@ -20,7 +20,7 @@ from arcor2_server.files import DIRECTORY_MODE, FILE_MODE, write_private
 from arcor2_server.nodes import claims
 from arcor2_server.nodes.claims import Rights
 from arcor2_server.nodes.connections import connect_client
-from arcor2_server.nodes.credentials import Credentials, address_of, check_name, load, require_tls
+from arcor2_server.nodes.credentials import Credentials, MemberKind, address_of, check_name, load, require_tls
 from arcor2_server.nodes.lanes import PREFIX
 from arcor2_server.nodes.nkeys import Kind, SigningKey
 from arcor2_server.settings import ServerSettings, is_loopback
@@ -35,26 +35,25 @@ UPDATE_TIMEOUT: Final = 2.0
 class Members(NamedTuple):
     """What the members of an account are.
 
-    command: the group of commands for them. rights: returns those of a member, or of the broker of a site, by its name.
+    command: the group of commands for them. rights: returns those of a member by its name and kind.
     server: rights of the server; None for everything in the account.
     """
 
     command: str
-    rights: Callable[[str, bool], Rights]
+    rights: Callable[[str, MemberKind], Rights]
     server: Rights | None = None
 
 
 class AcceptedMember(msgspec.Struct, frozen=True):
     """A member that may connect.
 
-    key: its public key. accepted: when (UTC). address: of its computer at that time. site: whether it is the broker of
-    a site.
+    key: its public key. accepted: when (UTC). address: of its computer at that time. kind: what it is.
     """
 
     key: str
     accepted: str
     address: str = ""
-    site: bool = False
+    kind: MemberKind = MemberKind.MEMBER
 
 
 class _State(msgspec.Struct):
@@ -81,7 +80,7 @@ class _Answer(msgspec.Struct, frozen=True):
     error: dict[str, object] | None = None
 
 
-def node_rights(name: str, _site: bool) -> Rights:
+def node_rights(name: str, _kind: MemberKind) -> Rights:
     """Return the rights of a node.
 
     The server must not answer messages of nodes: the broker does not check the subject for an answer, which could be
@@ -170,24 +169,24 @@ class Accounts:
         """Return the accepted members by name. Raise StorageError if the file cannot be used."""
         return self._load().nodes if self._file.exists() else {}
 
-    def check_new(self, name: str, *, site: bool = False) -> None:
+    def check_new(self, name: str, kind: MemberKind = MemberKind.MEMBER) -> None:
         """Check that a member can be accepted.
 
         Raises:
             InvalidData: the text is not a name.
             NotFound: the broker has not been set up.
-            Conflict: the name is used, or the broker does not accept sites.
+            Conflict: the name is used, the broker does not accept sites, or it has accepted a server of the page.
         """
-        self._check(name, self._load(), site)
+        self._check(name, self._load(), kind)
 
-    def accept(self, name: str, key: str, address: str, *, site: bool = False) -> Credentials:
+    def accept(self, name: str, key: str, address: str, kind: MemberKind = MemberKind.MEMBER) -> Credentials:
         """Accept a member; return its credentials without its private key.
 
         Args:
             name: its name.
             key: its public key.
             address: where it is, for the list.
-            site: whether it is the broker of a site.
+            kind: what it is.
 
         Raises:
             InvalidData, NotFound, Conflict: as of `check_new`.
@@ -195,11 +194,11 @@ class Accounts:
         """
         with self._locked():
             state = self._load()
-            self._check(name, state, site)
-            state.nodes[name] = AcceptedMember(key, now(), address, site)
+            self._check(name, state, kind)
+            state.nodes[name] = AcceptedMember(key, now(), address, kind)
             self._save(state)
-        claim = claims.user(SigningKey.from_seed(state.account), key, name, self._members.rights(name, site))
-        return Credentials(state.sites if site else state.url, state.authority, claim, leaf=site)
+        claim = claims.user(SigningKey.from_seed(state.account), key, name, self._members.rights(name, kind))
+        return Credentials(state.sites if kind is MemberKind.SITE else state.url, state.authority, claim, kind=kind)
 
     async def revoke(self, name: str) -> None:
         """Revoke a member. The broker ends its connections at once.
@@ -245,7 +244,7 @@ class Accounts:
         if found.error is not None:
             raise ConnectionLost("The broker does not accept the change.", str(found.error))
 
-    def _check(self, name: str, state: _State, site: bool) -> None:
+    def _check(self, name: str, state: _State, kind: MemberKind) -> None:
         check_name(name)
         command = self._members.command
         if name in state.nodes:
@@ -254,7 +253,15 @@ class Accounts:
                 name=name,
                 command=command,
             )
-        if site and not state.sites:
+        pages = [each for each, member in state.nodes.items() if member.kind is MemberKind.PAGE]
+        if kind is MemberKind.PAGE and pages:
+            raise Conflict(
+                "{name} is the server of the page already. There can be one only, because each result is delivered "
+                "once. Revoke it first: arcor2-hw {command} revoke {name}",
+                name=pages[0],
+                command=command,
+            )
+        if kind is MemberKind.SITE and not state.sites:
             raise Conflict(
                 "The broker accepts no sites. Run `arcor2-hw {command} broker` with --sites first.", command=command
             )

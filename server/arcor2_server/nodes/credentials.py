@@ -4,6 +4,7 @@ import base64
 import re
 import ssl
 from collections.abc import Mapping
+from enum import StrEnum, auto
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -18,19 +19,30 @@ from arcor2_server.nodes.nkeys import SigningKey
 from arcor2_server.settings import is_loopback
 
 
+class MemberKind(StrEnum):
+    """What a member of the account of a broker is."""
+
+    MEMBER = auto()
+    """A node, or a cell of the fleet."""
+    SITE = auto()
+    """The broker of a site of the fleet."""
+    PAGE = auto()
+    """The server of the page of the fleet."""
+
+
 class Credentials(msgspec.Struct, frozen=True):
     """Address and credentials of the broker.
 
     url: address, with tls:// unless the broker is on this computer. authority: certificates to trust (PEM); empty for
     those that the system trusts. claim: signed by the server; empty without. seed: private key of this computer.
-    leaf: whether a broker uses them, which connects as a leaf node.
+    kind: what this computer is for the broker; that of a site connects as a leaf node.
     """
 
     url: str
     authority: str = ""
     claim: str = ""
     seed: str = ""
-    leaf: bool = False
+    kind: MemberKind = MemberKind.MEMBER
 
     def __repr__(self) -> str:
         return f"Credentials({address_of(self.url)})"

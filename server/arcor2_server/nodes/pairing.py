@@ -1,6 +1,6 @@
 """Pairing: with a one-time code, a node and the server prove to each other who they are.
 
-Cells and sites of the fleet pair in the same manner.
+Cells, sites and the page of the fleet pair in the same manner.
 
 The server listens with TLS and a certificate made for this pairing. Both ends prove that they know the code, with HMACs
 of the certificate that each of them sees and of what they send. A computer in the middle needs another certificate, so

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import nats
 import pytest
+from msgspec.structs import replace
 from nats.aio.client import Client
 from nats.aio.msg import Msg
 
@@ -15,9 +16,9 @@ from arcor2_hw.exceptions import Conflict
 from arcor2_server.access.authority import Authority
 from arcor2_server.cli import fleet_members as cli
 from arcor2_server.cli.exit_status import ExitStatus
-from arcor2_server.fleet.accounts import fleet_accounts, save_hub, set_up
+from arcor2_server.fleet.accounts import fleet_accounts, paired_page, save_hub, set_up
 from arcor2_server.fleet.records import answer_subject, state_subject, stream_name
-from arcor2_server.nodes.credentials import Credentials, load
+from arcor2_server.nodes.credentials import Credentials, MemberKind, load
 from arcor2_server.nodes.nkeys import Kind, SigningKey
 from arcor2_server.settings import ServerSettings
 from arcor2_server.storage import Storage
@@ -69,10 +70,10 @@ class Hub:
         self.process = subprocess.Popen((NATS_SERVER, "-c", str(config), "-l", str(log)))
         wait_for(lambda: listens(self.port))
 
-    def accept(self, name: str, *, site: bool = False) -> Credentials:
+    def accept(self, name: str, kind: MemberKind = MemberKind.MEMBER) -> Credentials:
         key = SigningKey.create(Kind.USER)
-        found = self.accounts.accept(name, key.public, "127.0.0.1", site=site)
-        return Credentials(found.url, found.authority, found.claim, key.seed, leaf=site)
+        found = self.accounts.accept(name, key.public, "127.0.0.1", kind)
+        return replace(found, seed=key.seed)
 
     def end(self) -> None:
         self.process.kill()
@@ -127,13 +128,15 @@ FORBIDDEN = (
 )  # fmt: skip
 
 
-async def test_a_cell_publishes_only_under_its_own_name(hub: Hub) -> None:
+@pytest.mark.parametrize("elsewhere", [False, True])
+async def test_a_cell_publishes_only_under_its_own_name(hub: Hub, elsewhere: bool) -> None:
+    """The page's server has the same rights on the computer of the broker and elsewhere."""
     received: list[str] = []
 
     async def receive(message: Msg) -> None:
         received.append(message.subject)
 
-    page = load(hub.settings.broker_credentials)
+    page = hub.accept("page", MemberKind.PAGE) if elsewhere else load(hub.settings.broker_credentials)
     async with connected(page) as here, connected(hub.accept(CELL), CELL) as press:
         stream = here.client.jetstream(domain="hub")
         for cell in ("oven", CELL):
@@ -173,7 +176,7 @@ async def reached(read: Callable[[], int], expected: int) -> None:
 
 async def test_a_site_delivers_states_and_results_and_is_revoked(hub: Hub, tmp_path: Path) -> None:
     site = Hub(tmp_path / "brno", "brno")
-    save_hub(site.settings, "brno", hub.accept("brno", site=True))
+    save_hub(site.settings, "brno", hub.accept("brno", MemberKind.SITE))
     with pytest.raises(Conflict, match="Use --domain brno"):
         set_up(site.settings, site.sites, "", domain="hub", certificate="", key_file="", folder="/unused")
     site.start()
@@ -192,7 +195,7 @@ async def test_a_site_delivers_states_and_results_and_is_revoked(hub: Hub, tmp_p
         await cell.units.put([unit(2)])
         await cell.sent()
         site.end()
-        save_hub(site.settings, "brno", hub.accept("brno", site=True))
+        save_hub(site.settings, "brno", hub.accept("brno", MemberKind.SITE))
         site.start()
         await until(fleet.numbers, [1, 2])
         # The site revokes its cells itself.
@@ -206,10 +209,46 @@ async def test_a_site_delivers_states_and_results_and_is_revoked(hub: Hub, tmp_p
 
 
 # ---------------------------------------------------------------------------------------------------- command line
+async def test_the_page_is_served_by_another_computer(hub: Hub, tmp_path: Path) -> None:
+    """It is paired again after a revocation, without being restarted."""
+    page = ServerSettings(data_dir=tmp_path / "page")
+
+    def pair() -> None:
+        run, said = paired_by_commands("fleet", "page", hub.settings.data_dir, page.data_dir, "--page")
+        assert run.startswith("Run on the computer of the page: ")
+        assert said.endswith("arcor2-hw fleet serve\n")
+
+    await asyncio.to_thread(pair)
+    assert paired_page(page).stat().st_mode & 0o077 == 0
+    assert not page.broker_credentials.exists()
+    with pytest.raises(Conflict, match=r"page is the server of the page already.* fleet revoke page"):
+        hub.accounts.check_new("second", MemberKind.PAGE)
+    fleet = FleetProcess("", page.data_dir)
+    storage = await Storage.open(ServerSettings(data_dir=tmp_path))
+    cell = SmallCell(storage, hub.accept(CELL), "hub")
+    try:
+        await cell.units.put([unit(1)])
+        await until(fleet.numbers, [1])
+        alive = lambda: [each["alive"] for each in fleet.cells()]  # noqa: E731
+        await until(alive, [True])
+        await hub.accounts.revoke("page")
+        await until(alive, [False])
+        await cell.units.put([unit(2)])
+        await cell.sent()
+        await asyncio.to_thread(pair)
+        await until(fleet.numbers, [1, 2])
+        await until(alive, [True])
+    finally:
+        await cell.close()
+        await storage.close()
+        fleet.kill()
+
+
 def test_a_technician_pairs_lists_and_revokes(hub: Hub, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     for name, options, saved in (
         (CELL, (), "fleet/press-3.json"),
         ("brno", ("--site",), "broker/hub.creds"),
+        ("screen", ("--page",), "broker/page.json"),
     ):
         paired_by_commands("fleet", name, hub.settings.data_dir, tmp_path / name, *options)
         assert (tmp_path / name / saved).stat().st_mode & 0o077 == 0
@@ -217,8 +256,11 @@ def test_a_technician_pairs_lists_and_revokes(hub: Hub, tmp_path: Path, capfd: p
     assert not ServerSettings(data_dir=tmp_path / CELL, cell_name="press-4").in_fleet
     capfd.readouterr()
     assert cli.list_members(data_dir=hub.settings.data_dir) == ExitStatus.OK
-    assert [line.split()[:2] for line in capfd.readouterr().out.splitlines()[1:]] == [["brno", "site"], [CELL, "cell"]]
+    listed = [line.split()[:2] for line in capfd.readouterr().out.splitlines()[1:]]
+    assert listed == [["brno", "site"], [CELL, "cell"], ["screen", "page"]]
     assert cli.revoke(CELL, data_dir=hub.settings.data_dir) == ExitStatus.OK
     assert cli.revoke(CELL, data_dir=hub.settings.data_dir) == ExitStatus.NOT_FOUND
     assert "arcor2-hw fleet: press-3 has not been accepted." in capfd.readouterr().err
     assert cli.accept("press 3", data_dir=hub.settings.data_dir) == ExitStatus.USAGE
+    assert cli.accept("other", site=True, page=True, data_dir=hub.settings.data_dir) == ExitStatus.USAGE
+    assert cli.accept("other", page=True, data_dir=hub.settings.data_dir) == ExitStatus.CONFLICT
