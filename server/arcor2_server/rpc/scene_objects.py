@@ -87,29 +87,37 @@ class SceneObjectRequests:
         async with self._locks.auto(context.user, SCENE):
             self._session.require_scene_alone()
             self._online.require_offline()
-            await self._add_object(context, args)
+            await self._add_object(context, self._new_object(args))
 
     @rpc("AddSceneObject")
     async def add_scene_object(self, context: Context, args: AddObjectToSceneArgs) -> None:
         """Add an object also while a project is open or the scene is online; then it is connected, too."""
         async with self._locks.auto(context.user, SCENE):
             self._session.require_scene_open()
-            added = SceneObject(args.name, args.type, node=args.node or UNSET)
-            await self._online.prepare_addition(added, dry_run=context.dry_run)
-            obj = await self._add_object(context, args)
+            obj = self._new_object(args)
+            await self._online.prepare_addition(obj, dry_run=context.dry_run)
+            obj = await self._add_object(context, obj)
         if not context.dry_run and self._online.online:
             self._online.connect_added(obj)
 
-    async def _add_object(self, context: Context, args: AddObjectToSceneArgs) -> SceneObject:
-        obj = SceneObject(args.name, args.type, args.pose, id=new_id("obj"), node=args.node or UNSET)
-        obj = replace(obj, parameters=await self._editing.hide_secrets(context, obj, args.parameters))
+    def _new_object(self, args: AddObjectToSceneArgs) -> SceneObject:
+        """Return the object that a request adds, with its settings as sent. Raise Arcor2Error if it is invalid."""
+        obj = SceneObject(args.name, args.type, args.pose, args.parameters, new_id("obj"), args.node or UNSET)
+        self._check(obj)
+        return obj
+
+    async def _add_object(self, context: Context, obj: SceneObject) -> SceneObject:
+        obj = replace(obj, parameters=await self._editing.hide_secrets(context, obj, obj.parameters))
         await self._add(context, obj)
         return obj
 
-    async def _add(self, context: Context, obj: SceneObject) -> None:
+    def _check(self, obj: SceneObject) -> None:
         self._editing.require_name_free(Kind.OBJECT, obj.name, "an object")
         if problems := object_problems(obj, self._types):
             raise InvalidData(Message.joined(problems))
+
+    async def _add(self, context: Context, obj: SceneObject) -> None:
+        self._check(obj)
         await self._editing.commit_one(context, self._session.document.add(Kind.OBJECT, obj.id, obj))
 
     @rpc("AddVirtualCollisionObjectToScene")

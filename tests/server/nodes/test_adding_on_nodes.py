@@ -90,6 +90,7 @@ async def test_a_request_names_the_node_of_an_added_object(
 
         for name, kind, where, error, reason in (
             ("away", "Clock", "saw", Arcor2Error, r"The node saw is not connected\."),
+            ("first", "Clock", NODE, Arcor2Error, "first"),
             ("second_arm", "Arm", NODE, SeveralNodes, r"on one computer: arm .*, second_arm \(node press\)\."),
         ):
             with pytest.raises(error, match=reason):
