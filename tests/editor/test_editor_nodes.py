@@ -68,18 +68,25 @@ async def test_a_device_is_set_on_a_node_that_is_lost(node: Node, served: Cell, 
         while (added := (await client.next_event("SceneObjectChanged")).data).type != "RandomActions":
             continue
         assert added.node == "press"
-        while (state := (await client.next_event("ObjectState")).data).state != "online":
-            assert state.state != "failed"
+        reached = ""
+        while reached != "online":
+            state = (await client.next_event("ObjectState")).data
+            reached = state.state if state.object_id == added.id else ""
+            assert reached != "failed", state
         await client.call("StopScene")
         while (await client.next_event("SceneState")).data.state != "stopped":
             continue
+        await screen.press(texts.DUPLICATE)
+        while (copy := (await client.next_event("SceneObjectChanged")).data).name == added.name:
+            continue
+        assert copy.node == "press", "the copy runs where the original does"
 
         await tools.get_by_role("button", name=texts.OBJECTS, exact=True).click()
         await page.get_by_role("treegrid", name="Without a pose").get_by_role("row").filter(has_text="clock").click()
         await page.get_by_label("Runs on").select_option("press")
         await tools.get_by_role("button", name=texts.DEVICES, exact=True).click()
         row = page.get_by_role("region", name="Nodes").get_by_role("listitem").filter(has_text="press")
-        await expect(row).to_contain_text("Devices of this scene: clock, random_actions")
+        await expect(row).to_contain_text("Devices of this scene: clock, random_actions, random_actions_2")
         await expect(row.locator(".tag")).to_have_text("connected")
 
         for name, where in (("left", "press"), ("right", "")):
