@@ -33,7 +33,7 @@ from arcor2_server.mqtt.service import Mqtt
 from arcor2_server.plant import process
 from arcor2_server.plant.process import PlantProcess
 from arcor2_server.settings import MqttSettings
-from tests.server.mqtt.brokers import Broker, Mosquitto, Nats, nats_version
+from tests.server.mqtt.brokers import Broker, Mosquitto, Nats
 from tests.server.mqtt.host import Host
 from tests.server.mqtt.test_mqtt_server import until
 from tests.server.opcua.plant_client import client_certificate
@@ -214,9 +214,6 @@ async def test_the_session_number_continues_after_a_restart(mosquitto: Broker, t
     host.end()
 
 
-@pytest.mark.skipif(
-    nats_version() < (2, 10), reason="the namespace spBv1.0 contains a dot: NATS supports it from 2.10 on"
-)
 async def test_sparkplug_over_nats(nats: Broker, tmp_path: Path) -> None:
     host = Host(nats.port, "spBv1.0/plant/#")
     async with publishing(EdgeNode, nats.port, tmp_path, "nats", "scada") as cell:
