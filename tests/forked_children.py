@@ -19,7 +19,7 @@ from tests.forking import Forker, awaited
 ADDRESS: Final = "ARCOR2_HW_TEST_FORKING_PROCESS"
 """Environment variable of a forked server: the address of the process that forks its children."""
 IMPORTS: Final = {
-    "arcor2_hw.runtime.host": ("arcor2_hw.runtime.host", "numpy"),
+    "arcor2_hw.runtime.host": ("arcor2_hw.runtime.host", "numpy", "pinocchio", "coal"),
     "arcor2_hw.compute": ("arcor2_hw.compute.worker", "arcor2_hw.compute.kinematics_functions"),
     "arcor2_server.nodes.relay": ("arcor2_server.nodes.relay",),
     "arcor2_hw.opcua": ("arcor2_hw.opcua.process",),
