@@ -1,5 +1,6 @@
 """The fake tester from the host's side: pymodbus and the registers of the device page."""
 
+import contextlib
 import logging
 import struct
 import time
@@ -24,6 +25,9 @@ class Host:
         host, port = address.split(":")
         self.client = ModbusTcpClient(host, port=int(port), timeout=timeout, retries=0)
         assert self.client.connect()
+
+    def close(self) -> None:
+        self.client.close()
 
     def inputs(self) -> list[int]:
         answer = self.client.read_input_registers(0, count=17, device_id=1)
@@ -75,9 +79,8 @@ def tester(one_tester: FakeProcess) -> FakeProcess:
 
 @pytest.fixture
 def host(tester: Any) -> Iterator[Host]:
-    host = Host(tester.ready["modbus"])
-    yield host
-    host.client.close()
+    with contextlib.closing(Host(tester.ready["modbus"])) as host:
+        yield host
 
 
 def load(tester: Any, host: Host, wait_for: Callable[..., Any], code: str, defect: str | None = None) -> None:
@@ -205,20 +208,24 @@ def test_hold_stop_and_abort_give_no_result(tester: Any, host: Host, wait_for: C
     assert not host.switches[3]
 
 
-def test_the_door_stays_closed_during_a_test(tester: Any, host: Host, wait_for: Callable[..., Any]) -> None:
-    ready_to_start(tester, host, wait_for)
-    host.command(START)
-    wait_for(lambda: host.state, lambda state: state == EXECUTE)
-    result = host.inputs()[2]
-    host.door(1)
-    assert host.switches[:2] == [False, True]
-    assert host.inputs()[2] == result
-    with pytest.raises(Exception, match="door is closed"):
-        tester.control.do("take_board")
-    tester.control.do("push_door", opening=True)
-    wait_for(lambda: host.state, lambda state: state == ABORTED)
-    assert host.inputs()[3] == 102
-    assert tester.truth()["tested"] == 0
+def test_the_door_stays_closed_during_a_test(wait_for: Callable[..., Any]) -> None:
+    with (
+        FakeProcess("functional_tester", "--time-scale", "20", "--test-time", "200") as tester,
+        contextlib.closing(Host(tester.ready["modbus"])) as host,
+    ):
+        ready_to_start(tester, host, wait_for)
+        host.command(START)
+        wait_for(lambda: host.state, lambda state: state == EXECUTE)
+        result = host.inputs()[2]
+        host.door(1)
+        assert host.switches[:2] == [False, True]
+        assert host.inputs()[2] == result
+        with pytest.raises(Exception, match="door is closed"):
+            tester.control.do("take_board")
+        tester.control.do("push_door", opening=True)
+        wait_for(lambda: host.state, lambda state: state == ABORTED)
+        assert host.inputs()[3] == 102
+        assert tester.truth()["tested"] == 0
 
 
 def test_a_board_goes_in_only_through_an_open_door(tester: Any, host: Host, wait_for: Callable[..., Any]) -> None:
