@@ -31,12 +31,22 @@ class PeriodicTimer:
         self._fd: int = libc.timerfd_create(time.CLOCK_MONOTONIC, _TFD_NONBLOCK | _TFD_CLOEXEC)
         if self._fd < 0:
             raise OSError(ctypes.get_errno(), "timerfd_create")
-        nanoseconds = round(period * 1e9)
-        each = _Timespec(nanoseconds // 1_000_000_000, nanoseconds % 1_000_000_000)
-        if libc.timerfd_settime(self._fd, 0, ctypes.byref(_Itimerspec(each, each)), None) < 0:
-            raise OSError(ctypes.get_errno(), "timerfd_settime")
+        self._libc = libc
+        self._period = period
         self._tick = tick
         self._count = struct.Struct("@Q")
+        self._periods = 0
+        self.every(1)
+
+    def every(self, periods: int) -> None:
+        """Tick only once in so many periods from now on."""
+        if periods == self._periods:
+            return
+        self._periods = periods
+        nanoseconds = round(self._period * periods * 1e9)
+        each = _Timespec(nanoseconds // 1_000_000_000, nanoseconds % 1_000_000_000)
+        if self._libc.timerfd_settime(self._fd, 0, ctypes.byref(_Itimerspec(each, each)), None) < 0:
+            raise OSError(ctypes.get_errno(), "timerfd_settime")
 
     def start(self) -> None:
         """Start in the running event loop."""
@@ -51,4 +61,4 @@ class PeriodicTimer:
 
     def _expired(self) -> None:
         with contextlib.suppress(BlockingIOError):
-            self._tick(self._count.unpack(os.read(self._fd, 8))[0])
+            self._tick(self._count.unpack(os.read(self._fd, 8))[0] * self._periods)
