@@ -39,12 +39,20 @@ def _distributions() -> dict[str, str]:
     found: dict[str, str] = {}
     for distribution in importlib.metadata.distributions():
         name = _SEPARATORS.sub("-", distribution.metadata["Name"]).lower()
-        for path in distribution.files or ():
-            first = path.parts[0]
-            module = first if len(path.parts) > 1 else inspect.getmodulename(first)
+        for first, inside in _top_level(distribution):
+            module = first if inside else inspect.getmodulename(first)
             if module and module.isidentifier():
                 found.setdefault(module, name)
     return found
+
+
+def _top_level(distribution: importlib.metadata.Distribution) -> set[tuple[str, bool]]:
+    """Return the first parts of the paths of a distribution's files, and whether the path has more parts."""
+    if (record := distribution.read_text("RECORD")) is None:  # not installed from a wheel
+        return {(path.parts[0], len(path.parts) > 1) for path in distribution.files or ()}
+    # A path object for each of some ten thousand files would take most of the time.
+    paths = (line.partition(",")[0].strip('"').partition("/") for line in record.splitlines())
+    return {(first, bool(slash)) for first, slash, _ in paths if first}
 
 
 def present(imported: Iterable[str]) -> Versions:
