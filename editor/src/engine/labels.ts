@@ -50,6 +50,8 @@ export class Labels {
     const placed = [...taken];
     this.placed = placed;
     const tried = new Set<string>();
+    // Moved after all sizes were read: each read after a change lays the page out again.
+    const boxes = new Map<HTMLElement, Rect | undefined>();
     const wanted = [...labels].sort((a, b) => b.weight - a.weight);
     for (const label of wanted) {
       if (placed.length >= MAX_LABELS + taken.length || tried.size >= MAX_TRIED) break;
@@ -59,21 +61,20 @@ export class Labels {
       const y = ((1 - at.y) / 2) * height;
       tried.add(label.id);
       const element = this.element(label);
-      const half = element.offsetWidth / 2;
+      const [half, tall] = [element.offsetWidth / 2, element.offsetHeight];
       // Keep the label inside the view.
       const centre = Math.min(Math.max(x, half + 4), Math.max(half + 4, width - half - 4));
       // Above the item, else below it.
-      const box = [y - element.offsetHeight - 8, y + 12]
+      const box = [y - tall - 8, y + 12]
         .map((edge) => Math.max(4, edge))
-        .map((top) => ({ left: centre - half, right: centre + half, top, bottom: top + element.offsetHeight }))
+        .map((top) => ({ left: centre - half, right: centre + half, top, bottom: top + tall }))
         .find((each) => !placed.some((other) => overlap(each, other)));
-      if (!box) {
-        element.style.visibility = "hidden";
-        continue;
-      }
-      element.style.visibility = "visible";
-      element.style.transform = `translate(${Math.round(box.left)}px, ${Math.round(box.top)}px)`;
-      placed.push(box);
+      boxes.set(element, box);
+      if (box) placed.push(box);
+    }
+    for (const [{ style }, box] of boxes) {
+      style.visibility = box ? "visible" : "hidden";
+      if (box) style.transform = `translate(${Math.round(box.left)}px, ${Math.round(box.top)}px)`;
     }
     for (const [id, element] of this.elements) {
       if (tried.has(id)) continue;
@@ -112,7 +113,8 @@ export class Labels {
     badge.hidden = !label.badge;
     if (note.textContent !== label.note) note.textContent = label.note;
     note.hidden = !label.note;
-    element.dataset.selected = String(label.selected);
+    const selected = String(label.selected);
+    if (element.dataset.selected !== selected) element.dataset.selected = selected;
     return element;
   }
 }
