@@ -81,6 +81,21 @@ for (const [name, count] of Object.entries(counted)) {
   WebGL2RenderingContext.prototype[name] = function (...given) {
     return window.__drawing ? draw.apply(this, given) : count(...given);
   };
+}
+// The drawing buffer keeps its first size: a new one takes more time than all other work of a frame that is not drawn.
+for (const side of ["width", "height"]) {
+  const { get, set } = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, side);
+  const wanted = new WeakMap();
+  Object.defineProperty(HTMLCanvasElement.prototype, side, {
+    configurable: true,
+    get() {
+      return wanted.get(this) ?? get.call(this);
+    },
+    set(size) {
+      if (this.dataset.engine && !window.__xrOptions) wanted.set(this, size);
+      else set.call(this, size);
+    },
+  });
 }"""
 _RULES: Final = """async () => {
   const tags = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"];
