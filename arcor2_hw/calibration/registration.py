@@ -20,8 +20,6 @@ MIN_SEEN: Final = 60
 COARSE: Final = 5e-4
 FINE: Final = 1e-5
 """Step size at which a stage ends, m."""
-CANDIDATE_FACTOR: Final = 4.0
-"""Multiple of a stage's reach beyond which a point is not considered again."""
 MIN_INCIDENCE_COSINE: Final = 0.2
 """Cosine of the angle between ray and normal below which a point is not used."""
 
@@ -198,19 +196,21 @@ def refine(model: Model, cloud: Floats, start: Floats, stages: tuple[Stage, ...]
     """
     pose = start
     fit: Fit | None = None
+    measured, gaps = np.zeros_like(cloud), np.zeros(len(cloud))  # where each point was measured last, and its distance
     for stage in stages:
-        kept = np.arange(len(cloud))
         for _ in range(stage.steps):
-            points = cloud[kept] @ pose[:3, :3].T + pose[:3, 3]
+            points = cloud @ pose[:3, :3].T + pose[:3, 3]
+            # Queries take longest, above all for far points. A point comes nearer by no more than it has moved.
+            within = np.flatnonzero(gaps - np.linalg.norm(points - measured, axis=1) < stage.reach)
+            points = measured[within] = points[within]
             targets, normals = model.nearest(points)
             rays = points - pose[:3, 3]
             slope = np.abs(np.einsum("ij,ij->i", normals, rays)) / np.linalg.norm(rays, axis=1)
-            gaps = np.linalg.norm(targets - points, axis=1)
-            near = (slope > MIN_INCIDENCE_COSINE) & (gaps < stage.reach)
+            gaps[within] = np.linalg.norm(targets - points, axis=1)
+            near = (slope > MIN_INCIDENCE_COSINE) & (gaps[within] < stage.reach)
             if np.count_nonzero(near) < MIN_SEEN:
                 return None
-            fit, pose = _fit(pose, points[near], kept[near], targets[near], normals[near], stage.reach)
-            kept = kept[gaps < CANDIDATE_FACTOR * stage.reach]  # nearest-point queries take longest for far points
+            fit, pose = _fit(pose, points[near], within[near], targets[near], normals[near], stage.reach)
             if fit.moved < FINE:
                 break
     return fit

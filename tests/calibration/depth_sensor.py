@@ -9,6 +9,7 @@ are holes, a table and a wall, and next to the arm a gripper and a cable that th
 import itertools
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -148,16 +149,7 @@ class Sensor:
     """x of a wall in the world."""
 
     def rays(self) -> Floats:
-        k1, k2, p1, p2, k3 = self.distortion
-        u, v = np.meshgrid(np.arange(self.width), np.arange(self.height))
-        xd, yd = (u - self.cx) / self.fx, (v - self.cy) / self.fy
-        x, y = xd, yd
-        for _ in range(15):
-            r2 = x * x + y * y
-            radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-            dx, dy = 2 * p1 * x * y + p2 * (r2 + 2 * x * x), p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
-            x, y = (xd - dx) / radial, (yd - dy) / radial
-        return np.stack([x, y, np.ones_like(x)], axis=-1)
+        return _rays(self.width, self.height, self.fx, self.fy, self.cx, self.cy, self.distortion)
 
     def exact(self, world_from_camera: Floats) -> Floats:
         """Return the depth along the optical axis, m; infinite where the ray hits nothing."""
@@ -180,8 +172,11 @@ class Sensor:
 
     def take(self, world_from_camera: Floats, rng: np.random.Generator) -> npt.NDArray[np.uint16]:
         """Return the mean of several noisy pictures, mm; 0 where there is no depth."""
-        z = self.exact(world_from_camera)
-        z = np.where(z < 6.0, z, 0.0).astype(np.float32)
+        return self.noisy(self.exact(world_from_camera), rng)
+
+    def noisy(self, exact: Floats, rng: np.random.Generator) -> npt.NDArray[np.uint16]:
+        """Return the mean of several noisy pictures of exact depths, as `take`."""
+        z = np.where(exact < 6.0, exact, 0.0).astype(np.float32)
         smooth = cv2.GaussianBlur(rng.standard_normal(z.shape).astype(np.float32), (0, 0), 3.0)
         smooth *= self.fixed_noise / smooth.std()
         far, near = cv2.dilate(z, np.ones((3, 3))), cv2.erode(z, np.ones((3, 3)))
@@ -196,6 +191,23 @@ class Sensor:
         mean = np.rint(total / np.maximum(count, 1))
         holes = rng.random(z.shape) < 0.005
         return np.where((count > 0) & ~holes, mean, 0.0).astype(np.uint16)
+
+
+@lru_cache(maxsize=4)
+def _rays(
+    width: int, height: int, fx: float, fy: float, cx: float, cy: float, distortion: tuple[float, ...]
+) -> Floats:
+    """The direction of each pixel's ray, (height, width, 3), with z = 1."""
+    k1, k2, p1, p2, k3 = distortion
+    u, v = np.meshgrid(np.arange(width), np.arange(height))
+    xd, yd = (u - cx) / fx, (v - cy) / fy
+    x, y = xd, yd
+    for _ in range(15):
+        r2 = x * x + y * y
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        dx, dy = 2 * p1 * x * y + p2 * (r2 + 2 * x * x), p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+        x, y = (xd - dx) / radial, (yd - dy) / radial
+    return np.stack([x, y, np.ones_like(x)], axis=-1)
 
 
 def _meet_capsule(shape: Capsule, origin: Floats, rays: Floats) -> Floats:

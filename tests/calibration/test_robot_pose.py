@@ -108,10 +108,10 @@ def test_the_number_of_joint_states_is_checked(three: States) -> None:
 def test_averaged_pictures_reduce_the_error(plain: View) -> None:
     sensor = Sensor(shapes=[*arm(JOINTS), *tool(JOINTS)], wall=-2.0, pictures=1, noise=0.004, fixed_noise=0.0)
     rng = np.random.default_rng(5)
-    stack = np.stack([sensor.take(EYE, rng) for _ in range(5)])
+    exact = sensor.exact(EYE)
+    stack = np.stack([sensor.noisy(exact, rng) for _ in range(5)])
     single = depth_view(stack[0], plain.parameters)
     mean = depth_view(stack, plain.parameters)
-    exact = sensor.exact(EYE)
     inner = (single.depth > 0) & (mean.depth > 0) & (exact < 2.0)
     assert np.std((mean.depth - exact)[inner]) < 0.6 * np.std((single.depth - exact)[inner])
 
