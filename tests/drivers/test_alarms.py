@@ -32,6 +32,8 @@ from tests.fakes.test_every_fake import ARGUMENTS, FOUND
 
 PATIENCE = 15.0
 """Time until a fault is reported, s."""
+EVERY = 0.02
+"""Time between two reports of a device, s."""
 FOLDERS = {each.name: Path(each.folder) for each in declarations.drivers()}
 
 
@@ -113,7 +115,7 @@ async def found_after(fault: Fault, bench: Any, device: Generic) -> list[AlarmRe
         else:
             async with asyncio.timeout(PATIENCE):
                 while not await report_once():
-                    pass
+                    await asyncio.sleep(EVERY)
             error = DeviceTimeout("{device} did not answer", device=device.name)
         failed = replace(error_data(error, device.id), object_name=device.name, object_type=type(device).__name__)
         alarms.failed(failed, 1, "step")
@@ -149,6 +151,7 @@ async def test_lost_connection_is_exactly_one_alarm(bench: Any) -> None:
         async with asyncio.timeout(PATIENCE):
             while not await alarms.find(ListAlarmsArgs(AlarmFilter.ALL)):
                 board.changed(await asyncio.to_thread(report, device))
+                await asyncio.sleep(EVERY)
         board.changed(await asyncio.to_thread(report, device))
         [record] = await alarms.find(ListAlarmsArgs(AlarmFilter.ALL))
     kind = "label_printer-8" if isinstance(bench, ZplPrinterBench) else LOST  # its alarm also names missing labels
