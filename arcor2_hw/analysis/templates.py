@@ -30,6 +30,8 @@ _MARKED: Final = {
 _DATA: Final = frozenset({"NotificationData", "WebApiError"})
 """Data that always contain a text for users."""
 _WORDS: Final = re.compile(r"[A-Za-z]+ [a-z]+")
+_CLASS: Final = re.compile(rb"^[ \t]*class\s+(\w+)\s*\(([^)]*)\)", re.MULTILINE)
+_NAME: Final = re.compile(rb"\w+")
 _TEXTS: Final = frozenset({"message", "template", "texts", "text", "remedy"})
 
 
@@ -73,11 +75,9 @@ def templates(files: Iterable[Path]) -> list[Template]:
     """Return the templates in source files: of errors of `arcor2_hw` and of these files, and of `Message.of`.
 
     Raises:
-        SyntaxError: A file is not valid Python.
+        SyntaxError: A file with a text for users is not valid Python.
     """
-    scans = _scanned(files)
-    errors = dict(_errors_of_library())
-    errors |= _errors((scan for path, scan in scans.items() if LIBRARY not in path.parents), errors)
+    scans, errors = _with_errors(files)
     return [found for path, scan in scans.items() for found in _templates(scan, errors, str(path))]
 
 
@@ -88,11 +88,9 @@ def hard_coded(files: Iterable[Path]) -> list[str]:
     an event or answer gets a text without its key.
 
     Raises:
-        SyntaxError: A file is not valid Python.
+        SyntaxError: A file with a text for users is not valid Python.
     """
-    scans = _scanned(files)
-    errors = dict(_errors_of_library())
-    errors |= _errors((scan for path, scan in scans.items() if LIBRARY not in path.parents), errors)
+    scans, errors = _with_errors(files)
     return [
         f"{path}:{call.lineno} {ast.unparse(call)[:120]}"
         for path, scan in scans.items()
@@ -223,9 +221,36 @@ def _scanned(files: Iterable[Path]) -> dict[Path, _Scan]:
         return {path: _Scan.of(parse(path.read_bytes(), str(path))) for path in files}
 
 
+def _with_errors(files: Iterable[Path]) -> tuple[dict[Path, _Scan], _Errors]:
+    """Return the scans of the files that have texts for users, and the error classes that are known in them."""
+    contents = {path: path.read_bytes() for path in files}
+    errors = dict(_errors_of_library())
+    own = {path: content for path, content in contents.items() if LIBRARY not in path.parents}
+    errors |= _errors(_scanned(_defining_errors(own, errors)).values(), errors)
+    names = [*_MARKED, *_DATA, *(name for name, parameters in errors.items() if parameters)]
+    # Parsing takes much longer than the search for a call. A name in a comment means only that a file is parsed.
+    call = re.compile(rb"\b(?:%s)\s*\(" % "|".join(map(re.escape, names)).encode())
+    return _scanned(path for path, content in contents.items() if call.search(content)), errors
+
+
+def _defining_errors(contents: Mapping[Path, bytes], known: Iterable[str]) -> list[Path]:
+    """Return the files that may define classes derived from known ones, by their text."""
+    classes = {path: _CLASS.findall(content) for path, content in contents.items()}
+    names, found = {name.encode() for name in known}, dict.fromkeys(contents, False)
+    while True:
+        before = len(names)
+        for path, defined in classes.items():
+            derived = {name for name, bases in defined if name in names or names.intersection(_NAME.findall(bases))}
+            names |= derived
+            found[path] |= bool(derived)
+        if len(names) == before:
+            return [path for path, defines in found.items() if defines]
+
+
 @lru_cache(maxsize=1)
 def _errors_of_library() -> _Errors:
-    return _errors(_scanned(sources(LIBRARY)).values(), {_ROOT: ()})
+    contents = {path: path.read_bytes() for path in sources(LIBRARY)}
+    return _errors(_scanned(_defining_errors(contents, [_ROOT])).values(), {_ROOT: ()})
 
 
 def _errors(scans: Iterable[_Scan], known: _Errors) -> dict[str, tuple[str, ...] | None]:
