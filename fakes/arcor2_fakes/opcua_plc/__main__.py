@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import logging
 import sys
 from datetime import UTC, datetime
@@ -146,7 +147,10 @@ def register_commands(fake: Fake, plc: Plc, proxy: Proxy) -> None:
 async def make_server(user: str, password: str, certificate: Path | None, key: Path | None) -> Server:
     """Return the OPC UA stack on a free port; it is not started."""
     server = Server(user_manager=OneUser(user, password) if user else None)
+    gc.disable()  # it would visit the 700,000 objects of the address space repeatedly while they are created
     await server.init()
+    gc.freeze()
+    gc.enable()
     server.set_endpoint("opc.tcp://127.0.0.1:0")
     server.set_server_name("Fake PLC")
     await server.set_build_info("urn:arcor2-hw:fake-plc", "ARCOR2-HW", "Fake PLC 1500", "2.9", "7", datetime.now(UTC))
