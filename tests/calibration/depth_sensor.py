@@ -194,9 +194,7 @@ class Sensor:
 
 
 @lru_cache(maxsize=4)
-def _rays(
-    width: int, height: int, fx: float, fy: float, cx: float, cy: float, distortion: tuple[float, ...]
-) -> Floats:
+def _rays(width: int, height: int, fx: float, fy: float, cx: float, cy: float, distortion: tuple[float, ...]) -> Floats:
     """The direction of each pixel's ray, (height, width, 3), with z = 1."""
     k1, k2, p1, p2, k3 = distortion
     u, v = np.meshgrid(np.arange(width), np.arange(height))

@@ -216,8 +216,8 @@ FAULTS: dict[type[Bench], list[Fault]] = {
         Fault("deaf", {}, "device-5", lambda plc: plc.run_job(1)),
         Fault("stuck", {}, "device-5", lambda plc: plc.run_job(1, 1.5)),
         Fault("stranger", {"number": 77}, "device-3", lambda plc: plc.run_job(1)),
-        Fault("remove", {"name": "Level"}, "device-6", lambda plc: plc.read_analog("level")),
         Fault("restart", {}, "device-3", lambda plc: plc.run_job(1)),
+        Fault("remove", {"name": "Level"}, "device-6", lambda plc: plc.read_analog("level")),  # last: it stays
     ],
     RemoteIOBench: [
         Fault("diagnosis", {"supply_missing": True}, "remote_io-1"),

@@ -25,7 +25,10 @@ from arcor2_server.alarms.service import Alarms
 from arcor2_server.cli.installed_fakes import InstalledFake
 from arcor2_server.hosts.devices import DeviceBoard
 from arcor2_server.websocket.hub import Hub
+from tests import leaks
 from tests.drivers.benches.label_printer_bench import ZplPrinterBench
+from tests.drivers.benches.oak_d_bench import OakDBench
+from tests.drivers.benches.opcua_plc_bench import OpcUaPlcBench
 from tests.drivers.fault_table import CONNECTION, FAULTS, LOST, NO_ALARM, Fault, fake_of
 from tests.fakes.conftest import FakeProcess
 from tests.fakes.test_every_fake import ARGUMENTS, FOUND
@@ -70,21 +73,46 @@ async def recording(device: Generic) -> AsyncIterator[tuple[Alarms, DeviceBoard]
     await alarms.close()
 
 
+SHARED = (OakDBench, OpcUaPlcBench)
+"""Benches whose fake needs a second of processor time to start, and whose reset ends all of its faults."""
+
+
+class Running:
+    """The bench of the last test. The next one has the same bench, if it is about the same driver and may share it."""
+
+    def __init__(self) -> None:
+        self._bench: Any = None
+
+    def of(self, kind: type[Bench]) -> Any:
+        """Return the bench of a driver; end the previous one if it is another."""
+        if type(self._bench) is not kind or kind not in SHARED:
+            self.end()
+            with leaks.outliving_the_test():
+                bench = kind()
+                bench.start()
+                self._bench = bench
+        return self._bench
+
+    def end(self) -> None:
+        if self._bench is not None:
+            self._bench.end()
+        self._bench = None
+
+
 @pytest.fixture(scope="module")
-def running(request: pytest.FixtureRequest) -> Iterator[Any]:
-    """Return a bench that the faults of a driver share."""
-    bench: Bench = request.param()
-    bench.start()
-    yield bench
-    bench.end()
+def running() -> Iterator[Running]:
+    shared = Running()
+    yield shared
+    shared.end()
 
 
 @pytest.fixture
-def bench(running: Any) -> Iterator[Any]:
-    running.reset()
-    yield running
-    running.release()
-    running.reset()
+def bench(running: Running, request: pytest.FixtureRequest) -> Iterator[Any]:
+    bench = running.of(request.param)
+    bench.reset()
+    yield bench
+    bench.release()
+    bench.reset()
 
 
 def failing(action: Callable[[Any], object], device: Generic) -> DeviceError:
@@ -125,9 +153,9 @@ async def found_after(fault: Fault, bench: Any, device: Generic) -> list[AlarmRe
 
 
 @pytest.mark.parametrize(
-    ("running", "fault"),
+    ("bench", "fault"),
     [(bench, fault) for bench, faults in FAULTS.items() for fault in faults],
-    indirect=["running"],
+    indirect=["bench"],
     ids=lambda each: each.__name__ if isinstance(each, type) else str(each),
 )
 async def test_fault_is_exactly_one_alarm(bench: Any, fault: Fault) -> None:
@@ -143,7 +171,7 @@ async def test_fault_is_exactly_one_alarm(bench: Any, fault: Fault) -> None:
     assert record.remedy
 
 
-@pytest.mark.parametrize("running", [bench for bench in FAULTS if fake_of(bench)], indirect=True)
+@pytest.mark.parametrize("bench", [bench for bench in FAULTS if fake_of(bench)], indirect=True)
 async def test_lost_connection_is_exactly_one_alarm(bench: Any) -> None:
     device = await asyncio.to_thread(bench.connected)
     async with recording(device) as (alarms, board):

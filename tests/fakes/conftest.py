@@ -20,13 +20,16 @@ READY_TIMEOUT = 60.0  # s; imports take long on a busy machine, above all OPC UA
 END_TIMEOUT = 30.0  # s
 
 
+IMPORTED_LATER = {"oak_d": ("arcor2_fakes.oak_d.render", "arcor2_fakes.oak_d.sensor")}
+"""Modules that a fake imports only when it needs them, in seconds of processor time."""
+
 _forker = Forker()
 
 
 def start_forked_fake(module: str, arguments: Sequence[str], stderr: IO[Any] | int) -> Forked | subprocess.Popen[bytes]:
     """Start a fake as `python -m arcor2_fakes.MODULE`, forked from a process that has imported it."""
     name = f"arcor2_fakes.{module}"
-    return _forker.start(name, arguments, [f"{name}.__main__"], stderr)
+    return _forker.start(name, arguments, [f"{name}.__main__", *IMPORTED_LATER.get(module, ())], stderr)
 
 
 class FakeProcess:
