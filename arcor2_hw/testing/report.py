@@ -6,6 +6,7 @@ import platform
 import re
 from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -57,7 +58,7 @@ class DeviceRun(Data, frozen=True):
     identity: Identity
     distribution: str
     version: str
-    libraries: dict[str, str]
+    libraries: Mapping[str, str]
     cases: dict[str, CaseResult]
     sources: str = ""
     limits: dict[str, Any] = field(default_factory=dict)
@@ -93,7 +94,8 @@ def digest(folder: Path) -> str:
     return found.hexdigest()
 
 
-def libraries(distribution: str) -> dict[str, str]:
+@lru_cache
+def libraries(distribution: str) -> Mapping[str, str]:
     """Return the installed versions of the requirements of a distribution."""
     found = {}
     try:
