@@ -103,7 +103,7 @@ def tool(joints: list[float]) -> list[Shape]:
     return [Block(pose, (0.10, 0.05, 0.10)), Capsule(forearm.begin + aside, forearm.end + aside, 0.008)]
 
 
-def triangles(capsule: Capsule, around: int = 96, rings: int = 20) -> tuple[Floats, npt.NDArray[np.int64]]:
+def triangles(capsule: Capsule, around: int = 48, rings: int = 10) -> tuple[Floats, npt.NDArray[np.int64]]:
     """A capsule as the triangles that a solver is given: corners lie on the surface, so that it is a little small."""
     axis = capsule.end - capsule.begin
     length = float(np.linalg.norm(axis))
