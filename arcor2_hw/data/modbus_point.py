@@ -30,7 +30,7 @@ FORMATS: Final = {
 }
 """Formats of `struct` by type of a number."""
 LARGEST: Final = {"float32": 3.4028234663852886e38, "float64": sys.float_info.max}
-"""Greatest number by type."""
+"""Maximum number by type."""
 LAST_ADDRESS: Final = 0xFFFF
 WORD_BITS: Final = 16
 MAX_DEBOUNCE_TIME: Final = 10.0

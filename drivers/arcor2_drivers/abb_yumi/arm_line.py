@@ -21,17 +21,17 @@ from arcor2_hw.exceptions import (
 from arcor2_hw.keep_alive import PULSE_PERIOD, KeepAlive, RunningTime
 from arcor2_hw.messages import Message
 
-from .motion_lines import LAST_SEQUENCE, LONGEST_LINE, MEANING, VERSION, Answer, Code, Status, answer, line
+from .motion_lines import MAX_LINE_LENGTH, MAX_SEQUENCE, MEANING, VERSION, Answer, Code, Status, answer, line
 
-ANSWER_WITHIN: Final = 2.0
+ANSWER_TIMEOUT: Final = 2.0
 """Time for an answer that needs no motion, s; the server reads every 20 ms."""
-KEEP_ALIVES: Final = 4
+KEEP_ALIVES_PER_PERIOD: Final = 4
 """Keep-alives per period of the watchdog."""
-LISTENS_AGAIN: Final = 0.1
+RECONNECT_INTERVAL: Final = 0.1
 """Time between two attempts to connect, s."""
-SILENT: Final = 1.0
+KEEP_ALIVE_TIMEOUT: Final = 1.0
 """Time without an answer to a keep-alive after which the connection is lost, s."""
-STOP_ANSWER: Final = 0.8
+STOP_TIMEOUT: Final = 0.8
 """Time for the server to confirm standstill, s: 50 ms until it reads, 0.2 s of braking, and slack."""
 NUMBERS: Final = {"left": 1, "right": 2}
 
@@ -54,7 +54,7 @@ class _Socket:
         if not data:
             raise ConnectionResetError("closed by the controller")
         *lines, self._rest = (self._rest + data).split(b"\n")
-        if len(self._rest) > 2 * LONGEST_LINE:
+        if len(self._rest) > 2 * MAX_LINE_LENGTH:
             raise ConnectionResetError("it sends an endless line")
         return lines
 
@@ -156,9 +156,9 @@ class ArmLine:
                 raw = socket.create_connection((self._host, port), max(until - time.monotonic(), 0.05))
                 break
             except ConnectionRefusedError:  # a program that has just started does not listen yet
-                if time.monotonic() + LISTENS_AGAIN > until:
+                if time.monotonic() + RECONNECT_INTERVAL > until:
                     raise
-                time.sleep(LISTENS_AGAIN)
+                time.sleep(RECONNECT_INTERVAL)
         raw.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         return raw
 
@@ -169,7 +169,7 @@ class ArmLine:
         self._commands, self._watch = _Socket(commands), _Socket(watch)
         message = line(self._next(), Code.KEEP_ALIVE)
         try:
-            self._keep_alive = KeepAlive(watch.fileno(), message, watchdog / KEEP_ALIVES)
+            self._keep_alive = KeepAlive(watch.fileno(), message, watchdog / KEEP_ALIVES_PER_PERIOD)
         except DeviceTimeout:
             self._close()
             raise
@@ -185,7 +185,7 @@ class ArmLine:
                 each.raw.close()
 
     # -------------------------------------------------------------------------------- commands
-    def ask(self, code: Code, *values: float, within: float = ANSWER_WITHIN) -> tuple[float, ...]:
+    def ask(self, code: Code, *values: float, within: float = ANSWER_TIMEOUT) -> tuple[float, ...]:
         """Return the values of the server's answer. Raise DeviceTimeout, CommandRefused or why it ended."""
         with self._asking:
             if self._motion is not None:
@@ -259,14 +259,14 @@ class ArmLine:
             return False
         clock = RunningTime()
         while not stood.wait(0.02):
-            if self.ended is not None or clock() > STOP_ANSWER:
+            if self.ended is not None or clock() > STOP_TIMEOUT:
                 self._stopped.pop(sequence, None)
                 return False
         return True
 
     def _next(self) -> int:
         with self._numbering:
-            self._sequence = self._sequence % LAST_SEQUENCE + 1
+            self._sequence = self._sequence % MAX_SEQUENCE + 1
             return self._sequence
 
     def _send(self, code: Code, values: tuple[float, ...]) -> Command:
@@ -312,8 +312,10 @@ class ArmLine:
                 if each.raw in ready:
                     for raw in each.lines():
                         self._take(answer(raw), each is watch)
-            if self._silent() > SILENT:
-                raise ConnectionLost("{device} has not answered for {silent:g} s.", device=self.who, silent=SILENT)
+            if self._silent() > KEEP_ALIVE_TIMEOUT:
+                raise ConnectionLost(
+                    "{device} has not answered for {silent:g} s.", device=self.who, silent=KEEP_ALIVE_TIMEOUT
+                )
 
     def _take(self, found: Answer, from_watch: bool) -> None:
         if not from_watch:

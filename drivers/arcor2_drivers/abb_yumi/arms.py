@@ -16,7 +16,7 @@ from .settings import ARMS, YumiSettings
 JOINTS: Final = {arm: tuple(f"{unit}_{number}" for number in range(1, 8)) for arm, unit in UNITS.items()}
 """Axes 1 to 7 of each mechanical unit; 7 is the one between 2 and 3, eax_a on the wire."""
 JOINT_LIMITS: Final = {arm: dict(zip(names, LIMITS, strict=True)) for arm, names in JOINTS.items()}
-LIMIT_SLACK: Final = 1e-4
+LIMIT_TOLERANCE: Final = 1e-4
 """Rounding error on the wire of a joint at its limit, rad."""
 
 
@@ -60,7 +60,7 @@ class Arms:
 
     def joint_values(self, joints: list[Joint], arm: str) -> list[float]:
         """Return joint values in the order of the axes. Raise InvalidData or OutOfRange."""
-        return joint_values(f"the {arm} arm of {self.name}", joints, JOINT_LIMITS[arm], LIMIT_SLACK)
+        return joint_values(f"the {arm} arm of {self.name}", joints, JOINT_LIMITS[arm], LIMIT_TOLERANCE)
 
     def within(self, what: str, value: float, low: float, high: float) -> None:
         """Raise OutOfRange, naming robot and parameter, unless a value is in its range."""

@@ -23,9 +23,9 @@ AXES: Final = (1, 3, 4, 6)
 """Frames with their origins at shoulder, elbow, wrist and flange."""
 ANGLE_STEP: Final = 0.05
 """Joint angle between two checked positions, rad."""
-APPROACH: Final = 0.002
+MAX_APPROACH: Final = 0.002
 """Distance by which arms that are too close already may approach further while they separate, m."""
-TIMING: Final = 0.05
+MAX_TIMING_ERROR: Final = 0.05
 """Fraction of a synchronized path by which one arm may be ahead of the other."""
 
 
@@ -85,7 +85,7 @@ class Clearance:
         count = max(len(path) for path in paths.values())
         one, two = (_resampled(capsule_points(arm, paths[arm], self._tools[arm]), count) for arm in ARMS)
         with self._lock:
-            reach = int(np.ceil(TIMING * count))
+            reach = int(np.ceil(MAX_TIMING_ERROR * count))
             gaps = np.full(count, np.inf)
             for shift in range(-reach, reach + 1):
                 at = np.clip(np.arange(count) + shift, 0, count - 1)
@@ -110,7 +110,7 @@ class Clearance:
 
     def _check(self, arm: str, gaps: Array) -> None:
         least = float(gaps.min())
-        if least < min(self._least, float(gaps[0]) - APPROACH):
+        if least < min(self._least, float(gaps[0]) - MAX_APPROACH):
             gap = f"{least * 1e3:.0f} mm" if least > 0.0 else "touching it"
             raise Refused(
                 "{name}: the {arm} arm would come too close to the {other_arm} arm.",

@@ -20,9 +20,9 @@ from .session import ControlSession, await_value, release_mastership, request_ma
 from .settings import ARMS, MAX_PAYLOAD
 from .states import AUTOMATIC, COLLISION, MOTORS_ON, REMEDIES, safety_of
 
-MOTORS_WITHIN: Final = 5.0
+MOTORS_ON_TIMEOUT: Final = 5.0
 """Time the controller may take to switch the motors on, s; a real one takes one or two seconds."""
-RELEASE_WITHIN: Final = 0.5
+RELEASE_TIMEOUT: Final = 0.5
 """Time for releasing control when disconnecting from a controller that is slow or does not answer, s."""
 log = logging.getLogger(__name__)
 
@@ -126,10 +126,10 @@ class Control:
         self._observer.leave()
         with contextlib.ExitStack() as limited:
             if rws is not None:
-                limited.enter_context(rws.all_until(time.monotonic() + RELEASE_WITHIN))
+                limited.enter_context(rws.all_until(time.monotonic() + RELEASE_TIMEOUT))
             self.release()
             if rws is not None and online:
-                rws.logout(RELEASE_WITHIN)  # the controller releases all mastership of the session
+                rws.logout(RELEASE_TIMEOUT)  # the controller releases all mastership of the session
         if rws is not None:
             rws.close()
         self._rws, self._mastership = None, False
@@ -342,7 +342,7 @@ class Control:
 
     def _motors_on(self, rws: Rws) -> None:
         rws.act("/rw/panel/ctrlstate", "setctrlstate", {"ctrl-state": MOTORS_ON})
-        await_value(rws, "/rw/panel/ctrlstate", "ctrlstate", MOTORS_ON, MOTORS_WITHIN, "switch its motors on")
+        await_value(rws, "/rw/panel/ctrlstate", "ctrlstate", MOTORS_ON, MOTORS_ON_TIMEOUT, "switch its motors on")
 
     def set_tool(
         self, arm: str, tcp: Pose, mass: float, cog: tuple[float, float, float], inertia: tuple[float, ...] | None

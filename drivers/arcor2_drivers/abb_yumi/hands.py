@@ -9,9 +9,9 @@ from .control import Control
 from .motion_lines import Code
 from .settings import YumiSettings
 
-HAND_WITHIN: Final = 6.0
+HAND_TIMEOUT: Final = 6.0
 """Time that a command of the hand may take, s; the whole stroke of the fingers takes one or two seconds."""
-HELD: Final = 0.001
+MIN_GRIPPED_WIDTH: Final = 0.001
 """Width between closed fingers from which on they hold a part, m."""
 NOTHING_HELD: Final = "nothing_held"
 
@@ -39,7 +39,7 @@ class Hands:
         """
         assert 1.0 <= force <= 20.0
         width = self._move_fingers(arm, Code.HAND_GRIP, force)
-        if width < HELD:
+        if width < MIN_GRIPPED_WIDTH:
             raise DeviceFault(
                 "The {value} hand of {name} gripped nothing.", fault_code=NOTHING_HELD, value=arm.value, name=self.name
             )
@@ -108,4 +108,4 @@ class Hands:
                 name=self.name,
                 setting=setting,
             )
-        return self._control.current().lines[arm.value].ask(code, *values, within=HAND_WITHIN)
+        return self._control.current().lines[arm.value].ask(code, *values, within=HAND_TIMEOUT)

@@ -21,7 +21,7 @@ from .observer import Observer
 from .session import ControlSession
 from .settings import ARMS
 
-COMPUTE_WITHIN: Final = 3.0
+COMPUTE_TIMEOUT: Final = 3.0
 """Time for the controller to compute, s."""
 
 
@@ -44,8 +44,8 @@ class Kinematics:
     def _describe(self, line: ArmLine, joints: list[float]) -> RobTarget:
         """Return the robtarget of joint values: TCP in the robot's frame, configuration, arm angle."""
         line.ask(Code.STAGE_JOINTS, *to_degrees(joints))
-        x, y, z, angle = line.ask(Code.FORWARD_POSITION, within=COMPUTE_WITHIN)
-        orientation = line.ask(Code.FORWARD_ORIENTATION, within=COMPUTE_WITHIN)
+        x, y, z, angle = line.ask(Code.FORWARD_POSITION, within=COMPUTE_TIMEOUT)
+        orientation = line.ask(Code.FORWARD_ORIENTATION, within=COMPUTE_TIMEOUT)
         pose = pose_from((x, y, z), orientation[:4])
         return RobTarget(pose, Configuration(*map(int, orientation[4:8])), math.radians(angle))
 
@@ -88,4 +88,4 @@ class Kinematics:
     def _inverse(line: ArmLine, tcp: Pose, like: RobTarget) -> list[float]:
         line.ask(Code.STAGE_POSITION, *position_values(tcp), math.degrees(like.arm_angle))
         line.ask(Code.STAGE_ORIENTATION, *orientation_values(tcp), *like.configuration)
-        return to_radians(line.ask(Code.INVERSE, within=COMPUTE_WITHIN)[:7])
+        return to_radians(line.ask(Code.INVERSE, within=COMPUTE_TIMEOUT)[:7])

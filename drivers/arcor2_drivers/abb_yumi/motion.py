@@ -33,25 +33,25 @@ from .clearance import Clearance, joint_path
 from .control import Control
 from .frames import to_degrees
 from .kinematics import Kinematics
-from .motion_lines import MOST_WAYPOINTS, Code, Status
+from .motion_lines import MAX_WAYPOINTS, Code, Status
 from .nominal import Array
-from .observer import AT_REST, Observer
+from .observer import STANDSTILL_SPEED, Observer
 from .session import ControlSession
 from .settings import ARMS
 
-RAMP: Final = 0.2
+RAMP_TIME: Final = 0.2
 """Time that accelerating and braking add to a motion, s."""
-SLACK: Final = 1.5
+DURATION_FACTOR: Final = 1.5
 """Factor on the computed time of a motion."""
-GRACE: Final = 3.0
+DURATION_MARGIN: Final = 3.0
 """Time added to that, s."""
-SLOWEST: Final = 0.05
+MIN_SPEED_OVERRIDE: Final = 0.05
 """Lowest speed override that extends the time of a motion in full."""
-REST_WITHIN: Final = 2.0
+STANDSTILL_TIMEOUT: Final = 2.0
 """Time after which a stopped arm must be at standstill, s; from full speed it takes 0.2 s."""
-STOP_AGAIN: Final = 0.15
+STOP_REPEAT_INTERVAL: Final = 0.15
 """Time after which a stop is sent again, s: the two sockets of an arm have no common order."""
-LONGEST: Final = 600.0
+MAX_DURATION: Final = 600.0
 """Longest joint motion, s."""
 
 
@@ -111,12 +111,12 @@ class Motion:
         """Move the TCP of an arm in lines through poses in the world."""
         self._arms.within("speed", speed, 0.001, 1.0)
         self._arms.within("blend", blend, 0.0, 0.2)
-        if not 1 <= len(waypoints) <= MOST_WAYPOINTS:
+        if not 1 <= len(waypoints) <= MAX_WAYPOINTS:
             given = len(waypoints)
             raise OutOfRange(
                 "{name}: waypoints must be 1 to {most_waypoints} poses, not {given}.",
                 name=self._arms.name,
-                most_waypoints=MOST_WAYPOINTS,
+                most_waypoints=MAX_WAYPOINTS,
                 given=given,
             )
         with self._exclusive((arm,)):
@@ -213,20 +213,20 @@ class Motion:
 
     def _joint_time(self, start: Array, goal: list[float], speed: float) -> float:
         longest = float(np.abs(np.array(goal) - start).max())
-        duration = longest / (speed * self._arms.settings.max_joint_speed) + RAMP
-        if duration > LONGEST:
+        duration = longest / (speed * self._arms.settings.max_joint_speed) + RAMP_TIME
+        if duration > MAX_DURATION:
             raise OutOfRange(
                 "{robot}: at speed {speed:g} the move would take {duration:.0f} s. At most {longest:.0f} s is allowed.",
                 robot=self._arms.name,
                 speed=speed,
                 duration=duration,
-                longest=LONGEST,
+                longest=MAX_DURATION,
             )
         return duration
 
     def _line_time(self, arm: str, poses: list[Pose], speed: float) -> float:
         at = self._arms.tcp(self._observer.sample(), arm)
-        duration, settings = RAMP, self._arms.settings
+        duration, settings = RAMP_TIME, self._arms.settings
         for pose in poses:
             distance = at.position.distance_to(pose.position) / (speed * settings.max_tcp_speed)
             duration += max(distance, at.orientation.angle_to(pose.orientation) / (speed * settings.max_joint_speed))
@@ -253,7 +253,7 @@ class Motion:
         """Wait for the end of motions and return their results. An error of one stops all of them."""
         started, end = time.monotonic(), MoveEnd.DONE
         try:
-            self._wait_done(session, commands, guards, SLACK * duration + GRACE)
+            self._wait_done(session, commands, guards, DURATION_FACTOR * duration + DURATION_MARGIN)
         except DeviceError as error:
             cause = self._cause(session, guards, error)
             end = MoveEnd.SAFETY if isinstance(cause, SafetyStop) else MoveEnd.STOPPED
@@ -278,12 +278,12 @@ class Motion:
                     del left[arm]
             now = time.monotonic()
             stopped = [arm for arm in left if guards[arm].stopped()]
-            if stopped and now - stop_sent > STOP_AGAIN:
+            if stopped and now - stop_sent > STOP_REPEAT_INTERVAL:
                 stop_sent = now
                 for arm in stopped:
                     session.lines[arm].stop()
             panel = self._observer.known_panel
-            budget -= (now - last) * max(panel.speed_ratio if panel is not None else 1.0, SLOWEST)
+            budget -= (now - last) * max(panel.speed_ratio if panel is not None else 1.0, MIN_SPEED_OVERRIDE)
             last = now
             if budget < 0.0:
                 raise DeviceTimeout(
@@ -327,7 +327,7 @@ class Motion:
             return
         if not all(_stop_all([session.lines[arm] for arm in arms])) and session.ended is None:
             self._control.stop_rapid()
-        if not once_within(lambda: session.ended is not None or not self.in_progress(arms), REST_WITHIN, 0.005):
+        if not once_within(lambda: session.ended is not None or not self.in_progress(arms), STANDSTILL_TIMEOUT, 0.005):
             raise self._no_rest()
         if session.ended is not None:
             self._await_rest(arms)
@@ -336,7 +336,7 @@ class Motion:
         return DeviceTimeout(
             "{robot} did not come to a standstill within {limit:g} s of a stop. Press the emergency stop.",
             robot=self._arms.name,
-            limit=REST_WITHIN,
+            limit=STANDSTILL_TIMEOUT,
         )
 
     def _await_rest(self, arms: tuple[str, ...]) -> None:
@@ -344,10 +344,10 @@ class Motion:
         newest, panel = self._observer.newest(), self._observer.known_panel
         if newest is None or panel is None or not panel.ours or not self._observer.observing.online:
             return
-        until = time.monotonic() + REST_WITHIN
+        until = time.monotonic() + STANDSTILL_TIMEOUT
         with contextlib.suppress(ConnectionLost, NotConnected):
             self._observer.fresh()
-            while max(self._observer.fresh().value.speeds[arm] for arm in arms) > AT_REST:
+            while max(self._observer.fresh().value.speeds[arm] for arm in arms) > STANDSTILL_SPEED:
                 if time.monotonic() > until:
                     raise self._no_rest()
 

@@ -9,10 +9,10 @@ from arcor2_hw.exceptions import DeviceFault
 from arcor2_hw.messages import translatable
 
 VERSION: Final = 1
-LONGEST_LINE: Final = 79
-"""Greatest number of characters before the line feed: a RAPID string holds 80."""
-LAST_SEQUENCE: Final = 9999
-MOST_WAYPOINTS: Final = 50
+MAX_LINE_LENGTH: Final = 79
+"""Maximum number of characters before the line feed: a RAPID string holds 80."""
+MAX_SEQUENCE: Final = 9999
+MAX_WAYPOINTS: Final = 50
 
 
 class Code(enum.IntEnum):
@@ -114,12 +114,12 @@ def number(value: float, decimals: int = 3) -> str:
 
 def line(sequence: int, code: Code, values: Iterable[float] = ()) -> bytes:
     """Return the line of a command. Raise ValueError if it is too long, or a number is not finite."""
-    first = QUATERNIONS.get(code, LONGEST_LINE)
+    first = QUATERNIONS.get(code, MAX_LINE_LENGTH)
     numbers = (number(value, 6 if place >= first else 3) for place, value in enumerate(values))
     text = " ".join([str(sequence), str(int(code)), *numbers])
     out = f"{text}*{check(text)}"
-    if len(out) > LONGEST_LINE:
-        raise ValueError(f"The line has {len(out)} characters; at most {LONGEST_LINE} are allowed: {out}")
+    if len(out) > MAX_LINE_LENGTH:
+        raise ValueError(f"The line has {len(out)} characters; at most {MAX_LINE_LENGTH} are allowed: {out}")
     return f"{out}\n".encode()
 
 

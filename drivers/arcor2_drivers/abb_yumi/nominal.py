@@ -14,7 +14,7 @@ from .settings import LEFT, RIGHT
 
 Array = npt.NDArray[np.float64]
 
-ORDER: Final = (0, 1, 6, 2, 3, 4, 5)
+AXIS_ORDER: Final = (0, 1, 6, 2, 3, 4, 5)
 """Axes from the foot to the flange."""
 LIMITS: Final = tuple(
     (math.radians(low), math.radians(high))
@@ -45,7 +45,7 @@ FEET: Final = {
     RIGHT: ((0.05355, -0.0725, 0.41492), (-0.9795, -0.5682, -2.3155)),
 }
 MAX_ERROR: Final = 0.03
-"""Greatest error of nominal kinematics, m, with which the controller is still asked for a solution."""
+"""Maximum error of nominal kinematics, m, with which the controller is still asked for a solution."""
 
 
 def _transform(position: tuple[float, float, float], rpy: tuple[float, float, float]) -> Array:
@@ -71,7 +71,7 @@ def frames(arm: str, joints: Array) -> Array:
     """Return the frames of the axes in the robot's, shape (n, 7, 4, 4), for joints (n, 7); the last is the flange."""
     out = np.empty((len(joints), 7, 4, 4))
     at = np.broadcast_to(_FEET[arm], (len(joints), 4, 4))
-    for link, (axis, step) in enumerate(zip(ORDER, _STEPS, strict=True)):
+    for link, (axis, step) in enumerate(zip(AXIS_ORDER, _STEPS, strict=True)):
         at = at @ step
         c, s = np.cos(joints[:, axis])[:, None], np.sin(joints[:, axis])[:, None]
         turned = at.copy()
@@ -120,8 +120,8 @@ def _linearised(arm: str, q: Array, flange: Array) -> tuple[Array, Array]:
     missing[3:] = 0.3 * _turn(flange[:3, :3] @ at[:3, :3].T)
     axes, origins = found[:, :3, 2], found[:, :3, 3]
     jacobian = np.empty((6, 7))
-    jacobian[:3, list(ORDER)] = np.cross(axes, at[:3, 3] - origins).T
-    jacobian[3:, list(ORDER)] = 0.3 * axes.T
+    jacobian[:3, list(AXIS_ORDER)] = np.cross(axes, at[:3, 3] - origins).T
+    jacobian[3:, list(AXIS_ORDER)] = 0.3 * axes.T
     return missing, jacobian
 
 

@@ -9,16 +9,16 @@ from arcor2_hw.exceptions import ConnectionLost, NotConnected, Refused
 from arcor2_hw.objects.state_observer import Snapshot, StateObserver
 
 from .frames import Configuration, RobTarget, pose_from, to_radians
-from .rws import FIRST_WITHIN, Fields, Rws
+from .rws import FIRST_ANSWER_TIMEOUT, Fields, Rws
 from .settings import ARMS, YumiSettings
 
 TASKS: Final = {"left": "T_ROB_L", "right": "T_ROB_R"}
 UNITS: Final = {"left": "ROB_L", "right": "ROB_R"}
 PROGRAMS: Final = {"left": "Arcor2Left", "right": "Arcor2Right"}
 """Names of the programs that the .pgf files load."""
-FRESH: Final = 0.8
-"""Greatest age of a sample, s: it takes six requests of ten ms or more each."""
-AT_REST: Final = 2e-3
+MAX_SAMPLE_AGE: Final = 0.8
+"""Maximum age of a sample, s: it takes six requests of ten ms or more each."""
+STANDSTILL_SPEED: Final = 2e-3
 """Joint speed below which a joint is at standstill, rad/s."""
 
 
@@ -70,7 +70,7 @@ class Sample(NamedTuple):
     @property
     def moving(self) -> bool:
         """Return whether an arm moves."""
-        return max(self.speeds.values()) > AT_REST
+        return max(self.speeds.values()) > STANDSTILL_SPEED
 
 
 def read_panel(rws: Rws) -> Panel:
@@ -152,7 +152,7 @@ class Observer(StateObserver[Sample]):
 
     def __init__(self, name: str, settings: YumiSettings) -> None:
         self.rws = Rws(name, settings.host, settings.rws_port, settings.user, settings.password)
-        self.period, self.fresh_for = settings.poll_period, max(FRESH, 3.0 * settings.poll_period)
+        self.period, self.fresh_for = settings.poll_period, max(MAX_SAMPLE_AGE, 3.0 * settings.poll_period)
         super().__init__(self.rws.who)
         self.version = ""
         self.on_sample: Callable[[Sample], None] = lambda _: None
@@ -195,7 +195,7 @@ class Observer(StateObserver[Sample]):
     def open(self, timeout: float) -> Snapshot[Sample]:
         """Read version, panel and state of the controller."""
         with self.rws.all_until(time.monotonic() + timeout):
-            self.version = self.rws.get("/rw/system", FIRST_WITHIN)[0].get("rwversion", "")
+            self.version = self.rws.get("/rw/system", FIRST_ANSWER_TIMEOUT)[0].get("rwversion", "")
             if not self.version.startswith("6."):
                 version = self.version or "?"
                 raise Refused(

@@ -15,7 +15,7 @@ from arcor2_hw.messages import Message
 
 REQUEST_TIMEOUT: Final = 1.0
 """Time for a request, s: the web server of an IRC5 usually answers within some ten ms, rarely in hundreds."""
-FIRST_WITHIN: Final = 1.5
+FIRST_ANSWER_TIMEOUT: Final = 1.5
 """Time for the first answer of a session, s: digest authentication needs two requests."""
 
 Fields = dict[str, str]
@@ -135,7 +135,7 @@ class Rws:
 
     def _ask(self, method: str, path: str, query: Fields, body: Fields | None, timeout: float) -> httpx.Response:
         if self._fresh:  # digest authentication needs two requests
-            timeout = max(timeout, FIRST_WITHIN)
+            timeout = max(timeout, FIRST_ANSWER_TIMEOUT)
         until = min(time.monotonic() + timeout, self._until)
         timeout = max(until - time.monotonic(), 0.01)
         with self._turn(timeout), self._connection() as client:

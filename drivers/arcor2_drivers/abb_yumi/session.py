@@ -16,9 +16,9 @@ from .motion_lines import Code
 from .rws import Rws
 from .settings import ARMS, YumiSettings
 
-LINE_WITHIN: Final = 2.0
+LISTEN_TIMEOUT: Final = 2.0
 """Time for the servers to listen after the program was started, s."""
-POLL: Final = 0.05
+POLL_INTERVAL: Final = 0.05
 """Time between two readings of a value that is awaited, s."""
 
 log = logging.getLogger(__name__)
@@ -40,7 +40,7 @@ class ControlSession:
     def open(self) -> None:
         """Connect to both servers and start their sessions. Raise DeviceError."""
         for line in self.lines.values():
-            line.open(LINE_WITHIN, self._settings.watchdog)
+            line.open(LISTEN_TIMEOUT, self._settings.watchdog)
 
     def set_tool(self, arm: str, tcp: Pose, load: Load) -> None:
         """Set the tool of an arm."""
@@ -81,7 +81,7 @@ def release_mastership(rws: Rws, domain: str) -> bool:
 
 def await_value(rws: Rws, path: str, field: str, value: str, within: float, what: str) -> None:
     """Wait until a field of a resource has a value. Raise DeviceTimeout; `what` names the expected action."""
-    if not once_within(lambda: rws.value(path, field) == value, within, POLL):
+    if not once_within(lambda: rws.value(path, field) == value, within, POLL_INTERVAL):
         raise DeviceTimeout("{device} did not {what} within {limit:g} s.", device=rws.who, what=what, limit=within)
 
 

@@ -13,10 +13,10 @@ LEFT = "left"
 RIGHT = "right"
 ARMS = (LEFT, RIGHT)
 MAX_PAYLOAD = 0.5
-"""Greatest mass at the flange of an arm, hand included, kg."""
+"""Maximum mass at the flange of an arm, hand included, kg."""
 
-TURN = 2.0 * math.pi
-LONGEST_WATCHDOG = 0.5
+FULL_TURN = 2.0 * math.pi
+MAX_WATCHDOG_PERIOD = 0.5
 """Longest watchdog, s, with which an arm stops within the time that the type declares (`loss_reaction`)."""
 
 
@@ -76,9 +76,9 @@ class YumiSettings(Settings):
     left_tcp_x: Annotated[float, Range(-0.5, 0.5)] = 0.0
     left_tcp_y: Annotated[float, Range(-0.5, 0.5)] = 0.0
     left_tcp_z: Annotated[float, Range(-0.5, 0.5)] = 0.0
-    left_tcp_rx: Annotated[float, Range(-TURN, TURN)] = 0.0
-    left_tcp_ry: Annotated[float, Range(-TURN, TURN)] = 0.0
-    left_tcp_rz: Annotated[float, Range(-TURN, TURN)] = 0.0
+    left_tcp_rx: Annotated[float, Range(-FULL_TURN, FULL_TURN)] = 0.0
+    left_tcp_ry: Annotated[float, Range(-FULL_TURN, FULL_TURN)] = 0.0
+    left_tcp_rz: Annotated[float, Range(-FULL_TURN, FULL_TURN)] = 0.0
     right_mass: float = dataclasses.field(default=-1.0, metadata={"for_control": True})
     right_cog_x: Annotated[float, Range(-0.5, 0.5)] = 0.0
     right_cog_y: Annotated[float, Range(-0.5, 0.5)] = 0.0
@@ -86,9 +86,9 @@ class YumiSettings(Settings):
     right_tcp_x: Annotated[float, Range(-0.5, 0.5)] = 0.0
     right_tcp_y: Annotated[float, Range(-0.5, 0.5)] = 0.0
     right_tcp_z: Annotated[float, Range(-0.5, 0.5)] = 0.0
-    right_tcp_rx: Annotated[float, Range(-TURN, TURN)] = 0.0
-    right_tcp_ry: Annotated[float, Range(-TURN, TURN)] = 0.0
-    right_tcp_rz: Annotated[float, Range(-TURN, TURN)] = 0.0
+    right_tcp_rx: Annotated[float, Range(-FULL_TURN, FULL_TURN)] = 0.0
+    right_tcp_ry: Annotated[float, Range(-FULL_TURN, FULL_TURN)] = 0.0
+    right_tcp_rz: Annotated[float, Range(-FULL_TURN, FULL_TURN)] = 0.0
     left_gripper: bool = True
     right_gripper: bool = True
     left_suction: bool = False
@@ -96,7 +96,7 @@ class YumiSettings(Settings):
     max_tcp_speed: Annotated[float, Range(0.01, 1.5)] = 0.5
     max_joint_speed: Annotated[float, Range(0.01, math.pi)] = 1.0
     clearance: Annotated[float, Range(0.0, 0.08)] = 0.02  # the shoulders are 0.1 m apart
-    watchdog: Annotated[float, Range(0.2, LONGEST_WATCHDOG)] = 0.4
+    watchdog: Annotated[float, Range(0.2, MAX_WATCHDOG_PERIOD)] = 0.4
     poll_period: Annotated[float, Range(0.02, 0.5)] = 0.1
 
     def __post_init__(self) -> None:

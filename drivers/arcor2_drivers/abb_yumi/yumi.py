@@ -29,10 +29,10 @@ from .hands import ArmId as ArmId, Hands
 from .kinematics import Kinematics
 from .motion import Motion
 from .observer import Observer
-from .settings import ARMS, LONGEST_WATCHDOG, YumiSettings
+from .settings import ARMS, MAX_WATCHDOG_PERIOD, YumiSettings
 from .states import AUTOMATIC, REMEDIES, mode_of, power_of
 
-BRAKES_WITHIN: Final = 0.2
+BRAKING_TIME: Final = 0.2
 """Time to brake from full speed, s."""
 
 
@@ -49,7 +49,7 @@ class YuMi(Hands, Connected, MultiArmRobot):
     _ABSTRACT = False
     display_name = "ABB YuMi"
     robot_type = RobotType.ARTICULATED
-    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(FROZEN_AFTER + LONGEST_WATCHDOG + BRAKES_WITHIN)
+    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(FROZEN_AFTER + MAX_WATCHDOG_PERIOD + BRAKING_TIME)
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {"move": "stop", "move_to": "stop", "move_both": "stop"}
 
     def __init__(self, obj_id: str, name: str, pose: Pose, settings: YumiSettings) -> None:

@@ -12,7 +12,7 @@ HEADER: Final = b"\xaa\xaa"
 WRITE: Final = 0x01
 QUEUED: Final = 0x02
 LONGEST: Final = 0xFF - 2
-"""Greatest size of the parameters, bytes: the length byte counts id and control, too."""
+"""Maximum size of the parameters, bytes: the length byte counts id and control, too."""
 
 
 class Command(enum.IntEnum):

@@ -24,7 +24,7 @@ LIMITS: Final = {
 """Published limits, rad."""
 JOINTS: Final = tuple(LIMITS)
 LEVEL: Final = math.radians(1.0)
-"""Greatest angle between the tool axis of a pose and the vertical, rad: the precision of hand teaching."""
+"""Maximum angle between the tool axis of a pose and the vertical, rad: the precision of hand teaching."""
 SLACK: Final = 1e-4
 """Tolerance beyond a joint limit, rad: the rounding error of single precision."""
 

@@ -25,7 +25,7 @@ STANDSTILL_AFTER: Final = 0.1
 STANDSTILL_CHANGE: Final = math.radians(0.005)
 """Change of a joint between two readings at standstill, rad."""
 MAX_AGE: Final = 0.5
-"""Greatest age of a sample, s."""
+"""Maximum age of a sample, s."""
 
 
 class Sample(Data, frozen=True):

@@ -10,7 +10,7 @@ from arcor2_hw.objects.line import Line
 from .status import Activation, Command, Object, Status
 
 LONGEST: Final = 64
-"""Greatest length of an answer, bytes; a valid one has about ten."""
+"""Maximum length of an answer, bytes; a valid one has about ten."""
 _VALUE: Final = re.compile(rb"([A-Z]{3}) ([0-9A-F]{1,3})\r?\n")
 _ACKNOWLEDGED: Final = re.compile(rb"ack(\r?\n)?")
 _ORDER: Final = ("ACT", "GTO", "STA", "FLT", "PRE", "OBJ", "POS")

@@ -28,9 +28,9 @@ Angles = tuple[float, float]
 
 JOINTS: Final = ("joint_1", "joint_2")
 OUT_OF_PLANE: Final = 0.001
-"""Greatest distance of a pose from the plane in which the arm moves, m."""
+"""Maximum distance of a pose from the plane in which the arm moves, m."""
 TILTED: Final = 0.02
-"""Greatest angle between the z axis of a pose and the axes of the joints, rad."""
+"""Maximum angle between the z axis of a pose and the axes of the joints, rad."""
 REACHED: Final = 12
 """Ticks (1°) from the goal within which a joint at standstill has arrived: a loaded servo stops short of its goal."""
 ZERO_VELOCITY: Final = 1e-6

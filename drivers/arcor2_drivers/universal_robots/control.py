@@ -19,15 +19,15 @@ from .pendant import Pendant
 from .program import Tool
 from .session import ControlSession
 from .states import MAY_MOVE, MODE_NAMES, MODE_RUNNING, REMEDIES, Runtime, program_plays, safety_of
-from .timing import GUARD_PERIOD, PROGRAM_ENDS, TAKE_TIMEOUT
+from .timing import GUARD_PERIOD, PROGRAM_END_TIMEOUT, TAKE_TIMEOUT
 
-LOWER_ONLY: Final = ((5, 23), (10, 0))
+LOWER_REGISTER_VERSIONS: Final = ((5, 23), (10, 0))
 """Versions from which on ur_rtde 1.6.5 uses the lower registers itself although its program uses the upper ones."""
-INERTIA_FROM: Final = (5, 10)
+MIN_INERTIA_VERSION: Final = (5, 10)
 """First controller version that accepts an inertia."""
 MAX_INERTIA: Final = 133.0
-"""Greatest inertia that the controller accepts, kg m²."""
-TOOL_REPORTED: Final = 0.2
+"""Maximum inertia that the controller accepts, kg m²."""
+TOOL_REPORT_TIMEOUT: Final = 0.2
 """Time for a sample that is based on a new tool, s."""
 
 log = logging.getLogger(__name__)
@@ -112,7 +112,9 @@ class Control:
 
     def _program_ends(self) -> bool:
         """Return whether the program that plays ends at once, as that of a client which has just disconnected."""
-        return once_within(lambda: not program_plays(self._observer.sample().runtime), PROGRAM_ENDS, GUARD_PERIOD)
+        return once_within(
+            lambda: not program_plays(self._observer.sample().runtime), PROGRAM_END_TIMEOUT, GUARD_PERIOD
+        )
 
     def release(self) -> None:
         """Stop the arm and release control, if we have it."""
@@ -186,7 +188,7 @@ class Control:
     def uses_upper_registers(self) -> bool:
         """Return whether the session uses the upper registers: if set, and supported by the controller."""
         version = self._observer.version[:2]
-        lower_only = any(version[0] == major and version >= (major, minor) for major, minor in LOWER_ONLY)
+        lower_only = any(version[0] == major and version >= (major, minor) for major, minor in LOWER_REGISTER_VERSIONS)
         return self._arm.settings.use_upper_range_registers and not lower_only
 
     # -------------------------------------------------------------------------------- tool and hand teaching
@@ -210,7 +212,7 @@ class Control:
                 raise OutOfRange("{name}: inertia must be six numbers: Ixx, Iyy, Izz, Ixy, Ixz, Iyz.", name=arm.name)
             for value in inertia:
                 arm.within("inertia", value, -MAX_INERTIA, MAX_INERTIA)
-            if self._observer.version[:2] < INERTIA_FROM:
+            if self._observer.version[:2] < MIN_INERTIA_VERSION:
                 raise Refused("{name}: the controller accepts an inertia only from version 5.10 on.", name=arm.name)
         tool = Tool(tcp, mass, cog, inertia)
         self.send_tool(self.current(), tool)
@@ -228,7 +230,7 @@ class Control:
     def _await_samples(self) -> None:
         """Wait for two samples: the second was taken after now, and so with the tool that was sent."""
         wanted = self._observer.samples_received + 2
-        once_within(lambda: self._observer.samples_received >= wanted, TOOL_REPORTED, 0.002)
+        once_within(lambda: self._observer.samples_received >= wanted, TOOL_REPORT_TIMEOUT, 0.002)
 
     def set_teaching(self, enabled: bool) -> None:
         """Enable or disable hand teaching. Raise Refused if the payload is not set."""

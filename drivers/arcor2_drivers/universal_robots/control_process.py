@@ -46,23 +46,23 @@ SIGNALS = frozenset({*COMMANDS, *SPEEDS, "own"})
 MOTIONS = frozenset({"moveJ", "moveL", "teachMode", "own"})
 """Commands that end a jog first: two threads of the control program must not both move the arm."""
 OUTPUTS = ("setConfigurableDigitalOut", "setStandardDigitalOut", "setToolDigitalOut")
-VELOCITY_READ: Final = 0.02
+MIN_VELOCITY_INTERVAL: Final = 0.02
 """Time before the next command may overwrite a velocity in its register, s: two cycles of a CB3."""
-RESUMED_WITHIN: Final = 3.0
+RESUME_TIMEOUT: Final = 3.0
 """Time for the control program to play again, s; it takes 0.1 s."""
 KICKS_PER_PERIOD: Final = 8.0
 """Watchdog signals within one period of the watchdog."""
-NEARLY_TOO_SLOW: Final = 0.8
+LATE_SIGNAL_FRACTION: Final = 0.8
 """Part of the period of the watchdog after which it may have tripped."""
-LATE_FOR: Final = 2.0
+MAX_LATE_SIGNAL_AGE: Final = 2.0
 """Time for which a late signal may be the reason for a stopped program, s."""
-LAST_STOP: Final = 0.15
+LAST_STOP_TIMEOUT: Final = 0.15
 """Time for the last stop of this process, s; if it fails, the watchdog stops the arm."""
-HOST_CHECK: Final = 0.1
+HOST_CHECK_INTERVAL: Final = 0.1
 """Time between two checks whether the host has ended, s."""
-TOO_SLOW: Final = 3
+EXIT_TOO_SLOW: Final = 3
 """Exit status when this process was not scheduled in time, so that the watchdog must have tripped."""
-HOST_FROZEN: Final = 4
+EXIT_HOST_FROZEN: Final = 4
 """Exit status when the host has sent no pulse for FROZEN_AFTER s."""
 
 
@@ -104,11 +104,11 @@ def _listen(requests: "queue.SimpleQueue[bytes | int]") -> None:
     """Queue requests, finally the exit status, and give the main thread time for its last stop."""
     parent = Parent()
     while parent.ended is None:
-        for line in parent.lines(HOST_CHECK):
+        for line in parent.lines(HOST_CHECK_INTERVAL):
             requests.put(line)
-    status = HOST_FROZEN if parent.ended is ParentEnd.FROZEN else 0
+    status = EXIT_HOST_FROZEN if parent.ended is ParentEnd.FROZEN else 0
     requests.put(status)
-    time.sleep(LAST_STOP)
+    time.sleep(LAST_STOP_TIMEOUT)
     os._exit(status)
 
 
@@ -176,7 +176,7 @@ class ControlProgram:
     def _signalled(self, since: float) -> None:
         """Note that the library sent a signal, at an unknown time between `since` and now."""
         self._written = time.monotonic()
-        if self._written - since > NEARLY_TOO_SLOW / self._frequency:
+        if self._written - since > LATE_SIGNAL_FRACTION / self._frequency:
             self._late = self._written
 
     def _armed(self) -> bool:
@@ -190,13 +190,13 @@ class ControlProgram:
         """Exit if the watchdog has tripped: the library would deny commands without telling why."""
         now = time.monotonic()
         if now - self._written > 1.0 / self._frequency:
-            os._exit(TOO_SLOW)
-        if now - self._written > NEARLY_TOO_SLOW / self._frequency:
+            os._exit(EXIT_TOO_SLOW)
+        if now - self._written > LATE_SIGNAL_FRACTION / self._frequency:
             self._late = now
 
     def _was_late(self) -> bool:
         """Return whether the watchdog may have tripped recently: when it received a signal is not known exactly."""
-        return time.monotonic() - self._late < LATE_FOR
+        return time.monotonic() - self._late < MAX_LATE_SIGNAL_AGE
 
     def last_stop(self) -> None:
         """Stop the program: the host has ended."""
@@ -225,7 +225,7 @@ class ControlProgram:
             # Without the duration that the library supports: its call would block watchdog signals and a stop so long.
             taken = command(velocities, acceleration)
             self._jog_ends = until
-            time.sleep(VELOCITY_READ)
+            time.sleep(MIN_VELOCITY_INTERVAL)
             return taken
 
         return speed
@@ -242,7 +242,7 @@ class ControlProgram:
 
     def _resume(self) -> bool:
         """Send the control program again, after a motion program, and arm its watchdog."""
-        control, until = self._control, time.monotonic() + RESUMED_WITHIN
+        control, until = self._control, time.monotonic() + RESUME_TIMEOUT
         # While the library assumes that a program runs, it would first send "stop", which the new program obeys.
         while control.isProgramRunning() and time.monotonic() < until:
             time.sleep(0.002)

@@ -21,7 +21,7 @@ PORT = 29999
 NAME = Message.of("dashboard server")
 """Name of the port in errors."""
 MAX_LINE = 4096
-"""Greatest length of an answer, bytes: the longest ones contain a file name."""
+"""Maximum length of an answer, bytes: the longest ones contain a file name."""
 
 
 def is_remote(answer: str) -> bool:

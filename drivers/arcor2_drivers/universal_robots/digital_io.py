@@ -14,9 +14,9 @@ from arcor2_hw.objects.small import IOPoint, OnLoss, PointDirection, PointKind, 
 from .control import Control
 from .observer import Observer
 from .settings import OUTPUTS
-from .timing import POLL
+from .timing import POLL_INTERVAL
 
-OUTPUT_WITHIN: Final = 0.5
+OUTPUT_TIMEOUT: Final = 0.5
 """Time for a switched output to be reported, s: about ten cycles of the controller, and the network."""
 _GROUPS: Final = (("digital", 0, 8), ("config", 8, 8), ("tool", 16, 2))
 NUMBERS: Final = {
@@ -76,7 +76,7 @@ class DigitalIO:
             guard.check(f"Waiting for input {number} of {self.name}")
             return self.get_digital_input(number) is value
 
-        if not once_within(seen, timeout, POLL):
+        if not once_within(seen, timeout, POLL_INTERVAL):
             raise DeviceTimeout(
                 "Input {number} of {name} was not {value} in {timeout:g} s.",
                 number=number,
@@ -126,7 +126,9 @@ class DigitalIO:
             )
         self._control.current().set_output(output, value)
         self._on_switched(output, value)
-        if not once_within(lambda: self._observer.sample().outputs >> output & 1 == value, OUTPUT_WITHIN, POLL):
+        if not once_within(
+            lambda: self._observer.sample().outputs >> output & 1 == value, OUTPUT_TIMEOUT, POLL_INTERVAL
+        ):
             raise DeviceFault(
                 "Output {output} of {name} did not switch {value}.",
                 output=output,

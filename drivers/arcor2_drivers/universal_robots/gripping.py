@@ -12,7 +12,7 @@ from arcor2_hw.objects.arm import StopGuard
 from .digital_io import DigitalIO
 from .motion import Motion
 from .settings import UrSettings
-from .timing import POLL
+from .timing import POLL_INTERVAL
 
 NOTHING_HELD: Final = "nothing_held"
 PART_LOST: Final = "part_lost"
@@ -101,7 +101,7 @@ class DigitalGripper(HoldsParts, DigitalIO):
             guard.check(f"The gripper of {self.name}")
             return self.part_present() is held
 
-        return once_within(seen, self._ur.gripper_time, POLL) or self.part_present() is None
+        return once_within(seen, self._ur.gripper_time, POLL_INTERVAL) or self.part_present() is None
 
     def _check_part_held(self, when: str) -> None:
         if self.part_present() is False:

@@ -23,11 +23,18 @@ from .pendant import Pendant
 from .session import ControlSession
 from .settings import MANUAL_TCP_SPEED
 from .states import program_plays
-from .timing import POLL, REST_WITHIN, SLOWEST_FRACTION, STANDING, joint_budget, linear_budget
+from .timing import (
+    MIN_SPEED_FRACTION,
+    POLL_INTERVAL,
+    STALLED_MOVE_TIMEOUT,
+    STANDSTILL_TIMEOUT,
+    joint_budget,
+    linear_budget,
+)
 
-JOINTS_REACHED = 0.01
-POSITION_REACHED = 0.002
-ANGLE_REACHED = 0.02
+JOINT_TOLERANCE = 0.01
+POSITION_TOLERANCE = 0.002
+ANGLE_TOLERANCE = 0.02
 """Tolerances within which a target is reached: rad of a joint, m and rad of the TCP."""
 
 
@@ -47,15 +54,15 @@ def at_pose(vector: Sequence[float]) -> Callable[[Sample], bool]:
 
     def reached(sample: Sample) -> bool:
         at = from_vector(sample.tcp)
-        near = at.position.distance_to(target.position) < POSITION_REACHED
-        return near and at.orientation.angle_to(target.orientation) < ANGLE_REACHED
+        near = at.position.distance_to(target.position) < POSITION_TOLERANCE
+        return near and at.orientation.angle_to(target.orientation) < ANGLE_TOLERANCE
 
     return reached
 
 
 def at_joints(q: Sequence[float]) -> Callable[[Sample], bool]:
     """Return a check whether the joints have their values."""
-    return lambda sample: max(abs(a - b) for a, b in zip(sample.q, q, strict=True)) < JOINTS_REACHED
+    return lambda sample: max(abs(a - b) for a, b in zip(sample.q, q, strict=True)) < JOINT_TOLERANCE
 
 
 class Motion:
@@ -153,13 +160,13 @@ class Motion:
                 return
             if sample.moving or running or standing is None:
                 standing = sample.timestamp
-            elif sample.timestamp - standing > STANDING:
+            elif sample.timestamp - standing > STALLED_MOVE_TIMEOUT:
                 raise DeviceFault("{what} ended before its target.", what=what)
             if clock.exceeded(sample):
                 self._control.stops.request()
                 session.stop_motion(self._arm.settings.stop_deceleration)
                 raise DeviceTimeout("{what} did not end within the computed time. It was stopped.", what=what)
-            time.sleep(POLL)
+            time.sleep(POLL_INTERVAL)
 
     # -------------------------------------------------------------------------------- stopping
     def stop(self) -> None:
@@ -181,7 +188,7 @@ class Motion:
         self.wait_rest(session)
         self._control.note_stop(session)
         # The control program accepts the next command only then.
-        once_within(lambda: session.own is None or session.ended is not None, REST_WITHIN, POLL)
+        once_within(lambda: session.own is None or session.ended is not None, STANDSTILL_TIMEOUT, POLL_INTERVAL)
 
     def end_jog(self, session: ControlSession) -> None:
         """End a jog and wait for standstill, where a path can be planned. Raise DeviceFault or DeviceTimeout."""
@@ -190,23 +197,23 @@ class Motion:
 
     def wait_rest(self, session: ControlSession) -> None:
         """Wait for standstill; use the dashboard when it takes too long. Raise DeviceTimeout."""
-        until, dashboard_at = time.monotonic() + REST_WITHIN, time.monotonic() + REST_WITHIN / 2
+        until, dashboard_at = time.monotonic() + STANDSTILL_TIMEOUT, time.monotonic() + STANDSTILL_TIMEOUT / 2
         while True:
             newest = self._observer.newest()
             if newest is None or (session.ended is not None and not isinstance(session.ended, Cancelled)):
                 return  # the watchdog or the safety system stops the arm
-            if not newest.moving and newest.age < POLL + 2.0 * self._observer.period:
+            if not newest.moving and newest.age < POLL_INTERVAL + 2.0 * self._observer.period:
                 return
             now = time.monotonic()
             if now > until:
                 raise DeviceTimeout(
                     "{robot} did not come to a standstill within {limit:g} s of a stop. Press the emergency stop.",
                     robot=self._arm.name,
-                    limit=REST_WITHIN,
+                    limit=STANDSTILL_TIMEOUT,
                 )
             if now > dashboard_at and session.ended is None:
                 session.stop_by_dashboard()
-            time.sleep(POLL)
+            time.sleep(POLL_INTERVAL)
 
     # -------------------------------------------------------------------------------- kinematics of the controller
     def solve(self, session: ControlSession, vector: list[float], near: Sequence[float]) -> list[float]:
@@ -236,6 +243,6 @@ class Budget:
     def exceeded(self, sample: Sample) -> bool:
         """Subtract the time between this sample and that of the last call; return whether none is left."""
         if self._last is not None:
-            self._left -= (sample.timestamp - self._last) * max(sample.speed_fraction, SLOWEST_FRACTION)
+            self._left -= (sample.timestamp - self._last) * max(sample.speed_fraction, MIN_SPEED_FRACTION)
         self._last = sample.timestamp
         return self._left < 0.0

@@ -32,17 +32,17 @@ FIELDS: Final = [
     "output_int_register_42",
 ]
 """Variables of the recipe, in the order of the fields of `Sample`."""
-STALLED: Final = 0.8
+SAMPLE_TIMEOUT: Final = 0.8
 """Time without a sample after which the connection is lost, s; the library itself needs 2.5 s to notice."""
-FRESH: Final = 0.1
-"""Greatest age of a sample by default, s: 50 samples of an e-series, 12 of a CB3."""
-FRESH_WITHIN: Final = 0.5
+MAX_SAMPLE_AGE: Final = 0.1
+"""Maximum age of a sample by default, s: 50 samples of an e-series, 12 of a CB3."""
+FRESH_SAMPLE_TIMEOUT: Final = 0.5
 """Time to wait for a fresh sample, s: a busy computer may delay the reading thread."""
-RING: Final = 1024
+MAX_SAMPLES: Final = 1024
 """Number of samples stored: two seconds."""
-READ_WAIT: Final = 0.1
+READ_TIMEOUT: Final = 0.1
 """Time to wait for a sample before checking whether to end, s."""
-AT_REST: Final = 1e-3
+STANDSTILL_SPEED: Final = 1e-3
 """Joint speed below which a joint is at standstill, rad/s: the noise of a real arm's encoders."""
 
 
@@ -74,7 +74,7 @@ class Sample(NamedTuple):
     @property
     def moving(self) -> bool:
         """Return whether a joint moves."""
-        return max(map(abs, self.qd)) > AT_REST
+        return max(map(abs, self.qd)) > STANDSTILL_SPEED
 
     def operation(self, upper: bool) -> tuple[int, bool]:
         """Return number and "running" of the control program's asynchronous operation, from its status register.
@@ -101,7 +101,7 @@ class Observer:
         self.period = 0.002
         self.samples_received = 0
         self.samples_missed = 0
-        self.ring: collections.deque[Sample] = collections.deque(maxlen=RING)
+        self.ring: collections.deque[Sample] = collections.deque(maxlen=MAX_SAMPLES)
         self.unsafe: Sample | None = None
         """The latest sample in which the safety system prevented motion; a slow reader does not miss a short stop."""
         self._newest: Sample | None = None
@@ -112,7 +112,7 @@ class Observer:
         """Return the latest sample, even if it is outdated; None before the first."""
         return self._newest
 
-    def sample(self, max_age: float = FRESH) -> Sample:
+    def sample(self, max_age: float = MAX_SAMPLE_AGE) -> Sample:
         """Return the latest sample, waiting briefly for one that is fresh.
 
         Raises:
@@ -131,7 +131,7 @@ class Observer:
                 raise NotConnected("{device} has sent no sample yet.", device=self.who)
             if newest.age <= max_age:
                 return newest
-            if clock() > FRESH_WITHIN:
+            if clock() > FRESH_SAMPLE_TIMEOUT:
                 break
             time.sleep(self.period)
         raise Stale(
@@ -150,7 +150,7 @@ class Observer:
             raise e.with_message(Message.of("{name}: {reason}", name=self.name, reason=e)) from e
         self.version = stream.version
         self.period = 0.002 if self.version[0] >= 5 else 0.008
-        self.ring = collections.deque(maxlen=RING)  # other threads may be reading the old one
+        self.ring = collections.deque(maxlen=MAX_SAMPLES)  # other threads may be reading the old one
         while not self.ring:
             left = deadline - time.monotonic()
             if left <= 0.0:
@@ -167,9 +167,11 @@ class Observer:
         assert stream is not None
         empty = 0  # reads, not seconds: while this process is not scheduled, no sample is missed
         while not stopping.is_set():
-            empty = 0 if self._receive(stream, READ_WAIT) else empty + 1
-            if empty * READ_WAIT >= STALLED:
-                raise ConnectionLost("{device} has sent nothing for {stalled:g} s.", device=self.who, stalled=STALLED)
+            empty = 0 if self._receive(stream, READ_TIMEOUT) else empty + 1
+            if empty * READ_TIMEOUT >= SAMPLE_TIMEOUT:
+                raise ConnectionLost(
+                    "{device} has sent nothing for {stalled:g} s.", device=self.who, stalled=SAMPLE_TIMEOUT
+                )
 
     def _receive(self, stream: RtdeStream, wait: float) -> bool:
         """Store the samples that have arrived; return False if there are none."""

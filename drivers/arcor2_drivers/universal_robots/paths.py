@@ -19,15 +19,23 @@ from .program import ENDED, Limit, RunState, joint, linear, motion_program
 from .script_port import ScriptPort
 from .session import ControlSession
 from .states import program_plays
-from .timing import POLL, PROGRAM_GONE, REST_WITHIN, STARTS_WITHIN, joint_budget, linear_budget, path_budget
+from .timing import (
+    POLL_INTERVAL,
+    PROGRAM_GONE_TIMEOUT,
+    STANDSTILL_TIMEOUT,
+    START_TIMEOUT,
+    joint_budget,
+    linear_budget,
+    path_budget,
+)
 
 MAX_WAYPOINTS: Final = 200
 MAX_BLEND: Final = 0.5
-"""Greatest blend radius, m."""
+"""Maximum blend radius, m."""
 FORCE_LIMITS: Final = (1.0, 100.0)
 """Force limits, N: below, the noise of the sensor triggers; above, the controller's own supervision comes first."""
 MAX_CONTACT_DISTANCE: Final = 1.0
-"""Greatest distance of a move until contact, m."""
+"""Maximum distance of a move until contact, m."""
 NO_CONTACT: Final = "no_contact"
 FORCE_LIMIT: Final = "force_limit"
 RUN_NUMBERS: Final = 1 << 20
@@ -185,7 +193,7 @@ class Paths:
         gone_since: float | None = None  # by the controller's clock
         timed_out = False
         while True:
-            time.sleep(POLL)
+            time.sleep(POLL_INTERVAL)
             port.drain()
             if session.ended is not None:
                 raise session.ended
@@ -199,7 +207,7 @@ class Paths:
                     session.resume()
                     raise DeviceTimeout("{what} did not end within the computed time. It was stopped.", what=what)
                 return RunState(state)
-            if not ours and now - started > STARTS_WITHIN:
+            if not ours and now - started > START_TIMEOUT:
                 error = DeviceFault(
                     "The controller of {name} did not start the program of {what}.", name=self._arm.name, what=what
                 )
@@ -207,12 +215,12 @@ class Paths:
                 raise error
             if plays or not ours or gone_since is None:
                 gone_since = sample.timestamp
-            if sample.timestamp - gone_since > PROGRAM_GONE + (REST_WITHIN if state in ENDED else 0.0):
+            if sample.timestamp - gone_since > PROGRAM_GONE_TIMEOUT + (STANDSTILL_TIMEOUT if state in ENDED else 0.0):
                 session.end(session.program_gone())
                 continue
             if guard.stopped() and stopped_at is None:
                 stopped_at = now
-            if stopped_at is not None and now - stopped_at > REST_WITHIN / 2.0:
+            if stopped_at is not None and now - stopped_at > STANDSTILL_TIMEOUT / 2.0:
                 session.stop_by_dashboard()
             if clock.exceeded(sample) and not timed_out:
                 timed_out = True

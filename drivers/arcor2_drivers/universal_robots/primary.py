@@ -24,13 +24,13 @@ NAME: Final = Message.of("primary port")
 TIMEOUT: Final = 2.0
 """Time for the kinematics to arrive, s: the controller sends ten states per second."""
 MAX_MESSAGE: Final = 1 << 16
-"""Greatest size of a message, bytes."""
+"""Maximum size of a message, bytes."""
 _HEADER: Final = struct.Struct(">IB")
 _STATE: Final = 16
 _KINEMATICS: Final = 5
 _LAYOUT: Final = struct.Struct(">6I24dI")
-_LONGEST: Final = 1000.0
-"""Greatest plausible parameter, m or rad: nearly parallel axes may have a d of several metres."""
+_MAX_PARAMETER: Final = 1000.0
+"""Maximum plausible parameter, m or rad: nearly parallel axes may have a d of several metres."""
 
 
 def parts(buffer: bytes) -> tuple[list[tuple[int, bytes]], bytes]:
@@ -60,7 +60,7 @@ def calibration_in(message: bytes) -> KinematicCalibration | None:
                 raise ValueError(f"invalid length of the kinematics: {len(content)} bytes")
             numbers = _LAYOUT.unpack_from(content)
             theta, a, d, alpha = (numbers[at : at + 6] for at in (6, 12, 18, 24))
-            if not all(math.isfinite(value) and abs(value) < _LONGEST for value in numbers[6:30]):
+            if not all(math.isfinite(value) and abs(value) < _MAX_PARAMETER for value in numbers[6:30]):
                 raise ValueError("the kinematics contain impossible numbers")
             joints = [DhParameters(*row) for row in zip(theta, d, a, alpha, strict=True)]
             return KinematicCalibration(joints, "-".join(f"{checksum:08x}" for checksum in numbers[:6]))

@@ -20,7 +20,7 @@ PORT: Final = 30004
 NAME: Final = Message.of("RTDE port")
 """Name of the port in errors."""
 MAX_FRAME: Final = 4096
-"""Greatest size of a frame, bytes; a recipe of all variables is smaller."""
+"""Maximum size of a frame, bytes; a recipe of all variables is smaller."""
 _PROTOCOL: Final = 2
 _HEADER: Final = struct.Struct(">HB")
 _VERSION, _CONTROLLER, _OUTPUTS, _START, _DATA, _TEXT = (ord(letter) for letter in "VvOSUM")

@@ -15,11 +15,11 @@ from .observer import Observer, Sample
 from .pendant import Pendant
 from .states import MAY_MOVE, MODE_IDLE, MODE_RUNNING, safety_of
 
-POWER_WITHIN: Final = 20.0
+POWER_TIMEOUT: Final = 20.0
 """Time from "power on" to idle, s: a controller takes six seconds, or longer if it checks its joints."""
-BRAKES_WITHIN: Final = 20.0
-SAFETY_WITHIN: Final = 5.0
-POLL: Final = 0.02
+BRAKE_RELEASE_TIMEOUT: Final = 20.0
+SAFETY_TIMEOUT: Final = 5.0
+POLL_INTERVAL: Final = 0.02
 _BROKEN: Final = frozenset({Safety.FAULT, Safety.VIOLATION})
 
 log = logging.getLogger(__name__)
@@ -54,7 +54,7 @@ class SafetySystem:
         if self._observer.sample().robot_mode >= MODE_IDLE:
             return
         self._pendant.do("power on", "Powering on")
-        self._await("switch on", lambda sample: sample.robot_mode >= MODE_IDLE, POWER_WITHIN)
+        self._await("switch on", lambda sample: sample.robot_mode >= MODE_IDLE, POWER_TIMEOUT)
 
     def release_brakes(self) -> None:
         """Release the brakes; the arm does not move. Raise NotInControl, Refused or DeviceTimeout."""
@@ -64,7 +64,7 @@ class SafetySystem:
         if mode < MODE_IDLE:
             raise Refused("{name} has no power. Switch it on before releasing the brakes.", name=self.name)
         self._pendant.do("brake release", "Brake releasing")
-        self._await("release its brakes", lambda sample: sample.robot_mode == MODE_RUNNING, BRAKES_WITHIN)
+        self._await("release its brakes", lambda sample: sample.robot_mode == MODE_RUNNING, BRAKE_RELEASE_TIMEOUT)
 
     def acknowledge_protective_stop(self, confirmed_by: str) -> None:
         """Unlock a protective stop, at the earliest 5 s after it; the old motion does not continue."""
@@ -74,7 +74,7 @@ class SafetySystem:
         self._control.revoke("a protective stop was acknowledged")
         self._pendant.do("unlock protective stop", "Protective stop releasing")
         log.warning("%s: protective stop acknowledged by %s", self.name, confirmed_by)
-        self._await("leave the protective stop", lambda sample: not _is(sample, Safety.PROTECTIVE_STOP), SAFETY_WITHIN)
+        self._await("leave the protective stop", lambda sample: not _is(sample, Safety.PROTECTIVE_STOP), SAFETY_TIMEOUT)
 
     def restart_safety(self, confirmed_by: str) -> None:
         """Restart the safety system after a fault or violation; drive power is off afterwards."""
@@ -84,7 +84,7 @@ class SafetySystem:
         self._control.revoke("the safety system was restarted")
         self._pendant.do("restart safety", "Restarting safety")
         log.warning("%s: safety system restarted by %s", self.name, confirmed_by)
-        self._await("restart its safety system", lambda sample: not _is(sample, *_BROKEN), POWER_WITHIN)
+        self._await("restart its safety system", lambda sample: not _is(sample, *_BROKEN), POWER_TIMEOUT)
 
     def _newest_safety(self) -> Safety:
         newest = self._observer.newest()
@@ -94,7 +94,7 @@ class SafetySystem:
         return safety_of(self._observer.sample().safety_mode)
 
     def _await(self, what: str, holds: Callable[[Sample], bool], within: float) -> None:
-        if not once_within(lambda: holds(self._observer.sample(max_age=0.5)), within, POLL):
+        if not once_within(lambda: holds(self._observer.sample(max_age=0.5)), within, POLL_INTERVAL):
             raise DeviceTimeout(
                 "{name} did not {what} within {within:g} s. Check the pendant.",
                 name=self.name,

@@ -23,7 +23,7 @@ from arcor2_hw.exceptions import (
     SafetyStop,
     WatchdogTripped,
 )
-from arcor2_hw.keep_alive import FROZEN_AFTER, PULSE_PERIOD, TOO_SLOW, once_within, pulse, result_within
+from arcor2_hw.keep_alive import EXIT_TOO_SLOW, FROZEN_AFTER, PULSE_PERIOD, once_within, pulse, result_within
 from arcor2_hw.objects.arm import label
 
 from . import timing
@@ -41,7 +41,7 @@ _TOO_SLOW: Final = {
 """Causes by exit status of the control process, where the computer was busy."""
 _BROKEN: Final = (b"disconnected", b"could not receive", b"closed the connection", b"lost connection", b"reconnecting")
 """Texts that ur_rtde 1.6.5 prints, in lower case, when its connection breaks and before it reconnects."""
-ASKED: Final = 3
+MAX_ATTEMPTS: Final = 3
 """Attempts of a repeatable command."""
 log = logging.getLogger(__name__)
 
@@ -151,13 +151,13 @@ class ControlSession:
             self.call("the end of control", "stopScript", timeout=wait)
         self.end(reason)
         if self._process is not None:  # until its connections are closed, its registers are in use
-            self._process.wait(timing.PROCESS_ENDS)
+            self._process.wait(timing.PROCESS_END_TIMEOUT)
 
     def await_end(self) -> None:
         """Wait until the guard of an ended session has finished: its last stop must not stop the next program."""
         if self._guard is not None:
             guard = self._guard
-            once_within(lambda: not guard.is_alive(), timing.GUARD_ENDS, timing.GUARD_PERIOD)
+            once_within(lambda: not guard.is_alive(), timing.GUARD_END_TIMEOUT, timing.GUARD_PERIOD)
 
     # -------------------------------------------------------------------------------- commands, from any thread
     def call(
@@ -194,8 +194,8 @@ class ControlSession:
             raise error from None
 
     def ask(self, what: str, question: str, *arguments: Any) -> Any:
-        """Execute a repeatable command, up to ASKED times if the library fails or denies, as on a busy computer."""
-        for _ in range(ASKED - 1):
+        """Execute a repeatable command. Try MAX_ATTEMPTS times if the library fails or denies, as on a busy computer."""
+        for _ in range(MAX_ATTEMPTS - 1):
             try:
                 if answer := self.call(what, question, *arguments):
                     return answer
@@ -216,7 +216,9 @@ class ControlSession:
             self._not_accepted(what)
 
     def _not_accepted(self, what: str) -> NoReturn:
-        once_within(self._ending.is_set, 2.0 * timing.PROGRAM_GONE + timing.PROCESS_ENDS, timing.GUARD_PERIOD)
+        once_within(
+            self._ending.is_set, 2.0 * timing.PROGRAM_GONE_TIMEOUT + timing.PROCESS_END_TIMEOUT, timing.GUARD_PERIOD
+        )
         if self.ended is not None:
             raise self.ended  # the guard was about to find the cause
         raise DeviceFault("{device} did not accept {what}.", device=self.who, what=what)
@@ -241,7 +243,7 @@ class ControlSession:
 
     def end_jog(self) -> bool:
         """End a jog. Return whether one was running. Raise as `do`."""
-        if time.monotonic() >= self._jogs_until + timing.SPEED_STOPPED:
+        if time.monotonic() >= self._jogs_until + timing.JOG_STOP_TIMEOUT:
             return False
         self._jogs_until = 0.0
         self.do("the end of a jog", "speedStop")
@@ -254,13 +256,13 @@ class ControlSession:
 
     def stop_motion(self, deceleration: float) -> None:
         """Stop the motion; by the dashboard, which ends the session, if the program does not react in time."""
-        jogs, self._jogs_until = time.monotonic() < self._jogs_until + timing.SPEED_STOPPED, 0.0
+        jogs, self._jogs_until = time.monotonic() < self._jogs_until + timing.JOG_STOP_TIMEOUT, 0.0
         own = self.own
         try:
             stopping = self._send("a stop", "stop", (deceleration,))
             if own is None:
-                result_within(stopping, timing.SPEED_STOPPED if jogs else timing.STOP_REACTION)
-            elif not once_within(lambda: self._reacted(own), timing.STOP_REACTION, timing.GUARD_PERIOD / 4.0):
+                result_within(stopping, timing.JOG_STOP_TIMEOUT if jogs else timing.STOP_REACTION_TIMEOUT)
+            elif not once_within(lambda: self._reacted(own), timing.STOP_REACTION_TIMEOUT, timing.GUARD_PERIOD / 4.0):
                 self.stop_by_dashboard()
         except (TimeoutError, DeviceFault):
             self.stop_by_dashboard()
@@ -341,7 +343,7 @@ class ControlSession:
 
     def _too_slow(self, detail: str) -> ConnectionLost:
         self.too_slow = True
-        return WatchdogTripped("{device}: {too_slow}", detail, device=self.who, too_slow=TOO_SLOW)
+        return WatchdogTripped("{device}: {too_slow}", detail, device=self.who, too_slow=EXIT_TOO_SLOW)
 
     def _on_output(self, line: bytes) -> None:
         text = line.decode("utf-8", "replace").strip()
@@ -365,7 +367,7 @@ class ControlSession:
                 gone_since = None
             elif gone_since is None:  # the controller's clock: an old sample was taken before the program was sent
                 gone_since = newest.timestamp
-            elif newest.timestamp - gone_since > timing.PROGRAM_GONE:
+            elif newest.timestamp - gone_since > timing.PROGRAM_GONE_TIMEOUT:
                 self.end(self.program_gone())
             if not self._ending.is_set() and (now := time.monotonic()) >= due:
                 due = now + PULSE_PERIOD
@@ -385,7 +387,10 @@ class ControlSession:
             return gone  # the watchdog would leave the arm switched on
         assert self._process is not None
         response = self._process.request("was_late", ())
-        if not once_within(self._ending.is_set, timing.PROCESS_ENDS, timing.GUARD_PERIOD) and not response.done():
+        if (
+            not once_within(self._ending.is_set, timing.PROCESS_END_TIMEOUT, timing.GUARD_PERIOD)
+            and not response.done()
+        ):
             return self._too_slow("the control process did not respond")
         if response.done() and response.exception() is None and response.result():
             return self._too_slow("the control process was late")
@@ -407,7 +412,7 @@ class ControlSession:
         if self._dashboard is not None and left_behind and not self._released:
             for _ in range(2):  # idempotent; the first attempt may meet a connection that was reset
                 try:
-                    self._dashboard.do("stop", "Stopped", timing.LAST_STOP)
+                    self._dashboard.do("stop", "Stopped", timing.LAST_STOP_TIMEOUT)
                     break
                 except DeviceError as e:
                     log.warning("%s: the dashboard could not stop the program: %s", self.who, e)

@@ -9,11 +9,11 @@ from arcor2_hw.objects import Settings
 from arcor2_hw.objects.gripping import LARGEST
 from arcor2_hw.objects.settings import Range, check_host, within
 
-SLOWEST_WATCHDOG = 2.5
-"""Lowest watchdog frequency, Hz, with which the arm stops within the time that the type declares (`loss_reaction`)."""
+MIN_WATCHDOG_FREQUENCY = 2.5
+"""Minimum watchdog frequency, Hz, with which the arm stops within the time that the type declares (`loss_reaction`)."""
 MANUAL_TCP_SPEED = 0.25
 """Highest TCP speed in manual mode, m/s (ISO 10218-1, reduced speed)."""
-TURN = 2.0 * math.pi
+FULL_TURN = 2.0 * math.pi
 OUTPUTS = 18
 """Number of digital inputs, and of digital outputs: 8 standard, 8 configurable, 2 at the tool."""
 
@@ -57,15 +57,15 @@ class UrSettings(Settings):
     tcp_x: Annotated[float, Range(-1.0, 1.0)] = 0.0
     tcp_y: Annotated[float, Range(-1.0, 1.0)] = 0.0
     tcp_z: Annotated[float, Range(-1.0, 1.0)] = 0.0
-    tcp_rx: Annotated[float, Range(-TURN, TURN)] = 0.0
-    tcp_ry: Annotated[float, Range(-TURN, TURN)] = 0.0
-    tcp_rz: Annotated[float, Range(-TURN, TURN)] = 0.0
+    tcp_rx: Annotated[float, Range(-FULL_TURN, FULL_TURN)] = 0.0
+    tcp_ry: Annotated[float, Range(-FULL_TURN, FULL_TURN)] = 0.0
+    tcp_rz: Annotated[float, Range(-FULL_TURN, FULL_TURN)] = 0.0
     max_tcp_speed: Annotated[float, Range(0.01, 3.0)] = 1.0
     max_joint_speed: Annotated[float, Range(0.01, math.pi)] = 1.05
     tcp_acceleration: Annotated[float, Range(0.05, 15.0)] = 1.2
     joint_acceleration: Annotated[float, Range(0.05, 40.0)] = 1.4
     stop_deceleration: Annotated[float, Range(0.5, 15.0)] = 5.0
-    watchdog_frequency: Annotated[float, Range(SLOWEST_WATCHDOG, 50.0)] = SLOWEST_WATCHDOG
+    watchdog_frequency: Annotated[float, Range(MIN_WATCHDOG_FREQUENCY, 50.0)] = MIN_WATCHDOG_FREQUENCY
     use_upper_range_registers: bool = True
     gripper_output: Annotated[int, Range(-1, OUTPUTS - 1)] = 0
     part_sensor_input: Annotated[int, Range(-1, OUTPUTS - 1)] = -1

@@ -6,11 +6,11 @@ from typing import Final
 
 from arcor2_hw.data.geometry import Pose
 
-SLACK: Final = 1.5
+DURATION_FACTOR: Final = 1.5
 """Factor on the computed time of a move: the controller applies limits of its own, too."""
-GRACE: Final = 3.0
+DURATION_MARGIN: Final = 3.0
 """Time added to that, s: for sending the command and for settling."""
-SLOWEST_FRACTION: Final = 0.05
+MIN_SPEED_FRACTION: Final = 0.05
 """Lowest setting of the speed slider that extends the time of a move in full."""
 ROTATION_SPEED: Final = 0.5
 """Lowest angular speed of the tool in a linear move, rad/s."""
@@ -25,29 +25,29 @@ RESUME_TIMEOUT: Final = 4.0
 """Time for the control program to play again after a motion program, s; it takes 0.1 s."""
 GUARD_PERIOD: Final = 0.01
 """Time between two checks of the guard, s."""
-GUARD_ENDS: Final = 1.0
+GUARD_END_TIMEOUT: Final = 1.0
 """Time the guard of an ended session may take to finish, s."""
-STOP_REACTION: Final = 0.08
+STOP_REACTION_TIMEOUT: Final = 0.08
 """Time the control program may take to react to a stop before the dashboard is used, s: twice that of two commands."""
-SPEED_STOPPED: Final = 0.4
+JOG_STOP_TIMEOUT: Final = 0.4
 """Time for stopping a jog, s: the command returns when the arm is at standstill."""
-LAST_STOP: Final = 0.3
+LAST_STOP_TIMEOUT: Final = 0.3
 """Time for the dashboard to answer the stop at the end of a session, s."""
-PROGRAM_GONE: Final = 0.1
+PROGRAM_GONE_TIMEOUT: Final = 0.1
 """Time for which our program may be reported as not playing before the session ends, s of the controller's clock: two
 streams report it at different times."""
-PROGRAM_ENDS: Final = 0.3
+PROGRAM_END_TIMEOUT: Final = 0.3
 """Time for which taking control waits for the end of another program, s."""
-PROCESS_ENDS: Final = 0.6
+PROCESS_END_TIMEOUT: Final = 0.6
 """Time for the control process to report why our program is not playing, and to end after it was killed, s. The guard
 does not signal during this time, so it is below the 0.8 s after which the cell host counts as frozen."""
-POLL: Final = 0.005
+POLL_INTERVAL: Final = 0.005
 """Time between two checks for the end of a motion, s."""
-REST_WITHIN: Final = 2.0
+STANDSTILL_TIMEOUT: Final = 2.0
 """Time after which a stopped arm must be at standstill, s; from full speed it takes 0.3 s."""
-STANDING: Final = 0.5
+STALLED_MOVE_TIMEOUT: Final = 0.5
 """Time an arm may be at standstill, short of its target and with no motion running, before the move has failed, s."""
-STARTS_WITHIN: Final = 1.0
+START_TIMEOUT: Final = 1.0
 """Time from sending a motion program to its first line, s; a controller takes some tens of milliseconds."""
 
 
@@ -62,16 +62,16 @@ def trapezoid(distance: float, speed: float, acceleration: float) -> float:
 def joint_budget(start: Sequence[float], target: Sequence[float], speed: float, acceleration: float) -> float:
     """Return the longest time that a joint motion may take at full speed slider, s."""
     longest = max(abs(b - a) for a, b in zip(start, target, strict=True))
-    return SLACK * trapezoid(longest, speed, acceleration) + GRACE
+    return DURATION_FACTOR * trapezoid(longest, speed, acceleration) + DURATION_MARGIN
 
 
 def linear_budget(start: Pose, target: Pose, speed: float, acceleration: float) -> float:
     """Return the longest time that a linear motion may take at full speed slider, s."""
     distance = start.position.distance_to(target.position)
     angle = start.orientation.angle_to(target.orientation)
-    return SLACK * (trapezoid(distance, speed, acceleration) + angle / ROTATION_SPEED) + GRACE
+    return DURATION_FACTOR * (trapezoid(distance, speed, acceleration) + angle / ROTATION_SPEED) + DURATION_MARGIN
 
 
 def path_budget(budgets: Sequence[float]) -> float:
     """Return the longest time that consecutive motions may take, s, given that of each."""
-    return sum(budgets) - GRACE * (len(budgets) - 1)
+    return sum(budgets) - DURATION_MARGIN * (len(budgets) - 1)

@@ -28,11 +28,11 @@ from .safety import SafetySystem
 from .settings import UrSettings
 from .states import REMEDIES, power_of, safety_of
 
-STOPS_WITHIN: Final = 1.5
+MAX_STOP_TIME: Final = 1.5
 """Time to standstill when this computer freezes, s: FROZEN_AFTER, one period of the watchdog, and braking."""
 CONTACT_SPEED: Final = 0.05
-SAME_POSITION: Final = 0.005
-SAME_ANGLE: Final = 0.02
+MAX_POSITION_DIFFERENCE: Final = 0.005
+MAX_ANGLE_DIFFERENCE: Final = 0.02
 """Differences between nominal model and controller with the same tool, m and rad: real ones are smaller."""
 
 
@@ -41,7 +41,7 @@ class UniversalRobot(MoveActions, DigitalGripper, SafetySystem, SingleArm):
 
     _ABSTRACT = True
     robot_type = RobotType.ARTICULATED
-    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(STOPS_WITHIN)
+    loss_reaction: ClassVar[LossReaction] = LossReaction.stops_within(MAX_STOP_TIME)
     model: ClassVar[ArmModel] = UR5E
     CANCEL_MAPPING: ClassVar[dict[str, str]] = {
         "move": "stop",
@@ -148,7 +148,7 @@ class UniversalRobot(MoveActions, DigitalGripper, SafetySystem, SingleArm):
             ours = flange(self.model, sample.q) * self._control.stated_tool.tcp
             theirs = from_vector(sample.tcp)
             away = ours.position.distance_to(theirs.position), ours.orientation.angle_to(theirs.orientation)
-            if away[0] >= SAME_POSITION or away[1] >= SAME_ANGLE:
+            if away[0] >= MAX_POSITION_DIFFERENCE or away[1] >= MAX_ANGLE_DIFFERENCE:
                 return self._arm.base * ours
         return self._arm.tcp(sample)
 

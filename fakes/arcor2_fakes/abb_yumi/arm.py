@@ -9,7 +9,7 @@ from arcor2_fakes.abb_yumi.kinematics import LIMITS, MAX_SPEED, Array, Kinematic
 
 RAMP: Final = 0.2
 """Time from standstill to full speed, s."""
-STOP_RAMP: Final = 0.1
+STOP_TIME: Final = 0.1
 """Time from full speed to standstill on a stop, s."""
 HAND_STROKE: Final = 0.025
 """Width of the open hand, m."""
@@ -45,7 +45,7 @@ class Motion:
     def advance(self, dt: float, ratio: float) -> bool:
         """Advance by `dt` s at a fraction of the speed; return whether the motion has ended."""
         if self.stopping:
-            self.v -= self.cruise / STOP_RAMP * dt
+            self.v -= self.cruise / STOP_TIME * dt
             if self.v <= 0.0:
                 self.v = 0.0
                 return True

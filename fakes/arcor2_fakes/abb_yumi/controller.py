@@ -24,8 +24,8 @@ TASKS: Final = {"left": "T_ROB_L", "right": "T_ROB_R"}
 UNITS: Final = {"left": "ROB_L", "right": "ROB_R"}
 PROGRAMS: Final = {"left": "Arcor2Left", "right": "Arcor2Right"}
 DOMAINS: Final = ("cfg", "motion", "rapid")
-MOTORS_ON_TAKES: Final = 0.5  # s
-LONGEST_STEP: Final = 0.005  # s
+MOTORS_ON_TIME: Final = 0.5  # s
+MAX_STEP: Final = 0.005  # s
 
 
 @dataclass
@@ -88,7 +88,7 @@ class Controller:
         if not on:
             self._power_lost("motoroff", 10011, "Motors OFF state")
         elif self.control_state == "motoroff":
-            self._motors_due = time.monotonic() + MOTORS_ON_TAKES / self.pace
+            self._motors_due = time.monotonic() + MOTORS_ON_TIME / self.pace
         return True
 
     def start(self) -> bool:
@@ -191,7 +191,7 @@ class Controller:
                 self.log(10011, 1, "Motors ON state")
         left = dt * self.pace
         while left > 0.0:
-            step = min(left, LONGEST_STEP)
+            step = min(left, MAX_STEP)
             left -= step
             for arm in self.arms.values():
                 arm.advance(step, self.speed_ratio / 100.0)

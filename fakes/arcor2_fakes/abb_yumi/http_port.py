@@ -17,7 +17,7 @@ from arcor2_fakes.wire import Connection
 
 REALM: Final = "validusers@robapi.abb"
 MAX_SESSIONS: Final = 70
-SESSION_LASTS: Final = 300.0
+SESSION_TIMEOUT: Final = 300.0
 """Time after its last request at which a session ends and its mastership is released, s."""
 MAX_BODY: Final = 65536
 COOKIE: Final = "-http-session-"
@@ -112,7 +112,7 @@ class HttpPort:
     def expire(self) -> None:
         """End sessions without recent requests."""
         for session in list(self._sessions.values()):
-            if time.monotonic() - session.last_request > SESSION_LASTS:
+            if time.monotonic() - session.last_request > SESSION_TIMEOUT:
                 self._end(session)
 
     def end_all(self) -> None:

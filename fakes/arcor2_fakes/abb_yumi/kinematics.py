@@ -40,7 +40,7 @@ HOME: Final = {
 _ANGLE_WEIGHT: Final = 0.2  # m/rad: weight of an error of the arm angle against one of the position
 _TURN_WEIGHT: Final = 0.3  # m/rad: weight of an error of the orientation
 _STEP: Final = 1e-6
-_CLOSE: Final = 1e-6
+_TOLERANCE: Final = 1e-6
 
 
 class NotReachable(Exception):
@@ -184,7 +184,7 @@ class Kinematics:
         error, jacobian = self._linearised(q, pose, angle)
         for _ in range(rounds):
             size = float(np.linalg.norm(error))
-            if size < _CLOSE:
+            if size < _TOLERANCE:
                 return q
             moved = jacobian.copy()
             for _ in range(3):

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 STIFFNESS = 20_000.0  # N/m: a part on a bench, with the compliance of the arm
-COLLISION = 150.0  # N: force at the TCP at which the controller stops the arm; UR's default limit
-TOUCH = 5.0  # N: force that counts as a contact (tool_contact)
+COLLISION_FORCE = 150.0  # N: force at the TCP at which the controller stops the arm; UR's default limit
+CONTACT_FORCE = 5.0  # N: force that counts as a contact (tool_contact)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Generator
 from typing import Any
 
-from arcor2_fakes.ur.contact import COLLISION, TOUCH, Obstacle
+from arcor2_fakes.ur.contact import COLLISION_FORCE, CONTACT_FORCE, Obstacle
 from arcor2_fakes.ur.kinematics import Chain
 from arcor2_fakes.ur.motion import Arm
 from arcor2_fakes.ur.paths import MotionRefused
@@ -17,12 +17,12 @@ from arcor2_fakes.ur.states import MAY_MOVE, SAFETY_BITS, JointMode, RobotMode, 
 log = logging.getLogger("controller")
 
 HOME = (0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0)
-UNLOCK_WAIT = 5.0  # s after a protective stop before it may be unlocked
+UNLOCK_DELAY = 5.0  # s after a protective stop before it may be unlocked
 REDUCED_JOINT_SPEED = 1.0  # rad/s
 _EMERGENCY_DECELERATION = 24.0  # rad/s^2
 _POWER_ON_TIME = 4.0  # s
 _BRAKE_RELEASE_TIME = 3.0  # s
-_KEPT = 200  # number of commands and stops recorded for the truth
+_MAX_RECORDS = 200  # number of commands and stops recorded for the truth
 Steps = Generator[None, None, None]
 """A running part of a program; each step ends where the real program waits for the next control cycle."""
 
@@ -76,8 +76,8 @@ class Controller:
         self.input_bits, self.output_bits = 0, 0  # 128 bits each
         self.digital_inputs, self.digital_outputs = 0, 0  # 0-7 standard, 8-15 configurable, 16-17 tool
         self.analog_outputs = [0.0, 0.0]
-        self.commands: deque[dict[str, Any]] = deque(maxlen=_KEPT)
-        self.stops: deque[dict[str, Any]] = deque(maxlen=_KEPT)
+        self.commands: deque[dict[str, Any]] = deque(maxlen=_MAX_RECORDS)
+        self.stops: deque[dict[str, Any]] = deque(maxlen=_MAX_RECORDS)
         self.stops_seen = 0
         self.watchdog_trips = self.programs_killed = 0
         self.changed: Callable[[], None] = lambda: None
@@ -131,14 +131,14 @@ class Controller:
     def _touch(self, obstacle: Obstacle) -> None:
         force = obstacle.force(self.arm.pose)
         self.tcp_force = (*force, 0.0, 0.0, 0.0)
-        if math.hypot(*force) > COLLISION and self.safety in MAY_MOVE and self.arm.moving:
+        if math.hypot(*force) > COLLISION_FORCE and self.safety in MAY_MOVE and self.arm.moving:
             self.arm.halt(_EMERGENCY_DECELERATION)
             self.protective_stop("the tool has run into something")
 
     @property
     def touching(self) -> bool:
         """Return whether the tool counts as in contact."""
-        return self.contact or math.hypot(*self.tcp_force[:3]) > TOUCH
+        return self.contact or math.hypot(*self.tcp_force[:3]) > CONTACT_FORCE
 
     def place_obstacle(self, obstacle: Obstacle | None) -> None:
         """Set or remove the obstacle."""
@@ -194,7 +194,7 @@ class Controller:
     def protective_stop(self, why: str) -> None:
         """Stop on the path, and pause the program until a person unlocks it."""
         log.info("protective stop: %s", why)
-        self._unlockable = self.cycles + round(UNLOCK_WAIT * self.time_scale * self.frequency)
+        self._unlockable = self.cycles + round(UNLOCK_DELAY * self.time_scale * self.frequency)
         self._pause(protective=True)
         self._resumes = False
         self._condition(SafetyMode.PROTECTIVE_STOP, True)

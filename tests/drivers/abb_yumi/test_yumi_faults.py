@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from arcor2_drivers.abb_yumi.observer import FRESH
+from arcor2_drivers.abb_yumi.observer import MAX_SAMPLE_AGE
 from arcor2_drivers.abb_yumi.yumi import YuMi
 from arcor2_hw.data.device import Connection
 from arcor2_hw.data.robot import Joint, MoveEnd, Safety
@@ -157,9 +157,9 @@ def test_disconnecting_from_a_slow_controller_releases_mastership(fake: FakeYumi
 
 def test_a_stale_state_is_an_error_that_names_the_address(fake: FakeYumi, robot: YuMi) -> None:
     robot.get_end_effector_pose("tcp", "left")
-    robot._observer.fresh_for = FRESH
+    robot._observer.fresh_for = MAX_SAMPLE_AGE
     fake.do("silence", wire="rws")
-    time.sleep(FRESH + 0.1)
+    time.sleep(MAX_SAMPLE_AGE + 0.1)
     for call in (
         lambda: robot.get_end_effector_pose("tcp", "left"),
         lambda: robot.robot_joints(arm_id="right"),

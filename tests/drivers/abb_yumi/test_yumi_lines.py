@@ -12,7 +12,7 @@ from hypothesis import example, given, strategies as st
 
 from arcor2_drivers.abb_yumi import nominal
 from arcor2_drivers.abb_yumi.arm_line import ArmLine
-from arcor2_drivers.abb_yumi.motion_lines import LONGEST_LINE, Code, answer, check, line
+from arcor2_drivers.abb_yumi.motion_lines import MAX_LINE_LENGTH, Code, answer, check, line
 from arcor2_drivers.abb_yumi.settings import YumiSettings
 from arcor2_fakes.abb_yumi import kinematics, protocol
 from arcor2_hw.exceptions import DeviceFault, DeviceTimeout, NotInControl, OutOfRange
@@ -76,7 +76,7 @@ part = st.floats(-1.0, 1.0)
 @given(st.integers(1, 9999), st.lists(joint, min_size=7, max_size=7))
 def test_seven_joints_fit_and_the_server_reads_them(sequence: int, joints: list[float]) -> None:
     made = line(sequence, Code.STAGE_JOINTS, joints)
-    assert len(made) <= LONGEST_LINE + 1
+    assert len(made) <= MAX_LINE_LENGTH + 1
     number, code, values = protocol.parsed(made.decode().rstrip("\n"))
     assert (number, code) == (sequence, 20)
     assert values == pytest.approx(joints, abs=5.1e-4)
@@ -85,7 +85,7 @@ def test_seven_joints_fit_and_the_server_reads_them(sequence: int, joints: list[
 @example([-0.123456] * 3, [-0.123456] * 4)
 @given(st.lists(st.floats(-499.0, 499.0), min_size=3, max_size=3), st.lists(part, min_size=4, max_size=4))
 def test_a_tool_fits_into_a_line(position: list[float], quaternion: list[float]) -> None:
-    assert len(line(9999, Code.TOOL, [*position, *quaternion])) <= LONGEST_LINE + 1
+    assert len(line(9999, Code.TOOL, [*position, *quaternion])) <= MAX_LINE_LENGTH + 1
 
 
 @given(st.text(st.characters(min_codepoint=32, max_codepoint=126), min_size=2, max_size=40), st.data())

@@ -12,7 +12,7 @@ import psutil
 import pytest
 
 from arcor2_drivers.universal_robots import timing
-from arcor2_drivers.universal_robots.control_process import TOO_SLOW, ControlProgram
+from arcor2_drivers.universal_robots.control_process import EXIT_TOO_SLOW, ControlProgram
 from arcor2_drivers.universal_robots.ur5e import UR5e
 from arcor2_hw.data.device import LossKind
 from arcor2_hw.exceptions import Cancelled, ConnectionLost
@@ -46,7 +46,9 @@ def await_standstill(fake: FakeUr) -> None:
 def test_a_stall_of_half_a_second_does_not_stop_a_move(
     ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(timing, "STOP_REACTION", 10.0)  # on a busy machine the dashboard would stop the arm first
+    monkeypatch.setattr(
+        timing, "STOP_REACTION_TIMEOUT", 10.0
+    )  # on a busy machine the dashboard would stop the arm first
     doing = far_move(ready, fake)
     trips = fake.truth()["watchdog_trips"]
     for _ in range(2):
@@ -105,7 +107,7 @@ def test_a_command_that_outlasts_the_watchdog_reports_the_reason(monkeypatch: py
     monkeypatch.setattr(os, "_exit", sys.exit)
     with pytest.raises(SystemExit) as exit_:
         program.do("setPayload", [])
-    assert exit_.value.code == TOO_SLOW
+    assert exit_.value.code == EXIT_TOO_SLOW
 
 
 def test_only_a_command_that_reaches_the_control_program_signals_its_watchdog() -> None:
@@ -127,7 +129,7 @@ def test_a_slow_command_may_have_tripped_the_watchdog() -> None:
 
 
 def test_a_frozen_owner_stops_the_arm(owner: Owner, fake: FakeUr) -> None:
-    assert UR5e.loss_reaction.kind is LossKind.STOPS_WITHIN
+    assert UR5e.loss_reaction.kind is LossKind.MAX_STOP_TIME
     process = owner()
     time.sleep(0.3)  # at full speed
     os.kill(process.pid, signal.SIGSTOP)

@@ -358,7 +358,7 @@ def test_manual_mode_limits_the_tcp_speed(ready: UR5e, fake: FakeUr) -> None:
 def test_a_low_speed_slider_extends_the_move_timeout(
     ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(timing, "GRACE", 0.2)
+    monkeypatch.setattr(timing, "DURATION_MARGIN", 0.2)
     fake.do("speed_slider", fraction=0.2)
     ready.move_to_joints(turned(ready, 0.15), 0.5)  # five times as long as at full speed; half as much again is allowed
     assert fake.truth()["q"][0] == pytest.approx(0.15, abs=1e-3)
@@ -379,8 +379,8 @@ def test_the_move_timeout_elapses_by_the_controllers_clock() -> None:
 
 
 def test_a_move_that_exceeds_its_time_is_stopped(ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(timing, "GRACE", 0.1)
-    monkeypatch.setattr(timing, "SLACK", 0.1)
+    monkeypatch.setattr(timing, "DURATION_MARGIN", 0.1)
+    monkeypatch.setattr(timing, "DURATION_FACTOR", 0.1)
     with pytest.raises(DeviceTimeout, match="computed time"):
         ready.move_to_joints(turned(ready, 2.0), 0.5)
     await_standstill(fake)
@@ -392,7 +392,9 @@ def test_a_move_that_exceeds_its_time_is_stopped(ready: UR5e, fake: FakeUr, monk
 def test_stop_overtakes_the_move_and_reports_the_result(
     ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(timing, "STOP_REACTION", 10.0)  # on a busy machine the dashboard would stop the arm first
+    monkeypatch.setattr(
+        timing, "STOP_REACTION_TIMEOUT", 10.0
+    )  # on a busy machine the dashboard would stop the arm first
     for _ in range(5):
         doing = far_move(ready, fake)
         ready.stop()

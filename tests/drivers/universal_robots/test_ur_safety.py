@@ -193,7 +193,7 @@ def await_moved(fake: FakeUr, q: list[float]) -> None:
 def test_a_long_jog_delays_neither_the_watchdog_nor_a_stop(
     ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(timing, "SPEED_STOPPED", 10.0)  # on a busy machine the dashboard would stop the arm first
+    monkeypatch.setattr(timing, "JOG_STOP_TIMEOUT", 10.0)  # on a busy machine the dashboard would stop the arm first
     trips = fake.truth()["watchdog_trips"]
     ready.jog(joint_velocities=[0.3, 0.0, 0.0, 0.0, 0.0, 0.0], valid_for=1.0)
     time.sleep(0.5)

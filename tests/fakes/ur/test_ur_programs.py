@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from arcor2_fakes.ur.contact import COLLISION, STIFFNESS, Obstacle
+from arcor2_fakes.ur.contact import COLLISION_FORCE, STIFFNESS, Obstacle
 from arcor2_fakes.ur.controller import HOME, Controller
 from arcor2_fakes.ur.language import WrittenProgram, parse
 from arcor2_fakes.ur.states import Runtime, SafetyMode
@@ -152,7 +152,7 @@ def test_an_obstacle_acts_like_a_spring_and_a_collision_stops_the_arm(c):
     for _ in range(1500):
         c.tick()
     assert c.safety is SafetyMode.PROTECTIVE_STOP
-    assert COLLISION < c.tcp_force[2] < 2.0 * COLLISION
+    assert COLLISION_FORCE < c.tcp_force[2] < 2.0 * COLLISION_FORCE
     assert not c.arm.moving
 
 
