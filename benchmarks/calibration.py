@@ -48,7 +48,7 @@ class View:
 
 
 @dataclass
-class Tally:
+class ErrorStatistics:
     """Errors in mm and degrees, times in s, reasons of refusals, number of wrong verdicts.
 
     opencv: times in which OpenCV decodes the pictures and detects their markers.
@@ -161,9 +161,9 @@ def errors_of(pose: Pose, world_from_camera: Array) -> tuple[float, float]:
 # ------------------------------------------------------------------------------------------------ metrics
 def measure(
     make: Callable[[np.random.Generator, Plate], View], pictures: int, limit: float, options: PoseOptions, factor: float
-) -> Tally:
+) -> ErrorStatistics:
     """Compute camera poses from JPEG files; an error of more than `limit` mm is a wrong verdict."""
-    tally = Tally()
+    tally = ErrorStatistics()
     for index in range(pictures):
         random = np.random.default_rng([SEED, index])
         if index % 20 == 0:

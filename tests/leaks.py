@@ -24,7 +24,7 @@ GRACE = 20.0
 
 
 @dataclass
-class Holdings:
+class ProcessResources:
     """Resources of this process: threads by ident, children by pid and start time, sockets by inode."""
 
     threads: dict[int, str] = field(default_factory=dict)
@@ -32,7 +32,7 @@ class Holdings:
     sockets: set[str] = field(default_factory=set)
 
     @classmethod
-    def now(cls, *, again: bool = False) -> "Holdings":
+    def now(cls, *, again: bool = False) -> "ProcessResources":
         """Return the present resources. Whether the same children have ended is checked only `again`."""
         sockets = set()
         for fd in Path("/proc/self/fd").iterdir():
@@ -47,7 +47,7 @@ class Holdings:
             _children.update(_running_children())
         return cls({t.ident or 0: t.name for t in threading.enumerate()}, dict(_children), sockets)
 
-    def beyond(self, other: "Holdings") -> list[str]:
+    def beyond(self, other: "ProcessResources") -> list[str]:
         """Name the resources that are here and not in `other`."""
         found = [f"thread {name}" for ident, name in self.threads.items() if ident not in other.threads]
         started = {pid for pid, _ in other.children} - forking
@@ -57,7 +57,7 @@ class Holdings:
         found += [f"socket {s}" for s in sorted(self.sockets - other.sockets)]
         return found
 
-    def add(self, other: "Holdings") -> None:
+    def add(self, other: "ProcessResources") -> None:
         self.threads |= other.threads
         self.children |= other.children
         self.sockets |= other.sockets
@@ -100,11 +100,11 @@ def _ancestors(pid: int) -> set[int]:
     return {each.pid for each in parents} | {int(server) for server in servers if server.isdigit()}
 
 
-_before = pytest.StashKey[Holdings]()
-_allowed = Holdings()
+_before = pytest.StashKey[ProcessResources]()
+_allowed = ProcessResources()
 forking: set[int] = set()
 """Processes that fork programs for tests (`tests.forking`). They may stay, but not the programs that they start."""
-_after: list[Holdings] = []
+_after: list[ProcessResources] = []
 """Resources of this process after the previous test."""
 
 
@@ -120,11 +120,11 @@ def pytest_fixture_setup(fixturedef: Any) -> Generator[None, object, object]:
 @contextlib.contextmanager
 def outliving_the_test() -> Iterator[None]:
     """Allow resources created in this context to outlive the test: part of a wider fixture that is restarted."""
-    before = Holdings.now()
+    before = ProcessResources.now()
     yield
-    after = Holdings.now()
+    after = ProcessResources.now()
     _allowed.add(
-        Holdings(
+        ProcessResources(
             {k: v for k, v in after.threads.items() if k not in before.threads},
             {k: v for k, v in after.children.items() if k not in before.children},
             after.sockets - before.sockets,
@@ -134,7 +134,7 @@ def outliving_the_test() -> Iterator[None]:
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> Generator[None, None, None]:
-    item.stash[_before] = _after.pop() if _after else Holdings.now()
+    item.stash[_before] = _after.pop() if _after else ProcessResources.now()
     yield
 
 
@@ -146,12 +146,12 @@ def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, None, None]:
     allowed = item.stash[_before]
     allowed.add(_allowed)
     deadline = time.monotonic() + GRACE
-    after = Holdings.now()
+    after = ProcessResources.now()
     leaked = after.beyond(allowed)
     while leaked and time.monotonic() < deadline:
         gc.collect()
         time.sleep(0.02)
-        after = Holdings.now(again=True)
+        after = ProcessResources.now(again=True)
         leaked = after.beyond(allowed)
     _after[:] = [after]
     if leaked:

@@ -9,7 +9,7 @@ from arcor2_hw.analysis.constants import constant
 from arcor2_hw.analysis.module import Binding, ClassInfo, FunctionNode, Value
 from arcor2_hw.analysis.symbols import External, Resolver, framework_name, is_framework
 
-Lineage = list["ClassInfo | External"]
+Ancestors = list["ClassInfo | External"]
 
 DRIVER_BASES: Final = ("Connected", "PointActions")
 """Bases for drivers: mixins that implement what an object type base leaves to the driver."""
@@ -20,7 +20,7 @@ class Hierarchy:
 
     def __init__(self, resolver: Resolver) -> None:
         self.resolver = resolver
-        self._lineages: dict[ClassInfo, Lineage] = {}
+        self._lineages: dict[ClassInfo, Ancestors] = {}
         self._ours: dict[ClassInfo, frozenset[str]] = {}
         self._offered: dict[ClassInfo, list[str]] = {}
         self._underway: list[ClassInfo] = []
@@ -48,7 +48,7 @@ class Hierarchy:
         bases = self.bases(info)
         return bases[-1] if bases and isinstance(bases[-1], ClassInfo) else None
 
-    def lineage(self, info: ClassInfo) -> Lineage:
+    def lineage(self, info: ClassInfo) -> Ancestors:
         """Return the class and its ancestors in Python's lookup order (C3).
 
         Raises:
@@ -62,17 +62,17 @@ class Hierarchy:
         self._underway.append(info)
         try:
             bases = self.bases(info)
-            sequences: list[Lineage] = [
+            sequences: list[Ancestors] = [
                 list(self.lineage(base)) if isinstance(base, ClassInfo) else [base] for base in bases
             ]
-            result: Lineage = [info, *self._merged(info, [*sequences, list(bases)])]
+            result: Ancestors = [info, *self._merged(info, [*sequences, list(bases)])]
         finally:
             self._underway.pop()
         self._lineages[info] = result
         return result
 
-    def _merged(self, info: ClassInfo, sequences: list[Lineage]) -> Lineage:
-        result: Lineage = []
+    def _merged(self, info: ClassInfo, sequences: list[Ancestors]) -> Ancestors:
+        result: Ancestors = []
         while sequences := [sequence for sequence in sequences if sequence]:
             for sequence in sequences:
                 candidate = sequence[0]

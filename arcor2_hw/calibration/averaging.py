@@ -7,8 +7,8 @@ import numpy as np
 
 from arcor2_hw.calibration.camera_results import PoseOptions
 from arcor2_hw.calibration.lens import Array, Lens
-from arcor2_hw.calibration.pose_problem import Hints, PoseProblem, Seen
-from arcor2_hw.calibration.pose_search import Found, covariance_of, lens_changes, solve
+from arcor2_hw.calibration.pose_problem import DetectedTarget, Hints, PoseProblem
+from arcor2_hw.calibration.pose_search import PoseCandidate, covariance_of, lens_changes, solve
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.rigid import inverted, mean_rotation, motion
 from arcor2_hw.exceptions import InvalidData
@@ -17,7 +17,7 @@ _FLAT: float = 2.0
 """Angle between the camera's axis and a marker's z up to which the marker has no weight, rad (protocol, section 15)."""
 
 
-def weight_of(camera_from_origin: Array, each: Seen, options: PoseOptions) -> float:
+def weight_of(camera_from_origin: Array, each: DetectedTarget, options: PoseOptions) -> float:
     """Return the weight of a marker, 0 to 1, by its distance and its angle to the camera (protocol, section 15)."""
     middle = camera_from_origin[:3, :3] @ each.middle + camera_from_origin[:3, 3]
     distance = float(np.linalg.norm(middle))
@@ -27,7 +27,7 @@ def weight_of(camera_from_origin: Array, each: Seen, options: PoseOptions) -> fl
     return (min(max(near, 0.0), 1.0) + min(max(facing, 0.0), 1.0)) / 2
 
 
-def averaged(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions) -> Found:
+def averaged(lens: Lens, seen: Sequence[DetectedTarget], hints: Hints, options: PoseOptions) -> PoseCandidate:
     """Find a pose for each marker and average the poses.
 
     Raises:
@@ -77,4 +77,6 @@ def averaged(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOption
                 Reason.IMPLAUSIBLE,
                 name=each.name.capitalize(),
             )
-    return Found(inverted(pose), everything.unchanged, covariance, list(seen), errors, lens.parameters, left_out)
+    return PoseCandidate(
+        inverted(pose), everything.unchanged, covariance, list(seen), errors, lens.parameters, left_out
+    )

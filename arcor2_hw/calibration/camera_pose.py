@@ -15,10 +15,10 @@ from arcor2_hw.calibration.diagnosis import check_not_mirrored, wanted_markers
 from arcor2_hw.calibration.drawing import GOOD, Canvas, error_picture
 from arcor2_hw.calibration.layout import Layout, item_name
 from arcor2_hw.calibration.lens import Array, Lens
-from arcor2_hw.calibration.lens_check import Checked, check_of_lens
+from arcor2_hw.calibration.lens_check import CheckedPose, check_of_lens
 from arcor2_hw.calibration.pictures import Picture, grey_of, one_by_one
-from arcor2_hw.calibration.pose_problem import Hints, Seen
-from arcor2_hw.calibration.pose_search import Found, search
+from arcor2_hw.calibration.pose_problem import DetectedTarget, Hints
+from arcor2_hw.calibration.pose_search import PoseCandidate, search
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.results import Grade
 from arcor2_hw.calibration.rigid import inverted
@@ -129,13 +129,13 @@ def _hints(options: PoseOptions) -> Hints:
     return Hints(expected, options.expected_position, options.expected_orientation, gravity, options.gravity_deviation)
 
 
-def _check_still(seen: list[Seen]) -> None:
+def _check_still(seen: list[DetectedTarget]) -> None:
     """Require that markers are at the same pixels in all images.
 
     Raises:
         CalibrationRefused: Something moved.
     """
-    first: dict[tuple[str, int], Seen] = {}
+    first: dict[tuple[str, int], DetectedTarget] = {}
     for each in seen:
         before = first.setdefault(each.key, each)
         if each.key[0] == "marker" and before is not each:
@@ -153,7 +153,7 @@ def _check_still(seen: list[Seen]) -> None:
 
 
 def _result(
-    found: Found, checked: Checked, layout: Layout, options: PoseOptions, blur: float, pictures: int
+    found: PoseCandidate, checked: CheckedPose, layout: Layout, options: PoseOptions, blur: float, pictures: int
 ) -> CameraPose:
     """Return the result with its verdict, or refuse it."""
     seen, covariance = found.seen, found.covariance
@@ -205,7 +205,7 @@ def _result(
     )
 
 
-def _check_known(found: Found, lens: LensCheck, position: float, options: PoseOptions) -> None:
+def _check_known(found: PoseCandidate, lens: LensCheck, position: float, options: PoseOptions) -> None:
     """Require that the pose is certain enough and agrees with the hints.
 
     Raises:
@@ -245,7 +245,7 @@ def _verdict(
     residual: float,
     errors: list[MarkerError],
     f: float,
-    checked: Checked,
+    checked: CheckedPose,
     options: PoseOptions,
 ) -> tuple[Grade, Message]:
     """Return how good a pose is, and what a technician should check."""

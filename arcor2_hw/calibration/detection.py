@@ -13,7 +13,7 @@ from arcor2_hw.calibration.layout import CharucoBoard, Layout, MarkerDictionary,
 from arcor2_hw.calibration.lens import Array, Lens
 from arcor2_hw.calibration.markers import detect, measured
 from arcor2_hw.calibration.pictures import Grey
-from arcor2_hw.calibration.pose_problem import Seen
+from arcor2_hw.calibration.pose_problem import DetectedTarget
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.messages import Message
 
@@ -27,7 +27,7 @@ _SHARP: Final = 1.4
 class Detection:
     """Detected targets, and the blur: standard deviation of edges, px, 0 where it could not be measured."""
 
-    seen: list[Seen]
+    seen: list[DetectedTarget]
     blur: float
 
 
@@ -43,7 +43,7 @@ class _ImageContent:
         strangers: Numbers of markers that are not listed.
     """
 
-    seen: list[Seen] = field(default_factory=list)
+    seen: list[DetectedTarget] = field(default_factory=list)
     widths: list[tuple[float, float]] = field(default_factory=list)
     blurs: list[float] = field(default_factory=list)
     pieces: bool = False
@@ -169,7 +169,9 @@ def _detect_board(
         placed = board.pose.matrix()
         in_origin = points @ placed[:3, :3].T + placed[:3, 3]
         key = ("board", index)
-        content.seen.append(Seen(f"board {index}", key, picture, in_origin, pixels, root, placed[:3, 2], placed[:3, 3]))
+        content.seen.append(
+            DetectedTarget(f"board {index}", key, picture, in_origin, pixels, root, placed[:3, 2], placed[:3, 3])
+        )
 
 
 def _root_of(each: Measured) -> Array:
@@ -177,11 +179,11 @@ def _root_of(each: Measured) -> Array:
     return np.asarray(np.linalg.cholesky(each.information).T, dtype=np.float64)
 
 
-def _seen_marker(each: Measured, origin_from_marker: Array, size: float, picture: int) -> Seen:
+def _seen_marker(each: Measured, origin_from_marker: Array, size: float, picture: int) -> DetectedTarget:
     """Return a measured marker as part of a problem."""
     half = size / 2
     corners = np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
-    return Seen(
+    return DetectedTarget(
         f"marker {each.number}",
         ("marker", each.number),
         picture,

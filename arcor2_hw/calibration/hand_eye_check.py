@@ -23,7 +23,7 @@ _LEVELS: Final = np.logspace(-2, 2, 41)
 
 
 @dataclass(frozen=True, eq=False)
-class Checked:
+class CheckedCalibration:
     """A hand-eye calibration with an unknown size of the target and an unknown focal length.
 
     Attributes:
@@ -113,7 +113,9 @@ class Checked:
         )
 
 
-def check_of_hand_eye(lens: Lens, stations: Sequence[Station], found: Mount, robot: tuple[float, float]) -> Checked:
+def check_of_hand_eye(
+    lens: Lens, stations: Sequence[Station], found: Mount, robot: tuple[float, float]
+) -> CheckedCalibration:
     """Check a result by computing it again with an unknown size of the target and an unknown focal length.
 
     The inaccuracy of the robot is estimated from the images (chi square equals its degrees of freedom), so that an
@@ -155,7 +157,7 @@ def check_of_hand_eye(lens: Lens, stations: Sequence[Station], found: Mount, rob
     between = max(6 * len(stations) - _POSE - 2, 1)
     shift = np.concatenate((mount[:3, 3] - found.mount[:3, 3], rotation_vector(mount[:3, :3] @ found.mount[:3, :3].T)))
     size, focal = np.exp(logs)
-    return Checked(
+    return CheckedCalibration(
         (float(size), float(deviations[0])),
         (float(focal), float(deviations[1])),
         bool((deviations <= _CONFIRMED).all()),

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from arcor2_hw.calibration.lens import Array, Lens
-from arcor2_hw.calibration.pose_problem import Seen
+from arcor2_hw.calibration.pose_problem import DetectedTarget
 from arcor2_hw.calibration.rigid import cross_matrix, inverted, moved
 
 _ROUNDS: Final = 60
@@ -26,7 +26,7 @@ class Station:
 
     index: int
     hand: Array
-    seen: list[Seen]
+    seen: list[DetectedTarget]
 
     @property
     def points(self) -> Array:

@@ -46,7 +46,7 @@ class _View:
 
 
 @dataclass(frozen=True, eq=False)
-class _Solved:
+class _Solution:
     matrix: Array
     coefficients: Array
     deviations: Array
@@ -150,7 +150,7 @@ def coverage_of(pixels: Sequence[Array], size: tuple[int, int]) -> float:
     return len(fields) / (columns * rows)
 
 
-def _solve(views: list[_View], size: tuple[int, int], options: IntrinsicsOptions) -> _Solved:
+def _solve(views: list[_View], size: tuple[int, int], options: IntrinsicsOptions) -> _Solution:
     """Find the intrinsics that explain the views best."""
     points: Any = [view.points.astype(np.float32).reshape(-1, 1, 3) for view in views]
     pixels: Any = [view.pixels.astype(np.float32).reshape(-1, 1, 2) for view in views]
@@ -173,7 +173,7 @@ def _solve(views: list[_View], size: tuple[int, int], options: IntrinsicsOptions
         expected: Any = cv2.projectPoints(view.points, turn, place, matrix, numbers)[0]
         errors.append(np.asarray(expected, dtype=np.float64).reshape(-1, 2) - view.pixels)
         normals.append(np.asarray(cv2.Rodrigues(turn)[0], dtype=np.float64)[:, 2])
-    return _Solved(
+    return _Solution(
         np.asarray(matrix, dtype=np.float64),
         numbers,
         np.ravel(deviations)[:4].astype(np.float64),
@@ -182,7 +182,7 @@ def _solve(views: list[_View], size: tuple[int, int], options: IntrinsicsOptions
     )
 
 
-def _outlier(solved: _Solved) -> int | None:
+def _outlier(solved: _Solution) -> int | None:
     """Return the view that fits far worse than the others."""
     residuals = [_root_mean_square(each) for each in solved.errors]
     worst = int(np.argmax(residuals))
@@ -200,7 +200,7 @@ def _tilt_between(normals: Array) -> float:
 
 def _result(
     views: list[_View],
-    solved: _Solved,
+    solved: _Solution,
     problems: dict[int, Message],
     size: tuple[int, int],
     options: IntrinsicsOptions,

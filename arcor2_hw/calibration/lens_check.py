@@ -10,7 +10,7 @@ from scipy.special import chdtrc
 from arcor2_hw.calibration.camera_results import LensCheck, LensState, PoseOptions
 from arcor2_hw.calibration.lens import Array, Lens
 from arcor2_hw.calibration.pose_problem import Hints, PoseProblem, Solution
-from arcor2_hw.calibration.pose_search import Found, covariance_of, lens_changes
+from arcor2_hw.calibration.pose_search import PoseCandidate, covariance_of, lens_changes
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.rigid import inverted, rotation_vector
 from arcor2_hw.data.camera import CameraParameters
@@ -41,7 +41,7 @@ def is_misfit(squares: float, freedom: int) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Checked:
+class CheckedPose:
     """A pose checked against the noise of corners and with an unknown focal length.
 
     Attributes:
@@ -57,7 +57,7 @@ class Checked:
     covariance: Array
 
 
-def check_of_lens(lens: Lens, found: Found, hints: Hints, options: PoseOptions) -> Checked:
+def check_of_lens(lens: Lens, found: PoseCandidate, hints: Hints, options: PoseOptions) -> CheckedPose:
     """Check a pose and the lens.
 
     The pose is computed again with an unknown focal length, and its change is compared with its standard deviation
@@ -97,7 +97,7 @@ def check_of_lens(lens: Lens, found: Found, hints: Hints, options: PoseOptions) 
     distance = float(np.median([np.linalg.norm(inverted(pose)[:3, 3] - each.middle) for each in seen]))
     verdict = _verdict(state, factor, deviation, distance)
     check = LensCheck(state, factor, deviation, misfit, left, parameters, verdict.text, **verdict.translation())
-    return Checked(check, is_large, covariance)
+    return CheckedPose(check, is_large, covariance)
 
 
 def _solved(problem: PoseProblem, pose: Array, change: Array) -> tuple[Solution, float, bool]:

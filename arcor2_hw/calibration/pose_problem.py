@@ -25,7 +25,7 @@ _CANDIDATES_OF: Final = 6
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class DetectedTarget:
     """A detected marker or board of known pose.
 
     Attributes:
@@ -111,7 +111,7 @@ class Solution:
 class _Group:
     """Targets with equal numbers of points, computed together."""
 
-    def __init__(self, members: list[int], seen: Sequence[Seen], firsts: Sequence[int]) -> None:
+    def __init__(self, members: list[int], seen: Sequence[DetectedTarget], firsts: Sequence[int]) -> None:
         self.members = members
         count = len(seen[members[0]].points)
         self.index = np.concatenate([np.arange(firsts[i], firsts[i] + count) for i in members])
@@ -135,7 +135,7 @@ class PoseProblem:
         scale: Unit of standard deviations; above 1 where targets are not exactly where they should be.
     """
 
-    def __init__(self, lens: Lens, seen: Sequence[Seen], hints: Hints, lens_changes: Array) -> None:
+    def __init__(self, lens: Lens, seen: Sequence[DetectedTarget], hints: Hints, lens_changes: Array) -> None:
         self.lens = lens
         self.seen = list(seen)
         self.hints = hints
@@ -273,7 +273,7 @@ class PoseProblem:
         return normal, right
 
 
-def planar_poses(lens: Lens, each: Seen) -> list[Array]:
+def planar_poses(lens: Lens, each: DetectedTarget) -> list[Array]:
     """Return the poses of the camera (camera_from_origin) that one marker or board allows: one or two."""
     rays = lens.rays(each.pixels)
     if each.square is not None:

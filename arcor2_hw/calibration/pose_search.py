@@ -9,7 +9,7 @@ import numpy as np
 from arcor2_hw.calibration.camera_results import PoseOptions
 from arcor2_hw.calibration.layout import item_name
 from arcor2_hw.calibration.lens import Array, Lens
-from arcor2_hw.calibration.pose_problem import Hints, PoseProblem, Seen, Solution
+from arcor2_hw.calibration.pose_problem import DetectedTarget, Hints, PoseProblem, Solution
 from arcor2_hw.calibration.refusals import CalibrationRefused, Reason
 from arcor2_hw.calibration.rigid import inverted, pose_difference
 from arcor2_hw.data.camera import CameraParameters
@@ -30,7 +30,7 @@ _SAME: Final = (0.002, 0.004)
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class PoseCandidate:
     """A pose (camera_from_origin), errors in px, and the lens.
 
     Attributes:
@@ -41,18 +41,18 @@ class Found:
     pose: Array
     change: Array
     covariance: Array
-    seen: list[Seen]
+    seen: list[DetectedTarget]
     errors: list[Array]
     parameters: CameraParameters
     left_out: set[tuple[str, int]] = field(default_factory=set)
 
     @property
-    def used(self) -> list[Seen]:
+    def used(self) -> list[DetectedTarget]:
         """Return the targets that were not excluded."""
         return [each for each in self.seen if each.key not in self.left_out]
 
 
-def search(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions) -> Found:
+def search(lens: Lens, seen: Sequence[DetectedTarget], hints: Hints, options: PoseOptions) -> PoseCandidate:
     """Find the pose that explains everything detected.
 
     Raises:
@@ -89,7 +89,7 @@ def search(lens: Lens, seen: Sequence[Seen], hints: Hints, options: PoseOptions)
     if left is None:
         raise CalibrationRefused("The markers contradict each other.", reason=Reason.IMPLAUSIBLE)
     parameters = lens.changed(changes @ best.change)
-    return Found(best.pose, best.change, covariance_of(best), list(seen), left, parameters, left_out)
+    return PoseCandidate(best.pose, best.change, covariance_of(best), list(seen), left, parameters, left_out)
 
 
 def solve(problem: PoseProblem, options: PoseOptions) -> Solution:

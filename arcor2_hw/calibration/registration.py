@@ -30,7 +30,7 @@ SURFACE_NOISE: Final = 0.0007
 """Standard deviation between a model and its robot, m."""
 
 
-class Rendered(NamedTuple):
+class RenderedSurface(NamedTuple):
     """A surface as seen along rays: depth (n,) along the optical axis, infinite where there is none."""
 
     depth: Floats
@@ -103,14 +103,14 @@ class Model:
             o3d.core.Tensor.from_numpy(np.ascontiguousarray(surface.triangles, dtype=np.uint32)),
         )
 
-    def render(self, base_from_camera: Floats, rays: Floats) -> Rendered:
+    def render(self, base_from_camera: Floats, rays: Floats) -> RenderedSurface:
         """Cast rays (n, 3), given in the camera's frame with z = 1."""
         both = np.empty((len(rays), 6), np.float32)
         both[:, :3] = base_from_camera[:3, 3]
         both[:, 3:] = rays @ base_from_camera[:3, :3].T
         hit = self._scene.cast_rays(o3d.core.Tensor.from_numpy(both))
         normals: Floats = _towards(hit["primitive_normals"].numpy().astype(np.float64), both[:, 3:])
-        return Rendered(hit["t_hit"].numpy().astype(np.float64), normals)
+        return RenderedSurface(hit["t_hit"].numpy().astype(np.float64), normals)
 
     def distance(self, points: Floats) -> Floats:
         """Return the distances of points (n, 3) from the surface, m."""

@@ -20,11 +20,11 @@ from arcor2_hw.compute.history_tasks import (
     RUNS,
     VALID_MS,
     ColdFile,
+    ColdFileResult,
     ReadPoint,
     ReadRuns,
     SummarizePoint,
     WriteColdFile,
-    Written,
 )
 from arcor2_hw.compute.worker_state import WorkerState
 from arcor2_hw.data.editor import RunEnd
@@ -59,7 +59,7 @@ _ORDER: Final = {POINTS: "point, time", RUNS: "time"}
 
 
 # -------------------------------------------------------------------------------- writing
-def write_cold_file(task: WriteColdFile, _state: WorkerState) -> Written:
+def write_cold_file(task: WriteColdFile, _state: WorkerState) -> ColdFileResult:
     """Write a Parquet file, complete and flushed to the disk before it has its name.
 
     Raises:
@@ -73,7 +73,7 @@ def write_cold_file(task: WriteColdFile, _state: WorkerState) -> Written:
                 f"select coalesce(max(id), 0), count(*) from {_TABLES[task.kind]} where time < ?", (task.before,)
             ).fetchone()
             if not count and not task.merged:
-                return Written(None)
+                return ColdFileResult(None)
             _load(engine, task.kind, recent, "time < ? and id <= ?", (task.before, last_id))
             rows = _all_rows(task.kind, [str(directory / name) for name in task.merged])
             if task.kind == POINTS:
@@ -90,7 +90,9 @@ def write_cold_file(task: WriteColdFile, _state: WorkerState) -> Written:
         sync(temporary)
         temporary.rename(target)
         sync(directory)
-        return Written(ColdFile(task.kind, task.name, found[1], found[2], found[0], target.stat().st_size), last_id)
+        return ColdFileResult(
+            ColdFile(task.kind, task.name, found[1], found[2], found[0], target.stat().st_size), last_id
+        )
     except (duckdb.Error, sqlite3.Error, OSError) as error:
         raise _unusable(directory, error) from error
     finally:

@@ -39,7 +39,7 @@ class ColdFile(Data, frozen=True):
     size: int
 
 
-class Written(Data, frozen=True):
+class ColdFileResult(Data, frozen=True):
     """The result of WriteColdFile.
 
     Attributes:
@@ -51,7 +51,7 @@ class Written(Data, frozen=True):
     last_id: int = 0
 
 
-class WriteColdFile(Task[Written], frozen=True):
+class WriteColdFile(Task[ColdFileResult], frozen=True):
     """Write rows of the database and the content of other Parquet files into a new Parquet file.
 
     Attributes:
@@ -62,7 +62,7 @@ class WriteColdFile(Task[Written], frozen=True):
         merged: Names of the Parquet files whose rows are included.
     """
 
-    result_type: ClassVar = Written
+    result_type: ClassVar = ColdFileResult
     function: ClassVar = "arcor2_hw.compute.history_functions:write_cold_file"
     worker: ClassVar = WorkerKind.HISTORY
     timeout: ClassVar = 600.0

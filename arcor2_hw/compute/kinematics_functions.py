@@ -69,39 +69,39 @@ def inverse(task: t.SolveInverse, state: WorkerState) -> list[Joint]:
 
 
 # ------------------------------------------------------------------------------------------------ reachability
-def judge_poses(task: t.JudgePoses, state: WorkerState) -> list[t.Judged]:
+def judge_poses(task: t.JudgePoses, state: WorkerState) -> list[t.ReachResult]:
     """Judge how an end effector reaches poses."""
     world = state.world()
     model = world.collisions.robot(task.robot).model
     found = world.reachability(task.robot, named_end_effector(model, task.end_effector)).judge(task.poses)
-    return [t.Judged(Reach(each.reach.value), each.reason) for each in found]
+    return [t.ReachResult(Reach(each.reach.value), each.reason) for each in found]
 
 
-def judge_joints(task: t.JudgeJoints, state: WorkerState) -> list[t.Judged]:
+def judge_joints(task: t.JudgeJoints, state: WorkerState) -> list[t.ReachResult]:
     """Judge joint configurations."""
     collisions = state.world().collisions
     model = collisions.robot(task.robot).model
     return [_judge(collisions, task.robot, model, joints) for joints in task.joints]
 
 
-def _judge(collisions: "CollisionWorld", robot: str, model: "RobotModel", joints: list[Joint]) -> t.Judged:
+def _judge(collisions: "CollisionWorld", robot: str, model: "RobotModel", joints: list[Joint]) -> t.ReachResult:
     from arcor2_hw.kinematics.errors import ModelError
 
     try:
         q = model.values(joints)
     except ModelError as error:
-        return t.Judged(Reach.UNKNOWN, error.message)
+        return t.ReachResult(Reach.UNKNOWN, error.message)
     for column, joint in enumerate(model.joints):
         if not joint.lower - 1e-6 <= q[column] <= joint.upper + 1e-6:
             message = Message.of("The joint {joint} is beyond its limits.", joint=joint.name)
-            return t.Judged(Reach.OUT_OF_REACH, message)
+            return t.ReachResult(Reach.OUT_OF_REACH, message)
     if contacts := collisions.contacts(robot, q):
-        return t.Judged(Reach.IN_COLLISION, Message.of("In collision: {contact}.", contact=contacts[0]))
+        return t.ReachResult(Reach.IN_COLLISION, Message.of("In collision: {contact}.", contact=contacts[0]))
     near = [name for end_effector in model.end_effectors for name in _near(model, end_effector, q)]
     if near:
         names = ", ".join(dict.fromkeys(near))
-        return t.Judged(Reach.NEAR_LIMIT, Message.of("Near a limit: {joints}.", joints=names))
-    return t.Judged(Reach.REACHABLE)
+        return t.ReachResult(Reach.NEAR_LIMIT, Message.of("Near a limit: {joints}.", joints=names))
+    return t.ReachResult(Reach.REACHABLE)
 
 
 def _near(model: "RobotModel", end_effector: str, q: "Array") -> list[str]:

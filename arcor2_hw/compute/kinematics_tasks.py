@@ -88,17 +88,17 @@ class SolveInverse(Task[list[Joint]], frozen=True):
 
 
 # ------------------------------------------------------------------------------------------------ reachability
-class Judged(Data, frozen=True):
+class ReachResult(Data, frozen=True):
     """Whether an end effector reaches a pose; `reason` is a sentence when it does not, or only with reservation."""
 
     reach: Reach
     reason: Message | None = None
 
 
-class JudgePoses(Task[list[Judged]], frozen=True):
+class JudgePoses(Task[list[ReachResult]], frozen=True):
     """Judge how an end effector reaches poses. Results are cached in the world of the task."""
 
-    result_type: ClassVar = list[Judged]
+    result_type: ClassVar = list[ReachResult]
     function: ClassVar = f"{_FUNCTIONS}:judge_poses"
     worker: ClassVar = WorkerKind.KINEMATICS
     timeout: ClassVar = 20.0
@@ -109,10 +109,10 @@ class JudgePoses(Task[list[Judged]], frozen=True):
     poses: list[Pose]
 
 
-class JudgeJoints(Task[list[Judged]], frozen=True):
+class JudgeJoints(Task[list[ReachResult]], frozen=True):
     """Judge whether a robot may be in joint configurations."""
 
-    result_type: ClassVar = list[Judged]
+    result_type: ClassVar = list[ReachResult]
     function: ClassVar = f"{_FUNCTIONS}:judge_joints"
     worker: ClassVar = WorkerKind.KINEMATICS
     timeout: ClassVar = 20.0

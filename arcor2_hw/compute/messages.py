@@ -18,7 +18,7 @@ MAX_MESSAGE: Final = 512 * 1024 * 1024
 """Maximum size of a message, bytes. The images of a camera calibration are sent together."""
 
 
-class Work(Struct, frozen=True, tag=True):
+class RunTask(Struct, frozen=True, tag=True):
     """Run a task. The answer is Done or Failed.
 
     Attributes:
@@ -55,7 +55,7 @@ class ForgetWorld(Struct, frozen=True, tag=True):
     place: str
 
 
-ToWorker = Work | ChangeWorld | ForgetWorld
+ToWorker = RunTask | ChangeWorld | ForgetWorld
 
 
 class Done(Struct, frozen=True, tag=True):

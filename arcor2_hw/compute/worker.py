@@ -60,12 +60,12 @@ def serve(sock: socket.socket) -> None:
                     state.change(message.place, message.put, message.remove)
                 case m.ForgetWorld():
                     state.forget(message.place)
-                case m.Work():
+                case m.RunTask():
                     state.place = message.place
                     send(_answer(message, state))
 
 
-def _answer(work: m.Work, state: WorkerState) -> m.Done | m.Failed:
+def _answer(work: m.RunTask, state: WorkerState) -> m.Done | m.Failed:
     # The default action of the signal ends the process even inside a library call that never returns.
     signal.setitimer(signal.ITIMER_REAL, work.within + KILL_DELAY)
     try:

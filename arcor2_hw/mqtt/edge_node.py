@@ -19,7 +19,7 @@ from arcor2_hw.data.points import PointQuality
 from arcor2_hw.mqtt import payload
 from arcor2_hw.mqtt.cell import CellState, Changes, Device
 from arcor2_hw.mqtt.link import Link, connection, end_if_cancelled
-from arcor2_hw.mqtt.messages import Dropped, Setup
+from arcor2_hw.mqtt.messages import Setup, ValuesDropped
 from arcor2_hw.mqtt.payload import Kind, Metric, Value
 
 NAMESPACE: Final = "spBv1.0"
@@ -332,7 +332,7 @@ class EdgeNode:
         ]
         await self._send(connected, "NBIRTH", "", [*control, *metrics])
         if self._queue.dropped:
-            self._report(Dropped(self._queue.dropped))
+            self._report(ValuesDropped(self._queue.dropped))
             self._queue.dropped = 0
 
     async def _publish_owner(self, connected: Client, key: str, owner: _Owner) -> None:

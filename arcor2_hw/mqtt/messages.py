@@ -55,14 +55,14 @@ class LinkChanged(Struct, frozen=True, tag=True):
     reason: str = ""
 
 
-class Dropped(Struct, frozen=True, tag=True):
+class ValuesDropped(Struct, frozen=True, tag=True):
     """So many values were dropped, because too many waited for the broker or the host."""
 
     count: int
 
 
 ToProcess = Setup | Update
-FromProcess = LinkChanged | Dropped
+FromProcess = LinkChanged | ValuesDropped
 
 decode_to_process: Any = msgspec.msgpack.Decoder(ToProcess).decode
 decode_from_process: Any = msgspec.msgpack.Decoder(FromProcess).decode

@@ -23,7 +23,7 @@ from arcor2_hw.data.points import PointQuality, PointValue
 from arcor2_hw.data.units import Unit
 from arcor2_hw.mqtt.cell import CellState, Changes, Device, Point
 from arcor2_hw.mqtt.link import Link, connection, end_if_cancelled
-from arcor2_hw.mqtt.messages import Dropped, Setup
+from arcor2_hw.mqtt.messages import Setup, ValuesDropped
 
 POINTS_PERIOD: Final = 1.0
 """Shortest time between two messages with the points of a device, s."""
@@ -170,7 +170,7 @@ class PlainJson:
                 await connected.unsubscribe(everything)
                 self._link.up()
                 if self._dropped:
-                    self._report(Dropped(self._dropped))
+                    self._report(ValuesDropped(self._dropped))
                     self._dropped = 0
                 while True:
                     end_if_cancelled()

@@ -17,7 +17,7 @@ from asyncua.server.uaprocessor import UaProcessor
 from asyncua.ua.ua_binary import struct_from_binary
 
 from arcor2_hw.opcua.certificates import TrustedClients
-from arcor2_hw.opcua.interest import Interest
+from arcor2_hw.opcua.interest import MonitoredDevices
 from arcor2_hw.opcua.messages import User
 from arcor2_hw.opcua.space import node_id
 
@@ -83,9 +83,9 @@ class Session(InternalSession):
     """
 
     @property
-    def _interest(self) -> Interest:
+    def _interest(self) -> MonitoredDevices:
         server: Any = self.iserver
-        interest: Interest = server.interest
+        interest: MonitoredDevices = server.interest
         return interest
 
     async def read(self, params: ua.ReadParameters) -> list[ua.DataValue]:
@@ -144,7 +144,7 @@ class Internal(InternalServer):
         super().__init__(user_manager=Users())  # type: ignore[arg-type]
         self.trusted, self.check, self.unencrypted = trusted, check, unencrypted
         self.acknowledge: AcknowledgeCondition
-        self.interest: Interest
+        self.interest: MonitoredDevices
         self.max_connections = MAX_CONNECTIONS
         self.max_subscriptions = MAX_SUBSCRIPTIONS
         self.max_monitored_item_queue_size = MAX_QUEUED

@@ -16,7 +16,7 @@ FIRST_VALUES: Final = 2.0
 """Time limit for the first values of a device that was not read before, s. Then clients get the last ones."""
 
 
-class Interest:
+class MonitoredDevices:
     """The devices whose values clients monitor, or have read or browsed within LEASE.
 
     Args:

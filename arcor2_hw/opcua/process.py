@@ -22,7 +22,7 @@ from arcor2_hw.opcua.access import Internal, OpcUaServer, Services, caller
 from arcor2_hw.opcua.certificates import TrustedClients, application_uri, own_certificate
 from arcor2_hw.opcua.conditions import Conditions
 from arcor2_hw.opcua.devices import Device
-from arcor2_hw.opcua.interest import Interest
+from arcor2_hw.opcua.interest import MonitoredDevices
 from arcor2_hw.opcua.space import Space
 from arcor2_hw.opcua.unit import VENDOR, Unit
 from arcor2_hw.plant.messages import BEAT_PERIOD, STALE_AFTER, DeviceInfo, UnitData, Update
@@ -50,7 +50,7 @@ class Process:
         self._numbers = itertools.count(1)
         self._answers: dict[int, asyncio.Future[Any]] = {}
         self._devices: dict[str, Device] = {}
-        self._interest = Interest(self._devices, lambda devices: self._link.send(m.Watch(devices)))
+        self._interest = MonitoredDevices(self._devices, lambda devices: self._link.send(m.Watch(devices)))
         self._unit_data = UnitData()
         self._heard = time.monotonic()
 

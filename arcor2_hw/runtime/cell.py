@@ -18,7 +18,7 @@ from arcor2_hw.messages import Message
 from arcor2_hw.objects import Camera, Generic, Robot
 from arcor2_hw.runtime.creation import Recipe, load_type, recipe
 from arcor2_hw.runtime.device import CLOSE_DEADLINE, Device, describe, time_left
-from arcor2_hw.runtime.identification import Identification, Reported
+from arcor2_hw.runtime.identification import Identification, ReadIdentity
 from arcor2_hw.runtime.lane import Job
 from arcor2_hw.runtime.messages import OpenScene, RunPackage
 from arcor2_hw.runtime.methods import overrides
@@ -168,7 +168,7 @@ class Cell:
         """Called when a device has reported a condition, on any thread."""
         self.identities: Mapping[str, Identity] = {}
         """The confirmed identities by object id."""
-        self.identified: Callable[[Device, Reported], None] | None = None
+        self.identified: Callable[[Device, ReadIdentity], None] | None = None
         """Called with the identity of a device after it connected, on any thread; None: identities are not read."""
         self.state_taken: Callable[[Device, object], None] = lambda *_: None
         """Called when a driver has read a new state of its device, on the thread that observes it."""

@@ -50,7 +50,7 @@ class _Hold:
         self.error: Arcor2Error | None = None
 
 
-class Holds:
+class ActiveHolds:
     """At most one hold of each device. Leases arrive on the reader thread and expire on the clock thread."""
 
     def __init__(

@@ -35,7 +35,7 @@ from arcor2_hw.runtime.checkpoints_at_server import CheckpointsAtServer
 from arcor2_hw.runtime.clock import Clock
 from arcor2_hw.runtime.device import Device
 from arcor2_hw.runtime.forcing import CHECK_PERIOD, Forces
-from arcor2_hw.runtime.holding import Holds
+from arcor2_hw.runtime.holding import ActiveHolds
 from arcor2_hw.runtime.hosted_scene import HostedScene, recognise
 from arcor2_hw.runtime.interlocks import Interlocks
 from arcor2_hw.runtime.link import Link
@@ -103,7 +103,7 @@ class Host:
             self._interlocks,
             self._recorder,
         )
-        self._holds = Holds(
+        self._holds = ActiveHolds(
             lambda: self._cell, self.link.post, self.clock, self._calls, self._teaching, self._interlocks
         )
         self._forces = Forces(lambda: self._cell, self.link.post, self.clock)

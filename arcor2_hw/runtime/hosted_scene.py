@@ -15,7 +15,7 @@ from arcor2_hw.runtime.calls import error_data
 from arcor2_hw.runtime.cell import Cell, SceneFault, own_objects, scene_recipes
 from arcor2_hw.runtime.creation import write_sources
 from arcor2_hw.runtime.device import Device
-from arcor2_hw.runtime.identification import Reported
+from arcor2_hw.runtime.identification import ReadIdentity
 from arcor2_hw.runtime.link import Link
 from arcor2_hw.runtime.methods import overrides
 from arcor2_hw.runtime.package import PackageData, package_recipes
@@ -177,7 +177,7 @@ class HostedScene:
 def recognise(cell: Cell, identities: Mapping[str, Identity], link: Link) -> None:
     """Compare the devices that will be connected with the confirmed identities, and report their identities."""
 
-    def identified(device: Device, reported: Reported) -> None:
+    def identified(device: Device, reported: ReadIdentity) -> None:
         cls = device.recipe.cls
         backup = overrides(cls, "parameters_dump"), overrides(cls, "parameters_restore")
         link.post(m.DeviceIdentified(device.id, device.name, cls.__name__, *reported, *backup))

@@ -29,7 +29,7 @@ _ORDER: Final = ("vendor", "model", "serial", "firmware")
 _REMEDY: Final = "Call a technician, who confirms the device."
 
 
-class Reported(NamedTuple):
+class ReadIdentity(NamedTuple):
     """The read identity, or the reason why it cannot be read; and the counters of the device, None without counters."""
 
     identity: Identity | None
@@ -53,7 +53,7 @@ class Identification:
         self,
         name: str,
         known: Identity | None,
-        report: Callable[[Reported], None],
+        report: Callable[[ReadIdentity], None],
         changed: Callable[[], None] = lambda: None,
     ) -> None:
         self._name = name
@@ -86,7 +86,7 @@ class Identification:
             found = Identity()
         except Exception as error:
             message = message_of(error)
-            self._report(Reported(None, message))
+            self._report(ReadIdentity(None, message))
             if self._known is None:
                 return
             raise Refused(
@@ -99,7 +99,7 @@ class Identification:
             return  # it may be that of the device before the connection loss; the next command reads it again
         self._found = found
         self._compare()
-        self._report(Reported(found, counters=_counters(instance)))
+        self._report(ReadIdentity(found, counters=_counters(instance)))
 
     def require_confirmed(self, instance: Generic) -> None:
         """Read the identity if necessary.

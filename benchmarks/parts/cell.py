@@ -20,7 +20,7 @@ from arcor2_server.demo.run import FAST, FAST_ACCELERATIONS
 from arcor2_server.demo.workplace import Creation, Scalar, layout_file, load
 
 
-class Do(NamedTuple):
+class FakeCommand(NamedTuple):
     """A command to a fake."""
 
     fake: str
@@ -88,7 +88,7 @@ class Cell:
         """Send a command to a fake."""
         return await ask(self.at[fake], command, within=15.0, **arguments)
 
-    async def apply(self, commands: tuple[Do, ...]) -> None:
+    async def apply(self, commands: tuple[FakeCommand, ...]) -> None:
         """Send commands to fakes. One that is impossible now, such as dropping nothing, has no effect."""
         for fake, command, arguments in commands:
             with contextlib.suppress(Arcor2Error):

@@ -5,14 +5,14 @@ import random
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
 
-from benchmarks.parts.cell import Cell, Do
+from benchmarks.parts.cell import Cell, FakeCommand
 from benchmarks.parts.checks import Result
 from benchmarks.parts.places import PICKS, PLACES, REPORTS
 
 
-def do(fake: str, command: str, **arguments: Any) -> Do:
+def do(fake: str, command: str, **arguments: Any) -> FakeCommand:
     """Return a command to a fake."""
-    return Do(fake, command, {name: value for name, value in arguments.items() if value != ""})
+    return FakeCommand(fake, command, {name: value for name, value in arguments.items() if value != ""})
 
 
 class Fault(NamedTuple):
@@ -24,8 +24,8 @@ class Fault(NamedTuple):
 
     name: str
     device: str
-    cause: tuple[Do, ...] = ()
-    cure: tuple[Do, ...] = ()
+    cause: tuple[FakeCommand, ...] = ()
+    cure: tuple[FakeCommand, ...] = ()
     kill: str = ""
     at: tuple[str, ...] = ()
 

@@ -131,7 +131,7 @@ class RegisterMap:
         return written
 
 
-class Mapped(Protocol):
+class MappedFake(Protocol):
     """A device whose values are in a map."""
 
     map: RegisterMap
@@ -149,7 +149,7 @@ class Mapped(Protocol):
 class MapTables(ModbusTables):
     """The tables of a device with a map. Addresses that are not in the map are answered with "illegal address"."""
 
-    def __init__(self, device: Mapped) -> None:
+    def __init__(self, device: MappedFake) -> None:
         self._device = device
         for table in TABLES:
             setattr(self, table, SIZE if device.map.has(table) else 0)
@@ -194,7 +194,7 @@ class MapTables(ModbusTables):
 class _Cells:
     """A table whose values are read on request."""
 
-    def __init__(self, device: Mapped, table: str) -> None:
+    def __init__(self, device: MappedFake, table: str) -> None:
         self._device, self._table = device, table
 
     def __getitem__(self, part: slice) -> list[int]:

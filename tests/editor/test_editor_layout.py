@@ -32,7 +32,7 @@ FEW = ("phone", "tablet")
 """Sizes for screens that differ by their panel alone: a sheet from below, or at the side."""
 
 
-class Looks:
+class ScreenFaults:
     """Collects the faults of each screen, of one in dark colours and of the next in light ones."""
 
     def __init__(self, screen: Screen, *, dark: bool = True) -> None:
@@ -90,7 +90,7 @@ async def open_tool(screen: Screen, name: str) -> None:
 
 async def test_join_and_home(cell: Cell, project: Project, browser: Browser, sizes: list[str]) -> None:
     async with screen_of(browser, cell.url, touch=True) as screen:
-        looks = Looks(screen)
+        looks = ScreenFaults(screen)
         page = screen.page
         await page.goto(f"{screen.url}/?q=low")
         await page.get_by_label(texts.YOUR_NAME).wait_for()
@@ -115,11 +115,13 @@ async def test_join_and_home(cell: Cell, project: Project, browser: Browser, siz
 
 
 @asynccontextmanager
-async def at_work(cell: Cell, project: Project, browser: Browser, *, dark: bool) -> AsyncIterator[tuple[Screen, Looks]]:
+async def at_work(
+    cell: Cell, project: Project, browser: Browser, *, dark: bool
+) -> AsyncIterator[tuple[Screen, ScreenFaults]]:
     """Open the project on a tablet. `dark`: colours of the first screen. Fails at the end if the layout had faults."""
     async with screen_of(browser, cell.url, touch=True) as screen:
         await at_the_project(screen, "Adam", project)
-        looks = Looks(screen, dark=dark)
+        looks = ScreenFaults(screen, dark=dark)
         yield screen, looks
         assert not looks.found, looks.report()
 
@@ -216,6 +218,6 @@ async def test_lost_server(cell: Cell, project: Project, browser: Browser, sizes
         await screen.page.wait_for_load_state("networkidle")  # all lazily loaded parts are loaded
         await cell.kill("server")
         await screen.sees(texts.NO_CONNECTION)
-        looks = Looks(screen)
+        looks = ScreenFaults(screen)
         await looks.at("lost server", sizes)
         assert not looks.found, looks.report()

@@ -54,7 +54,7 @@ class PlainArm(UrdfRobot):
 '''
 
 
-class Around:
+class FixedSurroundings:
     """Surroundings defined by the test."""
 
     def __init__(self) -> None:
@@ -98,16 +98,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 @pytest.fixture
-def around() -> Around:
-    return Around()
+def around() -> FixedSurroundings:
+    return FixedSurroundings()
 
 
 @pytest.fixture
-def arm(folder: Path, around: Around) -> Any:
+def arm(folder: Path, around: FixedSurroundings) -> Any:
     return made(folder, around, "plain")
 
 
-def made(folder: Path, around: Around, name: str, pose: Pose = BASE) -> Any:
+def made(folder: Path, around: FixedSurroundings, name: str, pose: Pose = BASE) -> Any:
     cls = importlib.import_module("plain_driver.plain_arm").PlainArm
     device = cls("id", name, pose)
     device.now, device.ways = joints(READY), []

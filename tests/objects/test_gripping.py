@@ -11,7 +11,7 @@ from arcor2_hw.exceptions import NotFound
 from arcor2_hw.objects import CollisionObject, Generic, Gripper, PartSize, Robot
 from arcor2_hw.objects.small import GripperState
 
-from .conftest import BASE, READY, Around, joints, moved
+from .conftest import BASE, READY, FixedSurroundings, joints, moved
 
 
 class Claw(Gripper):
@@ -64,7 +64,7 @@ def claw(arm: Any, board: Board) -> Claw:
     return claw
 
 
-def below_tip(around: Around, arm: Any) -> Any:
+def below_tip(around: FixedSurroundings, arm: Any) -> Any:
     """Put a bin below a sideways line, so that only a long part touches it. Return the target."""
     here = arm.get_end_effector_pose("tcp")
     target = moved(here, 0.0, 0.25, 0.0)
@@ -78,7 +78,7 @@ def line(arm: Any, target: Pose) -> None:
     arm.move_to_pose("tcp", target, 0.5)
 
 
-def test_a_gripped_part_is_considered_until_released(arm: Any, around: Around, claw: Claw) -> None:
+def test_a_gripped_part_is_considered_until_released(arm: Any, around: FixedSurroundings, claw: Claw) -> None:
     target = below_tip(around, arm)
     claw.grip(0.0, 1.0, 1.0)
     line(arm, target)  # of an unknown size
@@ -97,7 +97,9 @@ def values_of(arm: Any, target: Pose) -> Any:
     return arm.inverse_kinematics("tcp", target, joints(READY), avoid_collisions=False)
 
 
-def test_an_object_of_the_scene_moves_with_the_tool(arm: Any, around: Around, claw: Claw, board: Board) -> None:
+def test_an_object_of_the_scene_moves_with_the_tool(
+    arm: Any, around: FixedSurroundings, claw: Claw, board: Board
+) -> None:
     target = below_tip(around, arm)
     around.box("board", (BASE.inverted() * board.pose).position, 0.03, 0.03, 0.28)
     around.things[-1].pose.orientation = board.pose.orientation
@@ -118,7 +120,7 @@ def test_an_object_of_the_scene_moves_with_the_tool(arm: Any, around: Around, cl
     assert arm.parts == {}, "only the next grip takes the object"
 
 
-def test_a_gripped_part_may_touch_the_surface_below(arm: Any, around: Around, claw: Claw) -> None:
+def test_a_gripped_part_may_touch_the_surface_below(arm: Any, around: FixedSurroundings, claw: Claw) -> None:
     here = arm.get_end_effector_pose("tcp")
     at = (BASE.inverted() * here).position
     around.box("table", at + Position(0.0, 0.0, -0.07), 0.3, 0.3, 0.1)  # its top 20 mm below the tip

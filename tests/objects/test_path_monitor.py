@@ -19,7 +19,7 @@ from arcor2_hw.kinematics.shapes import Box
 from arcor2_hw.objects.path_monitor import rest_of
 from arcor2_hw.objects.surroundings import HeldPart, Obstacle
 
-from .conftest import ACROSS, BASE, READY, URDF, Around, joints, made, moved, values
+from .conftest import ACROSS, BASE, READY, URDF, FixedSurroundings, joints, made, moved, values
 
 STEP = 0.005
 SPEED = 1.0
@@ -71,7 +71,7 @@ def tip_at(arm: Any, pan: float) -> Position:
     return position
 
 
-def touches(around: Around, now: Any) -> set[str]:
+def touches(around: FixedSurroundings, now: Any) -> set[str]:
     """Return the contacts of the arm in a separate collision world."""
     world = CollisionWorld()
     world.add_robot("arm", RobotModel.load(URDF), BASE, values(now))
@@ -82,7 +82,7 @@ def touches(around: Around, now: Any) -> set[str]:
     return {contact.second for contact in world.contacts("arm", values(now))}
 
 
-def test_the_robot_stops_before_a_box_that_enters_its_path(arm: Any, around: Around, motion: Motion) -> None:
+def test_the_robot_stops_before_a_box_that_enters_its_path(arm: Any, around: FixedSurroundings, motion: Motion) -> None:
     around.box("shelf", Position(0.0, 0.0, 1.6), 0.2, 0.2, 0.1)
     at = tip_at(arm, 1.8)
     motion.at = 0.3, lambda: around.box("crate", at, 0.1, 0.1, 0.1)
@@ -99,7 +99,9 @@ def test_the_robot_stops_before_a_box_that_enters_its_path(arm: Any, around: Aro
     assert np.allclose(values(arm.now), ACROSS)
 
 
-def test_a_linear_move_stops_before_an_obstacle_that_enters_it(arm: Any, around: Around, motion: Motion) -> None:
+def test_a_linear_move_stops_before_an_obstacle_that_enters_it(
+    arm: Any, around: FixedSurroundings, motion: Motion
+) -> None:
     here = arm.get_end_effector_pose("tcp")
     post = (BASE.inverted() * moved(here, 0.0, 0.3, 0.0)).position
     around.box("post", post + Position(0.0, 0.0, 3.0), 0.03, 0.03, 0.3)
@@ -113,7 +115,7 @@ def test_a_linear_move_stops_before_an_obstacle_that_enters_it(arm: Any, around:
     assert touches(around, arm.now) == set()
 
 
-def test_an_obstacle_within_the_braking_distance_is_reported(arm: Any, around: Around) -> None:
+def test_an_obstacle_within_the_braking_distance_is_reported(arm: Any, around: FixedSurroundings) -> None:
     motion = Motion(arm, braking=0.4)
     motion.at = 0.8, lambda: around.box("crate", tip_at(arm, 1.25), 0.1, 0.1, 0.1)
     with pytest.raises(PathBlocked, match=r"crate appeared within its braking distance: plain/\w+ and crate are in"):
@@ -122,7 +124,9 @@ def test_an_obstacle_within_the_braking_distance_is_reported(arm: Any, around: A
     assert touches(around, arm.now) == {"crate"}
 
 
-def test_an_obstacle_outside_the_rest_of_the_path_is_ignored(arm: Any, around: Around, motion: Motion) -> None:
+def test_an_obstacle_outside_the_rest_of_the_path_is_ignored(
+    arm: Any, around: FixedSurroundings, motion: Motion
+) -> None:
     def change() -> None:
         around.box("behind", tip_at(arm, 0.3), 0.1, 0.1, 0.1)
         around.box("above", tip_at(arm, 1.2) + Position(0.0, 0.0, 0.8), 0.1, 0.1, 0.1)
@@ -136,9 +140,9 @@ def test_an_obstacle_outside_the_rest_of_the_path_is_ignored(arm: Any, around: A
 
 
 def test_the_robot_stops_before_another_arm_that_enters_its_path(
-    folder: Path, arm: Any, around: Around, motion: Motion
+    folder: Path, arm: Any, around: FixedSurroundings, motion: Motion
 ) -> None:
-    second = made(folder, Around(), "second", BASE * Pose(Position(0.0, 0.95, 0.0)))
+    second = made(folder, FixedSurroundings(), "second", BASE * Pose(Position(0.0, 0.95, 0.0)))
     away, over = joints((1.57, *READY[1:])), joints((-1.57, *READY[1:]))
     around.others = [(second, away)]
 
@@ -161,7 +165,7 @@ def test_the_robot_stops_before_another_arm_that_enters_its_path(
     assert motion.stops == 0
 
 
-def test_a_part_gripped_during_the_move_is_considered(arm: Any, around: Around, motion: Motion) -> None:
+def test_a_part_gripped_during_the_move_is_considered(arm: Any, around: FixedSurroundings, motion: Motion) -> None:
     around.box("bin", tip_at(arm, 1.8) + Position(0.0, 0.0, -0.3), 0.06, 0.06, 0.1)
     rod = HeldPart("rod", "tcp", Pose(Position(0.0, 0.0, 0.15)), object_type.Box("rod", 0.03, 0.03, 0.28))
     motion.at = 0.3, lambda: arm.hold_part(rod)
@@ -169,7 +173,7 @@ def test_a_part_gripped_during_the_move_is_considered(arm: Any, around: Around, 
         arm.move_to_joints(joints(ACROSS), 0.5)
 
 
-def test_the_robot_stops_if_its_path_cannot_be_checked(arm: Any, around: Around, motion: Motion) -> None:
+def test_the_robot_stops_if_its_path_cannot_be_checked(arm: Any, around: FixedSurroundings, motion: Motion) -> None:
     shield = Obstacle("shield", object_type.Mesh("shield", "shield.stl"), BASE)
     motion.at = 0.3, lambda: around.things.append(shield)
     with pytest.raises(PathBlocked, match=r"plain stopped: its surroundings changed.*mesh of shield"):
@@ -178,7 +182,7 @@ def test_the_robot_stops_if_its_path_cannot_be_checked(arm: Any, around: Around,
 
 
 def test_a_user_stop_remains_cancelled_and_unsafe_moves_are_not_monitored(
-    arm: Any, around: Around, motion: Motion
+    arm: Any, around: FixedSurroundings, motion: Motion
 ) -> None:
     motion.at = 0.3, arm.stop
     with pytest.raises(Cancelled):

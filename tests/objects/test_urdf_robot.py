@@ -23,10 +23,10 @@ from arcor2_hw.objects import safe_moves
 from arcor2_hw.objects.surroundings import Obstacle
 from arcor2_hw.planning import planner
 
-from .conftest import ACROSS, BASE, READY, SOURCE, URDF, WALL, Around, joints, made, moved, values
+from .conftest import ACROSS, BASE, READY, SOURCE, URDF, WALL, FixedSurroundings, joints, made, moved, values
 
 
-def assert_free(arm: Any, around: Around, way: list[list[Joint]]) -> None:
+def assert_free(arm: Any, around: FixedSurroundings, way: list[list[Joint]]) -> None:
     """Check a path in a separate collision world with a finer resolution."""
     model = RobotModel.load(URDF)
     world = CollisionWorld()
@@ -84,7 +84,7 @@ def test_kinematics_use_world_coordinates(arm: Any) -> None:
         arm.forward_kinematics("tcp", joints(READY)[:2])
 
 
-def test_inverse_kinematics_avoids_obstacles_on_request(arm: Any, around: Around) -> None:
+def test_inverse_kinematics_avoids_obstacles_on_request(arm: Any, around: FixedSurroundings) -> None:
     goal = moved(arm.get_end_effector_pose("tcp"), 0.0, 0.1, 0.0)
     first = arm.inverse_kinematics("tcp", goal)
     model = RobotModel.load(URDF)
@@ -98,7 +98,7 @@ def test_inverse_kinematics_avoids_obstacles_on_request(arm: Any, around: Around
 
 
 # ------------------------------------------------------------------------------------------------ moves
-def test_only_a_safe_move_avoids_obstacles(arm: Any, around: Around) -> None:
+def test_only_a_safe_move_avoids_obstacles(arm: Any, around: FixedSurroundings) -> None:
     around.box("wall", *WALL)
     arm.move_to_joints(joints(ACROSS), 0.5)
     (way,) = arm.ways
@@ -112,7 +112,7 @@ def test_only_a_safe_move_avoids_obstacles(arm: Any, around: Around) -> None:
         assert_free(arm, around, arm.ways[-1].waypoints)
 
 
-def test_a_safe_move_to_a_pose_avoids_obstacles(arm: Any, around: Around) -> None:
+def test_a_safe_move_to_a_pose_avoids_obstacles(arm: Any, around: FixedSurroundings) -> None:
     around.box("wall", *WALL)
     goal = arm.forward_kinematics("tcp", joints(ACROSS))
     arm.move_to_pose("tcp", goal, 0.5, safe=True, linear=False)
@@ -120,7 +120,7 @@ def test_a_safe_move_to_a_pose_avoids_obstacles(arm: Any, around: Around) -> Non
     assert np.allclose(arm.get_end_effector_pose("tcp").matrix(), goal.matrix(), atol=1e-5)
 
 
-def test_a_linear_move_is_straight_or_refused(arm: Any, around: Around) -> None:
+def test_a_linear_move_is_straight_or_refused(arm: Any, around: FixedSurroundings) -> None:
     here = arm.get_end_effector_pose("tcp")
     goal = moved(here, 0.0, 0.3, 0.0)
     arm.move_to_pose("tcp", goal, 0.5)
@@ -141,7 +141,7 @@ def test_a_linear_move_is_straight_or_refused(arm: Any, around: Around) -> None:
     assert len(arm.ways) == 2
 
 
-def test_a_move_may_end_close_to_an_obstacle(arm: Any, around: Around) -> None:
+def test_a_move_may_end_close_to_an_obstacle(arm: Any, around: FixedSurroundings) -> None:
     """A pick ends nearer to the table than the margin, without touching it."""
     here = BASE.inverted() * arm.get_end_effector_pose("tcp")
     around.box("table", here.position + Position(0.0, 0.0, -0.152), 0.4, 0.4, 0.1)
@@ -151,7 +151,7 @@ def test_a_move_may_end_close_to_an_obstacle(arm: Any, around: Around) -> None:
         arm.move_to_pose("tcp", moved(BASE * here, 0.0, 0.0, -0.105), 0.2)
 
 
-def test_a_refused_move_names_the_reason(arm: Any, around: Around) -> None:
+def test_a_refused_move_names_the_reason(arm: Any, around: FixedSurroundings) -> None:
     tip = BASE.inverted() * arm.forward_kinematics("tcp", joints(ACROSS))
     around.box("crate", tip.position, 0.1, 0.1, 0.1)
     with pytest.raises(arm.KinematicsException, match="in collision at the goal: plain/wrist_3_link and crate"):
@@ -170,7 +170,9 @@ def test_a_refused_move_names_the_reason(arm: Any, around: Around) -> None:
     assert len(arm.ways) == 1
 
 
-def test_a_held_part_moves_with_the_robot_and_avoids_obstacles(folder: Path, arm: Any, around: Around) -> None:
+def test_a_held_part_moves_with_the_robot_and_avoids_obstacles(
+    folder: Path, arm: Any, around: FixedSurroundings
+) -> None:
     middle = BASE.inverted() * arm.forward_kinematics("tcp", joints((1.2, *READY[1:])))
     around.box("bin", middle.position + Position(0.0, 0.0, -0.3), 0.06, 0.06, 0.1)
     goal = joints((2.4, *READY[1:]))
@@ -215,9 +217,9 @@ def test_a_held_part_moves_with_the_robot_and_avoids_obstacles(folder: Path, arm
         arm.safe_moves.hold("bin", "claw", arm.now)
 
 
-def test_another_robot_is_an_obstacle(folder: Path, arm: Any, around: Around) -> None:
+def test_another_robot_is_an_obstacle(folder: Path, arm: Any, around: FixedSurroundings) -> None:
     beside = BASE * Pose(Position(0.75, 0.0, 0.0), Orientation.from_rotation_vector(0.0, 0.0, np.pi))
-    second = made(folder, Around(), "second", beside)
+    second = made(folder, FixedSurroundings(), "second", beside)
     around.others = [(second, joints((0.0, -1.57, 0.0, -1.57, 0.0, 0.0)))]
     here = arm.get_end_effector_pose("tcp")
     arm.move_to_pose("tcp", moved(here, 0.0, 0.0, 0.02), 0.5)
@@ -226,7 +228,9 @@ def test_another_robot_is_an_obstacle(folder: Path, arm: Any, around: Around) ->
         arm.move_to_pose("tcp", here, 0.5)
 
 
-def test_a_missing_mesh_refuses_moves_and_a_present_one_is_considered(arm: Any, around: Around, tmp_path: Path) -> None:
+def test_a_missing_mesh_refuses_moves_and_a_present_one_is_considered(
+    arm: Any, around: FixedSurroundings, tmp_path: Path
+) -> None:
     import trimesh
 
     around.things.append(Obstacle("shield", object_type.Mesh("shield", "shield.stl"), BASE * Pose(WALL[0])))
@@ -240,7 +244,7 @@ def test_a_missing_mesh_refuses_moves_and_a_present_one_is_considered(arm: Any, 
     assert_free(arm, around, arm.ways[-1].waypoints)
 
 
-def test_an_uploaded_model_takes_precedence(arm: Any, around: Around, tmp_path: Path) -> None:
+def test_an_uploaded_model_takes_precedence(arm: Any, around: FixedSurroundings, tmp_path: Path) -> None:
     longer = tmp_path / "88c1"
     text = URDF.read_text().replace('xyz="0 0 0.0996"', 'xyz="0 0 0.1996"')
     assert text != URDF.read_text()
@@ -251,7 +255,7 @@ def test_an_uploaded_model_takes_precedence(arm: Any, around: Around, tmp_path: 
     assert nominal.distance_to(tip) == pytest.approx(0.1, abs=1e-6)
 
 
-def test_a_missing_model_is_reported(folder: Path, around: Around) -> None:
+def test_a_missing_model_is_reported(folder: Path, around: FixedSurroundings) -> None:
     cls = importlib.import_module("plain_driver.plain_arm").PlainArm
     other = type("Nameless", (cls,), {"urdf_package_name": "missing.zip", "__module__": cls.__module__})
     device = other("id", "nameless", BASE)
@@ -260,7 +264,7 @@ def test_a_missing_model_is_reported(folder: Path, around: Around) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ time limits and stops
-def test_a_path_can_be_sampled_over_time(arm: Any, around: Around) -> None:
+def test_a_path_can_be_sampled_over_time(arm: Any, around: FixedSurroundings) -> None:
     around.box("wall", *WALL)
     arm.move_to_joints(joints(ACROSS), 0.5)
     way = arm.ways[-1]
@@ -275,7 +279,7 @@ def test_a_path_can_be_sampled_over_time(arm: Any, around: Around) -> None:
     assert arm.ways[-1].timed(0.05).duration == pytest.approx(0.25 / 0.05 + 0.25, rel=0.1)
 
 
-def fences(around: Around) -> None:
+def fences(around: FixedSurroundings) -> None:
     """Plates on both sides of the base, higher than the arm, so that its shoulder cannot turn past them."""
     for side in (-1.0, 1.0):
         around.box(f"fence {side:+.0f}", Position(0.0, side * 0.68, 0.5), 0.02, 1.06, 3.0)
@@ -284,7 +288,7 @@ def fences(around: Around) -> None:
 BEFORE, BEHIND = (0.8, *READY[1:]), (0.8 + np.pi, *READY[1:])
 
 
-def test_a_move_without_a_path_is_refused(arm: Any, around: Around, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_move_without_a_path_is_refused(arm: Any, around: FixedSurroundings, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(safe_moves, "PLANNING_TIMEOUT", 0.3)
     fences(around)
     arm.now = joints(BEFORE)
@@ -294,7 +298,7 @@ def test_a_move_without_a_path_is_refused(arm: Any, around: Around, monkeypatch:
 
 
 def test_a_repeat_after_no_path_has_more_time_and_another_seed(
-    arm: Any, around: Around, monkeypatch: pytest.MonkeyPatch
+    arm: Any, around: FixedSurroundings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(safe_moves, "PLANNING_TIMEOUT", 0.05)
     seeds: list[int] = []
@@ -333,7 +337,7 @@ class Steps:
 
 
 def test_a_repeat_finds_a_path_that_was_not_found_in_time(
-    arm: Any, around: Around, folder: Path, monkeypatch: pytest.MonkeyPatch
+    arm: Any, around: FixedSurroundings, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Seed 0 needs 152 steps and seed 1 needs 50: the repeat needs another seed as well as more time."""
     monkeypatch.setattr(planner, "time", Steps())
@@ -357,7 +361,7 @@ def test_a_repeat_finds_a_path_that_was_not_found_in_time(
     assert_free(arm, around, arm.ways[-1].waypoints)
 
 
-def test_a_stop_ends_planning(arm: Any, around: Around, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stop_ends_planning(arm: Any, around: FixedSurroundings, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(safe_moves, "PLANNING_TIMEOUT", 60.0)
     fences(around)
     arm.now = joints(BEFORE)

@@ -13,7 +13,7 @@ from arcor2_hw.exceptions import NotConnected, OutOfRange
 from arcor2_hw.objects import GenericWithPose
 from arcor2_hw.objects.connected import Connected
 
-from .errors import Empty, Full
+from .errors import Empty, NoFreePlace
 from .places import BadState, Places
 from .poses import grip_pose
 from .settings import BlisterSettings
@@ -81,7 +81,7 @@ class Blister(Connected, GenericWithPose):
         self.observing.check()
         found = self._places.next(full=False)
         if found is None:
-            raise Full("{name} is full. Empty it, then call clear.", name=self.name)
+            raise NoFreePlace("{name} is full. Empty it, then call clear.", name=self.name)
         self._next_free = found
         return self._pose_of(*found)
 
@@ -90,7 +90,7 @@ class Blister(Connected, GenericWithPose):
         """Record that a part was placed at the pose from next_free."""
         self.observing.check()
         if self._next_free is None:
-            raise Full("{name}: part_put needs a call of next_free first", name=self.name)
+            raise NoFreePlace("{name}: part_put needs a call of next_free first", name=self.name)
         self._set(*self._next_free, True)
         self._next_free = None
 

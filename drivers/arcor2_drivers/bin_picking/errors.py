@@ -9,7 +9,7 @@ class Empty(Refused):
     code = "empty"
 
 
-class Full(Refused):
+class NoFreePlace(Refused):
     """No free place is left."""
 
     code = "full"

@@ -39,7 +39,7 @@ class EmptyCrate(NamedTuple):
     height: float
 
 
-class Found(NamedTuple):
+class DetectedPart(NamedTuple):
     """The next part: its pose in the frame of the crate, 4 × 4, and how well it fits."""
 
     pose: Floats
@@ -94,7 +94,7 @@ def find(
     tolerance: float,
     min_quality: float,
     go_on: Callable[[], None] = lambda: None,
-) -> Found:
+) -> DetectedPart:
     """Find the highest part that fits well.
 
     Args:
@@ -134,7 +134,7 @@ def find(
             pose = fit.pose.copy()
             if model.box:
                 pose[:3, :3] = upright(pose[:3, :3])
-            return Found(pose, fit)
+            return DetectedPart(pose, fit)
         too_large = too_large or (fit.larger > TOO_LARGE and fit.covered > COVERED)
         best = fit if best is None else max(best, fit, key=_quality)
     assert best is not None

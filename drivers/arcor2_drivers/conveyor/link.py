@@ -37,7 +37,7 @@ OPERATIONAL: Final = b"\x05"
 # canopen logs every failure as an error; here it is raised, and a drive that is off would fill the log.
 logging.getLogger("canopen").setLevel(logging.CRITICAL)
 
-Hear = Callable[[int, bytes], None]
+FrameHandler = Callable[[int, bytes], None]
 
 
 class _Network(canopen.Network):
@@ -100,7 +100,7 @@ class CanLink:
     late answers.
     """
 
-    def __init__(self, name: str, settings: ConveyorSettings, hear: Hear) -> None:
+    def __init__(self, name: str, settings: ConveyorSettings, hear: FrameHandler) -> None:
         self.who: str | Message = Message.of(
             "{device} at {channel} node {node}", device=name, channel=settings.channel, node=settings.node_id
         )

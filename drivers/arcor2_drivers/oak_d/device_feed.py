@@ -13,7 +13,7 @@ from arcor2_hw.exceptions import ConnectionLost, DeviceFault, DeviceTimeout, Not
 from arcor2_hw.messages import Message
 
 from .calibration import parameters
-from .feed import Pipeline, Shot
+from .feed import ImagePair, Pipeline
 from .settings import OakDSettings
 
 POE_PORT: Final = 11490
@@ -137,7 +137,7 @@ class DeviceFeed:
             self.close()
             raise
 
-    def next(self, timeout: float) -> Shot | None:
+    def next(self, timeout: float) -> ImagePair | None:
         """Return the next image; None when none came within `timeout` s. Raises ConnectionLost."""
         shot = None if self._pipeline is None else self._pipeline.next(timeout)
         if shot is None and self._device.isClosed():

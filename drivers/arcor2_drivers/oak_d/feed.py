@@ -21,7 +21,7 @@ QUEUE_SIZE: Final = 2
 JPEG: Final = dai.ImgFrame.Type.BITSTREAM
 
 
-class Shot(NamedTuple):
+class ImagePair(NamedTuple):
     """Colour and depth images of one instant, taken at `monotonic` (this computer's clock, s)."""
 
     color: dai.ImgFrame
@@ -61,7 +61,7 @@ class Feed(Protocol):
     size: tuple[int, int]
     depth_range: tuple[float, float]
 
-    def next(self, timeout: float) -> Shot | None:
+    def next(self, timeout: float) -> ImagePair | None:
         """Return the next image; None when none came within `timeout` s. Raises DeviceError when the source is lost."""
 
     def temperature(self) -> float | None:
@@ -90,7 +90,7 @@ class Pipeline:
         """Start the pipeline."""
         self._pipeline.start()
 
-    def next(self, timeout: float) -> Shot | None:
+    def next(self, timeout: float) -> ImagePair | None:
         """Return the next image; None when none came within `timeout` s, or after `close`."""
         try:
             group: Any = self._queue.get(datetime.timedelta(seconds=timeout))
@@ -99,7 +99,7 @@ class Pipeline:
         if group is None:
             return None
         color, depth = group["color"], group["depth"]
-        return Shot(color, depth, color.getTimestamp().total_seconds())
+        return ImagePair(color, depth, color.getTimestamp().total_seconds())
 
     def close(self) -> None:
         """Stop the pipeline; does nothing when stopped."""

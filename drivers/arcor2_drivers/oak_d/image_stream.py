@@ -18,7 +18,7 @@ from arcor2_hw.objects.generic import DEFAULT_CONNECT_TIMEOUT
 from .settings import OakDSettings
 
 if TYPE_CHECKING:
-    from .feed import Feed, Shot
+    from .feed import Feed, ImagePair
 
 RECEIVE_TIMEOUT: Final = 0.1
 """Longest time the thread waits for an image before it checks whether it should end, s."""
@@ -47,7 +47,7 @@ class ImageStream(Connected):
         self.keep_connection(device_at(self.name, settings.address or Message.of("the only camera")))
         self._config = settings
         self._feed: Feed | None = None
-        self._newest: Shot | None = None
+        self._newest: ImagePair | None = None
         self._received_at = 0.0
         self._new_image = threading.Condition()
         self._exposure: float | None = None
@@ -103,7 +103,7 @@ class ImageStream(Connected):
         newest = self._newest
         return float("inf") if newest is None else self._received_at - newest.monotonic
 
-    def newest(self, max_age: float) -> "Shot":
+    def newest(self, max_age: float) -> "ImagePair":
         """Return the newest image. Raises Stale when it is older than `max_age` s, NotConnected, ConnectionLost."""
         self.observing.check()
         shot = self._newest
@@ -117,7 +117,7 @@ class ImageStream(Connected):
             )
         return shot
 
-    def next_after(self, moment: float, timeout: float) -> "Shot":
+    def next_after(self, moment: float, timeout: float) -> "ImagePair":
         """Wait for the first image whose exposure ended after `moment` (monotonic, s).
 
         Raises:
@@ -218,7 +218,7 @@ class ImageStream(Connected):
         """Wake the calls that wait for an image."""
         self._wake()
 
-    def _store(self, shot: "Shot") -> None:
+    def _store(self, shot: "ImagePair") -> None:
         self._received_at = time.monotonic()
         with self._new_image:
             self._newest = shot

@@ -12,7 +12,7 @@ from arcor2_hw.exceptions import DeviceError, DeviceFault
 from arcor2_hw.messages import Message
 
 from .calibration import handler_of, parameters
-from .feed import JPEG, Pipeline, Shot
+from .feed import JPEG, ImagePair, Pipeline
 from .network import NetworkSource
 from .settings import OakDSettings
 from .stream import Status
@@ -97,7 +97,7 @@ class NetworkFeed:
     def _on_status(self, status: Status) -> None:
         self._status = status
 
-    def next(self, timeout: float) -> Shot | None:
+    def next(self, timeout: float) -> ImagePair | None:
         """Return the next image; None when none came within `timeout` s. Raises DeviceError when the source is lost."""
         until = time.monotonic() + timeout
         while self._pipeline is not None:

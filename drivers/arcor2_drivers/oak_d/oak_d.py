@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
     from PIL import Image
 
-    from .feed import Shot
+    from .feed import ImagePair
 
 MIN_EXPOSURE_TIME: Final = 0.00001
 MAX_EXPOSURE_TIME: Final = 0.033
@@ -158,22 +158,22 @@ class OakD(ImageStream, Camera):
         self.set_exposure(None)
 
     # -------------------------------------------------------------------------------- images
-    def _after_now(self) -> "Shot":
+    def _after_now(self) -> "ImagePair":
         """Wait for an image whose exposure starts after this call."""
         began = time.monotonic()
         newest = self.newest(self._config.frame_timeout + self._config.max_age)
         exposure = MAX_EXPOSURE_TIME if newest.exposure is None else newest.exposure
         return self.next_after(began + exposure, self._config.frame_timeout)
 
-    def _note(self, shot: "Shot") -> PictureNote:
+    def _note(self, shot: "ImagePair") -> PictureNote:
         taken = datetime.datetime.now(datetime.UTC) - datetime.timedelta(seconds=time.monotonic() - shot.monotonic)
         return PictureNote(self.feed.parameters, self.pose, taken.isoformat(timespec="microseconds"), self.name)
 
-    def _frame(self, shot: "Shot") -> Frame:
+    def _frame(self, shot: "ImagePair") -> Frame:
         depth = shot.depth_mm().copy()
         return Frame(shot.color_rgb(), depth if depth.any() else None, self._note(shot), shot.monotonic, shot.exposure)
 
-    def _averaged(self, shot: "Shot", count: int) -> "tuple[npt.NDArray[np.uint16], Shot]":
+    def _averaged(self, shot: "ImagePair", count: int) -> "tuple[npt.NDArray[np.uint16], ImagePair]":
         """Return the mean of the valid depths of each pixel over `count` frames, and the last frame."""
         import numpy as np
 
@@ -188,7 +188,7 @@ class OakD(ImageStream, Camera):
         # Pixels at edges flicker: use only those that are valid in at least half of the frames.
         return np.where(2 * valid >= count, mean, 0).astype(np.uint16), shot
 
-    def _check_light(self, color: "npt.NDArray[np.uint8]", shot: "Shot") -> None:
+    def _check_light(self, color: "npt.NDArray[np.uint8]", shot: "ImagePair") -> None:
         sample = color[::SAMPLE_STEP, ::SAMPLE_STEP]
         white = float((sample.min(axis=2) >= WHITE).mean())
         if white > self._config.white_limit:

@@ -38,7 +38,7 @@ MIN_ANSWER: Final = 11
 """Size of an answer without data, bytes."""
 
 
-class _Endless(Exception):
+class _NoFrame(Exception):
     """Bytes keep arriving without forming an answer."""
 
 
@@ -57,7 +57,7 @@ class _Port(PortHandler):  # type: ignore[misc]
 
     def readPort(self, length: int) -> bytes:  # noqa: N802 - the library's name
         if self._clock() > MAX_EXCHANGE_TIME:
-            raise _Endless
+            raise _NoFrame
         found: bytes = self.ser.read(max(length, 0))
         self._heard = self._heard or bool(found)
         return found
@@ -140,7 +140,7 @@ class Bus:
             raise ConnectionLost(
                 "The port of {device} has disappeared. Check the cable.", str(e), device=self.who
             ) from e
-        except (_Endless, IndexError) as e:
+        except (_NoFrame, IndexError) as e:
             raise DeviceTimeout("{device}: the bytes received are not an answer.", "garbage", device=self.who) from e
         finally:
             port.is_using = False

@@ -23,7 +23,7 @@ from arcor2_hw.exceptions import (
     SafetyStop,
     WatchdogTripped,
 )
-from arcor2_hw.keep_alive import EXIT_TOO_SLOW, FROZEN_AFTER, PULSE_PERIOD, once_within, pulse, result_within
+from arcor2_hw.keep_alive import FROZEN_AFTER, PULSE_PERIOD, TOO_SLOW, once_within, pulse, result_within
 from arcor2_hw.objects.arm import label
 
 from . import timing
@@ -194,7 +194,7 @@ class ControlSession:
             raise error from None
 
     def ask(self, what: str, question: str, *arguments: Any) -> Any:
-        """Execute a repeatable command. Try MAX_ATTEMPTS times if the library fails or denies, as on a busy computer."""
+        """Execute a repeatable command. Try MAX_ATTEMPTS times if the library fails, as on a busy computer."""
         for _ in range(MAX_ATTEMPTS - 1):
             try:
                 if answer := self.call(what, question, *arguments):
@@ -343,7 +343,7 @@ class ControlSession:
 
     def _too_slow(self, detail: str) -> ConnectionLost:
         self.too_slow = True
-        return WatchdogTripped("{device}: {too_slow}", detail, device=self.who, too_slow=EXIT_TOO_SLOW)
+        return WatchdogTripped("{device}: {too_slow}", detail, device=self.who, too_slow=TOO_SLOW)
 
     def _on_output(self, line: bytes) -> None:
         text = line.decode("utf-8", "replace").strip()

@@ -46,7 +46,7 @@ PARTNER_TIMEOUT: Final = 2.0
 WATCHDOG: Final = (0.1, 5.0)
 
 
-class Meeting(NamedTuple):
+class SynchronizedMotion(NamedTuple):
     """A synchronized motion that waits for the other arm."""
 
     number: int
@@ -68,7 +68,7 @@ class MotionServer:
         self.commands: Lines | None = None
         self.watch: Lines | None = None
         self.wires: dict[str, TcpWire] = {}
-        self.meeting: Meeting | None = None
+        self.meeting: SynchronizedMotion | None = None
         self.stops_taken: deque[float] = deque(maxlen=200)
         """Times at which the program read a stop from its socket, on the monotonic clock, s."""
         self._watchdog = 0.0
@@ -236,7 +236,7 @@ class MotionServer:
             _ = self.staging.joints
             require(0.0 < values[1] <= 600.0)
             self._motion = sequence, code
-            self.meeting = Meeting(int(values[0]), values[1], time.monotonic() + PARTNER_TIMEOUT, sequence)
+            self.meeting = SynchronizedMotion(int(values[0]), values[1], time.monotonic() + PARTNER_TIMEOUT, sequence)
             self._meet()
         elif code in (30, 32):
             require(0.0 < values[0] <= 600.0)

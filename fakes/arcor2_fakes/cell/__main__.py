@@ -13,7 +13,7 @@ from cyclopts import App, Parameter, validators
 from cyclopts.types import NonNegativeFloat
 
 from arcor2_fakes.cell.boards import MAX_BOARDS, Board, draw_boards
-from arcor2_fakes.cell.devices import DeviceFeed, DeviceGone, Fake, FakeDevices, RobotFeed
+from arcor2_fakes.cell.devices import DeviceFeed, DeviceUnreachable, Fake, FakeDevices, RobotFeed
 from arcor2_fakes.cell.layout import Layout, LayoutError, read_layout
 from arcor2_fakes.cell.world import World
 from arcor2_fakes.control import ControlServer, parse_address
@@ -95,7 +95,7 @@ class Cell:
                     if now - shown >= _PICTURE_PERIOD:
                         shown = now
                         await self._devices.show(self.world.seen())
-        except DeviceGone as e:
+        except DeviceUnreachable as e:
             return str(e)
 
 
@@ -188,7 +188,7 @@ def main(
         try:
             drawn = draw_boards(boards, seed)
             problem = await first_of(wait_for_end(), live(cell, drawn, addresses, channel, patience))
-        except DeviceGone as e:
+        except DeviceUnreachable as e:
             problem = str(e)
 
     status = run(body, "cell")

@@ -20,7 +20,7 @@ _MOTION_RATE = 100.0  # Hz; error of the position of a belt: 5 mm at 0.5 m/s
 _OUTPUT_RATE = 10.0  # Hz; lamps are only displayed
 
 
-class DeviceGone(Exception):
+class DeviceUnreachable(Exception):
     """A fake cannot be reached, has ended, or sends unexpected data; the message names it and its address."""
 
 
@@ -45,7 +45,7 @@ class Fake:
                 return cls(name, address, await ControlClient.connect(address, within=_CONNECT_TIMEOUT))
             except ControlError as e:
                 if asyncio.get_running_loop().time() >= deadline:
-                    raise DeviceGone(f"the {name} can't be reached: {e}") from e
+                    raise DeviceUnreachable(f"the {name} can't be reached: {e}") from e
                 await asyncio.sleep(_RETRY_PERIOD)
 
     async def gone(self) -> str:
@@ -118,7 +118,7 @@ class FakeDevices:
         try:
             await fake.client.do(command, **arguments)
         except ControlError as e:
-            raise DeviceGone(f"the {fake.name} at {fake.address}: {e}") from e
+            raise DeviceUnreachable(f"the {fake.name} at {fake.address}: {e}") from e
 
 
 class RobotFeed:
@@ -127,14 +127,14 @@ class RobotFeed:
     def __init__(self) -> None:
         self._samples: list[Robot] = []
         self._arrived = asyncio.Event()
-        self._problem: DeviceGone | None = None
+        self._problem: DeviceUnreachable | None = None
 
     def take(self, truth: Any) -> None:
         """Store a sample from the fake controller."""
         try:
             sample = msgspec.convert(truth, Robot)
         except msgspec.ValidationError as e:
-            self._problem = DeviceGone(f"the robot's truth is not that of a controller: {e}")
+            self._problem = DeviceUnreachable(f"the robot's truth is not that of a controller: {e}")
         else:
             # While the world is busy with a device, positions may be skipped, but no change of an output.
             if self._samples and self._samples[-1].digital_outputs == sample.digital_outputs:
@@ -143,7 +143,7 @@ class RobotFeed:
         self._arrived.set()
 
     async def next(self) -> Robot:
-        """Return the next sample. Raises `DeviceGone` if the robot sends something else."""
+        """Return the next sample. Raises `DeviceUnreachable` if the robot sends something else."""
         while not self._samples:
             if self._problem is not None:
                 raise self._problem
@@ -152,7 +152,7 @@ class RobotFeed:
         return self._samples.pop(0)
 
 
-class _Truth(msgspec.Struct):
+class _FakeState(msgspec.Struct):
     """The fields of the state of a fake that the world uses; each fake sends some of them."""
 
     belt: float = 0.0
@@ -167,7 +167,7 @@ class DeviceFeed:
     def __init__(self, layout: Layout) -> None:
         self.inputs = Inputs()
         self._arm = None if layout.labelling is None else layout.labelling.arm
-        self._problem: DeviceGone | None = None
+        self._problem: DeviceUnreachable | None = None
 
     async def follow(self, fakes: Mapping[str, Fake]) -> None:
         """Subscribe to the states of the devices of the cell."""
@@ -183,31 +183,31 @@ class DeviceFeed:
 
             def update(truth: Any, take: Any = take, fake: Fake = fake) -> None:
                 try:
-                    take(msgspec.convert(truth, _Truth))
+                    take(msgspec.convert(truth, _FakeState))
                 except (msgspec.ValidationError, KeyError) as e:
-                    self._problem = DeviceGone(f"the {fake.name} at {fake.address} tells something else: {e}")
+                    self._problem = DeviceUnreachable(f"the {fake.name} at {fake.address} tells something else: {e}")
 
             try:
                 update(await fake.client.do(source))
                 await fake.client.subscribe(update, source, rate)
             except ControlError as e:
-                raise DeviceGone(f"the {fake.name} at {fake.address}: {e}") from e
+                raise DeviceUnreachable(f"the {fake.name} at {fake.address}: {e}") from e
 
     def check(self) -> None:
-        """Raise `DeviceGone` if a device has sent unexpected data."""
+        """Raise `DeviceUnreachable` if a device has sent unexpected data."""
         if self._problem is not None:
             raise self._problem
 
-    def _belt(self, truth: _Truth) -> None:
+    def _belt(self, truth: _FakeState) -> None:
         self.inputs.belt = truth.belt
 
-    def _angles(self, truth: _Truth) -> None:
+    def _angles(self, truth: _FakeState) -> None:
         if self._arm is not None:
             first, second = (truth.angles[str(number)] for number in self._arm.servos)
             self.inputs.arm = first, second
 
-    def _labels(self, truth: _Truth) -> None:
+    def _labels(self, truth: _FakeState) -> None:
         self.inputs.printed = truth.labels
 
-    def _outputs(self, truth: _Truth) -> None:
+    def _outputs(self, truth: _FakeState) -> None:
         self.inputs.outputs = truth.outputs

@@ -36,7 +36,7 @@ class Watchdog:
     expires: float = 0.0
 
 
-class Locked(ValueError):
+class OutputLocked(ValueError):
     """An expired watchdog holds this output in its safe state."""
 
 
@@ -99,7 +99,7 @@ class Block:
         """Raise Locked when an expired watchdog guards one of these (bit masks)."""
         for dog in self.watchdogs:
             if dog.state is WatchdogState.EXPIRED and (dog.do_guarded & digital or dog.ao_guarded & analog):
-                raise Locked
+                raise OutputLocked
 
     def _switch(self, number: int, *, on: bool, at: float) -> None:
         if self.outputs[number] != on:

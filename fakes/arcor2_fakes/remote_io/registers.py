@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from arcor2_fakes.modbus import ExceptionCode, ModbusRefusal, ModbusTables
-from arcor2_fakes.remote_io.block import ANALOG_OUT, DIGITAL, WATCHDOGS, Block, Locked, WatchdogState
+from arcor2_fakes.remote_io.block import ANALOG_OUT, DIGITAL, WATCHDOGS, Block, OutputLocked, WatchdogState
 
 _WORDS = ("time_ms", "number", "command", "do_guarded", "do_switched", "do_safe", "ao_guarded", "ao_switched")
 _SAFE = ("ao_safe_0", "ao_safe_1")
@@ -100,5 +100,5 @@ class RegisterMap(ModbusTables):
     def _check_unlocked(self, digital: int = 0, analog: int = 0) -> None:
         try:
             self._block.check_unlocked(digital, analog)
-        except Locked:
+        except OutputLocked:
             raise ModbusRefusal(ExceptionCode.DEVICE_FAILURE) from None

@@ -120,7 +120,7 @@ class Servo:
         return q
 
 
-class Guided:
+class GuidedMotion:
     """Freedrive: a person moves the arm by hand, slowly and straight to a configuration."""
 
     along_path = False

@@ -18,7 +18,7 @@ from arcor2_fakes.control import ControlServer
 from arcor2_fakes.ur.contact import STIFFNESS, Obstacle
 from arcor2_fakes.ur.controller import Controller
 from arcor2_fakes.ur.dashboard import Dashboard
-from arcor2_fakes.ur.motion import JOINT_RANGE, Guided
+from arcor2_fakes.ur.motion import JOINT_RANGE, GuidedMotion
 from arcor2_fakes.ur.rtde_server import RtdeServer
 from arcor2_fakes.ur.script_port import ScriptPort
 from arcor2_fakes.ur.states import RobotMode
@@ -117,7 +117,7 @@ def register(control: ControlServer, c: Controller, rtde: RtdeServer, script: Sc
     def guide(q: Sequence[float], speed: float = 0.5) -> None:
         if not c.freedrive or c.robot_mode is not RobotMode.RUNNING:
             raise ValueError("the brakes hold: not in freedrive")
-        c.arm.motion = Guided(c.arm.q, joints(q), speed)
+        c.arm.motion = GuidedMotion(c.arm.q, joints(q), speed)
 
     def operational_mode(mode: str) -> None:
         if mode not in ("MANUAL", "AUTOMATIC", "NONE"):

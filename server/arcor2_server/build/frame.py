@@ -87,7 +87,7 @@ class ParameterUse(NamedTuple):
     meta: ParameterMeta
 
 
-class OwnNames(NamedTuple):
+class ChosenNames(NamedTuple):
     """The names that a person has chosen in a script: of objects by id, and of imports by module and name."""
 
     objects: Mapping[str, str]
@@ -105,10 +105,10 @@ class Frame:
     """
 
     def __init__(
-        self, scene: Scene, project: Project, types: Mapping[str, TypeFacts], own: OwnNames | None = None
+        self, scene: Scene, project: Project, types: Mapping[str, TypeFacts], own: ChosenNames | None = None
     ) -> None:
         self.scene, self.project, self.types = scene, project, types
-        own = own or OwnNames({}, {})
+        own = own or ChosenNames({}, {})
         self._own = own
         self.index = ProjectIndex(scene, project)
         self.points: PointNames = names_of(project)

@@ -26,7 +26,7 @@ MAX_ID: Final = 255
 _Kind = Literal["type", "installed", "helper"]
 
 
-class Imported(Data, frozen=True):
+class ImportedPackage(Data, frozen=True):
     """The documents of a package, checked without the documents of the server.
 
     Args:
@@ -124,7 +124,7 @@ def _class_in(path: str, stem: str, source: str) -> tuple[str, _Kind]:
     raise InvalidPackage("{path} of the package has no class whose name matches the file name.", path=path)
 
 
-def read(data: Path | bytes) -> Imported:
+def read(data: Path | bytes) -> ImportedPackage:
     """Read a package from a zip file or its content.
 
     Raises:
@@ -161,7 +161,7 @@ def read(data: Path | bytes) -> Imported:
     for path in files:
         if path.startswith("data/models/") and PurePosixPath(path).stem not in modules:
             raise InvalidPackage("{path} of the package does not belong to any of its object types.", path=path)
-    content = Imported(scene, project, source, types, installed, helpers)
+    content = ImportedPackage(scene, project, source, types, installed, helpers)
     names = project.project_objects_ids
     return content if isinstance(names, Unset) else with_helper_names(content, names)
 
@@ -180,7 +180,7 @@ def _model(files: Mapping[str, bytes], name: str) -> ObjectModel | Unset:
     return model
 
 
-def with_helper_names(content: Imported, known: Iterable[str]) -> Imported:
+def with_helper_names(content: ImportedPackage, known: Iterable[str]) -> ImportedPackage:
     """Rename helpers from their module names to the known names. The files have only module names."""
     modules = {module_name(name): name for name in known}
     names = {name: modules.get(name, name) for name in content.helpers}

@@ -18,7 +18,7 @@ from arcor2_hw.exceptions import Conflict, InvalidPackage, InvalidProject, NotFo
 from arcor2_hw.messages import Message
 from arcor2_server.build import script
 from arcor2_server.build.combined_types import CombinedTypes
-from arcor2_server.build.imported import Imported, read, with_helper_names
+from arcor2_server.build.imported import ImportedPackage, read, with_helper_names
 from arcor2_server.documents import Session
 from arcor2_server.documents.checks.project import project_problems
 from arcor2_server.documents.renamed_actions import with_present_names
@@ -47,7 +47,7 @@ class ImportedIds(Data, frozen=True, rename="camel"):
     project_id: str
 
 
-def _check(package: Imported, types: CombinedTypes) -> None:
+def _check(package: ImportedPackage, types: CombinedTypes) -> None:
     """Raise an error for documents that could not be opened or run after they are saved."""
     for name in package.types:
         if (found := types.analysis(name)).problem is not None:
@@ -82,7 +82,7 @@ def _check_logic(project: Project) -> None:
                 )
 
 
-def _checked(package: Imported, known: Sequence[SourceFile], options: ImportOptions) -> Imported:
+def _checked(package: ImportedPackage, known: Sequence[SourceFile], options: ImportOptions) -> ImportedPackage:
     """Check all documents; return those to save."""
     types = CombinedTypes(known, package.types)
     if options.update_project_from_script:
@@ -91,7 +91,7 @@ def _checked(package: Imported, known: Sequence[SourceFile], options: ImportOpti
     return package
 
 
-def _from_script(package: Imported, types: CombinedTypes) -> Project:
+def _from_script(package: ImportedPackage, types: CombinedTypes) -> Project:
     """Return the project updated from the script, with default values added, as editors do."""
     if package.needs_source:
         raise InvalidProject(
@@ -101,7 +101,7 @@ def _from_script(package: Imported, types: CombinedTypes) -> Project:
     return script.read_with_text(package.script, package.scene, project, types.facts(package.scene))
 
 
-class _Saved(Data, frozen=True):
+class _SavedDocuments(Data, frozen=True):
     """The saved documents with the ids and names of a package; None for missing ones."""
 
     scene: Scene | None
@@ -122,7 +122,7 @@ class _Plan(Data, frozen=True):
     source: bool
 
 
-def _plan(package: Imported, saved: _Saved, options: ImportOptions) -> tuple[_Plan, list[Message]]:
+def _plan(package: ImportedPackage, saved: _SavedDocuments, options: ImportOptions) -> tuple[_Plan, list[Message]]:
     """Return the plan, and a message for each document that must not be overwritten."""
     conflicts: list[Message] = []
 
@@ -184,7 +184,7 @@ class PackageImport:
     _importing: asyncio.Lock = field(init=False, default_factory=asyncio.Lock)
     """Serializes imports."""
 
-    async def _saved(self, package: Imported) -> _Saved:
+    async def _saved(self, package: ImportedPackage) -> _SavedDocuments:
         storage = self._storage
 
         async def or_none(document: Any) -> Any:
@@ -193,7 +193,7 @@ class PackageImport:
             except NotFound:
                 return None
 
-        return _Saved(
+        return _SavedDocuments(
             await or_none(storage.scene(package.scene.id)),
             await or_none(storage.project(package.project.id)),
             await or_none(storage.project_source(package.project.id)),
@@ -203,7 +203,7 @@ class PackageImport:
             await storage.project_named(package.project.name),
         )
 
-    def _open_conflicts(self, plan: _Plan, package: Imported) -> list[Message]:
+    def _open_conflicts(self, plan: _Plan, package: ImportedPackage) -> list[Message]:
         """Return a message for each open document: saving it later would undo the import."""
         session = self._session
         scene, project = session.scene, session.project
@@ -214,7 +214,7 @@ class PackageImport:
             found.append(Message.of("The project {name} is open. Close it first.", name=project.name))
         return found
 
-    def _check_meshes(self, package: Imported) -> None:
+    def _check_meshes(self, package: ImportedPackage) -> None:
         for one in package.types.values():
             mesh = UNSET if isinstance(one.model, Unset) else one.model.model()
             if isinstance(mesh, Mesh) and not self._assets.exists(mesh.asset_id):
@@ -252,7 +252,7 @@ class PackageImport:
                 await self._write(package, plan)
         return ImportedIds(package.scene.id, package.project.id)
 
-    async def _write(self, package: Imported, plan: _Plan) -> None:
+    async def _write(self, package: ImportedPackage, plan: _Plan) -> None:
         """Save all documents in one transaction, then notify clients of the object types."""
         storage = self._storage
         async with storage.transaction():

@@ -63,7 +63,7 @@ class Tree:
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class ActionPosition:
     """The position of an action in the code.
 
     Args:
@@ -89,7 +89,7 @@ class Layout:
         nesting: the number of blocks around each action.
     """
 
-    placed: list[Placed]
+    placed: list[ActionPosition]
     is_join: list[bool]
     nesting: list[int]
     _begin: list[int]
@@ -104,7 +104,7 @@ class Layout:
         return target != self.placed[source].follow or self.placed[target].guarded
 
 
-class _Placing:
+class _LayoutBuilder:
     def __init__(self, edges: Sequence[tuple[Edge, ...]], moved: Collection[int]) -> None:
         self.edges = edges
         count = len(edges)
@@ -226,7 +226,7 @@ class _Placing:
             in_branch = len(self.edges[parent]) > 1 and lasts[parent] != node
             deeper = guarded[node] if self.is_join[node] else in_branch
             nesting[node] = nesting[parent] + deeper
-        placed = [Placed(tuple(self.joins[n]), lasts[n], follows[n], guarded[n]) for n in range(count)]
+        placed = [ActionPosition(tuple(self.joins[n]), lasts[n], follows[n], guarded[n]) for n in range(count)]
         return Layout(placed, self.is_join, nesting, begin, end)
 
 
@@ -239,11 +239,11 @@ def _too_deep(layout: Layout, edges: Sequence[tuple[Edge, ...]], parents: Sequen
 
 def arrange(edges: Sequence[tuple[Edge, ...]]) -> tuple[Layout, Layout]:
     """Return the layout of a graph, and the layout before deep blocks were moved out, for `always_before`."""
-    placing = _Placing(edges, ())
+    placing = _LayoutBuilder(edges, ())
     natural = layout = placing.layout()
     moved: set[int] = set()
     while max(layout.nesting) > MAX_NESTING:
         moved.update(_too_deep(layout, edges, placing.tree.parents))
-        placing = _Placing(edges, moved)
+        placing = _LayoutBuilder(edges, moved)
         layout = placing.layout()
     return layout, natural

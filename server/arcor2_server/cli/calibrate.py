@@ -305,7 +305,7 @@ def _lens_model(coefficients: int) -> IntrinsicsOptions:
 
 
 # ------------------------------------------------------------------------------------------------ touch
-class Touched(Data, frozen=True, forbid_unknown_fields=True):
+class TouchedPoints(Data, frozen=True, forbid_unknown_fields=True):
     """The touched points and flange poses. The method determines which fields are needed."""
 
     origin: Position | None = None
@@ -336,7 +336,7 @@ def touch(
     """
 
     async def work() -> None:
-        found: Any = await compute(_touch_task(read_as(points, Touched), points))
+        found: Any = await compute(_touch_task(read_as(points, TouchedPoints), points))
         pose = getattr(found, "pose", None)
         if pose is None:
             pose = Pose(getattr(found, "position", Position()), getattr(found, "orientation", Orientation()))
@@ -351,19 +351,19 @@ def touch(
     return calibrated("touch", work)
 
 
-def _touch_task(given: Touched, path: Path) -> Any:
+def _touch_task(given: TouchedPoints, path: Path) -> Any:
     match given:
-        case Touched(known=[_, *_], touched=[_, *_]):
+        case TouchedPoints(known=[_, *_], touched=[_, *_]):
             return t.FrameByPoints(given.known, given.touched)
-        case Touched(flanges=[_, *_]):
+        case TouchedPoints(flanges=[_, *_]):
             return t.TipByTouches(given.flanges)
-        case Touched(orientations=[_, *_]):
+        case TouchedPoints(orientations=[_, *_]):
             return t.OrientationByAlignment(given.orientations, given.reference or Orientation())
-        case Touched(
+        case TouchedPoints(
             flange=Orientation() as flange, tip=Position() as tip, along_z=Position() as z, on_x=Position() as x
         ):
             return t.OrientationByPoints(flange, tip, z, x)
-        case Touched(origin=Position() as origin, on_x=Position() as x):
+        case TouchedPoints(origin=Position() as origin, on_x=Position() as x):
             return t.FrameByAxes(origin, x, given.in_plane)
     raise InvalidData(
         "{path} lacks the fields of a method: known and touched, or origin, on_x and in_plane, or flanges, or "

@@ -25,7 +25,7 @@ from arcor2_server.exchange.archive import Archive, Kind
 from arcor2_server.exchange.differences import Difference, describe, differences, names_of
 from arcor2_server.exchange.export import Exporter
 from arcor2_server.exchange.import_ import Importer, Part, renamed
-from arcor2_server.exchange.validation import Known, find_problems
+from arcor2_server.exchange.validation import AvailableTypes, find_problems
 
 Output = Annotated[Path | None, Parameter(name=["--output", "-o"], help="The file. The default is NAME.zip.")]
 Force = Annotated[bool, Parameter(help="Replace an existing file.", negative=())]
@@ -136,7 +136,7 @@ async def validate(paths: list[Path], kind: Kind, as_json: bool) -> ExitStatus:
     for path in paths:
         try:
             archive = read(path, kind)
-            findings = list(find_problems(archive, Known(archive, files)))
+            findings = list(find_problems(archive, AvailableTypes(archive, files)))
         except InvalidPackage as error:
             entry, _, text = str(error).removeprefix(f"{path}: ").partition(": ")
             reported.append(

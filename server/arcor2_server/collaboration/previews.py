@@ -20,7 +20,7 @@ NAME: Final = "MovePreview"
 
 
 @dataclass(slots=True)
-class _Dragged:
+class _Preview:
     client: Connection
     user: str
     locked: str
@@ -33,7 +33,7 @@ class Previews:
     def __init__(self, hub: EventHub, locks: Locks) -> None:
         self._hub = hub
         self._locks = locks
-        self._dragged: dict[str, _Dragged] = {}
+        self._dragged: dict[str, _Preview] = {}
         self._events = Throttle(PERIOD, self._send)
         self._check_timer: asyncio.TimerHandle | None = None
 
@@ -44,7 +44,7 @@ class Previews:
             return
         dragged = self._dragged.get(preview.id)
         if dragged is None or dragged.changed or dragged.client is not client or dragged.user != user:
-            self._dragged[preview.id] = _Dragged(client, user, locked)
+            self._dragged[preview.id] = _Preview(client, user, locked)
         data = MovePreviewData(
             id=preview.id,
             position=preview.position,

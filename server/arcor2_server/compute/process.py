@@ -98,7 +98,7 @@ class ComputeProcess:
             async with asyncio.timeout(within + START_TIMEOUT):
                 if world is not None:
                     await self._send_world(world, place)
-                await self._send(m.Work(task, within, place))  # type: ignore[arg-type]
+                await self._send(m.RunTask(task, within, place))  # type: ignore[arg-type]
                 while isinstance(message := await self._read(), m.Progress):
                     if on_progress is not None:
                         on_progress(message.share, message.message)

@@ -90,7 +90,7 @@ class Manifest(Data, frozen=True):
         return sum(entry.size for entry in self.files.values())
 
 
-class _Vanished(Exception):
+class _FileDeleted(Exception):
     """A file was deleted before it was copied."""
 
 
@@ -114,7 +114,7 @@ def write_backup(data_dir: Path, target: Path, version: str) -> Manifest:
             with os.fdopen(descriptor, "wb") as file:
                 try:
                     manifest = _write(data_dir, file, version, target.parent)
-                except _Vanished:
+                except _FileDeleted:
                     if attempt == ATTEMPTS - 1:
                         raise
                     continue
@@ -124,7 +124,7 @@ def write_backup(data_dir: Path, target: Path, version: str) -> Manifest:
             sync(target.parent)
             return manifest
         raise AssertionError("unreachable")
-    except (OSError, sqlite3.Error, _Vanished) as error:
+    except (OSError, sqlite3.Error, _FileDeleted) as error:
         raise StorageError("{directory} cannot be backed up: {reason}.", directory=data_dir, reason=error) from error
     finally:
         temporary.unlink(missing_ok=True)
@@ -150,7 +150,7 @@ def _write(data_dir: Path, file: IO[bytes], version: str, scratch: Path) -> Mani
         # A snapshot may list files, such as those of the history: those that exist now are the ones that it lists.
         present = sorted(_files(data_dir))
         if missing := set(paths).difference(present):
-            raise _Vanished(", ".join(sorted(missing)))
+            raise _FileDeleted(", ".join(sorted(missing)))
         for path in present:
             if path not in entries and path not in databases:
                 entries[path] = _add(archive, file, path, data_dir / path)
@@ -188,7 +188,7 @@ def _is_sqlite(path: Path) -> bool:
         with path.open("rb") as file:
             return file.read(len(_SQLITE)) == _SQLITE
     except FileNotFoundError as error:
-        raise _Vanished(str(path)) from error
+        raise _FileDeleted(str(path)) from error
 
 
 @contextlib.contextmanager
@@ -261,7 +261,7 @@ def _add(archive: zipfile.ZipFile, file: IO[bytes], name: str, path: Path) -> Ba
     try:
         source = path.open("rb")
     except FileNotFoundError as error:
-        raise _Vanished(str(path)) from error
+        raise _FileDeleted(str(path)) from error
     with source, archive.open(info, "w", force_zip64=True) as target:
         while chunk := source.read(_CHUNK):
             digest.update(chunk)

@@ -33,7 +33,7 @@ OBJECT: Final = "object"
 _POINT_ITEMS: Final = {"pose": Kind.ORIENTATION, "joints": Kind.JOINTS}
 
 
-class Missing(RequestRefused):
+class MissingItem(RequestRefused):
     """The project has no item for a reference of an imported function."""
 
     code = "missing_items"
@@ -117,15 +117,15 @@ def import_function(
         Missing: the document lacks items; the message lists all of them.
         InvalidData: the export is damaged.
     """
-    found = _Found(document, points)
+    found = _ReferencedItems(document, points)
     ids: dict[tuple[str, str], str] = {}
     for reference in export.references:
         if (key := found.find(reference)) is not None:
             ids[reference.kind, reference.id] = key
     if found.missing:
-        raise Missing("The project lacks: {missing}.", missing="; ".join(found.missing))
+        raise MissingItem("The project lacks: {missing}.", missing="; ".join(found.missing))
     try:
-        return _Importing(document, export, ids, keep=not points).changes()
+        return _FunctionImport(document, export, ids, keep=not points).changes()
     except KeyError as error:
         key = error.args[0][-1] if isinstance(error.args[0], tuple) else error.args[0]
         raise InvalidData("The exported function is damaged: {id} is missing.", id=key) from error
@@ -133,7 +133,7 @@ def import_function(
         raise InvalidData("The exported function is damaged: {reason}.", reason=error) from error
 
 
-class _Found:
+class _ReferencedItems:
     """Finds the items of a document for references. `missing` describes those that do not exist."""
 
     def __init__(self, document: Document, points: Mapping[str, str]) -> None:
@@ -190,7 +190,7 @@ class _Found:
         return found or document.find(Kind.POINT, document.named(Kind.POINT, str(reference.point)) or "")
 
 
-class _Importing:
+class _FunctionImport:
     """One import.
 
     Args:

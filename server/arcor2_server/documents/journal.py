@@ -14,7 +14,7 @@ import structlog
 from arcor2_hw.exceptions import StorageError
 from arcor2_server.documents.changes import Edit
 from arcor2_server.documents.journal_file import JournalFile
-from arcor2_server.documents.journal_records import Base, Loss, Recovered
+from arcor2_server.documents.journal_records import Base, JournalLoss, RecoveredDocument
 
 log = structlog.get_logger(__name__)
 
@@ -37,7 +37,7 @@ class Journal:
         self,
         path: Path,
         on_failure: Callable[[], None] = lambda: None,
-        convert: Callable[[Recovered], Recovered] = lambda found: found,
+        convert: Callable[[RecoveredDocument], RecoveredDocument] = lambda found: found,
     ) -> None:
         self._path = path
         self._convert = convert
@@ -48,16 +48,16 @@ class Journal:
         self._epoch = 0
         self._failed_epoch = -1
         self._failure = StorageError()
-        self.loss: Loss | None = None
+        self.loss: JournalLoss | None = None
 
-    async def open(self) -> Recovered | None:
+    async def open(self) -> RecoveredDocument | None:
         """Start the thread, and return the document that an earlier server left open. `loss` describes damage.
 
         Raises:
             StorageError: The file cannot be read or written.
         """
         self._loop = asyncio.get_running_loop()
-        started: asyncio.Future[Recovered | None] = self._loop.create_future()
+        started: asyncio.Future[RecoveredDocument | None] = self._loop.create_future()
         self._thread = threading.Thread(target=self._run, args=(started,), name="journal", daemon=True)
         self._thread.start()
         return await started
@@ -94,7 +94,7 @@ class Journal:
         return done
 
     # ------------------------------------------------------------------------------------------ the thread
-    def _run(self, started: "asyncio.Future[Recovered | None]") -> None:
+    def _run(self, started: "asyncio.Future[RecoveredDocument | None]") -> None:
         assert self._loop is not None
         with closing(JournalFile(self._path, self._convert)) as file:
             try:

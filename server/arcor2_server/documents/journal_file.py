@@ -26,9 +26,9 @@ from arcor2_server.documents.journal_records import (
     Base,
     JournalContent,
     JournalDamaged,
-    Loss,
+    JournalLoss,
     Position,
-    Recovered,
+    RecoveredDocument,
     base_checksum,
     document_of,
     edit_checksum,
@@ -83,7 +83,9 @@ class JournalFile:
     old content remains.
     """
 
-    def __init__(self, path: Path, convert: Callable[[Recovered], Recovered] = lambda found: found) -> None:
+    def __init__(
+        self, path: Path, convert: Callable[[RecoveredDocument], RecoveredDocument] = lambda found: found
+    ) -> None:
         self._path = path
         self._convert = convert
         self._position_path = path.with_suffix(".position")
@@ -91,7 +93,7 @@ class JournalFile:
         self._descriptor = -1
         self.position = Position()
 
-    def open(self) -> tuple[Recovered | None, Loss | None]:
+    def open(self) -> tuple[RecoveredDocument | None, JournalLoss | None]:
         """Open or create the files. Return the document that an earlier server left open, and its lost changes.
 
         A damaged file is renamed, and its intact content is written into a new one.
@@ -126,7 +128,9 @@ class JournalFile:
             self._connection = _connect(self._path)
             _recover(self._connection)
             if content.damage and content.lost:
-                loss = Loss(content.damage, content.lost, "" if stored is None else str(stored), content.incomplete)
+                loss = JournalLoss(
+                    content.damage, content.lost, "" if stored is None else str(stored), content.incomplete
+                )
         _unlink(copy)
         recovered = content.recovered
         self.position = Position(content.serial)

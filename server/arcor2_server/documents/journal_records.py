@@ -67,7 +67,7 @@ class Times(msgspec.Struct, frozen=True):
         }
 
 
-class Recovered(msgspec.Struct, frozen=True):
+class RecoveredDocument(msgspec.Struct, frozen=True):
     """The restored document as `items` after edit `number`, and all stored edits."""
 
     items: list[Item]
@@ -128,7 +128,7 @@ class Position(msgspec.Struct, frozen=True):
         return [last] if self.time else []
 
 
-class Loss(msgspec.Struct, frozen=True):
+class JournalLoss(msgspec.Struct, frozen=True):
     """What a damaged journal lost, as sentences for users.
 
     Attributes:
@@ -167,7 +167,7 @@ class JournalContent(msgspec.Struct):
     """
 
     serial: int = 0
-    recovered: Recovered | None = None
+    recovered: RecoveredDocument | None = None
     damage: Message | None = None
     lost: Message | None = None
     incomplete: bool = False
@@ -251,7 +251,7 @@ def read_content(connection: sqlite3.Connection) -> JournalContent:
         for number, time, user, changes, request, kind, target, _ in (intact[key] for key in range(first, last + 1))
     ]
     scene, project = (msgspec.json.decode(text, type=Times) for text in times)
-    content.recovered = Recovered(decode_items(items), number, scene, project, edits)
+    content.recovered = RecoveredDocument(decode_items(items), number, scene, project, edits)
     document = document_of(content.recovered.items)
     if beyond := [row[0] for row in rows if row[0] > last]:
         content.damage = _damaged_change(last + 1)

@@ -6,13 +6,13 @@ from typing import Any, Final
 from msgspec.structs import replace
 
 from arcor2_server.documents.changes import Change, Kind
-from arcor2_server.documents.journal_records import Recovered
+from arcor2_server.documents.journal_records import RecoveredDocument
 from arcor2_server.storage.setting_secrets import SettingSecrets
 
 _WITH_SETTINGS: Final = frozenset({Kind.OBJECT, Kind.OVERRIDE})
 
 
-def hide_in_journal(secrets: SettingSecrets, found: Recovered) -> Recovered:
+def hide_in_journal(secrets: SettingSecrets, found: RecoveredDocument) -> RecoveredDocument:
     """Return the content of the journal without secrets, or `found` itself if it has none.
 
     Raises:

@@ -40,7 +40,7 @@ class Checked(Data, frozen=True, array_like=True):
     problems: list[Message]
 
 
-class Stored(Data, frozen=True):
+class StoredProblems(Data, frozen=True):
     """The content of the file: all problems by document id, and a digest of the code of the checks."""
 
     code: str
@@ -58,7 +58,7 @@ class SavedProblems:
         self._storage = storage
         self._types = types
         self._file = file
-        self._stored: Stored | None = None
+        self._stored: StoredProblems | None = None
         self._changing = asyncio.Lock()
         self._writing: asyncio.Task[None] | None = None
 
@@ -100,21 +100,21 @@ class SavedProblems:
 
         return lambda projects: {project.id: check(project) for project in projects}
 
-    def _read(self) -> Stored:
+    def _read(self) -> StoredProblems:
         """Return the stored problems; none if the file is missing, damaged or written by other code."""
         code = code_digest(_CHECKS)
         try:
-            stored = msgspec.msgpack.decode(self._file.read_bytes(), type=Stored)
+            stored = msgspec.msgpack.decode(self._file.read_bytes(), type=StoredProblems)
         except (OSError, msgspec.MsgspecError):
-            return Stored(code, {}, {})
-        return stored if stored.code == code else Stored(code, {}, {})
+            return StoredProblems(code, {}, {})
+        return stored if stored.code == code else StoredProblems(code, {}, {})
 
-    async def _known(self) -> Stored:
+    async def _known(self) -> StoredProblems:
         if self._stored is None:
             self._stored = await asyncio.to_thread(self._read)
         return self._stored
 
-    def _store(self, known: Stored) -> None:
+    def _store(self, known: StoredProblems) -> None:
         if known != self._stored:
             self._stored = known
             if self._writing is None or self._writing.done():
@@ -122,12 +122,12 @@ class SavedProblems:
 
     async def _write_newest(self) -> None:
         """Write the results until the newest ones are in the file, one write at a time."""
-        written: Stored | None = None
+        written: StoredProblems | None = None
         while self._stored is not None and self._stored is not written:
             written = self._stored
             await asyncio.to_thread(self._write, written)
 
-    def _write(self, known: Stored) -> None:
+    def _write(self, known: StoredProblems) -> None:
         try:
             write_private(self._file, msgspec.msgpack.encode(known))
         except OSError as error:

@@ -21,7 +21,7 @@ from arcor2_server.documents.closed_history import ClosedHistories
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.history import History
 from arcor2_server.documents.journal import Journal
-from arcor2_server.documents.journal_records import ALL, Base, Recovered, Times
+from arcor2_server.documents.journal_records import ALL, Base, RecoveredDocument, Times
 from arcor2_server.documents.journal_secrets import hide_in_journal
 from arcor2_server.documents.open_document import OpenDocument
 from arcor2_server.documents.renamed_actions import with_present_names
@@ -100,7 +100,7 @@ class Session(OpenDocument):
         """Write the waiting edits. The document stays in the journal for the next start."""
         await self._journal.close()
 
-    async def _with_history(self, recovered: Recovered) -> Recovered:
+    async def _with_history(self, recovered: RecoveredDocument) -> RecoveredDocument:
         """Add the history of a document if the server stopped before `show` had written it to the journal."""
         document = Document(recovered.items)
         if (scene := document.scene) is not None:
@@ -118,7 +118,7 @@ class Session(OpenDocument):
         times = self._scene_times if self.project is None else self._project_times
         return bool(times.modified) and newest < times.modified
 
-    def _restore(self, recovered: Recovered) -> None:
+    def _restore(self, recovered: RecoveredDocument) -> None:
         self.document = Document(recovered.items)
         self._scene_times, self._project_times = recovered.scene, recovered.project
         self._number = self._based_on = recovered.number

@@ -22,7 +22,7 @@ from arcor2_hw.messages import Message
 from arcor2_server.exchange.archive import Archive, AssetFile, with_needed
 from arcor2_server.exchange.export import Exporter
 from arcor2_server.exchange.rollback import Rollback
-from arcor2_server.exchange.validation import Known, find_problems
+from arcor2_server.exchange.validation import AvailableTypes, find_problems
 
 Part = Literal["all", "scene", "project", "types", "assets"]
 """The part of an export that may overwrite items on the server."""
@@ -100,7 +100,7 @@ class Importer:
         # Sources of the export may import sources on the server.
         on_server = [SourceFile.of_upload(one) for name, one in uploaded.items() if name not in archive.types]
         local = [file for file in installed if file.name not in uploaded]
-        known = Known(archive, [*local, *on_server], metas, actions, robots)
+        known = AvailableTypes(archive, [*local, *on_server], metas, actions, robots)
         for finding in find_problems(archive, known, [asset.id for asset in await self._rest.assets()]):
             if finding.level == "error":
                 raise InvalidPackage("{entry}: {text}", entry=finding.entry, text=finding.text)

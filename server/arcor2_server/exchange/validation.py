@@ -35,7 +35,7 @@ class Finding(Data, frozen=True):
     level: Literal["error", "note"] = "error"
 
 
-class Known:
+class AvailableTypes:
     """The object types of the export, the installed ones, and those of the importing server.
 
     Args:
@@ -80,7 +80,7 @@ class Known:
         return robot_of(self._elsewhere[name], self._robots.get(name))
 
 
-def find_problems(archive: Archive, types: Known, assets: Iterable[str] | None = None) -> Iterator[Finding]:
+def find_problems(archive: Archive, types: AvailableTypes, assets: Iterable[str] | None = None) -> Iterator[Finding]:
     """Return the problems of an export. `assets`: ids that exist on the server; None without a server."""
     available = {*archive.assets, *(assets or ())}
     for name, one in archive.types.items():
@@ -106,7 +106,7 @@ def find_problems(archive: Archive, types: Known, assets: Iterable[str] | None =
         yield from _program(archive, archive.scene, project, types, errors)
 
 
-def _document_findings(archive: Archive, types: Known) -> Iterator[tuple[str, str]]:
+def _document_findings(archive: Archive, types: AvailableTypes) -> Iterator[tuple[str, str]]:
     scene, project = archive.scene, archive.project
     if scene is None:
         return
@@ -175,7 +175,9 @@ def _logic(project: Project) -> Iterator[tuple[str, str]]:
                 )
 
 
-def _program(archive: Archive, scene: Scene, project: Project, types: Known, errors: bool) -> Iterator[Finding]:
+def _program(
+    archive: Archive, scene: Scene, project: Project, types: AvailableTypes, errors: bool
+) -> Iterator[Finding]:
     if not project.has_logic:
         try:
             script.check_syntax(archive.script or "")

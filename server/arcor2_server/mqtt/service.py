@@ -68,7 +68,7 @@ class Mqtt:
         match m.decode_from_process(body):
             case m.LinkChanged(link, connected, reason):
                 self._link_changed(link, reason, connected=connected)
-            case m.Dropped(count):
+            case m.ValuesDropped(count):
                 self.dropped += count
                 log.warning("values dropped: too many waited for the MQTT broker or the host", count=count)
 

@@ -44,7 +44,7 @@ def robot_of(meta: ObjectTypeMeta, robot: RobotMeta | None) -> RobotMeta:
     return robot
 
 
-class Known(Struct, frozen=True):
+class AnalysisResults(Struct, frozen=True):
     """All results of the analysis. They are replaced as a whole."""
 
     analyses: dict[str, TypeAnalysis] = {}
@@ -61,9 +61,9 @@ class KnownTypes:
     """
 
     def __init__(self) -> None:
-        self.results = Known()
+        self.results = AnalysisResults()
 
-    def replace(self, results: Known) -> None:
+    def replace(self, results: AnalysisResults) -> None:
         """Use the results of a new analysis."""
         self.results = results
 
@@ -91,7 +91,7 @@ class TypeCatalog:
         self._uploaded: dict[str, ObjectTypeSource] = {}
 
     @property
-    def _known(self) -> Known:
+    def _known(self) -> AnalysisResults:
         return self._known_types.results
 
     # ------------------------------------------------------------------------------------------------ look-ups

@@ -17,7 +17,7 @@ from arcor2_hw.data.robot import RobotMeta
 from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.messages import Message
 from arcor2_server.files import write_private
-from arcor2_server.object_types.catalog import Known, KnownTypes, TypeCatalog
+from arcor2_server.object_types.catalog import AnalysisResults, KnownTypes, TypeCatalog
 from arcor2_server.object_types.changes import Changes, PendingChanges
 from arcor2_server.object_types.robot_packages import robot_packages
 
@@ -186,7 +186,7 @@ class ObjectTypes(TypeCatalog):
         installed = self._installed[name]
         return f"{installed.distribution} {installed.version}".strip()
 
-    def _analyse(self, without_model: set[str], store: bool) -> Known:
+    def _analyse(self, without_model: set[str], store: bool) -> AnalysisResults:
         if store and self._stored_analysis is not None and not self._restored(self._stored_analysis):
             self._store(self._stored_analysis)
         analyses = {name: self._library.analyse(name) for name in self._library.names()}
@@ -214,7 +214,7 @@ class ObjectTypes(TypeCatalog):
         metas, robots = dict(sorted(metas.items())), dict(sorted(robots.items()))
         actions = [analyses[name].actions for name in metas]
         digest = hashlib.sha256(msgspec.msgpack.encode((metas, robots, actions))).hexdigest()
-        return Known(analyses, metas, robots, digest)
+        return AnalysisResults(analyses, metas, robots, digest)
 
     async def _analyse_huge(self) -> bool:
         """Analyse all types in another process if one of them is huge.

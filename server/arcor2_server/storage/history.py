@@ -14,7 +14,7 @@ from typing import Final
 
 import structlog
 
-from arcor2_hw.compute.history_tasks import DATABASE, POINTS, RUNS, ColdFile, Written
+from arcor2_hw.compute.history_tasks import DATABASE, POINTS, RUNS, ColdFile, ColdFileResult
 from arcor2_hw.data.base import now
 from arcor2_hw.data.history import HistoryPoint, PastRun
 from arcor2_hw.data.points import PointUse
@@ -191,7 +191,7 @@ class HistoryFile:
             row = connection.execute("select seq from sqlite_sequence where name = 'cold'").fetchone()
         return f"{kind}-{day}-{(row[0] if row else 0) + 1:06}.parquet"
 
-    def add(self, written: Written, before: int, replaced: Sequence[str] = ()) -> None:
+    def add(self, written: ColdFileResult, before: int, replaced: Sequence[str] = ()) -> None:
         """List a file with the rows of the database before a time, and with those of the files that it replaces."""
         with self._transaction() as connection:
             connection.executemany("delete from cold where name = ?", [(name,) for name in replaced])

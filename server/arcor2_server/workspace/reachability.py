@@ -9,7 +9,7 @@ import structlog
 from msgspec.structs import replace
 
 from arcor2_hw.collision.description import RobotSource, WorldItem
-from arcor2_hw.compute.kinematics_tasks import DescribeRobot, Judged, JudgeJoints, JudgePoses
+from arcor2_hw.compute.kinematics_tasks import DescribeRobot, JudgeJoints, JudgePoses, ReachResult
 from arcor2_hw.compute.task import ComputeStopped
 from arcor2_hw.data.base import UNSET, Unset
 from arcor2_hw.data.editor import Reach, ReachabilityData, ReachOfItem
@@ -307,7 +307,7 @@ class ReachabilityBoard:
             row.world = world
         new = {key: target for key, target in targets.items() if row.targets.get(key) != target}
         if problem is not None:
-            self._note(row, {key: Judged(Reach.UNKNOWN, problem) for key in new}, targets)
+            self._note(row, {key: ReachResult(Reach.UNKNOWN, problem) for key in new}, targets)
             return
         for kind in (list, Pose):
             of_kind = [key for key, target in new.items() if isinstance(target, kind)]
@@ -316,12 +316,12 @@ class ReachabilityBoard:
                 try:
                     judged = await self._judge(row, [new[key] for key in batch])
                 except Arcor2Error as error:
-                    judged = [Judged(Reach.UNKNOWN, error.message)] * len(batch)
+                    judged = [ReachResult(Reach.UNKNOWN, error.message)] * len(batch)
                 self._note(row, dict(zip(batch, judged, strict=True)), targets)
                 if self._wake.is_set():
                     return
 
-    async def _judge(self, row: _Row, targets: list[Any]) -> list[Judged]:
+    async def _judge(self, row: _Row, targets: list[Any]) -> list[ReachResult]:
         """Compute the reachability of poses or joints in the worker."""
         effector = end_effector_link(row.end_effector, row.arm)
         joints = isinstance(targets[0], list)
@@ -333,7 +333,7 @@ class ReachabilityBoard:
             # Another task may have crashed the worker, so try once more.
             return await run(task, world=row.world, place=place, background=True)
 
-    def _note(self, row: _Row, judged: dict[str, Judged], targets: dict[str, Target]) -> None:
+    def _note(self, row: _Row, judged: dict[str, ReachResult], targets: dict[str, Target]) -> None:
         """Store the results and publish those that changed."""
         changed = []
         for key, one in judged.items():

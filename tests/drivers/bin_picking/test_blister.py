@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from arcor2_drivers.bin_picking.blister import Blister
-from arcor2_drivers.bin_picking.errors import Empty, Full
+from arcor2_drivers.bin_picking.errors import Empty, NoFreePlace
 from arcor2_drivers.bin_picking.settings import BlisterSettings
 from arcor2_hw.data.geometry import Orientation, Pose, Position
 from arcor2_hw.exceptions import NotConnected, OutOfRange
@@ -67,9 +67,9 @@ def test_places_are_filled_in_serpentine_order(make: Callable[..., Blister]) -> 
     assert (TRAY.inverted() * pose).orientation.angle_to(
         Orientation(0.0, 0.0, np.sin(np.pi / 4), np.cos(np.pi / 4))
     ) == pytest.approx(0.0, abs=1e-6)
-    with pytest.raises(Full, match=r"^tray is full\. Empty it, then call clear"):
+    with pytest.raises(NoFreePlace, match=r"^tray is full\. Empty it, then call clear"):
         tray.next_free()
-    with pytest.raises(Full, match="part_put needs a call of next_free"):
+    with pytest.raises(NoFreePlace, match="part_put needs a call of next_free"):
         tray.part_put()
     tray.clear()
     assert tray.parts() == 0

@@ -2,7 +2,7 @@
 
 import pytest
 
-from arcor2_fakes.remote_io.block import ACKNOWLEDGE, RELEASE, Block, Locked, WatchdogState
+from arcor2_fakes.remote_io.block import ACKNOWLEDGE, RELEASE, Block, OutputLocked, WatchdogState
 
 
 class Clock:
@@ -50,9 +50,9 @@ def test_watchdog_expires_and_locks_what_it_guards(block: Block, clock: Clock) -
     block.trigger(dog, 7)  # too late
     assert dog.state is WatchdogState.EXPIRED
     for digital in (0b001, 0b100):
-        with pytest.raises(Locked):
+        with pytest.raises(OutputLocked):
             block.check_unlocked(digital=digital)
-    with pytest.raises(Locked):
+    with pytest.raises(OutputLocked):
         block.check_unlocked(analog=0b10)
     block.check_unlocked(digital=0b1000)
     block.command(dog, ACKNOWLEDGE)

@@ -28,7 +28,7 @@ from arcor2_server.audit.chain import AuditFile
 from arcor2_server.cli.exit_status import ExitStatus
 from arcor2_server.cli.serve import welcome
 from arcor2_server.settings import LegacyListener, ServerSettings
-from tests.server.core.serving import COMMAND, ServerProcess, Talker, running, talking
+from tests.server.core.serving import COMMAND, RawConnection, ServerProcess, running, talking
 
 
 def bearer(secret: str) -> dict[str, str]:
@@ -162,7 +162,7 @@ async def test_a_token_admits_with_its_role(server: ServerProcess, way: str) -> 
     url = f"{server.url}/?token={secret}" if way == "query" else server.url
     headers = bearer(secret) if way == "header" else {}
     async with connect(url, additional_headers=headers) as socket:
-        talker = Talker(socket)
+        talker = RawConnection(socket)
         if way == "message":
             assert "Authenticate" in await talker.refused("ListScenes")
             assert await talker.granted("Authenticate", {"token": secret}) == {"name": "Operator 1", "role": "operator"}
@@ -177,7 +177,7 @@ async def test_refused_clients_receive_no_data(server: ServerProcess) -> None:
         connect(server.url) as stranger,
         connect(server.url, additional_headers=bearer(token(server, "technician", Role.TECHNICIAN))) as known,
     ):
-        talker, other = Talker(stranger), Talker(known)
+        talker, other = RawConnection(stranger), RawConnection(known)
         await other.event("ShowMainScreen")
         await other.granted("RegisterUser", {"user_name": "x"})
         await other.granted("NewScene", {"name": "secret scene"})
@@ -192,7 +192,7 @@ async def test_a_wrong_token_is_refused(server: ServerProcess) -> None:
     async with connect(f"{server.url}/?token=wrong") as socket:
         assert await closed_with(socket) == 4401
     async with connect(server.url) as socket:
-        talker = Talker(socket)
+        talker = RawConnection(socket)
         assert "not valid" in await talker.refused("Authenticate", {"token": "wrong"})
         secret = token(server, "late", Role.OPERATOR)
         await talker.granted("Authenticate", {"token": secret})
@@ -217,7 +217,7 @@ async def test_a_revoked_token_ends_its_connections(server: ServerProcess) -> No
     ):
         TokenFile(server.data_dir).revoke("gone")
         assert await closed_with(first) == 4401
-        talker = Talker(second)
+        talker = RawConnection(second)
         await talker.event("ShowMainScreen")
         await talker.granted("ListScenes")
     log = server.log.read_text()
@@ -256,7 +256,7 @@ async def test_without_tokens_local_clients_have_all_rights(tmp_path: Path) -> N
             await talker.granted("NewScene", {"name": "scene"})
         TokenFile(server.data_dir).add("operator", Role.OPERATOR)  # from now on a token is needed
         async with connect(server.url) as socket:
-            assert "token" in await Talker(socket).refused("ListScenes")
+            assert "token" in await RawConnection(socket).refused("ListScenes")
 
 
 # ------------------------------------------------------------------------------------------------ other machines
@@ -289,10 +289,10 @@ async def test_a_trusted_proxy_admits_other_machines(tmp_path: Path) -> None:
     assert Access(msgspec.structs.replace(settings, trusted_proxies=())).open_to_all
     async with running(tmp_path / "data", ARCOR2_HW_TRUSTED_PROXIES="127.0.0.1") as server:
         async with connect(server.url) as socket:
-            assert "token" in await Talker(socket).refused("ListScenes")
+            assert "token" in await RawConnection(socket).refused("ListScenes")
         (line,) = [line for line in server.log.read_text().splitlines() if "first start" in line]
         async with connect(f"{server.url}/?token={line.rpartition('=')[2]}") as socket:
-            talker = Talker(socket)
+            talker = RawConnection(socket)
             assert (await talker.granted("ListPersons"))["needs_administrator"]
             assert "Log on" in await talker.refused("NewScene", {"name": "hall"})
             await talker.granted("StopAll")
@@ -345,7 +345,7 @@ async def test_tls_with_a_generated_certificate(tmp_path: Path) -> None:
         assert stat.S_IMODE((server.data_dir / authority.KEY).stat().st_mode) == 0o600
         assert certificate.fingerprint(file) in server.log.read_text()
         async with connect(server.url, additional_headers=bearer(secret), ssl=trusting(file)) as socket:
-            talker = Talker(socket)
+            talker = RawConnection(socket)
             await talker.event("ShowMainScreen")
             await talker.granted("ListScenes")
         async with rest(server, verify=trusting(file)) as http:

@@ -186,7 +186,7 @@ class Draft:
         return from_logic(SCENE, self.project(), TYPES)
 
 
-class Enough(Exception):
+class EnoughActions(Exception):
     """The run has covered the requested number of actions."""
 
 
@@ -327,7 +327,7 @@ class _Thing:
     def __getattr__(self, method: str) -> Callable[..., Any]:
         def call(*arguments: Any, an: str) -> Any:
             if len(self.done) == self._count:
-                raise Enough
+                raise EnoughActions
             drawn = self._oracle(an, len(self.done))
             error = failure(self._exits, an, len(self.done), drawn)
             self.done.append((an, arguments))
@@ -362,7 +362,7 @@ def run(source: str, oracle: Oracle, count: int, exits: Exits | None = None) -> 
                 parallel=lambda *calls, an: tuple(call() for call in calls),
             )
         )
-    except Enough:
+    except EnoughActions:
         return thing.done
     raise AssertionError("a generated program must not end by itself")
 

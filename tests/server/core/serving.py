@@ -135,7 +135,7 @@ async def running(data_dir: Path, *arguments: str, **environment: str) -> AsyncI
         await server.stop()
 
 
-class Talker:
+class RawConnection:
     """One bare connection. It stores received messages in order, answers separate from events."""
 
     def __init__(self, socket: ClientConnection) -> None:
@@ -187,10 +187,10 @@ class Talker:
 
 
 @contextlib.asynccontextmanager
-async def talking(url: str, user: str | None = None, **options: Any) -> AsyncIterator[Talker]:
+async def talking(url: str, user: str | None = None, **options: Any) -> AsyncIterator[RawConnection]:
     """Connect, read the first messages, register a user."""
     async with connect(url, compression=None, max_size=None, **options) as socket:
-        talker = Talker(socket)
+        talker = RawConnection(socket)
         await talker.event("ShowMainScreen")
         if user is not None:
             await talker.granted("RegisterUser", {"user_name": user})

@@ -22,7 +22,7 @@ from arcor2_server.settings import ServerSettings
 from arcor2_server.web import http_server
 from arcor2_server.web.http_server import Server, configuration
 from arcor2_server.web.websocket_transport import EXTENSION, MAX_UNADMITTED_MESSAGE
-from tests.server.core.serving import Talker, running, talking, until
+from tests.server.core.serving import RawConnection, running, talking, until
 
 TIMEOUT = 0.3
 BIG = b"x" * 8_000_000
@@ -344,7 +344,7 @@ async def test_the_server_limits_only_clients_without_admission(tmp_path: Path) 
                 await ann.granted("SystemInfo")
                 assert process.num_fds() - before < 64
                 await until(lambda: process.num_fds() <= before + 10)
-                assert isinstance(ann, Talker)
+                assert isinstance(ann, RawConnection)
                 await ann.granted("SystemInfo")
         finally:
             here.close()

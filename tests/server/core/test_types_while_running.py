@@ -4,7 +4,7 @@ from typing import Any
 
 import httpx
 
-from tests.server.core.serving import ServerProcess, Talker, talking
+from tests.server.core.serving import RawConnection, ServerProcess, talking
 
 SHELF = '''
 from typing import Optional
@@ -37,12 +37,12 @@ LABELS = "class Labels:\n    label = 'low'\n"
 MESH = {"id": "Shelf", "assetId": "shelf.stl"}
 
 
-async def following(client: Talker) -> dict[str, Any]:
+async def following(client: RawConnection) -> dict[str, Any]:
     """Return the next event."""
     return client.events.pop(0) if client.events else await client.receive(30)
 
 
-async def type_change(client: Talker, *kinds: str) -> dict[str, Any]:
+async def type_change(client: RawConnection, *kinds: str) -> dict[str, Any]:
     """Return the next change of an object type of one of these kinds. Drop other events."""
     while True:
         event = await following(client)
@@ -53,7 +53,7 @@ async def type_change(client: Talker, *kinds: str) -> dict[str, Any]:
             return found
 
 
-async def scene_is(client: Talker, state: str) -> None:
+async def scene_is(client: RawConnection, state: str) -> None:
     while True:
         event = await following(client)
         if event.get("event") == "SceneState" and event["data"]["state"] in (state, "stopped"):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import psutil
 
-from tests.server.core.serving import Talker, running, talking, until
+from tests.server.core.serving import RawConnection, running, talking, until
 
 READERS, DEAF = 40, 10
 EVENTS = 700
@@ -34,7 +34,7 @@ async def _deaf(url: str) -> socket.socket:
     return deaf
 
 
-async def _descriptions(talker: Talker) -> list[str]:
+async def _descriptions(talker: RawConnection) -> list[str]:
     """Return the beginnings of the descriptions that a client receives, once it has all of them."""
     found: list[str] = []
     while len(found) < EVENTS:

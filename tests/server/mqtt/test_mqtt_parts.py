@@ -334,7 +334,7 @@ async def test_results_wait_for_the_broker(tmp_path: Path, monkeypatch: pytest.M
         broker.start()
         host = Host(broker.port, f"{PREFIX}/#")
         await until(lambda: len(cell.reports) == 3)
-        assert cell.reports[1:] == [m.LinkChanged("JSON", True), m.Dropped(2)]
+        assert cell.reports[1:] == [m.LinkChanged("JSON", True), m.ValuesDropped(2)]
         host.end()
     broker.end()
 

@@ -17,7 +17,7 @@ from arcor2_server.access.tokens import TokenFile
 from tests.fakes.conftest import FakeProcess
 from tests.runtime.conftest import Package, scene_object
 from tests.server.cell.test_execution import LAMP, OBJ, PROJECT
-from tests.server.core.serving import ServerProcess, Talker, talking
+from tests.server.core.serving import RawConnection, ServerProcess, talking
 from tests.server.mqtt.brokers import Mosquitto
 from tests.server.mqtt.host import Host, Message
 
@@ -41,7 +41,7 @@ class Cell:
 
     data: Path
     server: ServerProcess
-    hub: Talker
+    hub: RawConnection
     robot: FakeProcess
     broker: Mosquitto
     host: Host

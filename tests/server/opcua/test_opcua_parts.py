@@ -386,7 +386,7 @@ async def test_only_devices_are_read_that_clients_monitor_or_have_just_read(monk
         key: SimpleNamespace(nodes=list(nodes), monitored=False, connected=key != "off") for key, nodes in names.items()
     }
     watched: list[list[str]] = []
-    wanted = interest.Interest(devices, watched.append)
+    wanted = interest.MonitoredDevices(devices, watched.append)
     wanted.update()
     assert watched == [[]]
     await wanted.need([ua.NodeId(2258), ua.NodeId("cell/Production", 9), ua.NodeId("devices/off/Points/DI1", 9)])

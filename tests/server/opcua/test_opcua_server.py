@@ -23,7 +23,7 @@ from arcor2_server.access.tokens import TokenFile
 from tests.fakes.conftest import FakeProcess
 from tests.runtime.conftest import Package, scene_object
 from tests.server.cell.test_execution import LAMP, OBJ, PROJECT
-from tests.server.core.serving import ServerProcess, Talker, running, talking
+from tests.server.core.serving import RawConnection, ServerProcess, running, talking
 from tests.server.opcua import plant_client as plant
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
@@ -46,7 +46,7 @@ class Plant:
 
     data: Path
     url: str
-    hub: Talker
+    hub: RawConnection
     robot: FakeProcess
     files: tuple[Path, Path]
     server: ServerProcess

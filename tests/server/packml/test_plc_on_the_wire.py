@@ -15,7 +15,7 @@ from arcor2_server.packml.plc import Holding, Input, Status
 from arcor2_server.packml.record import JobEnd, RequestResult as R
 from tests.runtime.conftest import Package, scene_object
 from tests.server.cell.test_execution import LAMP, OBJ, PROJECT
-from tests.server.core.serving import Talker, running, talking
+from tests.server.core.serving import RawConnection, running, talking
 
 WITHIN = 40.0
 LIFE_TIMEOUT = "3"
@@ -109,7 +109,7 @@ class Master:
 
 
 @contextlib.asynccontextmanager
-async def plc_of(client: Talker, request: int = 0) -> AsyncIterator[Master]:
+async def plc_of(client: RawConnection, request: int = 0) -> AsyncIterator[Master]:
     cell = await client.granted("GetCell")
     host, _, port = cell["plc"]["listening"].rpartition(":")
     master = Master(host, int(port), request)
@@ -123,7 +123,7 @@ async def plc_of(client: Talker, request: int = 0) -> AsyncIterator[Master]:
 
 
 @contextlib.asynccontextmanager
-async def cell(data_dir: Path) -> AsyncIterator[Talker]:
+async def cell(data_dir: Path) -> AsyncIterator[RawConnection]:
     if not (data_dir / "packages").exists():
         write_packages(data_dir)
     arguments = ("--plc-modbus", "127.0.0.1:0")
@@ -134,7 +134,7 @@ async def cell(data_dir: Path) -> AsyncIterator[Talker]:
         yield client
 
 
-async def alarms(client: Talker) -> dict[str, Any]:
+async def alarms(client: RawConnection) -> dict[str, Any]:
     found = await client.granted("ListAlarms", {"show": "all"})
     return {each["code"]: each for each in found["alarms"]}
 

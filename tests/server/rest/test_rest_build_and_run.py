@@ -15,7 +15,7 @@ import pytest
 
 from arcor2_hw.client import Client
 from arcor2_hw.data.base import Unset
-from tests.server.core.serving import COMMAND, ServerProcess, Talker, running, talking
+from tests.server.core.serving import COMMAND, RawConnection, ServerProcess, running, talking
 from tests.server.rest.asking import granted, refused
 
 COUNT = """
@@ -99,7 +99,7 @@ async def until_obstacles(http: httpx.AsyncClient, wanted: list[str]) -> None:
             await asyncio.sleep(0.02)
 
 
-async def next_of(talker: Talker, name: str, **data: Any) -> dict[str, Any]:
+async def next_of(talker: RawConnection, name: str, **data: Any) -> dict[str, Any]:
     """Return the next event with this name and content; skip others."""
     async with asyncio.timeout(20):
         while True:

@@ -15,7 +15,7 @@ from arcor2_server.access.tokens import TokenFile
 from arcor2_server.websocket.classic_ports import SOCKET, ports_from_environment
 from arcor2_server.websocket.execution_endpoint import EVENTS, REQUESTS
 from tests.protocol import PROTOCOL
-from tests.server.core.serving import ServerProcess, Talker, running, talking
+from tests.server.core.serving import RawConnection, ServerProcess, running, talking
 from tests.server.rest.asking import granted
 from tests.server.rest.test_rest_build_and_run import as_file, base, prepare, published
 
@@ -101,7 +101,7 @@ async def test_each_service_listens_at_its_port(tmp_path: Path) -> None:
         async with talking(f"ws://127.0.0.1:{ports['Storage']}") as talker:
             await talker.granted("SystemInfo")
         async with connect(f"ws://127.0.0.1:{ports[SOCKET]}") as socket:
-            executing = Talker(socket)
+            executing = RawConnection(socket)
             await executing.event("PackageState")
             assert await executing.granted("Version") == {"version": "1.2.0"}
 
@@ -117,14 +117,14 @@ async def test_a_used_port_is_named(tmp_path: Path) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ the websocket
-async def entered(socket: ClientConnection) -> Talker:
-    talker = Talker(socket)
+async def entered(socket: ClientConnection) -> RawConnection:
+    talker = RawConnection(socket)
     state = await talker.event("PackageState")
     assert state["data"] == {"state": "undefined"}
     return talker
 
 
-async def collected(talker: Talker, until: dict[str, Any]) -> list[str]:
+async def collected(talker: RawConnection, until: dict[str, Any]) -> list[str]:
     """Return the names of the events up to one with this data."""
     names = []
     async with asyncio.timeout(30):
@@ -161,7 +161,7 @@ async def test_the_execution_port_serves_only_packages(tmp_path: Path) -> None:
         assert order[:3] == ["PackageState", "PackageState", "PackageInfo"]
         assert order[3] == "ActionStateBefore"
         async with connect(f"{server.url}/execution") as second:
-            late = Talker(second)
+            late = RawConnection(second)
             assert (await late.event("PackageState"))["data"] == {"state": "running", "package_id": "pkg_a"}
             assert (await late.event("PackageInfo"))["data"]["package_id"] == "pkg_a"
         await execution.granted("PausePackage")
@@ -188,7 +188,7 @@ async def test_the_execution_websocket_requires_a_token(tmp_path: Path) -> None:
     _, secret = TokenFile(tmp_path / "data").add("line", Role.OPERATOR)
     async with running(tmp_path / "data") as server:
         async with connect(f"{server.url}/execution") as socket:
-            talker = Talker(socket)
+            talker = RawConnection(socket)
             assert "Authenticate" in await talker.refused("Version")
             await talker.granted("Authenticate", {"token": secret})
             await talker.event("PackageState")

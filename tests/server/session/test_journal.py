@@ -14,7 +14,7 @@ from arcor2_hw.exceptions import StorageError
 from arcor2_server.documents.changes import Edit
 from arcor2_server.documents.journal import Journal
 from arcor2_server.documents.journal_file import JournalFile
-from arcor2_server.documents.journal_records import Base, Recovered
+from arcor2_server.documents.journal_records import Base, RecoveredDocument
 from tests.server.session.test_journal_file import edit, numbers, reopened, scene
 
 Jobs = Sequence[Edit | Base | None]
@@ -174,7 +174,7 @@ async def test_recovered_documents_are_converted_and_losses_reported(path: Path,
         connection.execute("delete from edit where number = 3")
     connection.close()
 
-    def convert(found: Recovered) -> Recovered:
+    def convert(found: RecoveredDocument) -> RecoveredDocument:
         return replace(found, edits=found.edits[:1])
 
     journal = Journal(path, convert=convert)

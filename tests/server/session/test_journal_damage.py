@@ -11,7 +11,7 @@ from arcor2_hw.data.scene import Scene, SceneObject
 from arcor2_server.documents.changes import Change, Edit, Kind
 from arcor2_server.documents.document import Document
 from arcor2_server.documents.journal_file import JournalFile
-from arcor2_server.documents.journal_records import ALL, Base, Loss, Recovered, Times
+from arcor2_server.documents.journal_records import ALL, Base, JournalLoss, RecoveredDocument, Times
 
 EDITS = 40
 REBASED = 12
@@ -28,7 +28,7 @@ def edit(number: int) -> Edit:
     return Edit(number, time, "alice", [Change(Kind.OBJECT, added.id, "", number + 1, None, added)])
 
 
-def objects(found: Recovered | None) -> list[str]:
+def objects(found: RecoveredDocument | None) -> list[str]:
     """Return the names of the objects of the recovered document."""
     if found is None:
         return []
@@ -69,7 +69,7 @@ def killed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return copy
 
 
-def reopened(directory: Path) -> tuple[Recovered | None, Loss | None]:
+def reopened(directory: Path) -> tuple[RecoveredDocument | None, JournalLoss | None]:
     file = JournalFile(directory / "journal.sqlite")
     try:
         return file.open()
@@ -77,7 +77,7 @@ def reopened(directory: Path) -> tuple[Recovered | None, Loss | None]:
         file.close()
 
 
-def check(directory: Path, damage: str) -> Loss | None:
+def check(directory: Path, damage: str) -> JournalLoss | None:
     """Open the journal; assert that it is complete or reports the loss, and that it can be used again."""
     found, loss = reopened(directory)
     whole = objects(found) == ALL_OBJECTS

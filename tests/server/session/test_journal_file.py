@@ -19,9 +19,9 @@ from arcor2_server.documents.journal_records import (
     ALL,
     Base,
     JournalContent,
-    Loss,
+    JournalLoss,
     Position,
-    Recovered,
+    RecoveredDocument,
     Times,
 )
 
@@ -38,12 +38,12 @@ def edit(number: int, user: str = "alice") -> Edit:
     return Edit(number, time, user, [Change(Kind.OBJECT, added.id, "", number, None, added)], "AddObjectToScene")
 
 
-def reopened(path: Path) -> tuple[Recovered | None, Loss | None]:
+def reopened(path: Path) -> tuple[RecoveredDocument | None, JournalLoss | None]:
     with closing(JournalFile(path)) as file:
         return file.open()
 
 
-def numbers(found: Recovered | None) -> list[int]:
+def numbers(found: RecoveredDocument | None) -> list[int]:
     assert found is not None
     return [each.number for each in found.edits]
 
@@ -175,7 +175,7 @@ def test_a_position_that_cannot_be_written_is_not_an_error(path: Path, monkeypat
 def test_a_converted_document_leaves_nothing_of_the_old_one(path: Path, tmp_path: Path) -> None:
     assert b"object_5" in path.read_bytes()
 
-    def convert(found: Recovered) -> Recovered:
+    def convert(found: RecoveredDocument) -> RecoveredDocument:
         return replace(found, edits=found.edits[:2])
 
     with closing(JournalFile(path, convert)) as file:

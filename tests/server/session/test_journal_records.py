@@ -12,9 +12,9 @@ from arcor2_server.documents.document import Document
 from arcor2_server.documents.journal_records import (
     Base,
     JournalContent,
-    Loss,
+    JournalLoss,
     Position,
-    Recovered,
+    RecoveredDocument,
     Times,
     base_checksum,
     document_of,
@@ -79,7 +79,7 @@ def test_checksums_cover_every_column() -> None:
 
 
 def test_a_loss_is_a_text_for_users() -> None:
-    loss = Loss(Message.of("reason"), Message.of("Everything is lost."), "journal.damaged", incomplete=False)
+    loss = JournalLoss(Message.of("reason"), Message.of("Everything is lost."), "journal.damaged", incomplete=False)
     assert str(loss.message) == (
         "The journal of unsaved changes is damaged: reason. Everything is lost."
         " The damaged file is stored as journal.damaged."
@@ -88,7 +88,7 @@ def test_a_loss_is_a_text_for_users() -> None:
 
 
 def test_closed_documents_stay_closed() -> None:
-    found = Recovered(scene().items, 0, SAVED, Times(), [])
+    found = RecoveredDocument(scene().items, 0, SAVED, Times(), [])
     closed = JournalContent(3, found)
     note_missing(closed, Position(4))
     assert (closed.recovered, closed.lost, closed.damage, closed.serial) == (

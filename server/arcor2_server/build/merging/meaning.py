@@ -18,7 +18,7 @@ _OPPOSITE: Final = {ast.Eq: ast.NotEq, ast.NotEq: ast.Eq}
 Meaning = tuple[Any, ...]
 
 
-class Declared(NamedTuple):
+class DeclaredParameter(NamedTuple):
     """A parameter of the method or function that an action calls, with the expression for its default value."""
 
     name: str
@@ -26,7 +26,7 @@ class Declared(NamedTuple):
     default: ast.expr | None = None
 
 
-DeclaredOf = Callable[[str], Sequence[Declared]]
+DeclaredOf = Callable[[str], Sequence[DeclaredParameter]]
 """Returns the parameters of the method or function that the action with a name calls."""
 
 
@@ -130,7 +130,7 @@ def _parts(node: ast.stmt) -> tuple[ast.expr | None, ast.Call | None]:
     return None, None
 
 
-def _same_call(generated: ast.stmt, written: ast.stmt, declared: Sequence[Declared]) -> bool:
+def _same_call(generated: ast.stmt, written: ast.stmt, declared: Sequence[DeclaredParameter]) -> bool:
     """Return whether two calls have the same target, function and arguments, by position or by name."""
     (target, call), (other_target, other) = _parts(generated), _parts(written)
     if call is None or other is None or _text(call.func) != _text(other.func) or _names(target) != _names(other_target):
@@ -148,7 +148,7 @@ def _names(target: ast.expr | None) -> Any:
     return None if target is None else _text(target)
 
 
-def _arguments(call: ast.Call, declared: Sequence[Declared]) -> dict[str, Any]:
+def _arguments(call: ast.Call, declared: Sequence[DeclaredParameter]) -> dict[str, Any]:
     """Return the arguments of a call by parameter; a number for a double is a float."""
     kinds = {one.name: one.type for one in declared}
     named = [(one.name, node) for one, node in zip(declared, call.args, strict=False)]

@@ -13,9 +13,9 @@ from arcor2_hw.data.base import Unset
 from arcor2_hw.data.project import Action, ActionParameter, Project
 from arcor2_hw.data.scene import Scene
 from arcor2_hw.exceptions import Arcor2Error
-from arcor2_server.build.frame import DOCSTRING, Frame, OwnNames, References, TypeFacts
+from arcor2_server.build.frame import DOCSTRING, ChosenNames, Frame, References, TypeFacts
 from arcor2_server.build.merging.matching import Matching
-from arcor2_server.build.merging.meaning import Declared
+from arcor2_server.build.merging.meaning import DeclaredParameter
 from arcor2_server.build.merging.patching import CannotPatch, Edit, Patches, apply
 from arcor2_server.build.merging.text import Lines, Statement, Text
 from arcor2_server.build.merging.writing import MergingWriter
@@ -32,7 +32,7 @@ TreeOf = Callable[[Frame], ast.Module]
 """Generates the syntax tree of a script with the names of a frame."""
 
 
-class _Unusual(Exception):
+class _UnknownStructure(Exception):
     """The script does not have the parts of a generated one in their order."""
 
 
@@ -51,7 +51,7 @@ class _Parts:
                 self.main = rest[0]
                 self.entry = rest[1] if len(rest) > 1 else None
             case _:
-                raise _Unusual
+                raise _UnknownStructure
 
 
 def merged(scene: Scene, project: Project, types: Mapping[str, TypeFacts], tree_of: TreeOf) -> str | None:
@@ -75,7 +75,7 @@ def merged(scene: Scene, project: Project, types: Mapping[str, TypeFacts], tree_
         text = Text(project.script)
         parts = _Parts(text.module.statements)
         names = _own_names(parts)
-    except (SyntaxError, ValueError, RecursionError, MemoryError, _Unusual) as error:
+    except (SyntaxError, ValueError, RecursionError, MemoryError, _UnknownStructure) as error:
         log.warning("the comments of a script are not used", project=project.name, reason=str(error) or "its form")
         return None
     frame = Frame(scene, project, types, names)
@@ -143,7 +143,7 @@ def _main(tree: ast.Module) -> ast.FunctionDef:
 
 
 # ---------------------------------------------------------------------------------------------- names
-def _own_names(parts: _Parts) -> OwnNames:
+def _own_names(parts: _Parts) -> ChosenNames:
     """Return the names of objects and imports in a script."""
     objects: dict[str, str] = {}
     for statement in parts.main.blocks[0].statements:
@@ -158,7 +158,7 @@ def _own_names(parts: _Parts) -> OwnNames:
         if isinstance(node := statement.node, ast.ImportFrom)
         for alias in node.names
     }
-    return OwnNames(objects, imports)
+    return ChosenNames(objects, imports)
 
 
 class _DeclaredParameters:
@@ -167,9 +167,9 @@ class _DeclaredParameters:
     def __init__(self, frame: Frame) -> None:
         self._frame = frame
         self._actions = {action.name: action for action in frame.project.all_actions()}
-        self._found: dict[str, list[Declared]] = {}
+        self._found: dict[str, list[DeclaredParameter]] = {}
 
-    def __call__(self, name: str) -> list[Declared]:
+    def __call__(self, name: str) -> list[DeclaredParameter]:
         action = self._actions[name]
         if action.is_parallel:
             return []
@@ -182,7 +182,7 @@ class _DeclaredParameters:
                 if not isinstance(one.default_value, Unset) and (kind := PARAMETER_TYPES.get(one.type)):
                     with contextlib.suppress(Arcor2Error):
                         default = kind.expression(ActionParameter(one.name, one.type, one.default_value), names)
-                found.append(Declared(one.name, one.type, default))
+                found.append(DeclaredParameter(one.name, one.type, default))
             self._found[action.type] = found
         return self._found[action.type]
 

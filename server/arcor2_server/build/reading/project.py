@@ -48,10 +48,10 @@ def from_script(source: str, scene: Scene, project: Project, types: Mapping[str,
         NotUnderstood: a line cannot be converted. The error has its number.
         NotFound: `types` does not contain an object type.
     """
-    return _Reading(source, scene, project, types).project()
+    return _ProjectReader(source, scene, project, types).project()
 
 
-class _Reading:
+class _ProjectReader:
     """One conversion of a script to a project."""
 
     def __init__(self, source: str, scene: Scene, project: Project, types: Mapping[str, TypeFacts]) -> None:
