@@ -80,14 +80,14 @@ def _problem(template: str, place: Path | str, **values: object) -> Problem:
     return Problem(Message.of(template, **values), str(place), 1)
 
 
-def _types_of(distribution: Distribution, folder: Path, own: str) -> Iterator[InstalledType]:
+def _types_of(distribution: Distribution, folder: Path, exclude: str) -> Iterator[InstalledType]:
     try:
         points = [point for point in distribution.entry_points if point.group == GROUP]
-        origin = (distribution.name or own, distribution.version or "") if points else ("", "")
+        origin = (distribution.name or exclude, distribution.version or "") if points else ("", "")
     except (OSError, ValueError, LookupError, AttributeError, TypeError) as error:
         text = "the metadata of the distribution {own} cannot be read: {error!r}"
-        problem = _problem(text, folder, own=own, error=error)
-        yield InstalledType(str(humps.pascalize(own)), "", own, "", "", None, problem)
+        problem = _problem(text, folder, own=exclude, error=error)
+        yield InstalledType(str(humps.pascalize(exclude)), "", exclude, "", "", None, problem)
         return
     for point in points:
         if EntryPoint.pattern.fullmatch(point.value) is None:

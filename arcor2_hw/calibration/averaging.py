@@ -17,12 +17,12 @@ _FLAT: float = 2.0
 """Angle between the camera's axis and a marker's z up to which the marker has no weight, rad (protocol, section 15)."""
 
 
-def weight_of(camera_from_origin: Array, each: DetectedTarget, options: PoseOptions) -> float:
+def weight_of(camera_from_origin: Array, target: DetectedTarget, options: PoseOptions) -> float:
     """Return the weight of a marker, 0 to 1, by its distance and its angle to the camera (protocol, section 15)."""
-    middle = camera_from_origin[:3, :3] @ each.middle + camera_from_origin[:3, 3]
+    middle = camera_from_origin[:3, :3] @ target.middle + camera_from_origin[:3, 3]
     distance = float(np.linalg.norm(middle))
     near = 1.0 - (distance - options.min_distance) / (options.max_distance - options.min_distance)
-    theta = math.acos(float(np.clip((camera_from_origin[:3, :3] @ each.normal)[2], -1.0, 1.0)))
+    theta = math.acos(float(np.clip((camera_from_origin[:3, :3] @ target.normal)[2], -1.0, 1.0)))
     facing = (theta - _FLAT) / (math.pi - _FLAT)
     return (min(max(near, 0.0), 1.0) + min(max(facing, 0.0), 1.0)) / 2
 

@@ -79,30 +79,30 @@ _OLDER: Final = {"min_dist": "min_distance", "max_dist": "max_distance"}
 """Names of the original file, from general knowledge of it."""
 
 
-def configuration_of(content: Any, where: str) -> CalibrationConfiguration:
+def configuration_of(content: Any, source: str) -> CalibrationConfiguration:
     """Read plain data.
 
     Raises:
-        InvalidData: The data is invalid; the message names `where` and the marker.
+        InvalidData: The data is invalid; the message names `source` and the marker.
     """
     if not isinstance(content, dict):
-        raise InvalidData("{place}: expected a mapping with marker_size and markers.", place=where)
+        raise InvalidData("{place}: expected a mapping with marker_size and markers.", place=source)
     content = {_OLDER.get(key, key): value for key, value in content.items()}
     if isinstance(markers := content.get("markers"), dict):
-        content["markers"] = [_listed(key, value, where) for key, value in markers.items()]
+        content["markers"] = [_listed(key, value, source) for key, value in markers.items()]
     try:
         return msgspec.convert(content, CalibrationConfiguration)
     except msgspec.ValidationError as error:
-        raise InvalidData("{place}: {reason}.", place=where, reason=error) from None
+        raise InvalidData("{place}: {reason}.", place=source, reason=error) from None
 
 
-def _listed(key: Any, value: Any, where: str) -> dict[str, Any]:
+def _listed(key: Any, value: Any, source: str) -> dict[str, Any]:
     try:
         number = int(key)
     except (TypeError, ValueError):
-        raise InvalidData("{place}: {key!r} is not the id of a marker.", place=where, key=key) from None
+        raise InvalidData("{place}: {key!r} is not the id of a marker.", place=source, key=key) from None
     if not isinstance(value, dict):
-        raise InvalidData("{place}: marker {number} needs a pose.", place=where, number=number)
+        raise InvalidData("{place}: marker {number} needs a pose.", place=source, number=number)
     return {"marker_id": number} | (value if "pose" in value else {"pose": value})
 
 
@@ -128,28 +128,28 @@ def read_configuration(path: Path) -> CalibrationConfiguration:
     return configuration_of(yaml_of(text, str(path)), str(path))
 
 
-def yaml_of(text: bytes, where: str) -> Any:
+def yaml_of(text: bytes, source: str) -> Any:
     """Parse YAML.
 
     Raises:
-        InvalidData: It is invalid, or a key is repeated, which YAML itself ignores; the message names `where`.
+        InvalidData: It is invalid, or a key is repeated, which YAML itself ignores; the message names `source`.
     """
     import yaml  # imported here because it takes 10 ms of the server's start
 
     try:
         root = yaml.compose(text, yaml.SafeLoader)
-        _refuse_twice(root, where)
+        _refuse_twice(root, source)
         return yaml.safe_load(text)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise InvalidData("{place}: {reason}.", place=where, reason=" ".join(str(error).split())) from None
+        raise InvalidData("{place}: {reason}.", place=source, reason=" ".join(str(error).split())) from None
 
 
-def _refuse_twice(node: Any, where: str) -> None:
+def _refuse_twice(node: Any, source: str) -> None:
     import yaml
 
     if isinstance(node, yaml.SequenceNode):
         for item in node.value:
-            _refuse_twice(item, where)
+            _refuse_twice(item, source)
     elif isinstance(node, yaml.MappingNode):
         seen: set[str] = set()
         for key, value in node.value:
@@ -158,9 +158,9 @@ def _refuse_twice(node: Any, where: str) -> None:
                 what = f"marker {name}" if name.isdecimal() else name
                 raise InvalidData(
                     "{place}: {what} is listed twice, the second time in line {line}.",
-                    place=where,
+                    place=source,
                     what=what,
                     line=key.start_mark.line + 1,
                 )
             seen.add(name)
-            _refuse_twice(value, where)
+            _refuse_twice(value, source)

@@ -174,22 +174,22 @@ def _detect_board(
         )
 
 
-def _root_of(each: Measured) -> Array:
+def _root_of(marker: Measured) -> Array:
     """Return the square root of the information of a measured marker."""
-    return np.asarray(np.linalg.cholesky(each.information).T, dtype=np.float64)
+    return np.asarray(np.linalg.cholesky(marker.information).T, dtype=np.float64)
 
 
-def _seen_marker(each: Measured, origin_from_marker: Array, size: float, picture: int) -> DetectedTarget:
+def _seen_marker(marker: Measured, origin_from_marker: Array, size: float, picture: int) -> DetectedTarget:
     """Return a measured marker as part of a problem."""
     half = size / 2
     corners = np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
     return DetectedTarget(
-        f"marker {each.number}",
-        ("marker", each.number),
+        f"marker {marker.number}",
+        ("marker", marker.number),
         picture,
         corners @ origin_from_marker[:3, :3].T + origin_from_marker[:3, 3],
-        each.corners,
-        _root_of(each),
+        marker.corners,
+        _root_of(marker),
         origin_from_marker[:3, 2],
         origin_from_marker[:3, 3],
         origin_from_marker,

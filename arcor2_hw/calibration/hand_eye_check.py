@@ -189,23 +189,23 @@ def _changed(lens: Lens, stations: Sequence[Station], logs: Array) -> tuple[Lens
     return Lens(other, lens.width, lens.height), scaled
 
 
-def _slopes(lens: Lens, each: Station, mount: Array, target: Array) -> Array:
+def _slopes(lens: Lens, station: Station, mount: Array, target: Array) -> Array:
     """Return the derivatives of a station's pixels by mount, target, log size and log focal length, (2n, 14)."""
-    chain = inverted(each.hand @ mount) @ target
-    points = each.points @ chain[:3, :3].T
+    chain = inverted(station.hand @ mount) @ target
+    points = station.points @ chain[:3, :3].T
     _, by_point, by_lens = lens.projected_with_slopes(points + chain[:3, 3], np.zeros(len(lens.numbers)))
     by_size = np.einsum("nij,nj->ni", by_point, points).ravel()
     by_focal = (by_lens[:, :, :2] @ lens.numbers[:2]).ravel()
-    return np.column_stack((slopes_of(lens, each, mount, target), by_size, by_focal))
+    return np.column_stack((slopes_of(lens, station, mount, target), by_size, by_focal))
 
 
-def _covariance(each: Station, slopes: Array, robot: tuple[float, float], level: float) -> Array:
+def _covariance(station: Station, slopes: Array, robot: tuple[float, float], level: float) -> Array:
     """Return the covariance of a station's pixels by the noise of corners and the inaccuracy of the robot, (2n, 2n)."""
     variances = level**2 * np.array([robot[1] ** 2] * 3 + [robot[0] ** 2] * 3)
     by_hand = slopes[:, :6]
     covariance = (by_hand * variances) @ by_hand.T
     first = 0
-    for seen in each.seen:
+    for seen in station.seen:
         last = first + len(seen.root)
         covariance[first:last, first:last] += np.linalg.inv(seen.root.T @ seen.root)
         first = last

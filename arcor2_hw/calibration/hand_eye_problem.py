@@ -158,10 +158,10 @@ def _cost(errors: Sequence[Array], whiteners: Sequence[Array], usual: float) -> 
     return total
 
 
-def slopes_of(lens: Lens, each: Station, mount: Array, target: Array) -> Array:
+def slopes_of(lens: Lens, station: Station, mount: Array, target: Array) -> Array:
     """Return the derivatives of a station's pixels by small motions of mount and target (rotation, displacement)."""
-    hand_from_parent, camera_from_hand = inverted(each.hand), inverted(mount)
-    placed = each.points @ target[:3, :3].T + target[:3, 3]
+    hand_from_parent, camera_from_hand = inverted(station.hand), inverted(mount)
+    placed = station.points @ target[:3, :3].T + target[:3, 3]
     at_hand = placed @ hand_from_parent[:3, :3].T + hand_from_parent[:3, 3]
     camera = at_hand @ camera_from_hand[:3, :3].T + camera_from_hand[:3, 3]
     _, by_point, _ = lens.projected_with_slopes(camera, np.zeros(len(lens.numbers)))

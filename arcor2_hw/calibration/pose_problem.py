@@ -273,22 +273,22 @@ class PoseProblem:
         return normal, right
 
 
-def planar_poses(lens: Lens, each: DetectedTarget) -> list[Array]:
+def planar_poses(lens: Lens, target: DetectedTarget) -> list[Array]:
     """Return the poses of the camera (camera_from_origin) that one marker or board allows: one or two."""
-    rays = lens.rays(each.pixels)
-    if each.square is not None:
-        half = each.size / 2
+    rays = lens.rays(target.pixels)
+    if target.square is not None:
+        half = target.size / 2
         corners = np.array([[-half, half, 0.0], [half, half, 0.0], [half, -half, 0.0], [-half, -half, 0.0]])
-        marker_from_origin = inverted(each.square)
+        marker_from_origin = inverted(target.square)
         return [pose @ marker_from_origin for pose in _solved(corners, rays, cv2.SOLVEPNP_IPPE_SQUARE)]
-    z = each.normal
+    z = target.normal
     x = np.cross((0.0, 1.0, 0.0) if abs(z[1]) < 0.9 else (1.0, 0.0, 0.0), z)
     x /= np.linalg.norm(x)
     plane = np.vstack((x, np.cross(z, x), z))
     to_plane = np.eye(4)
     to_plane[:3, :3] = plane
-    to_plane[:3, 3] = -plane @ each.middle
-    flat = each.points @ plane.T + to_plane[:3, 3]
+    to_plane[:3, 3] = -plane @ target.middle
+    flat = target.points @ plane.T + to_plane[:3, 3]
     flat[:, 2] = 0.0
     return [pose @ to_plane for pose in _solved(flat, rays, cv2.SOLVEPNP_IPPE)]
 

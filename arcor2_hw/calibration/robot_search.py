@@ -218,9 +218,9 @@ def _uneven(distances: Floats, tiles: npt.NDArray[np.intp]) -> float:
     return float(np.sqrt(np.average(means[many] ** 2, weights=counts[many]))) if many.any() else 0.0
 
 
-def _near(one: Fit, other: Fit, times: float) -> bool:
-    between = one.base_from_camera @ np.linalg.inv(other.base_from_camera)
-    at_middle = between[:3, :3] @ one.centre + between[:3, 3] - one.centre
+def _near(first: Fit, second: Fit, times: float) -> bool:
+    between = first.base_from_camera @ np.linalg.inv(second.base_from_camera)
+    at_middle = between[:3, :3] @ first.centre + between[:3, 3] - first.centre
     return (
         float(np.linalg.norm(at_middle)) < times * DISTINCT_POSES[0]
         and angle_of(between[:3, :3]) < times * DISTINCT_POSES[1]

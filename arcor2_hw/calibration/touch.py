@@ -309,12 +309,12 @@ def _points(name: str, points: Sequence[Position], least: int) -> Floats:
     return found
 
 
-def _too_near(what: Literal["points", "x", "plane"] = "points") -> CalibrationRefused:
+def _too_near(kind: Literal["points", "x", "plane"] = "points") -> CalibrationRefused:
     text = (
         "The points are less than {shortest:.0f} mm apart. Take points farther apart."
-        if what == "points"
+        if kind == "points"
         else "The point on the x axis and the origin are less than {shortest:.0f} mm apart. Take points farther apart."
-        if what == "x"
+        if kind == "x"
         else "The point in the plane and the origin are less than {shortest:.0f} mm apart. Take points farther apart."
     )
     return CalibrationRefused(text, reason=Reason.DEGENERATE, shortest=MIN_POINT_DISTANCE * 1000.0)
@@ -327,7 +327,7 @@ def _on_one_line() -> CalibrationRefused:
     )
 
 
-def _refuse_misfit(residuals: Floats, points: Floats, what: Message) -> None:
+def _refuse_misfit(residuals: Floats, points: Floats, message: Message) -> None:
     spread = float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
     if _rms(residuals) > MAX_MISFIT * spread:
         raise CalibrationRefused(
@@ -335,7 +335,7 @@ def _refuse_misfit(residuals: Floats, points: Floats, what: Message) -> None:
             "touched, in this order.",
             f"residuals {np.round(residuals * 1e3, 2).tolist()} mm",
             Reason.NOT_CONVERGED,
-            what=what,
+            what=message,
             residual=_rms(residuals) * 1000.0,
             worst=int(np.argmax(residuals)) + 1,
         )

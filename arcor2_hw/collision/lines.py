@@ -70,7 +70,7 @@ def _near(obstacle: Obstacle, a: Position, d: Position, within: float) -> bool:
 
 
 def entry(
-    shape: Box | Cylinder | Capsule | Sphere, start: Sequence[float], way: Sequence[float], inflation: float = 0.0
+    shape: Box | Cylinder | Capsule | Sphere, start: Sequence[float], direction: Sequence[float], inflation: float = 0.0
 ) -> float | None:
     """Return the position along a line, 0 to 1, at which it enters a shape, or None if it does not.
 
@@ -80,21 +80,21 @@ def entry(
     Args:
         shape: The shape.
         start: Start of the line, (3).
-        way: Vector from start to end, (3).
+        direction: Vector from start to end, (3).
         inflation: Length added to sizes, m.
     """
     half = inflation / 2.0
     match shape:
         case Box():
             sizes = (shape.x, shape.y, shape.z)
-            return _common([_slab(start[i], way[i], size / 2.0 + half) for i, size in enumerate(sizes)])
+            return _common([_slab(start[i], direction[i], size / 2.0 + half) for i, size in enumerate(sizes)])
         case Sphere():
-            return _common([_round(start, way, shape.radius + inflation)])
+            return _common([_round(start, direction, shape.radius + inflation)])
         case Cylinder():
-            around = _round(start[:2], way[:2], shape.radius + inflation)
-            return _common([around, _slab(start[2], way[2], shape.length / 2.0 + half)])
+            around = _round(start[:2], direction[:2], shape.radius + inflation)
+            return _common([around, _slab(start[2], direction[2], shape.length / 2.0 + half)])
         case Capsule():
-            return _capsule(start, way, shape.radius + inflation, shape.length / 2.0)
+            return _capsule(start, direction, shape.radius + inflation, shape.length / 2.0)
 
 
 def _common(spans: list[_Span | None]) -> float | None:

@@ -11,7 +11,7 @@ _TINY: Final = 1e-12
 _CONTACTS: Final = 1000
 
 
-def entry(shape: Shape, start: Array, way: Array, inflation: float = 0.0) -> float | None:
+def entry(shape: Shape, start: Array, direction: Array, inflation: float = 0.0) -> float | None:
     """Return the position along a line, 0 to 1, at which it enters a shape, or None if it does not.
 
     The position is 0 for a line that starts inside.
@@ -22,26 +22,26 @@ def entry(shape: Shape, start: Array, way: Array, inflation: float = 0.0) -> flo
     Args:
         shape: The shape.
         start: Start of the line, (3).
-        way: Vector from start to end, (3).
+        direction: Vector from start to end, (3).
         inflation: Length added to sizes, m.
     """
     match shape:
         case Hull():
-            return _hull(shape, start, way, inflation / 2.0)
+            return _hull(shape, start, direction, inflation / 2.0)
         case TriangleMesh():
-            return _mesh(shape, start, way, inflation / 2.0)
+            return _mesh(shape, start, direction, inflation / 2.0)
         case _:
-            return lines.entry(shape, start.tolist(), way.tolist(), inflation)
+            return lines.entry(shape, start.tolist(), direction.tolist(), inflation)
 
 
-def _hull(shape: Hull, start: Array, way: Array, half: float) -> float | None:
+def _hull(shape: Hull, start: Array, direction: Array, half: float) -> float | None:
     first, second, third = (shape.vertices[shape.triangles[:, corner]] for corner in range(3))
     normals = np.cross(second - first, third - first)
     lengths = np.linalg.norm(normals, axis=1)
     real = lengths > _TINY
     normals = normals[real] / lengths[real, None]
     inside = ((first[real] - start) * normals).sum(axis=1) + half  # distance to each plane, positive inside
-    closing = normals @ way
+    closing = normals @ direction
     parallel = np.abs(closing) < _TINY
     if (inside[parallel] < 0.0).any():
         return None
@@ -51,35 +51,35 @@ def _hull(shape: Hull, start: Array, way: Array, half: float) -> float | None:
     return float(low) if low <= high else None
 
 
-def _mesh(shape: TriangleMesh, start: Array, way: Array, half: float) -> float | None:
+def _mesh(shape: TriangleMesh, start: Array, direction: Array, half: float) -> float | None:
     """Return the entry into the nearest triangle (T. Möller, B. Trumbore, Journal of Graphics Tools 2 (1997) 21)."""
     first, second, third = (shape.vertices[shape.triangles[:, corner]] for corner in range(3))
     u, v = second - first, third - first
-    p = np.cross(way, v)
+    p = np.cross(direction, v)
     determinant = (u * p).sum(axis=1)
     crossing = np.abs(determinant) > _TINY * _TINY
     scale = np.where(crossing, determinant, 1.0)
     s = start - first
     alpha = (s * p).sum(axis=1) / scale
     q = np.cross(s, u)
-    beta = (q @ way) / scale
+    beta = (q @ direction) / scale
     at = (v * q).sum(axis=1) / scale
     met = crossing & (alpha >= 0.0) & (beta >= 0.0) & (alpha + beta <= 1.0) & (at >= 0.0) & (at <= 1.0)
     found = float(at[met].min()) if met.any() else None
-    return found if not half else _touched(shape, start, way, half, found)
+    return found if not half else _touched(shape, start, direction, half, found)
 
 
-def _touched(shape: TriangleMesh, start: Array, way: Array, half: float, found: float | None) -> float | None:
+def _touched(shape: TriangleMesh, start: Array, direction: Array, half: float, found: float | None) -> float | None:
     """Return where a line of radius `half` first touches a mesh, at most `found`."""
     import coal
 
-    length = float(np.linalg.norm(way))
+    length = float(np.linalg.norm(direction))
     if length < _TINY:
         return found
-    along = way / length
+    along = direction / length
     aside = np.cross(along, (0.0, 0.0, 1.0) if abs(along[2]) < 0.9 else (1.0, 0.0, 0.0))
     aside /= np.linalg.norm(aside)
-    placed = coal.Transform3s(np.column_stack((aside, np.cross(along, aside), along)), start + way / 2.0)
+    placed = coal.Transform3s(np.column_stack((aside, np.cross(along, aside), along)), start + direction / 2.0)
     request, result = coal.CollisionRequest(), coal.CollisionResult()
     request.num_max_contacts = _CONTACTS
     mesh, still = coal_geometry(shape), coal.Transform3s.Identity()

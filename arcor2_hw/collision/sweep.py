@@ -132,23 +132,23 @@ class Sweep:
     def _chunks(self, count: int) -> int:
         return math.ceil(count / (1 << self._levels))
 
-    def _first_near(self, a: Array, way: Array, order: Iterable[int], chunks: int) -> float | None:
+    def _first_near(self, a: Array, direction: Array, order: Iterable[int], chunks: int) -> float | None:
         """Return the first position, in the given order of chunks, that is too near something, or None."""
         for number in order:
-            share = self._near(a, way, (number - 0.5) / chunks, 0.5 / chunks, self._levels)
+            share = self._near(a, direction, (number - 0.5) / chunks, 0.5 / chunks, self._levels)
             if share is not None:
                 return share
         return None
 
-    def _near(self, a: Array, way: Array, middle: float, half: float, levels: int) -> float | None:
+    def _near(self, a: Array, direction: Array, middle: float, half: float, levels: int) -> float | None:
         self.checks += 1
         more = self.resolution / 2.0 * 2.0**levels if levels else 0.0
-        if self.world.is_free_around(self.robot, self.whole(a + middle * way), more):
+        if self.world.is_free_around(self.robot, self.whole(a + middle * direction), more):
             return None
         if not levels:
             return middle
-        before = self._near(a, way, middle - half / 2.0, half / 2.0, levels - 1)
-        return before if before is not None else self._near(a, way, middle + half / 2.0, half / 2.0, levels - 1)
+        before = self._near(a, direction, middle - half / 2.0, half / 2.0, levels - 1)
+        return before if before is not None else self._near(a, direction, middle + half / 2.0, half / 2.0, levels - 1)
 
     def whole(self, q: Array) -> Array:
         """Return the joint values of the model for those of the arm, a view that the next call overwrites."""

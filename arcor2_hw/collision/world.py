@@ -124,40 +124,40 @@ class CollisionWorld(WorldState):
         found = self.contacts(robot, q)
         return str(found[0]) if found else "an obstacle"
 
-    def _contacts_with(self, mine: CollisionRobot, bodies: Iterable[PlacedBody], margin: float) -> Iterator[Contact]:
+    def _contacts_with(self, robot: CollisionRobot, bodies: Iterable[PlacedBody], margin: float) -> Iterator[Contact]:
         """Yield contacts of a robot, whose objects are already placed, with bodies."""
         every = list(bodies)
         boxes = np.array([body.box for body in every]).reshape(-1, 2, 3)
-        for number in mine.moving:
-            part = mine.parts[number]
+        for number in robot.moving:
+            part = robot.parts[number]
             low, high = corners(part.object)
             for index in np.nonzero(((boxes[:, 0] <= high) & (boxes[:, 1] >= low)).all(axis=1))[0]:
                 body = every[index]
-                if self._may_touch(part, mine.name, (body.name,)):
+                if self._may_touch(part, robot.name, (body.name,)):
                     continue
                 if (depth := _depth(part.object, body.object, margin)) is not None:
-                    yield Contact(_name(mine, part), body.name, depth)
+                    yield Contact(_name(robot, part), body.name, depth)
 
-    def _contacts_between(self, mine: CollisionRobot, other: CollisionRobot, margin: float) -> Iterator[Contact]:
+    def _contacts_between(self, robot: CollisionRobot, second: CollisionRobot, margin: float) -> Iterator[Contact]:
         """Yield contacts of the moving parts of a robot with another robot; objects of both are already placed."""
-        for number in mine.moving:
-            part = mine.parts[number]
+        for number in robot.moving:
+            part = robot.parts[number]
             low, high = corners(part.object)
-            for their in other.parts:
+            for their in second.parts:
                 their_low, their_high = corners(their.object)
                 if (their_low > high).any() or (their_high < low).any():
                     continue
-                names = (their.name,) if their.held is not None else (other.name, f"{other.name}/{their.link}")
-                if self._may_touch(part, mine.name, names):
+                names = (their.name,) if their.held is not None else (second.name, f"{second.name}/{their.link}")
+                if self._may_touch(part, robot.name, names):
                     continue
                 if (depth := _depth(part.object, their.object, margin)) is not None:
-                    yield Contact(_name(mine, part), _name(other, their), depth)
+                    yield Contact(_name(robot, part), _name(second, their), depth)
 
-    def _collides(self, one: Any, other: Any, margin: float) -> bool:
+    def _collides(self, first: Any, second: Any, margin: float) -> bool:
         callback = coal.CollisionCallBackDefault()
         callback.init()
         callback.data.request.security_margin = margin
-        one.collide(other, callback)
+        first.collide(second, callback)
         return bool(callback.data.result.isCollision())
 
     # -------------------------------------------------------------------------------- distances and lines
@@ -191,31 +191,31 @@ class CollisionWorld(WorldState):
                 best = Clearance(distance, _name(mine, part), name, *points)
         return best
 
-    def _nearby(self, mine: CollisionRobot) -> Iterator[tuple[float, RobotPart, Any, str]]:
+    def _nearby(self, robot: CollisionRobot) -> Iterator[tuple[float, RobotPart, Any, str]]:
         """Yield pairs that may not touch, each with a lower bound of their distance."""
         bodies, boxes = self.all_boxes()
-        for number in mine.moving:
-            part = mine.parts[number]
+        for number in robot.moving:
+            part = robot.parts[number]
             low, high = corners(part.object)
             gaps = np.maximum(0.0, np.maximum(boxes[:, 0] - high, low - boxes[:, 1]))
             for body, bound in zip(bodies, np.linalg.norm(gaps, axis=1), strict=True):
-                if not self._may_touch(part, mine.name, (body.name,)):
+                if not self._may_touch(part, robot.name, (body.name,)):
                     yield float(bound), part, body.object, body.name
-        for one, two in mine.pairs:
+        for one, two in robot.pairs:
             yield (
-                _gap(mine.parts[one], mine.parts[two]),
-                mine.parts[one],
-                mine.parts[two].object,
-                _name(mine, mine.parts[two]),
+                _gap(robot.parts[one], robot.parts[two]),
+                robot.parts[one],
+                robot.parts[two].object,
+                _name(robot, robot.parts[two]),
             )
         for other in self.robots.values():
-            if other is mine:
+            if other is robot:
                 continue
             other.pose(other.q, everything=True)
-            for part in mine.parts:
+            for part in robot.parts:
                 for their in other.parts:
                     names = (their.name,) if their.held is not None else (other.name, f"{other.name}/{their.link}")
-                    if (part.body or their.body) and not self._may_touch(part, mine.name, names):
+                    if (part.body or their.body) and not self._may_touch(part, robot.name, names):
                         yield _gap(part, their), part, their.object, _name(other, their)
 
     def ray(self, start: Position, end: Position, ignore: Iterable[str] = (), inflation: float = 0.0) -> RayHit | None:
@@ -285,8 +285,8 @@ def collision_check(world: CollisionWorld, robot: str, arm: Arm, others: Array |
     return check
 
 
-def _gap(one: RobotPart, two: RobotPart) -> float:
-    (low, high), (their_low, their_high) = corners(one.object), corners(two.object)
+def _gap(first: RobotPart, second: RobotPart) -> float:
+    (low, high), (their_low, their_high) = corners(first.object), corners(second.object)
     return float(np.linalg.norm(np.maximum(0.0, np.maximum(their_low - high, low - their_high))))
 
 
@@ -294,10 +294,10 @@ def _name(robot: CollisionRobot, part: RobotPart) -> str:
     return part.name if part.held is not None else f"{robot.name}/{part.link}"
 
 
-def _depth(one: Any, other: Any, margin: float) -> float | None:
+def _depth(first: Any, second: Any, margin: float) -> float | None:
     """Return the penetration depth of two objects: 0 when only the margin is violated, or None if they are free."""
     request, result = coal.CollisionRequest(), coal.CollisionResult()
     request.security_margin = margin
-    if not coal.collide(one, other, request, result):
+    if not coal.collide(first, second, request, result):
         return None
     return max(0.0, -float(result.getContact(0).penetration_depth))

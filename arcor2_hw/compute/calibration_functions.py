@@ -57,12 +57,12 @@ def intrinsics(task: t.FindIntrinsics, state: WorkerState) -> Intrinsics:
     return find_intrinsics(task.pictures, task.board, task.options, _counted(state, "picture"))
 
 
-def _counted(state: WorkerState, what: str) -> Callable[[int, int], None]:
-    """Return a function that reports progress as "`what` 3 of 20"."""
+def _counted(state: WorkerState, label: str) -> Callable[[int, int], None]:
+    """Return a function that reports progress as "`label` 3 of 20"."""
 
     def report(done: int, count: int) -> None:
         share = done / count if count else 0.0
-        state.progress(min(max(share, 0.0), 1.0), f"{what} {done} of {count}")
+        state.progress(min(max(share, 0.0), 1.0), f"{label} {done} of {count}")
 
     return report
 

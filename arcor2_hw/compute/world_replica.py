@@ -91,21 +91,21 @@ class WorldReplica:
         ]
 
     # -------------------------------------------------------------------------------- one thing
-    def _put(self, key: str, thing: WorldItem | None) -> None:
+    def _put(self, key: str, item: WorldItem | None) -> None:
         old = self._placed.get(key)
-        match thing:
+        match item:
             case None:
                 self._drop(key)
                 return
             case WorldRobot():
-                if not _same_robot(old, thing):
+                if not _same_robot(old, item):
                     self._drop(key)
-                self._stand(thing, key in self._placed)
+                self._stand(item, key in self._placed)
             case WorldBody():
                 if isinstance(old, WorldRobot):
                     self._drop(key)
-                self._place(thing, old if isinstance(old, WorldBody) else None)
-        self._placed[key] = thing
+                self._place(item, old if isinstance(old, WorldBody) else None)
+        self._placed[key] = item
 
     def _stand(self, robot: WorldRobot, stands: bool) -> None:
         world = self.collisions

@@ -183,23 +183,23 @@ class RobotModel(JointSet):
             made.append(LinkShape(link, f"{link} {number}", self._shape(geometry, where, use), geometry.origin))
         return _capsules(made) if kind == "collision" else made
 
-    def _shape(self, geometry: Geometry, where: Message, use: MeshUse) -> Shape:
+    def _shape(self, geometry: Geometry, element: Message, use: MeshUse) -> Shape:
         what = geometry.what
         if isinstance(what, MeshFile):
             if 0.0 in what.scale:
                 raise ZeroLength(
-                    "{place}: the mesh {reference} has a scale of zero.", place=where, reference=what.reference
+                    "{place}: the mesh {reference} has a scale of zero.", place=element, reference=what.reference
                 )
             path = self._package.locate(what.reference, self._beside)
             mesh = read_mesh(self._package.read(path, MAX_MESH), path, what.scale, upright=False)
             return (
                 mesh
                 if use == "exact"
-                else shapes.hull_of(mesh.vertices, Message.of("{place}: the mesh {path}", place=where, path=path))
+                else shapes.hull_of(mesh.vertices, Message.of("{place}: the mesh {path}", place=element, path=path))
             )
         made = {"box": shapes.Box, "cylinder": shapes.Cylinder, "sphere": shapes.Sphere, "capsule": shapes.Capsule}
         shape: Shape = made[what.kind](*what.sizes)
-        shapes.check(shape, where)
+        shapes.check(shape, element)
         return shape
 
 

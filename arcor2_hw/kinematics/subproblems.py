@@ -60,10 +60,10 @@ def level(
     return solved(dot(along, cross(across, axis)), -sine if backwards else sine, height, if_free)
 
 
-def between(axis: Vector, one: Vector, other: Vector, if_free: float) -> float:
-    """Return the angle about `axis` that rotates `one` nearest to `other`."""
-    across = cross(axis, one)
-    sine, cosine = dot(across, other), dot(cross(across, axis), other)
+def between(axis: Vector, start: Vector, target: Vector, if_free: float) -> float:
+    """Return the angle about `axis` that rotates `start` nearest to `target`."""
+    across = cross(axis, start)
+    sine, cosine = dot(across, target), dot(cross(across, axis), target)
     if math.hypot(sine, cosine) < SINGULAR:
         return if_free
     return math.atan2(sine, cosine)

@@ -100,14 +100,14 @@ def _unique(parts: Iterable[_Part], refusal: str, robot: str) -> dict[str, _Part
 
 
 # ------------------------------------------------------------------------------------------------ parts
-def _text(element: Element, attribute: str, where: str | Message) -> str:
+def _text(element: Element, attribute: str, place: str | Message) -> str:
     value = element.get(attribute)
     if not value:
-        raise ModelError("{place}: {tag} has no {attribute}.", place=where, tag=element.tag, attribute=attribute)
+        raise ModelError("{place}: {tag} has no {attribute}.", place=place, tag=element.tag, attribute=attribute)
     return value
 
 
-def _numbers(element: Element, attribute: str, default: tuple[float, ...], where: str | Message) -> tuple[float, ...]:
+def _numbers(element: Element, attribute: str, default: tuple[float, ...], place: str | Message) -> tuple[float, ...]:
     value = element.get(attribute)
     if value is None:
         return default
@@ -118,7 +118,7 @@ def _numbers(element: Element, attribute: str, default: tuple[float, ...], where
     if len(found) != len(default) or not all(map(math.isfinite, found)):
         raise ModelError(
             "{place}: {attribute} of {tag} must be {count} numbers, not {value!r}.",
-            place=where,
+            place=place,
             attribute=attribute,
             tag=element.tag,
             count=len(default),
@@ -127,8 +127,8 @@ def _numbers(element: Element, attribute: str, default: tuple[float, ...], where
     return found
 
 
-def _number(element: Element, attribute: str, default: float, where: str | Message) -> float:
-    return _numbers(element, attribute, (default,), where)[0]
+def _number(element: Element, attribute: str, default: float, place: str | Message) -> float:
+    return _numbers(element, attribute, (default,), place)[0]
 
 
 def transform(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> Array:
@@ -142,11 +142,11 @@ def transform(xyz: tuple[float, ...], rpy: tuple[float, ...]) -> Array:
     return out
 
 
-def _origin(element: Element, where: str | Message) -> Array:
+def _origin(element: Element, place: str | Message) -> Array:
     found = element.find("origin")
     if found is None:
         return np.eye(4)
-    return transform(_numbers(found, "xyz", (0.0,) * 3, where), _numbers(found, "rpy", (0.0,) * 3, where))
+    return transform(_numbers(found, "xyz", (0.0,) * 3, place), _numbers(found, "rpy", (0.0,) * 3, place))
 
 
 def _link(element: Element, robot: str) -> Link:
@@ -159,24 +159,24 @@ def _link(element: Element, robot: str) -> Link:
     return Link(name, visual, collision)
 
 
-def _geometry(element: Element, where: str | Message) -> Geometry:
+def _geometry(element: Element, place: str | Message) -> Geometry:
     found = element.find("geometry")
     what = found[0] if found is not None and len(found) else None
     if what is None:
-        raise ModelError("{place}: the geometry is missing.", place=where)
-    origin = _origin(element, where)
+        raise ModelError("{place}: the geometry is missing.", place=place)
+    origin = _origin(element, place)
     match what.tag:
         case "mesh":
-            sx, sy, sz = _numbers(what, "scale", (1.0, 1.0, 1.0), where)
-            return Geometry(MeshFile(_text(what, "filename", where), (sx, sy, sz)), origin)
+            sx, sy, sz = _numbers(what, "scale", (1.0, 1.0, 1.0), place)
+            return Geometry(MeshFile(_text(what, "filename", place), (sx, sy, sz)), origin)
         case "box":
-            return Geometry(Primitive("box", _numbers(what, "size", (0.0, 0.0, 0.0), where)), origin)
+            return Geometry(Primitive("box", _numbers(what, "size", (0.0, 0.0, 0.0), place)), origin)
         case "cylinder" | "capsule" as kind:
-            sizes = _number(what, "radius", 0.0, where), _number(what, "length", 0.0, where)
+            sizes = _number(what, "radius", 0.0, place), _number(what, "length", 0.0, place)
             return Geometry(Primitive(kind, sizes), origin)
         case "sphere":
-            return Geometry(Primitive("sphere", (_number(what, "radius", 0.0, where),)), origin)
-    raise ModelError("{place}: geometry of kind {tag} is not supported.", place=where, tag=what.tag)
+            return Geometry(Primitive("sphere", (_number(what, "radius", 0.0, place),)), origin)
+    raise ModelError("{place}: geometry of kind {tag} is not supported.", place=place, tag=what.tag)
 
 
 def _joint(element: Element, robot: str) -> Joint:
@@ -211,34 +211,34 @@ def _joint(element: Element, robot: str) -> Joint:
     )
 
 
-def _limits(element: Element, kind: str, where: str | Message) -> tuple[float, float, float]:
+def _limits(element: Element, kind: str, place: str | Message) -> tuple[float, float, float]:
     if kind == "fixed":
         return 0.0, 0.0, math.inf
     found = element.find("limit")
-    velocity = math.inf if found is None else _number(found, "velocity", 0.0, where) or math.inf
+    velocity = math.inf if found is None else _number(found, "velocity", 0.0, place) or math.inf
     if kind == "continuous":
         return -math.inf, math.inf, velocity
     if found is None:
         if element.find("mimic") is not None:
             return -math.inf, math.inf, velocity
-        raise ModelError("{place} has no limit.", place=where)
-    lower, upper = _number(found, "lower", 0.0, where), _number(found, "upper", 0.0, where)
+        raise ModelError("{place} has no limit.", place=place)
+    lower, upper = _number(found, "lower", 0.0, place), _number(found, "upper", 0.0, place)
     if lower > upper:
         raise ModelError(
             "{place}: its lower limit {lower:g} is above the upper limit {upper:g}.",
-            place=where,
+            place=place,
             lower=lower,
             upper=upper,
         )
     return lower, upper, velocity
 
 
-def _mimic(element: Element, where: str | Message) -> Mimic | None:
+def _mimic(element: Element, place: str | Message) -> Mimic | None:
     found = element.find("mimic")
     if found is None:
         return None
     return Mimic(
-        _text(found, "joint", where), _number(found, "multiplier", 1.0, where), _number(found, "offset", 0.0, where)
+        _text(found, "joint", place), _number(found, "multiplier", 1.0, place), _number(found, "offset", 0.0, place)
     )
 
 

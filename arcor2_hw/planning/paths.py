@@ -160,14 +160,14 @@ def free_line(sweep: Sweep, start: Array, target: Array, name: str = "") -> list
     return way
 
 
-def require_free(sweep: Sweep, way: Sequence[Array], name: str) -> None:
+def require_free(sweep: Sweep, path: Sequence[Array], name: str) -> None:
     """Require that a path is free of collision.
 
     Raises:
         MotionInCollision: It meets an obstacle; the message names both parts and the place.
     """
-    if (hit := sweep.first_hit(way)) is not None:
-        length = float(np.linalg.norm(sweep.arm.forward(way[-1])[:3, 3] - sweep.arm.forward(way[0])[:3, 3]))
+    if (hit := sweep.first_hit(path)) is not None:
+        length = float(np.linalg.norm(sweep.arm.forward(path[-1])[:3, 3] - sweep.arm.forward(path[0])[:3, 3]))
         raise MotionInCollision(
             "{name} cannot go straight: {distance:.3f} m along its line it is in collision: {what}.",
             name=name,

@@ -173,9 +173,9 @@ class Planner:
         over = (q < self.arm.lower - slack) | (q > self.arm.upper + slack)
         return ", ".join(name for name, is_over in zip(self.arm.joint_names, over, strict=True) if is_over)
 
-    def _length(self, way: Sequence[Array]) -> float:
+    def _length(self, path: Sequence[Array]) -> float:
         """Return the length of a path in joint values times their levers, m."""
-        return float(sum(np.linalg.norm((b - a) * self._scale) for a, b in itertools.pairwise(way)))
+        return float(sum(np.linalg.norm((b - a) * self._scale) for a, b in itertools.pairwise(path)))
 
 
 def _nearest(given: Sequence[Array], q: Array) -> Array:
@@ -286,9 +286,9 @@ class _Search:
         return tree.add(point, node) if self._free(at, point, resolution) else None
 
     # -------------------------------------------------------------------------------- shortening
-    def shortened(self, way: list[Array], resolution: float) -> list[Array]:
+    def shortened(self, path: list[Array], resolution: float) -> list[Array]:
         """Shorten a path by straight segments between random points, and drop waypoints that are not needed."""
-        points = [q * self._scale for q in way]
+        points = [q * self._scale for q in path]
         points = self._drop_redundant(points, resolution)
         idle = 0
         for _ in range(SHORTCUTS):

@@ -90,9 +90,9 @@ def point_to_point(start: Array, goal: Array, limits: MotionLimits) -> Trajector
     return Trajectory([_segment(start, goal, limits)])
 
 
-def with_stops(way: Sequence[Array], limits: MotionLimits) -> Trajectory:
+def with_stops(path: Sequence[Array], limits: MotionLimits) -> Trajectory:
     """Return a trajectory that stops at each waypoint, so that it follows the path exactly."""
-    return Trajectory([_segment(a, b, limits) for a, b in itertools.pairwise(way)])
+    return Trajectory([_segment(a, b, limits) for a, b in itertools.pairwise(path)])
 
 
 def _segment(start: Array, goal: Array, limits: MotionLimits) -> tuple[float, Callable[[float], tuple[Array, Array]]]:
@@ -121,12 +121,12 @@ def _segment(start: Array, goal: Array, limits: MotionLimits) -> tuple[float, Ca
 
 # ------------------------------------------------------------------------------------------------ waypoints
 def along_line(
-    way: Sequence[Array], limits: MotionLimits, lengths: Sequence[float], speed: float, acceleration: float
+    path: Sequence[Array], limits: MotionLimits, lengths: Sequence[float], speed: float, acceleration: float
 ) -> Trajectory:
     """Return a trajectory along closely spaced waypoints of a line.
 
     Args:
-        way: Waypoints.
+        path: Waypoints.
         limits: Limits of the joints.
         lengths: Distance of the end effector along the line at each waypoint, m.
         speed: Maximum speed of the end effector along the line, m/s.
@@ -135,10 +135,10 @@ def along_line(
     Raises:
         InvalidData: The numbers of waypoints and lengths differ, or speed or acceleration is not above zero.
     """
-    if len(lengths) != len(way) or not (speed > 0.0 and acceleration > 0.0):
+    if len(lengths) != len(path) or not (speed > 0.0 and acceleration > 0.0):
         raise InvalidData("A line needs a length at each waypoint, and a speed and an acceleration above zero.")
     # The distance along the line is treated as one more joint with limits of its own.
-    longer = [np.append(q, length) for q, length in zip(way, lengths, strict=True)]
+    longer = [np.append(q, length) for q, length in zip(path, lengths, strict=True)]
     velocity, ramp = np.append(limits.velocity, speed), np.append(limits.acceleration, acceleration)
     duration, at = _along(longer, MotionLimits(velocity, ramp, ramp))
 

@@ -70,9 +70,9 @@ def _read(device: Device, found: Checked) -> Checked:
     instance = device.require()
     problem = ""
 
-    def query(what: str, function: Callable[[], T], otherwise: T) -> T:
+    def query(query_name: str, function: Callable[[], T], otherwise: T) -> T:
         nonlocal problem
-        job = Job(what, function)
+        job = Job(query_name, function)
         device.lane.submit(job)
         if not job.wait(QUERY_TIMEOUT):
             device.lane.expire(job, QUERY_TIMEOUT)

@@ -36,24 +36,24 @@ def function_of(program: Program, body: F) -> F:
 
 
 def announced(
-    program: Program, what: str, an: str | None, shown: Sequence[Any], body: Callable[[Action], T], *, own: bool = False
+    program: Program, name: str, an: str | None, shown: Sequence[Any], body: Callable[[Action], T], *, own: bool = False
 ) -> T:
     """Run a call of a function, or parallel work, as an action that contains other actions.
 
     Args:
         program: the program.
-        what: what is called, for messages.
+        name: what is called, for messages.
         an: name of the action.
         shown: values of the parameters.
         body: receives the announced action and returns the result.
         own: whether `body` is code of this library, which is not interrupted, and whose result is not reported.
     """
     if on_any_lane():
-        raise InvalidData("the function {what} cannot be called inside an action", what=what)
+        raise InvalidData("the function {what} cannot be called inside an action", what=name)
     main = program.in_main_thread
     program.inside = program.inside or main
     try:
-        entered = program.function_begins(what, an, shown)
+        entered = program.function_begins(name, an, shown)
         try:
             if main:
                 program.inside = own

@@ -284,7 +284,7 @@ class Interlocks:
     def hold(
         self,
         device: Device,
-        what: str,
+        motion: str,
         velocity: Position | None,
         stop: Callable[[Interlocked], None],
         *,
@@ -296,7 +296,7 @@ class Interlocks:
 
         Args:
             device: the robot.
-            what: name of the motion.
+            motion: name of the motion.
             velocity: of the end effector in the world, m/s; None if it is unknown.
             stop: ends the motion, with the reason.
             retract: leave the zones in which the robot is; `velocity` is None.
@@ -308,17 +308,17 @@ class Interlocks:
         if not self._interlocks and not retract:
             return None
         if retract:
-            return self._admit_leaving(device, what, stop, None)
+            return self._admit_leaving(device, motion, stop, None)
         ahead = [] if velocity is None else [Position(*(LOOK_AHEAD * each for each in velocity))]
         try:
-            return self._admit(device, what, [], None, stop, ahead)
+            return self._admit(device, motion, [], None, stop, ahead)
         except Interlocked as error:
-            if what != JOG:
+            if motion != JOG:
                 raise
-            return self._admit_leaving(device, what, stop, error)
+            return self._admit_leaving(device, motion, stop, error)
 
     def _admit_leaving(
-        self, device: Device, what: str, stop: Callable[[Interlocked], None], refused: Interlocked | None
+        self, device: Device, motion: str, stop: Callable[[Interlocked], None], refused: Interlocked | None
     ) -> Guard:
         """Admit a motion that only leaves zones: those that the robot may not have, or all without `refused`."""
         robot = device.require()
@@ -328,13 +328,13 @@ class Interlocks:
         there = {zone: [n for n, zones in enumerate(touched) if zone in zones] for zone in bodies}
         inside = {zone for zone, found in there.items() if found}
         with self._lock:
-            found = self._obstruction(device.id, what, set(), inside)
+            found = self._obstruction(device.id, motion, set(), inside)
             leaving = {zone for zone in inside if refused is None or self._obstruction(device.id, "", {zone}, inside)}
             for ids in self._waiting.values():
                 ids.discard(device.id)
             if found is not None:
                 raise Interlocked(
-                    "{device}: {what} was not started. {reason}", device=device.name, what=what, reason=found.reason
+                    "{device}: {what} was not started. {reason}", device=device.name, what=motion, reason=found.reason
                 )
             if not leaving:
                 raise refused or Refused("{device} is in no zone that it could leave.", device=device.name)
@@ -342,7 +342,7 @@ class Interlocks:
             for zone in sorted(leaving):
                 paths = (one.retract for one in self._interlocks.values() if one.zone == zone and one.retract)
                 ways[self._name(zone)] = Retreat(bodies[zone], next(paths, []), there[zone])
-            guard = Guard(device, what, inside, self._watched(device.id, what, inside - leaving), False, stop)
+            guard = Guard(device, motion, inside, self._watched(device.id, motion, inside - leaving), False, stop)
             guard.leaving, guard.retracts = ZoneExit(device.name, ways, tips), refused is None
             self._guards[device.id] = guard
             return guard

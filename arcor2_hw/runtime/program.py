@@ -192,12 +192,12 @@ class Program:
         """Replace the breakpoints that users share. The breakpoints given at the start remain."""
         self.gate.set_breakpoints(self.breakpoints | ids)
 
-    def action_begins(self, device: str, what: str, name: str | None, arguments: Sequence[Any]) -> Action:
+    def action_begins(self, device: str, action: str, name: str | None, arguments: Sequence[Any]) -> Action:
         """Report that an action starts, and wait while the program is paused.
 
         Args:
             device: Id of the object.
-            what: Device and method, for messages.
+            action: Device and method, for messages.
             name: Name of the action in the project.
             arguments: Values of the parameters.
 
@@ -205,17 +205,17 @@ class Program:
             InvalidData: The project has no such action.
             ProgramStopped: The program was stopped.
         """
-        return self._begin(device, what, name, arguments, is_call=False)
+        return self._begin(device, action, name, arguments, is_call=False)
 
-    def function_begins(self, what: str, name: str | None, arguments: Sequence[Any]) -> Action:
+    def function_begins(self, action: str, name: str | None, arguments: Sequence[Any]) -> Action:
         """Report that a function is called, as an action without a device. `action_begins` states the arguments."""
-        return self._begin("", what, name, arguments, is_call=True)
+        return self._begin("", action, name, arguments, is_call=True)
 
     def action_repeats(
-        self, former: Action, device: str, what: str, name: str | None, arguments: Sequence[Any]
+        self, former: Action, device: str, action: str, name: str | None, arguments: Sequence[Any]
     ) -> Action:
         """Report that an action starts again because a person has decided so. `action_begins` states the arguments."""
-        return self._begin(device, what, name, arguments, is_call=False, attempt=former.attempt + 1)
+        return self._begin(device, action, name, arguments, is_call=False, attempt=former.attempt + 1)
 
     def _begin(
         self, device: str, what: str, name: str | None, arguments: Sequence[Any], *, is_call: bool, attempt: int = 0

@@ -149,8 +149,8 @@ def oak_cameras() -> list[Found]:
     ]
 
 
-def _in_network(probe: Probe, where: str, port: int) -> list[Found]:
-    return asyncio.run(search(probe, addresses_of(where), port))
+def _in_network(probe: Probe, network: str, port: int) -> list[Found]:
+    return asyncio.run(search(probe, addresses_of(network), port))
 
 
 def main() -> None:

@@ -136,10 +136,10 @@ class ArmLine:
             )
             raise
 
-    def end(self, why: DeviceError, wait: bool = True) -> None:
+    def end(self, reason: DeviceError, wait: bool = True) -> None:
         """Close the connection, unless it has ended; the server then stops its arm."""
         if self.ended is None:
-            self.ended = why
+            self.ended = reason
         self._over.set()
         for each in (self._commands, self._watch):
             if each is not None:

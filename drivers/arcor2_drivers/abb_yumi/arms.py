@@ -62,9 +62,9 @@ class Arms:
         """Return joint values in the order of the axes. Raise InvalidData or OutOfRange."""
         return joint_values(f"the {arm} arm of {self.name}", joints, JOINT_LIMITS[arm], LIMIT_TOLERANCE)
 
-    def within(self, what: str, value: float, low: float, high: float) -> None:
+    def within(self, name: str, value: float, low: float, high: float) -> None:
         """Raise OutOfRange, naming robot and parameter, unless a value is in its range."""
-        within(f"{self.name}: {what}", value, low, high)
+        within(f"{self.name}: {name}", value, low, high)
 
     def check_loads(self) -> None:
         """Raise Refused unless the load of both arms is set."""

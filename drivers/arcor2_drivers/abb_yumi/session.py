@@ -48,19 +48,19 @@ class ControlSession:
         line.ask(Code.TOOL, *position_values(tcp), *orientation_values(tcp))
         line.ask(Code.LOAD, load[0], *(value * 1e3 for value in load[1]))
 
-    def end(self, why: DeviceError, wait: bool = True) -> None:
+    def end(self, reason: DeviceError, wait: bool = True) -> None:
         """End the session, unless it has ended; the servers stop their arms."""
         with self._ending:
             if self.ended is None:
-                self.ended, self.ended_at = why, time.monotonic()
+                self.ended, self.ended_at = reason, time.monotonic()
         for line in self.lines.values():
-            line.end(why, wait)
+            line.end(reason, wait)
 
-    def _line_ended(self, why: DeviceError) -> None:
+    def _line_ended(self, reason: DeviceError) -> None:
         first = self.ended is None
-        self.end(why, wait=False)
+        self.end(reason, wait=False)
         if first:
-            log.warning("%s: control ended: %s", self.name, why)
+            log.warning("%s: control ended: %s", self.name, reason)
 
 
 def request_mastership(rws: Rws, domain: str) -> None:
@@ -79,10 +79,10 @@ def release_mastership(rws: Rws, domain: str) -> bool:
     return True
 
 
-def await_value(rws: Rws, path: str, field: str, value: str, within: float, what: str) -> None:
-    """Wait until a field of a resource has a value. Raise DeviceTimeout; `what` names the expected action."""
+def await_value(rws: Rws, path: str, field: str, value: str, within: float, name: str) -> None:
+    """Wait until a field of a resource has a value. Raise DeviceTimeout; `name` names the expected action."""
     if not once_within(lambda: rws.value(path, field) == value, within, POLL_INTERVAL):
-        raise DeviceTimeout("{device} did not {what} within {limit:g} s.", device=rws.who, what=what, limit=within)
+        raise DeviceTimeout("{device} did not {what} within {limit:g} s.", device=rws.who, what=name, limit=within)
 
 
 def start_rapid(rws: Rws) -> None:

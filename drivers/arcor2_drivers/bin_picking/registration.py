@@ -220,10 +220,10 @@ class _Evaluator:
         error = float(difference[on].mean()) if agreed else float("inf")
         return Fit(pose, explained * covered, explained, covered, self._count / max(seen, 1), error)
 
-    def _rendered(self, pose: Floats, where: tuple[slice, slice]) -> Any:
+    def _rendered(self, pose: Floats, window: tuple[slice, slice]) -> Any:
         """Return the depth of the model in each pixel of a rectangle, m; infinite where it is not visible."""
         part_from_camera = (np.linalg.inv(pose) @ self._camera).astype(np.float32)
-        beams = self._rays[where]
+        beams = self._rays[window]
         both = np.empty((*beams.shape[:2], 6), np.float32)
         both[..., :3] = part_from_camera[:3, 3]
         both[..., 3:] = beams @ part_from_camera[:3, :2].T + part_from_camera[:3, 2]

@@ -162,19 +162,21 @@ class Conveyor(PolledControl[State], Machine, Axis):
         other = Phrase.of("another client, which enabled the drive,")
         return other if state.power is Power.ENABLED else None
 
-    def drop_control(self, why: str = NOBODY) -> None:
+    def drop_control(self, reason: str = NOBODY) -> None:
         """End control. After a loss, also forget the zero: the drive may have been off."""
-        super().drop_control(why)
+        super().drop_control(reason)
         self._observer.guarded = False
         self._unit.forget()
         self._homed = self._homed and self.observing.online
 
-    def _begin(self, what: str, resting: bool = True) -> tuple[State, GoOn]:
-        go_on = self.begin(what)
+    def _begin(self, operation: str, resting: bool = True) -> tuple[State, GoOn]:
+        go_on = self.begin(operation)
         now = self.fresh()
-        self.require_control(what)
+        self.require_control(operation)
         if resting and not self._motion.is_stopped(now):
-            raise Refused("{device}: {what} is refused while the belt moves: halt it first", device=self.who, what=what)
+            raise Refused(
+                "{device}: {what} is refused while the belt moves: halt it first", device=self.who, what=operation
+            )
         return now, go_on
 
     # -------------------------------------------------------------------------------- values
@@ -242,14 +244,14 @@ class Conveyor(PolledControl[State], Machine, Axis):
         with self._unit.act(what):
             self._motion.run(self._units.counts(velocity), what, go_on)
 
-    def _check(self, position: float, speed: float, what: str) -> None:
+    def _check(self, position: float, speed: float, operation: str) -> None:
         s = self._units
         if not s.min_position <= position <= s.max_position:
             limits = f"{s.min_position:g} to {s.max_position:g} m"
             raise OutOfRange(
                 "{device}: {what}: position must be {limits}, not {position:g} m",
                 device=self.who,
-                what=what,
+                what=operation,
                 limits=limits,
                 position=position,
             )
@@ -257,7 +259,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
             raise OutOfRange(
                 "{device}: {what}: speed must be above 0 and at most {max_speed:g} m/s",
                 device=self.who,
-                what=what,
+                what=operation,
                 max_speed=s.max_speed,
             )
         longest = MAX_MOVE_TIME * speed
@@ -265,7 +267,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
             raise OutOfRange(
                 "{device}: {what} would take longer than {longest_move:g} s at {speed:g} m/s",
                 device=self.who,
-                what=what,
+                what=operation,
                 longest_move=MAX_MOVE_TIME,
                 speed=speed,
             )

@@ -258,10 +258,12 @@ class CanLink:
         data = struct.pack(entry.form, value)
         self._request(lambda sdo: sdo.download(entry.at, entry.subindex, data), what)
 
-    def _request(self, send: Callable[[Any], Any], what: str) -> bytes:
+    def _request(self, send: Callable[[Any], Any], operation: str) -> bytes:
         limit = self._settings.sdo_timeout
         if not acquire_within(self._one_request, 4.0 * limit):
-            raise DeviceTimeout("{device}: {what} found the drive busy with other requests", device=self.who, what=what)
+            raise DeviceTimeout(
+                "{device}: {what} found the drive busy with other requests", device=self.who, what=operation
+            )
         try:
             sdo = self._sdo
             if self.loss is not None or sdo is None:
@@ -274,7 +276,7 @@ class CanLink:
                     "{device} refuses {what}: {text} (abort {code:08X}h)",
                     fault_code=f"{error.code:08X}h",
                     device=self.who,
-                    what=what,
+                    what=operation,
                     text=text,
                     code=error.code,
                 ) from error
@@ -283,7 +285,7 @@ class CanLink:
                     "{device} did not answer {what} within {limit:g} s",
                     str(error),
                     device=self.who,
-                    what=what,
+                    what=operation,
                     limit=limit,
                 )
                 raise _again(self._lose(late)) from error

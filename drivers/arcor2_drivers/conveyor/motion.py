@@ -42,7 +42,7 @@ class Motion:
         """Return whether the belt is stopped."""
         return abs(now.velocity) <= self._standstill
 
-    def fault(self, now: State, what: str) -> DeviceFault:
+    def fault(self, now: State, operation: str) -> DeviceFault:
         """Return the error for a drive in fault."""
         code = now.error_code or self._observer.emergency
         fault = fault_of(code)
@@ -50,89 +50,89 @@ class Motion:
             "{device}: {what}: fault {code:04X}h, {text}; {remedy}",
             fault_code=f"{code:04X}h",
             device=self._who,
-            what=what,
+            what=operation,
             code=code,
             text=Message.of(fault.text),
             remedy=Message.of(fault.remedy),
         )
 
-    def _enabled(self, now: State, what: str) -> None:
+    def _enabled(self, now: State, operation: str) -> None:
         if now.power in FAULTY:
-            raise self.fault(now, f"{what} ended")
+            raise self.fault(now, f"{operation} ended")
         if now.power is not Power.ENABLED:
             emergency = self._observer.emergency
             why = f": {fault_of(emergency).text} ({emergency:04X}h)" if emergency else ""
             raise DeviceFault(
                 "{device}: {what} ended: the drive went to {power}{reason}",
                 device=self._who,
-                what=what,
+                what=operation,
                 power=now.power,
                 reason=why,
             )
 
     # -------------------------------------------------------------------------------- enabling
-    def enable(self, mode: Mode, what: str, go_on: GoOn) -> None:
+    def enable(self, mode: Mode, operation: str, go_on: GoOn) -> None:
         """Enable the drive in a mode, at standstill. Raises DeviceFault, DeviceTimeout, Cancelled."""
         now = self._observer.fresh().value
         if now.power in FAULTY:
-            raise self.fault(now, f"{what} is refused in state {now.power}")
+            raise self.fault(now, f"{operation} is refused in state {now.power}")
         if now.power is Power.QUICK_STOP:
             now = self._observer.wait(
-                lambda s: s.power is not Power.QUICK_STOP, STEP, f"{what}: leaving quick stop"
+                lambda s: s.power is not Power.QUICK_STOP, STEP, f"{operation}: leaving quick stop"
             ).value
         if now.power is Power.ENABLED and now.mode == mode:
             return
         self._link.write(cia402.TARGET_VELOCITY, 0)
         self._link.write(cia402.MODE, mode)
-        self._step(lambda s: s.mode == mode, f"{what}: changing to {mode.name.lower()}", go_on)
+        self._step(lambda s: s.mode == mode, f"{operation}: changing to {mode.name.lower()}", go_on)
         if now.power is Power.ENABLED:
             return
         if now.power is not Power.SWITCHED_ON:
             self.control(cia402.CW_SHUTDOWN, go_on)
-            self._step(lambda s: s.power is Power.READY, f"{what}: getting ready to switch on", go_on)
+            self._step(lambda s: s.power is Power.READY, f"{operation}: getting ready to switch on", go_on)
             self.control(cia402.CW_SWITCH_ON, go_on)
-            self._step(lambda s: s.power is Power.SWITCHED_ON, f"{what}: switching on", go_on)
+            self._step(lambda s: s.power is Power.SWITCHED_ON, f"{operation}: switching on", go_on)
         self.control(cia402.CW_ENABLE, go_on)
-        self._step(lambda s: s.power is Power.ENABLED, f"{what}: enabling", go_on)
+        self._step(lambda s: s.power is Power.ENABLED, f"{operation}: enabling", go_on)
 
-    def make_ready(self, what: str, go_on: GoOn) -> None:
+    def make_ready(self, operation: str, go_on: GoOn) -> None:
         """Enable the drive in profile velocity mode, at standstill."""
-        self.enable(Mode.PROFILE_VELOCITY, what, go_on)
+        self.enable(Mode.PROFILE_VELOCITY, operation, go_on)
         self.control(cia402.CW_ENABLE, go_on)
 
-    def _step(self, arrived: Callable[[State], bool], what: str, go_on: GoOn) -> State:
+    def _step(self, arrived: Callable[[State], bool], operation: str, go_on: GoOn) -> State:
         def holds(now: State) -> bool:
             go_on()
             if now.power in FAULTY:
-                raise self.fault(now, f"{what} ended")
+                raise self.fault(now, f"{operation} ended")
             return arrived(now)
 
-        return self._observer.wait(holds, STEP, what).value
+        return self._observer.wait(holds, STEP, operation).value
 
-    def _reach(self, arrived: Callable[[State], bool], timeout: float, what: str, go_on: GoOn) -> State:
+    def _reach(self, arrived: Callable[[State], bool], timeout: float, operation: str, go_on: GoOn) -> State:
         """Wait for a state while the drive is enabled; halt the belt after a timeout."""
 
         def holds(now: State) -> bool:
             go_on()
-            self._enabled(now, what)
+            self._enabled(now, operation)
             return arrived(now)
 
         try:
-            return self._observer.wait(holds, timeout, what).value
+            return self._observer.wait(holds, timeout, operation).value
         except DeviceTimeout:
             with contextlib.suppress(DeviceError):  # the drive monitors our heartbeat
                 self.halt()
             raise
 
     # -------------------------------------------------------------------------------- motions
-    def home(self, what: str, go_on: GoOn) -> None:
+    def home(self, operation: str, go_on: GoOn) -> None:
         """Home as configured in the settings. Raises DeviceFault when it fails."""
         s, write = self._settings, self._link.write
         write(cia402.HOMING_METHOD, s.homing_method)
         write(cia402.HOMING_SPEED_SEARCH, s.rate(s.homing_speed))
         write(cia402.HOMING_SPEED_ZERO, s.rate(s.homing_speed))
         write(cia402.HOMING_ACCELERATION, s.rate(s.acceleration))
-        self.enable(Mode.HOMING, what, go_on)
+        self.enable(Mode.HOMING, operation, go_on)
         self.control(cia402.CW_ENABLE, go_on)
         self.control(cia402.CW_ENABLE | cia402.CW_START, go_on)
 
@@ -141,35 +141,35 @@ class Motion:
                 raise DeviceFault(
                     "{device}: {what} ended with a homing error (method {homing_method})",
                     device=self._who,
-                    what=what,
+                    what=operation,
                     homing_method=s.homing_method,
                 )
             wanted = cia402.HOMING_ATTAINED | cia402.TARGET_REACHED
             return now.statusword & wanted == wanted and self.is_stopped(now)
 
-        self._reach(homed, s.homing_timeout, what, go_on)
+        self._reach(homed, s.homing_timeout, operation, go_on)
         self.control(cia402.CW_ENABLE, go_on)
 
-    def move(self, target: int, relative: bool, speed: int, expected: int, what: str, go_on: GoOn) -> None:
+    def move(self, target: int, relative: bool, speed: int, expected: int, operation: str, go_on: GoOn) -> None:
         """Move to `target`, or by it, counts; `expected` is the end position, counts."""
         s, write = self._settings, self._link.write
-        self.enable(Mode.PROFILE_POSITION, what, go_on)
+        self.enable(Mode.PROFILE_POSITION, operation, go_on)
         before = self._observer.fresh().value
         self.control(cia402.CW_ENABLE, go_on)
         write(cia402.PROFILE_VELOCITY, speed)
         write(cia402.TARGET_POSITION, target)
-        self._step(lambda now: not now.statusword & cia402.SETPOINT_ACKNOWLEDGE, f"{what}: being free", go_on)
+        self._step(lambda now: not now.statusword & cia402.SETPOINT_ACKNOWLEDGE, f"{operation}: being free", go_on)
         start = cia402.CW_ENABLE | cia402.CW_START | cia402.CW_AT_ONCE | (cia402.CW_RELATIVE if relative else 0)
         self.control(start, go_on)
         acknowledged = cia402.SETPOINT_ACKNOWLEDGE
-        self._reach(lambda now: bool(now.statusword & acknowledged), STEP, f"{what}: taking the set-point", go_on)
+        self._reach(lambda now: bool(now.statusword & acknowledged), STEP, f"{operation}: taking the set-point", go_on)
         self.control(cia402.CW_ENABLE, go_on)
-        self._reach(lambda now: not now.statusword & acknowledged, STEP, f"{what}: ending the handshake", go_on)
+        self._reach(lambda now: not now.statusword & acknowledged, STEP, f"{operation}: ending the handshake", go_on)
         takes = abs(expected - before.position) / speed + 2.0 * speed / s.rate(s.acceleration)
         after = self._reach(
             lambda now: bool(now.statusword & cia402.TARGET_REACHED) and self.is_stopped(now),
             takes + MARGIN,
-            what,
+            operation,
             go_on,
         )
         if abs(after.position - expected) > s.rate(s.tolerance):
@@ -177,15 +177,15 @@ class Motion:
             raise DeviceFault(
                 "{device}: {what} ended at {reached:.4f} m instead of {wanted:.4f} m",
                 device=self._who,
-                what=what,
+                what=operation,
                 reached=reached,
                 wanted=wanted,
             )
 
-    def run(self, speed: int, what: str, go_on: GoOn) -> None:
+    def run(self, speed: int, operation: str, go_on: GoOn) -> None:
         """Run with a velocity; return when it is reached."""
         s = self._settings
-        self.enable(Mode.PROFILE_VELOCITY, what, go_on)
+        self.enable(Mode.PROFILE_VELOCITY, operation, go_on)
         self.control(cia402.CW_ENABLE, go_on)
         with self._one_step:
             go_on()
@@ -195,7 +195,7 @@ class Motion:
         self._reach(
             lambda now: bool(now.statusword & cia402.TARGET_REACHED) and abs(now.velocity - speed) <= near,
             ramp + MARGIN,
-            what,
+            operation,
             go_on,
         )
 

@@ -68,12 +68,16 @@ class Unit:
         return S.HELD if self.held else S.IDLE
 
     @contextlib.contextmanager
-    def act(self, what: str) -> Iterator[None]:
+    def act(self, operation: str) -> Iterator[None]:
         """Run a command exclusively; it ends a hold. Raises Refused while another runs, and while aborted."""
         if self.aborted:
-            raise Refused("{device}: {what} is refused in state Aborted: clear it first", device=self._who, what=what)
+            raise Refused(
+                "{device}: {what} is refused in state Aborted: clear it first", device=self._who, what=operation
+            )
         if not self._one_act.acquire(blocking=False):
-            raise Refused("{device}: {what} is refused while another motion is under way", device=self._who, what=what)
+            raise Refused(
+                "{device}: {what} is refused while another motion is under way", device=self._who, what=operation
+            )
         try:
             self.held = False
             yield

@@ -337,27 +337,27 @@ class DobotMagician(HoldsParts, SingleArm):
             self._control.drive_belt(speed)
 
     def _pick_or_place(
-        self, what: str, pose: Pose, approach: float, speed: float, slow_speed: float, *, suck: bool
+        self, operation: str, pose: Pose, approach: float, speed: float, slow_speed: float, *, suck: bool
     ) -> None:
         # The tool points down, so the approach is from above.
         guard, above = self._control.stops.guard(), pose * Pose(Position(0.0, 0.0, -approach))
         self._motion.solve(pose)  # before the arm moves
         self._motion.to_pose(above, JOINT_TO_POSE, speed, guard)
         self._motion.to_pose(pose, LINE_TO_POSE, slow_speed, guard)
-        self._switch(what, Command.SUCTION_CUP, suck, self._dobot.suction_time, guard)
+        self._switch(operation, Command.SUCTION_CUP, suck, self._dobot.suction_time, guard)
         self._motion.to_pose(above, LINE_TO_POSE, slow_speed, guard)
 
-    def _switch(self, what: str, command: Command, on: bool, seconds: float, guard: StopGuard) -> None:
+    def _switch(self, operation: str, command: Command, on: bool, seconds: float, guard: StopGuard) -> None:
         """Switch the valve of the pump, read it back, and wait until it has taken effect. Raise DeviceFault."""
-        wanted, what = (1, int(on)), f"{what} of {self.who}"
+        wanted, operation = (1, int(on)), f"{operation} of {self.who}"
         with self._control.commands:
-            guard.check(what)
+            guard.check(operation)
             self._control.require()
             self._observer.set(command, "2B", *wanted)
             actual = self._observer.get(command, "2B")
         if actual != wanted:
-            raise DeviceFault("{what} did not switch.", f"sent {wanted}, read {actual}", what=what)
-        once_within(lambda: guard.check(what), seconds, POLL)
+            raise DeviceFault("{what} did not switch.", f"sent {wanted}, read {actual}", what=operation)
+        once_within(lambda: guard.check(operation), seconds, POLL)
         if on:
             self.attach_part(hanging=command is Command.SUCTION_CUP)
         else:

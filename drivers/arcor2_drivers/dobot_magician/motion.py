@@ -167,7 +167,7 @@ class Motion:
     # -------------------------------------------------------------------------------- from start to end of a motion
     def _run(
         self,
-        what: str,
+        operation: str,
         speed: float,
         budget: float,
         reached: Callable[[Sample], bool],
@@ -177,51 +177,51 @@ class Motion:
         *values: float,
     ) -> None:
         """Put a motion into the empty queue, start it, and wait until it is observed to have ended."""
-        started, what = time.monotonic(), f"{what} of {self._who}"
+        started, operation = time.monotonic(), f"{operation} of {self._who}"
         with self._control.commands:
-            guard.check(what)
+            guard.check(operation)
             self._control.require()
             self._observer.set(Command.PTP_COMMON, "2f", speed * 100.0, speed * 100.0)
             index = self._observer.queue(command, layout, *values)
             self._observer.set(Command.QUEUE_START)
         with self.log.recorded(speed, self._await_standstill):
-            self._wait_done(what, index, started + budget, reached, guard)
+            self._wait_done(operation, index, started + budget, reached, guard)
 
     def _await_standstill(self) -> None:
         with contextlib.suppress(DeviceError):  # the caller of `stop` receives it
             self._control.wait_rest()
 
     def _wait_done(
-        self, what: str, index: int, deadline: float, reached: Callable[[Sample], bool], guard: StopGuard
+        self, operation: str, index: int, deadline: float, reached: Callable[[Sample], bool], guard: StopGuard
     ) -> None:
         def done(sample: Sample) -> bool:
             if faults := self.obstacles(sample):
                 self._control.send_stop()
                 code = min(sample.alarms - {alarms.RESET})
-                raise DeviceFault("{what} failed: {fault}", "", alarms.title(code), what=what, fault=faults[0])
+                raise DeviceFault("{what} failed: {fault}", "", alarms.title(code), what=operation, fault=faults[0])
             if sample.index >= index and sample.unchanged > SHORT_OF_TARGET and not reached(sample):
-                raise DeviceFault("{what} ended before its target.", what=what)
+                raise DeviceFault("{what} ended before its target.", what=operation)
             return sample.index >= index and reached(sample)
 
         def go_on() -> None:
-            guard.check(what)
+            guard.check(operation)
             if not self._control.ours:
                 self._observer.observing.check()
-                raise NotInControl("{what}: control was lost. The arm completes the motion.", what=what)
+                raise NotInControl("{what}: control was lost. The arm completes the motion.", what=operation)
 
         try:
-            self._observer.wait(done, max(deadline - time.monotonic(), 0.0), what, go_on)
+            self._observer.wait(done, max(deadline - time.monotonic(), 0.0), operation, go_on)
         except ConnectionLost as e:
-            raise ConnectionLost("{reason} The arm completes {what}.", e.detail, reason=e, what=what) from None
+            raise ConnectionLost("{reason} The arm completes {what}.", e.detail, reason=e, what=operation) from None
         except DeviceTimeout as e:
             self._control.send_stop()
-            raise DeviceTimeout("{what} did not end within the computed time. It was stopped.", what=what) from e
+            raise DeviceTimeout("{what} did not end within the computed time. It was stopped.", what=operation) from e
 
     def _tcp(self) -> Pose:
         newest = self._observer.newest()
         return self.world(newest.tool) if newest is not None else self._robot.pose
 
 
-def _time(way: float, speed: float, acceleration: float) -> float:
+def _time(distance: float, speed: float, acceleration: float) -> float:
     """Return the longest time that a motion may take, s: half as much again as computed, and two seconds."""
-    return 1.5 * (way / speed + speed / acceleration) + 2.0
+    return 1.5 * (distance / speed + speed / acceleration) + 2.0

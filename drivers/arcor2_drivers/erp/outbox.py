@@ -217,12 +217,12 @@ class Outbox:
         with self._writing() as database:
             database.execute("DELETE FROM message WHERE number = ?", (message.number,))
 
-    def mark_refused(self, message: Message, why: str) -> None:
+    def mark_refused(self, message: Message, reason: str) -> None:
         """Mark a message that the service refused; it is sent again only after `resend_refused`."""
         with self._writing() as database:
             database.execute(
                 "UPDATE message SET state = 'refused', why = ?, since = ? WHERE number = ?",
-                (why, now(), message.number),
+                (reason, now(), message.number),
             )
 
     def resend_refused(self) -> int:

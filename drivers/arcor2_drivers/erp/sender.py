@@ -152,15 +152,15 @@ class Sender:
             self._order_pauses.setdefault(message.order_id, Pause(self._longest)).grow(answer.retry_after)
         self._report(text)
 
-    def _check_receipt(self, answer: Answer, message: Message, what: str) -> None:
-        receipt: Receipt = self._service.read(answer, Receipt, what)
+    def _check_receipt(self, answer: Answer, message: Message, operation: str) -> None:
+        receipt: Receipt = self._service.read(answer, Receipt, operation)
         if receipt.key != message.key:
             raise DeviceFault(
                 "{device} confirmed {what} with the key of another message",
                 receipt.key[:80],
                 "receipt",
                 device=self._who,
-                what=what,
+                what=operation,
             )
 
     def _report(self, text: str) -> None:

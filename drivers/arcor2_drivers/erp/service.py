@@ -211,7 +211,7 @@ class Service:
         self.check(answer, "GET /status")
         return self.read(answer, Status, "GET /status")
 
-    def check(self, answer: Answer, what: str) -> None:
+    def check(self, answer: Answer, operation: str) -> None:
         """Raise Refused or DeviceFault with the text of the service, unless it has executed the request."""
         if answer.done:
             return
@@ -222,17 +222,19 @@ class Service:
                 device=self._who,
             )
         if 400 <= answer.status < 500 and answer.status not in RETRIED:
-            raise Refused("{device} refused {what}: {text}", answer.text, device=self._who, what=what, text=answer.text)
+            raise Refused(
+                "{device} refused {what}: {text}", answer.text, device=self._who, what=operation, text=answer.text
+            )
         raise DeviceFault(
             "{device} cannot execute {what} now: {text}",
             answer.text,
             answer.status,
             device=self._who,
-            what=what,
+            what=operation,
             text=answer.text,
         )
 
-    def read(self, answer: Answer, form: type[T], what: str) -> T:
+    def read(self, answer: Answer, form: type[T], operation: str) -> T:
         """Decode the body of an answer. Raises DeviceFault."""
         try:
             return msgspec.json.decode(answer.body, type=form)
@@ -242,7 +244,7 @@ class Service:
                 f"{e}: {answer.body[:200]!r}",
                 "answer",
                 device=self._who,
-                what=what,
+                what=operation,
             ) from e
 
 

@@ -240,13 +240,13 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         """Return the contact resistance of the last tested board, Ω."""
         return self._measured("contact_resistance").contact_resistance
 
-    def _measured(self, what: str) -> Inputs:
+    def _measured(self, operation: str) -> Inputs:
         inputs = self.fresh()
         if inputs.result == 0:
             raise Refused(
                 "{device}: {what} is refused in state {state}: nothing was tested",
                 device=self.who,
-                what=what,
+                what=operation,
                 state=title(inputs.state),
             )
         return inputs

@@ -161,7 +161,7 @@ class Tester(ModbusDevice[Inputs]):
         newest = self.newest()
         return None if newest is None else self.owner_of(newest)
 
-    def require_command(self, what: str) -> Inputs:
+    def require_command(self, operation: str) -> Inputs:
         """Return a fresh state if we have control. Raises NotInControl, which names the owner."""
         inputs = self.fresh()
         owner = self.owner_of(inputs)
@@ -171,7 +171,7 @@ class Tester(ModbusDevice[Inputs]):
                 if owner
                 else "{device}: {what} is refused in state {state}: nobody has control",
                 device=self.who,
-                what=what,
+                what=operation,
                 state=title(inputs.state),
                 owner=owner,
             )
@@ -211,30 +211,30 @@ class Tester(ModbusDevice[Inputs]):
                 reason=why,
             )
 
-    def reach(self, wanted: set[MachineState], timeout: float, what: str, go_on: GoOn) -> Inputs:
+    def reach(self, wanted: set[MachineState], timeout: float, operation: str, go_on: GoOn) -> Inputs:
         """Wait for one of the states. Raises DeviceTimeout, and DeviceFault or SafetyStop when it aborts instead."""
 
         def arrived(inputs: Inputs) -> bool:
             if inputs.state in wanted:
                 return True
             if inputs.state in ABORT_STATES and not wanted & ABORT_STATES:
-                raise self.fault(inputs, what)
+                raise self.fault(inputs, operation)
             return False
 
-        return self.wait(arrived, timeout, what, go_on)
+        return self.wait(arrived, timeout, operation, go_on)
 
-    def fault(self, inputs: Inputs, what: str) -> DeviceError:
+    def fault(self, inputs: Inputs, operation: str) -> DeviceError:
         """Return the error for a tester that has aborted."""
         code = inputs.fault_code
         if not code:
             return DeviceFault(
-                "{device}: {what} ended: aborted by command; clear it", fault_code=0, device=self.who, what=what
+                "{device}: {what} ended: aborted by command; clear it", fault_code=0, device=self.who, what=operation
             )
         fault = fault_of(code)
         message = Message.of(
             "{device}: {what} ended: fault {code}, {text}; {remedy}",
             device=self.who,
-            what=what,
+            what=operation,
             code=code,
             text=Message.of(fault.text),
             remedy=Message.of(fault.remedy),
@@ -243,14 +243,14 @@ class Tester(ModbusDevice[Inputs]):
             return SafetyStop(message, kind="emergency_stop")
         return DeviceFault(message, fault_code=code)
 
-    def move_door(self, command: int, what: str, arrived: Callable[[Inputs], bool]) -> None:
+    def move_door(self, command: int, operation: str, arrived: Callable[[Inputs], bool]) -> None:
         """Move the door and wait for its end position. The tester reports no refusal, so the state is checked."""
-        self.require_command(what)
-        go_on = self.begin(what)
+        self.require_command(operation)
+        go_on = self.begin(operation)
         began = time.monotonic()
 
         def done(inputs: Inputs) -> bool:
-            values: dict[str, Any] = {"device": self.who, "what": what, "state": title(inputs.state)}
+            values: dict[str, Any] = {"device": self.who, "what": operation, "state": title(inputs.state)}
             if inputs.emergency_stop:
                 raise SafetyStop(
                     "{device}: {what} is refused in state {state}: the emergency stop is pressed",
@@ -266,12 +266,12 @@ class Tester(ModbusDevice[Inputs]):
             done(inputs)
             return inputs.state in registers.DOOR_MAY_MOVE
 
-        self.wait(movable, TRANSITION, f"{what}: reaching a state that lets the door move", go_on)
+        self.wait(movable, TRANSITION, f"{operation}: reaching a state that lets the door move", go_on)
         with self._one_command:
             self._write_numbered(Holding.DOOR_COMMAND, command, go_on)
         left = max(0.1, began + self._s.door_timeout - time.monotonic())
         try:
-            self.wait(done, left, what, go_on)
+            self.wait(done, left, operation, go_on)
         except DeviceTimeout as error:
             raise DeviceTimeout("{reason}: the door does not reach its end position", reason=error) from error
 

@@ -294,7 +294,7 @@ class Link:
             raise NotConnected("{device} is not connected", device=self.who)
         return self._client.uaclient
 
-    def _call(self, work: Callable[[], Coroutine[Any, Any, T]], timeout: float, what: str) -> T:
+    def _call(self, work: Callable[[], Coroutine[Any, Any, T]], timeout: float, operation: str) -> T:
         async def limited() -> T:
             return await awaited_within(work(), timeout)
 
@@ -309,25 +309,31 @@ class Link:
         except TimeoutError as e:  # the future's own and asyncio's are the same class
             future.cancel()
             raise DeviceTimeout(
-                "{device}: {what}: no answer within {timeout:g} s", str(e), device=self.who, what=what, timeout=timeout
+                "{device}: {what}: no answer within {timeout:g} s",
+                str(e),
+                device=self.who,
+                what=operation,
+                timeout=timeout,
             ) from e
         except (concurrent.futures.CancelledError, OSError) as e:
-            raise ConnectionLost("{device}: {what}: the connection broke", str(e), device=self.who, what=what) from e
+            raise ConnectionLost(
+                "{device}: {what}: the connection broke", str(e), device=self.who, what=operation
+            ) from e
         except ua.UaStatusCodeError as e:
-            raise self._typed(type(e).__name__, what, e) from e
+            raise self._typed(type(e).__name__, operation, e) from e
         except ua.UaError as e:
             raise ConnectionLost(
-                "{device}: {what}: invalid answer", f"{type(e).__name__}: {e}", device=self.who, what=what
+                "{device}: {what}: invalid answer", f"{type(e).__name__}: {e}", device=self.who, what=operation
             ) from e
 
-    def _typed(self, name: str, what: str, error: Exception) -> DeviceError:
+    def _typed(self, name: str, operation: str, error: Exception) -> DeviceError:
         if name == "BadTimeout" or name == "BadRequestTimeout":
-            return DeviceTimeout("{device}: {what}: no answer in time", str(error), device=self.who, what=what)
+            return DeviceTimeout("{device}: {what}: no answer in time", str(error), device=self.who, what=operation)
         if name.startswith(_BROKEN):
-            return ConnectionLost("{device}: {what}: the connection broke", str(error), device=self.who, what=what)
+            return ConnectionLost("{device}: {what}: the connection broke", str(error), device=self.who, what=operation)
         if name.startswith(_UNAUTHORIZED):
             return Refused("{device} rejected the credentials: {name}", str(error), device=self.who, name=name)
-        return DeviceFault("{device}: {what}: {name}", str(error), name, device=self.who, what=what, name=name)
+        return DeviceFault("{device}: {what}: {name}", str(error), name, device=self.who, what=operation, name=name)
 
 
 def _properties(file: str) -> uacrypto.CertProperties:

@@ -210,10 +210,10 @@ class Plc(PolledControl[Handshake]):
             return Phrase.of("the program of the PLC was stopped")
         return super().why_control_ended(state) if state.owner else Phrase.of("the PLC has taken control away")
 
-    def require_control(self, what: str) -> None:
+    def require_control(self, operation: str) -> None:
         """Raise NotConnected, ConnectionLost, NotInControl or Stale with the reason, unless we may write."""
         if self.handshake_nodes:
-            super().require_control(what)
+            super().require_control(operation)
         self.observing.check()
         self.check_program()
 
@@ -283,16 +283,16 @@ class Plc(PolledControl[Handshake]):
                 "{device}: {what} ended with error {code}", "", end.code, device=self.who, what=what, code=end.code
             )
 
-    def _await_job(self, holds: Callable[[Handshake], bool], timeout: float, what: str, go_on: GoOn) -> Handshake:
+    def _await_job(self, holds: Callable[[Handshake], bool], timeout: float, operation: str, go_on: GoOn) -> Handshake:
         def reached(hand: Handshake) -> bool:
             self.check_program()
             if not self.in_control:
                 why = self.why_not
-                raise NotInControl("{device}: {what} was cancelled: {why}", device=self.who, what=what, why=why)
+                raise NotInControl("{device}: {what} was cancelled: {why}", device=self.who, what=operation, why=why)
             return holds(self._checked(hand))
 
         try:
-            return self.wait(reached, timeout, what, go_on)
+            return self.wait(reached, timeout, operation, go_on)
         except DeviceTimeout as late:
             raise DeviceTimeout("{reason}; the PLC is {found}", reason=late, found=self.newest()) from late
 

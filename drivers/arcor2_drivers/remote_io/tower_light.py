@@ -122,9 +122,9 @@ class TowerLight(Block, Generic):
         self.pulse_output("buzzer", duration)
 
     # -------------------------------------------------------------------------------- lamps
-    def _show(self, pattern: Pattern, what: str) -> None:
+    def _show(self, pattern: Pattern, operation: str) -> None:
         with self._showing:
-            self.require_control(what)
+            self.require_control(operation)
             self._pattern, self._since, self._lit = pattern, time.monotonic(), {}
             self._switch_lamps(dict.fromkeys(self._lamps, False) | dict.fromkeys(pattern, True))
 

@@ -166,14 +166,14 @@ class Robotiq2F(PolledControl[Status], Gripper):
         """Return who has control."""
         return super().control_owner() or self._other_client or None
 
-    def drop_control(self, why: str = NOBODY) -> None:
+    def drop_control(self, reason: str = NOBODY) -> None:
         """Note that control has ended."""
-        super().drop_control(why)
+        super().drop_control(reason)
         self._commanded = None
 
-    def _check(self, status: Status, what: str) -> None:
+    def _check(self, status: Status, operation: str) -> None:
         """Check that we have control and that no major fault is active. Raise NotInControl or DeviceFault."""
-        self.require_control(what)
+        self.require_control(operation)
         if status.fault >= FIRST_MAJOR_FAULT:
             fault = fault_of(status.fault)
             raise DeviceFault(
@@ -181,7 +181,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
                 fault.remedy,
                 status.fault,
                 device=self.who,
-                what=what,
+                what=operation,
                 code=status.fault,
                 text=Message.of(fault.text),
             )
@@ -235,14 +235,14 @@ class Robotiq2F(PolledControl[Status], Gripper):
 
         self.wait(at_standstill, STANDSTILL_TIMEOUT, "coming to a standstill")
 
-    def _write(self, command: Command, what: str, go_on: GoOn) -> None:
+    def _write(self, command: Command, operation: str, go_on: GoOn) -> None:
         def write() -> None:
             self._commanded, self._echoed = None, False
             self._held = self._lost = False
             self._gripper.write(command)
             self._commanded = command.position
 
-        self.send(what, write, go_on)  # with a stop, either it is not sent or the stop follows
+        self.send(operation, write, go_on)  # with a stop, either it is not sent or the stop follows
 
     def _reset(self, go_on: GoOn) -> None:
         self._write(Command(act=False, go_to=False), "the reset", go_on)
@@ -252,7 +252,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
 
         self.wait(done, ACCEPT_TIMEOUT + self._s.request_timeout, "the reset")
 
-    def _move(self, width: float, force: float, speed: float, what: str) -> Status:
+    def _move(self, width: float, force: float, speed: float, operation: str) -> Status:
         """Move the fingers to a width; return the status at standstill."""
         try:
             command = Command(
@@ -262,35 +262,35 @@ class Robotiq2F(PolledControl[Status], Gripper):
             )
         except OutOfRange as e:
             raise OutOfRange("{device}: {reason}", device=self.who, reason=e) from e
-        with self.act(what) as go_on:
-            self.require_control(what)
+        with self.act(operation) as go_on:
+            self.require_control(operation)
             status = self.fresh()
-            self._check(status, what)
+            self._check(status, operation)
             if not status.active:
                 raise Refused(
                     "{device}: {what} is refused in state {inactive}: activate it first",
                     device=self.who,
-                    what=what,
+                    what=operation,
                     inactive=GripperState.INACTIVE,
                 )
-            self._write(command, what, go_on)
+            self._write(command, operation, go_on)
 
             def at_standstill(status: Status) -> bool:
-                self._check(status, what)
+                self._check(status, operation)
                 if not status.active:
                     raise DeviceFault(
                         "{device}: {what} ended early: the gripper was reset or switched off",
                         device=self.who,
-                        what=what,
+                        what=operation,
                     )
                 accepted = status.go_to and status.echo == command.position
                 return accepted and status.object is not Object.MOVING
 
             try:
-                return self.wait(at_standstill, self._s.stroke / speed + ACCEPT_TIMEOUT + MARGIN, what, go_on)
+                return self.wait(at_standstill, self._s.stroke / speed + ACCEPT_TIMEOUT + MARGIN, operation, go_on)
             except DeviceTimeout:
                 with contextlib.suppress(DeviceError):  # without it the gripper finishes the motion, then holds
-                    self._write(Command(go_to=False), what, go_on)  # no caller waits for the motion any more
+                    self._write(Command(go_to=False), operation, go_on)  # no caller waits for the motion any more
                 raise
 
     # -------------------------------------------------------------------------------- actions

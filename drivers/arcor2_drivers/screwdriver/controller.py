@@ -210,11 +210,11 @@ class Controller(StateObserver[State]):
         self._change(asked, enabled=on)
 
     def wait(
-        self, holds: Callable[[State], bool], timeout: float, what: str, go_on: GoOn | None = None
+        self, holds: Callable[[State], bool], timeout: float, operation: str, go_on: GoOn | None = None
     ) -> Snapshot[State]:
         """Send a keep-alive message at once, and return the first state for which `holds` is true."""
         self._ask_at_once = True
-        return super().wait(holds, timeout, what, go_on)
+        return super().wait(holds, timeout, operation, go_on)
 
     # -------------------------------------------------------------------------------- on the observing thread
     def read(self) -> State | None:

@@ -195,20 +195,20 @@ class OpenProtocolScrewdriver(PolledControl[State], Generic):
     def _request(self, mid: Mid, data: bytes, revision: int = 1) -> None:
         self.send(mid.name.lower(), lambda: self._controller.request(mid, data, revision))
 
-    def _require_ready(self, what: str) -> State:
-        self.require_control(what)
+    def _require_ready(self, operation: str) -> State:
+        self.require_control(operation)
         state = self.current()
         if not state.ready:
-            raise self._blocked(state, what)
+            raise self._blocked(state, operation)
         return state
 
-    def _blocked(self, state: State, what: str) -> DeviceFault:
+    def _blocked(self, state: State, operation: str) -> DeviceFault:
         alarm = next(each for each in state.alarms if not each.ready)
         return DeviceFault(
             "{device}: {what} is not possible: alarm {code} {text}",
             fault_code=alarm.code,
             device=self.who,
-            what=what,
+            what=operation,
             code=alarm.code,
             text=alarm.text,
         )

@@ -130,11 +130,11 @@ class TelegramBuffer:
         return found
 
 
-def _number(raw: bytes, what: str) -> int:
+def _number(raw: bytes, name: str) -> int:
     """Return a number of digits, with a sign or without. Blanks count as 0."""
     text = raw.strip()
     if text and not text.removeprefix(b"-").isdigit():
-        raise ValueError(f"{what} is {raw!r}")
+        raise ValueError(f"{name} is {raw!r}")
     return int(text or b"0")
 
 

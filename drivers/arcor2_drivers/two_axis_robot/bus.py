@@ -153,16 +153,18 @@ class Bus:
                 if port.readPort(256):
                     quiet = time.monotonic() + QUIET_TIME
 
-    def _check(self, number: int, result: int, error: int, what: str) -> None:
+    def _check(self, number: int, result: int, error: int, operation: str) -> None:
         if result == COMM_RX_TIMEOUT:
             raise DeviceTimeout(
-                "{servo} did not answer {what}. Check power and cable.", servo=self.servo(number), what=what
+                "{servo} did not answer {what}. Check power and cable.", servo=self.servo(number), what=operation
             )
         if result == COMM_RX_CORRUPT:
-            raise DeviceTimeout("The answer of {servo} to {what} was damaged.", servo=self.servo(number), what=what)
+            raise DeviceTimeout(
+                "The answer of {servo} to {what} was damaged.", servo=self.servo(number), what=operation
+            )
         if result != COMM_SUCCESS:
             raise ConnectionLost(
-                "{what} could not be sent to {servo}", f"result {result}", what=what, servo=self.servo(number)
+                "{what} could not be sent to {servo}", f"result {result}", what=operation, servo=self.servo(number)
             )
         if error & ~ALERT:
             reason = Message.of(STATUS_ERRORS.get(error & ~ALERT, f"error {error:#04x}"))
@@ -170,7 +172,7 @@ class Bus:
                 "{servo} refuses {what}: {reason}",
                 f"status error {error:#04x}",
                 servo=self.servo(number),
-                what=what,
+                what=operation,
                 reason=reason,
             )
 
@@ -181,20 +183,20 @@ class Bus:
         self._check(number, result, error, "a ping")
         return int(model)
 
-    def _answer(self, port: _Port, number: int, size: int, what: str) -> bytes:
+    def _answer(self, port: _Port, number: int, size: int, operation: str) -> bytes:
         """Return the data of a servo's answer. An answer of another length is a late one to another instruction."""
         while True:
             packet, result = self._packets.rxPacket(port, False)
             if result != COMM_SUCCESS or packet[PKT_ID] == number:
                 break
-        self._check(number, result, packet[PKT_ERROR] if result == COMM_SUCCESS else 0, what)
+        self._check(number, result, packet[PKT_ERROR] if result == COMM_SUCCESS else 0, operation)
         found = (packet[PKT_LENGTH_L] | packet[PKT_LENGTH_H] << 8) - EMPTY
         if found != size:
             raise DeviceTimeout(
                 "The answer of {servo} to {what} belongs to another instruction.",
                 f"{found} bytes",
                 servo=self.servo(number),
-                what=what,
+                what=operation,
             )
         return bytes(packet[PKT_DATA : PKT_DATA + size])
 

@@ -125,10 +125,10 @@ class Control:
             self.release(timeout=0.3)
         self.drop(Phrase.of("it was released."))
 
-    def drop(self, why: str) -> None:
+    def drop(self, reason: str) -> None:
         """Note that control has ended."""
         if self.ours:
-            self._why_not, self._tripped = why, False
+            self._why_not, self._tripped = reason, False
         self.ours = self.teaching = False
         self._observer.end_keep_alive()
 

@@ -159,10 +159,10 @@ class Motion:
                 recording.end = MoveEnd.SAFETY
                 raise
 
-    def _check_valid(self, what: str, guard: StopGuard) -> None:
-        guard.check(f"{what} of {self._name}")
+    def _check_valid(self, operation: str, guard: StopGuard) -> None:
+        guard.check(f"{operation} of {self._name}")
         if not self._control.ours:
-            raise Cancelled("{what} of {name} was stopped: control was lost.", what=what, name=self._name)
+            raise Cancelled("{what} of {name} was stopped: control was lost.", what=operation, name=self._name)
 
     def _check_servo_limits(self, goals: tuple[int, int]) -> None:
         for number, goal, setup in zip(self._settings.ids, goals, self._observer.setups, strict=True):

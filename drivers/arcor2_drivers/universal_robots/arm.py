@@ -48,9 +48,9 @@ class Arm:
         """Return joint values in the controller's order. Raise InvalidData or OutOfRange."""
         return joint_values(self.name, joints, JOINT_LIMITS)
 
-    def within(self, what: str, value: float, low: float, high: float) -> None:
+    def within(self, name: str, value: float, low: float, high: float) -> None:
         """Raise OutOfRange, naming arm and parameter, unless a value is in its range."""
-        within(f"{self.name}: {what}", value, low, high)
+        within(f"{self.name}: {name}", value, low, high)
 
     def check_speed(self, speed: float, acceleration: float = 1.0) -> None:
         """Raise OutOfRange unless speed and acceleration are fractions of the maxima."""

@@ -131,10 +131,10 @@ class Control:
                 session.stop_motion(self._arm.settings.stop_deceleration)
         session.release(NotInControl("Control of {name} was released.", name=self._arm.name), 0.4)
 
-    def revoke(self, why: str) -> None:
+    def revoke(self, reason: str) -> None:
         """End the session and stop the program, so that an old motion cannot continue."""
         if self.session is not None:
-            self.session.end(NotInControl("Control of {name} ended: {reason}.", name=self._arm.name, reason=why))
+            self.session.end(NotInControl("Control of {name} ended: {reason}.", name=self._arm.name, reason=reason))
         self._retake = False
         self._pendant.do("stop", "Stopped")
 

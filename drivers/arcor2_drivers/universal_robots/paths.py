@@ -185,7 +185,7 @@ class Paths:
         return self._motion.log.last, state
 
     def _wait_end(
-        self, session: ControlSession, port: ScriptPort, what: str, guard: StopGuard, budget: float
+        self, session: ControlSession, port: ScriptPort, operation: str, guard: StopGuard, budget: float
     ) -> RunState:
         """Return how the run ended, once no program plays and the arm is at standstill."""
         started, clock = time.monotonic(), Budget(budget)
@@ -205,11 +205,11 @@ class Paths:
             if ours and state in ENDED and not plays and not sample.moving:
                 if timed_out:
                     session.resume()
-                    raise DeviceTimeout("{what} did not end within the computed time. It was stopped.", what=what)
+                    raise DeviceTimeout("{what} did not end within the computed time. It was stopped.", what=operation)
                 return RunState(state)
             if not ours and now - started > START_TIMEOUT:
                 error = DeviceFault(
-                    "The controller of {name} did not start the program of {what}.", name=self._arm.name, what=what
+                    "The controller of {name} did not start the program of {what}.", name=self._arm.name, what=operation
                 )
                 session.end(error)
                 raise error

@@ -93,12 +93,12 @@ class SafetySystem:
     def _safety(self) -> Safety:
         return safety_of(self._observer.sample().safety_mode)
 
-    def _await(self, what: str, holds: Callable[[Sample], bool], within: float) -> None:
+    def _await(self, operation: str, holds: Callable[[Sample], bool], within: float) -> None:
         if not once_within(lambda: holds(self._observer.sample(max_age=0.5)), within, POLL_INTERVAL):
             raise DeviceTimeout(
                 "{name} did not {what} within {within:g} s. Check the pendant.",
                 name=self.name,
-                what=what,
+                what=operation,
                 within=within,
             )
 

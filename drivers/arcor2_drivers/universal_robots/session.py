@@ -162,7 +162,7 @@ class ControlSession:
     # -------------------------------------------------------------------------------- commands, from any thread
     def call(
         self,
-        what: str,
+        operation: str,
         command: str,
         *arguments: Any,
         timeout: float = timing.CALL_TIMEOUT,
@@ -171,7 +171,7 @@ class ControlSession:
         """Execute a command and return its result.
 
         Args:
-            what: Name of the command, for errors.
+            operation: Name of the command, for errors.
             command: Name of the method of ur_rtde.
             arguments: Arguments of the method.
             timeout: Time for the answer, s. The session ends when it elapses.
@@ -183,45 +183,48 @@ class ControlSession:
             DeviceTimeout: No answer came in time.
             DeviceFault: The library failed.
         """
-        future = self._send(what, command, arguments, stopped)
+        future = self._send(operation, command, arguments, stopped)
         try:
             return result_within(future, timeout)
         except TimeoutError:
             error = DeviceTimeout(
-                "{device} did not execute {what} within {timeout:g} s.", device=self.who, what=what, timeout=timeout
+                "{device} did not execute {what} within {timeout:g} s.",
+                device=self.who,
+                what=operation,
+                timeout=timeout,
             )
             self.end(error)
             raise error from None
 
-    def ask(self, what: str, question: str, *arguments: Any) -> Any:
+    def ask(self, operation: str, question: str, *arguments: Any) -> Any:
         """Execute a repeatable command. Try MAX_ATTEMPTS times if the library fails, as on a busy computer."""
         for _ in range(MAX_ATTEMPTS - 1):
             try:
-                if answer := self.call(what, question, *arguments):
+                if answer := self.call(operation, question, *arguments):
                     return answer
                 reason = f"the answer was {answer}"
             except DeviceFault as e:
                 reason = e.detail
-            log.info("%s: asking again for %s: %s", self.who, what, reason)
-        return self.call(what, question, *arguments)
+            log.info("%s: asking again for %s: %s", self.who, operation, reason)
+        return self.call(operation, question, *arguments)
 
-    def set(self, what: str, command: str, *arguments: Any) -> None:
+    def set(self, operation: str, command: str, *arguments: Any) -> None:
         """Execute a command that sets values and returns whether it was accepted, as `ask`. Raise as `do`."""
-        if not self.ask(what, command, *arguments):
-            self._not_accepted(what)
+        if not self.ask(operation, command, *arguments):
+            self._not_accepted(operation)
 
-    def do(self, what: str, command: str, *arguments: Any, **options: Any) -> None:
+    def do(self, operation: str, command: str, *arguments: Any, **options: Any) -> None:
         """Execute a command that returns whether it was accepted. Raise DeviceFault if not, else as `call`."""
-        if not self.call(what, command, *arguments, **options):
-            self._not_accepted(what)
+        if not self.call(operation, command, *arguments, **options):
+            self._not_accepted(operation)
 
-    def _not_accepted(self, what: str) -> NoReturn:
+    def _not_accepted(self, operation: str) -> NoReturn:
         once_within(
             self._ending.is_set, 2.0 * timing.PROGRAM_GONE_TIMEOUT + timing.PROCESS_END_TIMEOUT, timing.GUARD_PERIOD
         )
         if self.ended is not None:
             raise self.ended  # the guard was about to find the cause
-        raise DeviceFault("{device} did not accept {what}.", device=self.who, what=what)
+        raise DeviceFault("{device} did not accept {what}.", device=self.who, what=operation)
 
     def speed(
         self, command: str, velocities: list[float], acceleration: float, valid_for: float, stopped: Callable[[], bool]
@@ -321,13 +324,13 @@ class ControlSession:
         self.end(reason)
 
     def _send(
-        self, what: str, command: str, arguments: tuple[Any, ...], stopped: Callable[[], bool] = never
+        self, operation: str, command: str, arguments: tuple[Any, ...], stopped: Callable[[], bool] = never
     ) -> "Future[Any]":
         with self._lock:
             if self.ended is not None:
                 raise self.ended
             if stopped():
-                raise Cancelled("{what} was stopped before it started.", what=what)
+                raise Cancelled("{what} was stopped before it started.", what=operation)
             assert self._process is not None
             return self._process.request(command, arguments)
 

@@ -239,12 +239,12 @@ class SuctionGripper(Connected, Suction):
         return self.vacuum().value
 
     @contextlib.contextmanager
-    def _act(self, what: str) -> Iterator[GoOn]:
+    def _act(self, operation: str) -> Iterator[GoOn]:
         """Execute one action at a time; the value raises Cancelled after a stop, ConnectionLost after a loss."""
         if not self._acting.acquire(blocking=False):
             raise Refused("{gripper} is gripping or releasing already. Wait, or stop it.", gripper=self.name)
         try:
-            yield self.begin(what)
+            yield self.begin(operation)
         finally:
             self._acting.release()
 

@@ -76,9 +76,9 @@ class Controller:
         """Return whether the programs of both tasks are the motion servers."""
         return self.programs == PROGRAMS
 
-    def wrote(self, what: str) -> None:
+    def wrote(self, command: str) -> None:
         """Count a command that changed the state."""
-        self.writes[what] = self.writes.get(what, 0) + 1
+        self.writes[command] = self.writes.get(command, 0) + 1
 
     def motors(self, on: bool) -> bool:
         """Switch the motors; return False if the state does not allow it."""

@@ -56,8 +56,8 @@ def changes(
     return False, {name: thing["pose"] for name, thing in after.items() if _far(before[name]["pose"], thing["pose"])}
 
 
-def _appearance(thing: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in thing.items() if key != "pose"}
+def _appearance(board: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in board.items() if key != "pose"}
 
 
 def _far(one: dict[str, Any], other: dict[str, Any]) -> bool:

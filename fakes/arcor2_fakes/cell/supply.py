@@ -34,7 +34,7 @@ class Supply(Protocol):
         """Return the board in the view of a reader."""
         ...
 
-    def take(self, thing: Thing) -> None:
+    def take(self, board: Thing) -> None:
         """Remove a board."""
         ...
 
@@ -42,11 +42,11 @@ class Supply(Protocol):
         """Return whether a board released at a pose lands on the supply."""
         ...
 
-    def put(self, thing: Thing, world_from_board: Matrix) -> str | None:
+    def put(self, board: Thing, world_from_board: Matrix) -> str | None:
         """Put a board down; return the reason if there is no space."""
         ...
 
-    def pose(self, thing: Thing) -> Matrix | None:
+    def pose(self, board: Thing) -> Matrix | None:
         """Return the pose of a board; None if it has not arrived yet."""
         ...
 
@@ -79,25 +79,25 @@ class Magazine:
         """Return the top board if the pick place is in view."""
         return self.top() if window.holds(self._feeder.pose.matrix()) else None
 
-    def take(self, thing: Thing) -> None:
+    def take(self, board: Thing) -> None:
         """Remove a board; if it was the top one, the next one arrives after a while."""
-        if thing is self.top():
+        if board is self.top():
             self._refilled_at = self._now + self._feeder.refill_time
-        self._things.remove(thing)
+        self._things.remove(board)
 
     def accepts(self, world_from_board: Matrix) -> bool:
         """Return whether a board released at a pose lands at the pick place."""
         return self._feeder.holds(world_from_board)
 
-    def put(self, thing: Thing, world_from_board: Matrix) -> str | None:  # noqa: ARG002 - it slides to the pick place
+    def put(self, board: Thing, world_from_board: Matrix) -> str | None:  # noqa: ARG002 - it slides to the pick place
         """Put a board back."""
         if self.top() is not None:
             return "over the feeder, where there is already a board"
-        self._things.insert(0, thing)
+        self._things.insert(0, board)
         self._refilled_at = self._now
         return None
 
-    def pose(self, thing: Thing) -> Matrix | None:  # noqa: ARG002 - all boards are at one place
+    def pose(self, board: Thing) -> Matrix | None:  # noqa: ARG002 - all boards are at one place
         """Return the pick place."""
         return self._feeder.pose.matrix()
 
@@ -167,10 +167,10 @@ class BoardBelt:
         """Return the board in view."""
         return next((thing for thing, s in self._on if window.holds(self._pose(s))), None)
 
-    def take(self, thing: Thing) -> None:
+    def take(self, board: Thing) -> None:
         """Remove a board from the belt or the loader."""
-        self._on = [(other, s) for other, s in self._on if other is not thing]
-        self._loader = [other for other in self._loader if other is not thing]
+        self._on = [(other, s) for other, s in self._on if other is not board]
+        self._loader = [other for other in self._loader if other is not board]
 
     def accepts(self, world_from_board: Matrix) -> bool:
         """Return whether a board released at a pose lands on the belt."""
@@ -178,14 +178,14 @@ class BoardBelt:
         s = float(local[0, 3])
         return -self._belt.length <= s <= self._belt.tolerance.position and self._belt.tolerance.allows(local, s)
 
-    def put(self, thing: Thing, world_from_board: Matrix) -> str | None:
+    def put(self, board: Thing, world_from_board: Matrix) -> str | None:
         """Put a board on the belt."""
         s = min(float((self._belt.pose.inverse() @ world_from_board)[0, 3]), 0.0)
         if any(abs(s - other) < self._belt.board_length - _TOUCHING for _, other in self._on):
             return "onto a board that lies on the belt"
-        self._on = sorted([*self._on, (thing, s)], key=lambda placed: -placed[1])
+        self._on = sorted([*self._on, (board, s)], key=lambda placed: -placed[1])
         return None
 
-    def pose(self, thing: Thing) -> Matrix | None:
+    def pose(self, board: Thing) -> Matrix | None:
         """Return the pose of a board on the belt."""
-        return next((self._pose(s) for other, s in self._on if other is thing), None)
+        return next((self._pose(s) for other, s in self._on if other is board), None)

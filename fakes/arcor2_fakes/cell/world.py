@@ -152,57 +152,57 @@ class World:
                 thing, self._in_tester = self._in_tester, None
                 await self._hold(thing, layout.tester.pose.matrix(), "taken out of the tester")
 
-    async def _hold(self, thing: Thing, world_from_board: Matrix, why: str) -> None:
+    async def _hold(self, board: Thing, world_from_board: Matrix, reason: str) -> None:
         self._tip_from_board = np.linalg.inv(self._tip()) @ world_from_board
-        self._move(thing, "gripper", why)
+        self._move(board, "gripper", reason)
         await self._tell_sensor()
 
-    async def _let_go(self, why: str) -> None:
+    async def _let_go(self, reason: str) -> None:
         thing = self._held
         if thing is not None:
-            await self._fall(thing, self._tip() @ self._tip_from_board, why)
+            await self._fall(thing, self._tip() @ self._tip_from_board, reason)
             await self._tell_sensor()
 
-    async def _fall(self, thing: Thing, world_from_board: Matrix, why: str) -> None:
+    async def _fall(self, board: Thing, world_from_board: Matrix, reason: str) -> None:
         layout = self._layout
         if layout.tester.holds(world_from_board):
-            refused = await self._devices.put_into_tester(thing.board)
+            refused = await self._devices.put_into_tester(board.board)
             if refused is None:
-                self._in_tester = thing
-                self._move(thing, "tester", why)
+                self._in_tester = board
+                self._move(board, "tester", reason)
                 return
-            why = f"{why} over the tester, which did not take it: {refused}"
+            reason = f"{reason} over the tester, which did not take it: {refused}"
         elif layout.good_box.holds(world_from_board):
-            self._move(thing, "good", why)
+            self._move(board, "good", reason)
             return
         elif layout.bad_box.holds(world_from_board):
-            self._move(thing, "bad", why)
+            self._move(board, "bad", reason)
             return
         elif self._nest is not None and self._nest.holds(world_from_board):
             if self._nest.thing is None:
-                self._nest.thing = thing
-                self._move(thing, "label", why)
+                self._nest.thing = board
+                self._move(board, "label", reason)
                 return
-            why = f"{why} under the label printer, where there is already a board"
+            reason = f"{reason} under the label printer, where there is already a board"
         elif self._supply.accepts(world_from_board):
-            refused = self._supply.put(thing, world_from_board)
+            refused = self._supply.put(board, world_from_board)
             if refused is None:
-                self._move(thing, self._supply.place, why)
+                self._move(board, self._supply.place, reason)
                 return
-            why = f"{why} {refused}"
+            reason = f"{reason} {refused}"
         x, y, _ = world_from_board[:3, 3]
-        self._move(thing, "lost", why, (float(x), float(y), layout.table_height))
+        self._move(board, "lost", reason, (float(x), float(y), layout.table_height))
 
-    def _move(self, thing: Thing, place: str, why: str, position: tuple[float, float, float] | None = None) -> None:
+    def _move(self, board: Thing, place: str, reason: str, position: tuple[float, float, float] | None = None) -> None:
         if place == "gripper":
-            self._held = thing
-        elif thing is self._held:
+            self._held = board
+        elif board is self._held:
             self._held = None
-        thing.place, thing.position = place, position
-        self._note(thing, why)
+        board.place, board.position = place, position
+        self._note(board, reason)
 
-    def _note(self, thing: Thing, why: str) -> None:
-        thing.history.append(Event(self._now, thing.place, why))
+    def _note(self, board: Thing, reason: str) -> None:
+        board.history.append(Event(self._now, board.place, reason))
 
     # ------------------------------------------------------------------------------------------------ sensors
 
@@ -325,23 +325,23 @@ class World:
             **self._stations(),
         }
 
-    def pose(self, thing: Thing) -> Matrix | None:
+    def pose(self, board: Thing) -> Matrix | None:
         """Return the pose of a board; None if it has not arrived yet or was removed."""
-        if thing is self._held:
+        if board is self._held:
             held: Matrix = self._tip() @ self._tip_from_board
             return held
-        if thing.place in ("feeder", "belt"):
-            return self._supply.pose(thing)
+        if board.place in ("feeder", "belt"):
+            return self._supply.pose(board)
         layout = self._layout
         places = {"tester": layout.tester, "good": layout.good_box, "bad": layout.bad_box}
         if layout.labelling is not None:
             places["label"] = layout.labelling.place
-        if thing.place in places:
-            return places[thing.place].pose.matrix()
-        return None if thing.position is None else compose(thing.position, np.eye(3), np.ones(3))
+        if board.place in places:
+            return places[board.place].pose.matrix()
+        return None if board.position is None else compose(board.position, np.eye(3), np.ones(3))
 
-    def _position(self, thing: Thing) -> tuple[float, float, float] | None:
-        pose = self.pose(thing)
+    def _position(self, board: Thing) -> tuple[float, float, float] | None:
+        pose = self.pose(board)
         return None if pose is None else (float(pose[0, 3]), float(pose[1, 3]), float(pose[2, 3]))
 
     def seen(self) -> dict[str, dict[str, Any]]:

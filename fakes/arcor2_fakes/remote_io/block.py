@@ -107,25 +107,25 @@ class Block:
             self.history.append((at, number, on))
 
     # -------------------------------------------------------------------------------- watchdogs
-    def trigger(self, dog: Watchdog, number: int) -> None:
+    def trigger(self, watchdog: Watchdog, number: int) -> None:
         """Start or trigger a watchdog for the host with this number."""
-        dog.number = number
-        if dog.state is not WatchdogState.EXPIRED:
-            dog.state = WatchdogState.RUNNING if dog.time_ms and self.watchdogs_start else WatchdogState.OFF
-            dog.expires = self._clock() + dog.time_ms / 1000.0
+        watchdog.number = number
+        if watchdog.state is not WatchdogState.EXPIRED:
+            watchdog.state = WatchdogState.RUNNING if watchdog.time_ms and self.watchdogs_start else WatchdogState.OFF
+            watchdog.expires = self._clock() + watchdog.time_ms / 1000.0
 
-    def command(self, dog: Watchdog, command: int) -> None:
+    def command(self, watchdog: Watchdog, command: int) -> None:
         """Acknowledge an expired watchdog, or release one: safe state at once, then off."""
-        if command == RELEASE and dog.state is WatchdogState.RUNNING:
-            self._to_safe_state(dog, self._clock())
-        if command == RELEASE or (command == ACKNOWLEDGE and dog.state is WatchdogState.EXPIRED):
-            dog.state, dog.number = WatchdogState.OFF, 0
+        if command == RELEASE and watchdog.state is WatchdogState.RUNNING:
+            self._to_safe_state(watchdog, self._clock())
+        if command == RELEASE or (command == ACKNOWLEDGE and watchdog.state is WatchdogState.EXPIRED):
+            watchdog.state, watchdog.number = WatchdogState.OFF, 0
 
-    def _to_safe_state(self, dog: Watchdog, at: float) -> None:
+    def _to_safe_state(self, watchdog: Watchdog, at: float) -> None:
         for number in range(DIGITAL):
-            if dog.do_guarded & dog.do_switched & (1 << number):
+            if watchdog.do_guarded & watchdog.do_switched & (1 << number):
                 self._pulses.pop(number, None)
-                self._switch(number, on=bool(dog.do_safe & (1 << number)), at=at)
+                self._switch(number, on=bool(watchdog.do_safe & (1 << number)), at=at)
         for number in range(ANALOG_OUT):
-            if dog.ao_guarded & dog.ao_switched & (1 << number):
-                self.analog_outputs[number] = dog.ao_safe[number]
+            if watchdog.ao_guarded & watchdog.ao_switched & (1 << number):
+                self.analog_outputs[number] = watchdog.ao_safe[number]

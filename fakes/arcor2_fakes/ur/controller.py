@@ -191,9 +191,9 @@ class Controller:
             log.info("safety %s", self.safety.name)
         self.changed()
 
-    def protective_stop(self, why: str) -> None:
+    def protective_stop(self, reason: str) -> None:
         """Stop on the path, and pause the program until a person unlocks it."""
-        log.info("protective stop: %s", why)
+        log.info("protective stop: %s", reason)
         self._unlockable = self.cycles + round(UNLOCK_DELAY * self.time_scale * self.frequency)
         self._pause(protective=True)
         self._resumes = False
@@ -320,12 +320,12 @@ class Controller:
         log.info("program %s plays", program.name)
         self.changed()
 
-    def stop_program(self, why: str) -> None:
+    def stop_program(self, reason: str) -> None:
         """End the program, if there is one; the arm decelerates."""
         if self.program is None:
             return
-        log.info("program %s: %s", self.program.name, why)
-        if why != "ended":
+        log.info("program %s: %s", self.program.name, reason)
+        if reason != "ended":
             self.programs_killed += 1
         program, steps = self.program, self._steps
         self.program, self._steps, self._watchdog = None, None, None

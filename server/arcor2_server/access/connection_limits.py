@@ -129,10 +129,10 @@ class ConnectionLimits:
         self._note_drop("waiting connection dropped for a new one", oldest.address)
         oldest.drop()
 
-    def _note_drop(self, what: str, address: str) -> None:
+    def _note_drop(self, reason: str, address: str) -> None:
         self.dropped += 1
         if self.dropped & (self.dropped - 1) == 0:  # 1, 2, 4, 8 ...: an attack must not fill the log
-            log.warning(what, address=address, so_far=self.dropped, connections=len(self._open))
+            log.warning(reason, address=address, so_far=self.dropped, connections=len(self._open))
 
     def _add(self, connection: Connection) -> None:
         self._waiting.setdefault(connection.address, {})[connection] = None

@@ -133,13 +133,13 @@ class AlarmBook:
         return list(found.values())
 
     # -------------------------------------------------------------------------------- occurrences
-    def raised(self, what: Occurrence) -> list[AlarmRecord]:
+    def raised(self, occurrence: Occurrence) -> list[AlarmRecord]:
         """Handle an occurrence: open a record, or continue the open one of the same alarm or the same fault."""
-        if (entry := self._open(what.source, what.code)) is not None:
-            return self._again(entry, what)
-        if what.source and (entry := self._same_fault(what)) is not None:
-            return self._merge(entry, what)
-        return self._new(what)
+        if (entry := self._open(occurrence.source, occurrence.code)) is not None:
+            return self._again(entry, occurrence)
+        if occurrence.source and (entry := self._same_fault(occurrence)) is not None:
+            return self._merge(entry, occurrence)
+        return self._new(occurrence)
 
     def ended(self, source: str, code: str, at: Timestamp) -> list[AlarmRecord]:
         """Handle that a condition has ended."""
@@ -170,55 +170,57 @@ class AlarmBook:
                 return entry
         return None
 
-    def _again(self, entry: _Entry, what: Occurrence) -> list[AlarmRecord]:
+    def _again(self, entry: _Entry, occurrence: Occurrence) -> list[AlarmRecord]:
         record = entry.record
-        entry.last = what.stamp
-        context = _context(what)
-        if record.active or (what.momentary and entry.momentary and what.stamp - entry.stamp < SAME_FAULT_PERIOD):
+        entry.last = occurrence.stamp
+        context = _context(occurrence)
+        if record.active or (
+            occurrence.momentary and entry.momentary and occurrence.stamp - entry.stamp < SAME_FAULT_PERIOD
+        ):
             return [self._put(entry, **context)] if context.items() - _fields(record).items() else []
-        entry.momentary = what.momentary
+        entry.momentary = occurrence.momentary
         again = {"acknowledged": False, "acknowledged_by": UNSET, "acknowledged_at": UNSET, "count": record.count + 1}
-        state: dict[str, Any] = {} if what.momentary else {"active": True, "cleared": UNSET}
+        state: dict[str, Any] = {} if occurrence.momentary else {"active": True, "cleared": UNSET}
         return [self._put(entry, **context, **again, **state)]
 
-    def _same_fault(self, what: Occurrence) -> _Entry | None:
+    def _same_fault(self, occurrence: Occurrence) -> _Entry | None:
         """Return the open record of the same device that an occurrence belongs to, if any."""
         for entry in reversed(self._entries.values()):
             record = entry.record
-            if record.object_id != what.source or not record.retain:
+            if record.object_id != occurrence.source or not record.retain:
                 continue
-            if what.momentary and what.code in UNSPECIFIC and record.active and not entry.momentary:
+            if occurrence.momentary and occurrence.code in UNSPECIFIC and record.active and not entry.momentary:
                 return entry  # the active condition explains the error
-            near = entry.session is not None and abs(what.stamp - entry.stamp) <= SAME_FAULT_PERIOD
-            if not what.momentary and entry.momentary and near and record.code in UNSPECIFIC:
+            near = entry.session is not None and abs(occurrence.stamp - entry.stamp) <= SAME_FAULT_PERIOD
+            if not occurrence.momentary and entry.momentary and near and record.code in UNSPECIFIC:
                 return entry  # the device reports why the action failed
         return None
 
-    def _merge(self, entry: _Entry, what: Occurrence) -> list[AlarmRecord]:
-        if what.momentary:
-            return [self._put(entry, **_context(what))]
+    def _merge(self, entry: _Entry, occurrence: Occurrence) -> list[AlarmRecord]:
+        if occurrence.momentary:
+            return [self._put(entry, **_context(occurrence))]
         entry.momentary = False
-        entry.stamp = min(entry.stamp, what.stamp)
-        changed = self._put(entry, **_described(what), active=True, cleared=UNSET)
+        entry.stamp = min(entry.stamp, occurrence.stamp)
+        changed = self._put(entry, **_described(occurrence), active=True, cleared=UNSET)
         return self._regroup([changed], entry)
 
-    def _new(self, what: Occurrence) -> list[AlarmRecord]:
+    def _new(self, occurrence: Occurrence) -> list[AlarmRecord]:
         number = max(next(reversed(self._entries), 0), max(self.deleted, default=0)) + 1
-        active = not what.momentary
+        active = not occurrence.momentary
         record = AlarmRecord(
             number=number,
-            raised=what.at,
+            raised=occurrence.at,
             first_up=number,
-            object_id=what.source or UNSET,
-            object_name=what.name or UNSET,
-            object_type=what.object_type or UNSET,
+            object_id=occurrence.source or UNSET,
+            object_name=occurrence.name or UNSET,
+            object_type=occurrence.object_type or UNSET,
             active=active,
-            cleared=UNSET if active else what.at,
+            cleared=UNSET if active else occurrence.at,
             retain=True,
-            **_described(what),
-            **_context(what),
+            **_described(occurrence),
+            **_context(occurrence),
         )
-        entry = self._entries[number] = _Entry(record, what)
+        entry = self._entries[number] = _Entry(record, occurrence)
         changed = [self._put(entry)]
         while len(self._entries) > MAX_RECORDS and (oldest := self._deletable()) is not None:
             del self._entries[oldest]
@@ -305,22 +307,22 @@ def _fields(record: AlarmRecord) -> dict[str, Any]:
     return {"run": record.run, "action": record.action}
 
 
-def _context(what: Occurrence) -> dict[str, Any]:
+def _context(occurrence: Occurrence) -> dict[str, Any]:
     """Return the run and action of an occurrence, as far as they are known."""
-    return {name: value for name, value in (("run", what.run), ("action", what.action)) if value}
+    return {name: value for name, value in (("run", occurrence.run), ("action", occurrence.action)) if value}
 
 
-def _described(what: Occurrence) -> dict[str, Any]:
+def _described(occurrence: Occurrence) -> dict[str, Any]:
     """Return what a record states about its alarm. Texts of the declaration take precedence."""
-    kind = what.kind
-    text = Message.of(kind.text) if kind.text else what.text or Message.of(what.code)
-    remedy = Message.of(kind.remedy) if kind.remedy else what.remedy or Message.of("")
+    kind = occurrence.kind
+    text = Message.of(kind.text) if kind.text else occurrence.text or Message.of(occurrence.code)
+    remedy = Message.of(kind.remedy) if kind.remedy else occurrence.remedy or Message.of("")
     priority = kind.priority
-    if what.severity is not None and kind is UNDECLARED:
-        priority = PRIORITY_OF[what.severity]
+    if occurrence.severity is not None and kind is UNDECLARED:
+        priority = PRIORITY_OF[occurrence.severity]
     return {
         "kind": f"{kind.group}-{kind.number}",
-        "code": what.code,
+        "code": occurrence.code,
         "priority": priority,
         "category": kind.category,
         "text": text.text,
@@ -328,7 +330,7 @@ def _described(what: Occurrence) -> dict[str, Any]:
         "cause": kind.cause,
         "remedy": remedy.text,
         "remedy_message": remedy if remedy.values else UNSET,
-        "latching": kind.latching or kind.category is AlarmCategory.SAFETY or what.momentary,
+        "latching": kind.latching or kind.category is AlarmCategory.SAFETY or occurrence.momentary,
         "acknowledge": kind.acknowledge,
         "can_be_shelved": kind.can_be_shelved,
         "picture": kind.picture or UNSET,

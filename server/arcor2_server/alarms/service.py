@@ -83,21 +83,21 @@ class Alarms:
             await asyncio.gather(self._writing, return_exceptions=True)
 
     # -------------------------------------------------------------------------------- devices
-    def watch(self, board: DeviceBoard, what: str) -> None:
-        """Record the alarms of the devices of the online scene or of a program; `what` names which."""
-        board.on_report.append(lambda report: self._reported(board, what, report))
-        board.on_clear.append(lambda objects: self._gone(what, objects))
+    def watch(self, board: DeviceBoard, source: str) -> None:
+        """Record the alarms of the devices of the online scene or of a program; `source` names which."""
+        board.on_report.append(lambda report: self._reported(board, source, report))
+        board.on_clear.append(lambda objects: self._gone(source, objects))
 
     def _session(self) -> str:
         """Return the run or online scene to which alarms with the same cause belong."""
         return f"run {run}" if (run := self._run()) else "scene"
 
-    def _reported(self, board: DeviceBoard, what: str, report: DeviceChanged) -> None:
+    def _reported(self, board: DeviceBoard, source: str, report: DeviceChanged) -> None:
         try:
             device = board.object(report.object_id)
         except Arcor2Error:
             return  # the names are not known yet; the board repeats its reports then
-        key = (what, report.object_id)
+        key = (source, report.object_id)
         before = self._seen.get(key, set())
         alarms = {alarm.code: alarm for alarm in report.alarms}
         codes = set(alarms)
@@ -134,9 +134,9 @@ class Alarms:
         declared = self._kinds.declares(object_type, code)
         return declared and self._kinds.of_device(object_type, code).category is AlarmCategory.CONNECTION
 
-    def _gone(self, what: str, objects: list[str]) -> None:
+    def _gone(self, source: str, objects: list[str]) -> None:
         for object_id in objects:
-            self._seen.pop((what, object_id), None)
+            self._seen.pop((source, object_id), None)
         self._changed(self._book.all_ended(objects, now()))
 
     # -------------------------------------------------------------------------------- program and system
@@ -274,11 +274,11 @@ class Alarms:
         self._shelved.pop(number, None)
         self._changed(self._book.shelved(number, None, "", ""))
 
-    def _raised(self, what: Occurrence) -> None:
-        changed = self._book.raised(what)
+    def _raised(self, occurrence: Occurrence) -> None:
+        changed = self._book.raised(occurrence)
         for record in changed[:1]:  # the others have another first-up
             for notify in self.on_raised:
-                notify(record, what.stamp)
+                notify(record, occurrence.stamp)
         self._changed(changed)
 
     def _changed(self, records: list[AlarmRecord]) -> None:

@@ -98,13 +98,15 @@ class Conditions:
                 when=values,
             )
 
-    def _compared(self, node: int, what: Reference) -> tuple[str, str]:
+    def _compared(self, node: int, reference: Reference) -> tuple[str, str]:
         """Return the variable and the type of a compared value."""
-        if what.parameter:
-            return self._calls.frame.parameters[what.parameter], self._calls.frame.index.parameter(what.parameter).type
+        if reference.parameter:
+            return self._calls.frame.parameters[reference.parameter], self._calls.frame.index.parameter(
+                reference.parameter
+            ).type
         number = self._calls.nodes.actions[node]
-        if not self._calls.nodes.has_results(self._calls.natural, what.action, node):
-            raise self._calls.too_early(number, what.action)
-        returns = self._calls.returns(what.action)
-        kind = returns[what.output] if what.output < len(returns) else ""
-        return self._calls.result(number, what.action, what.output, kind), kind
+        if not self._calls.nodes.has_results(self._calls.natural, reference.action, node):
+            raise self._calls.too_early(number, reference.action)
+        returns = self._calls.returns(reference.action)
+        kind = returns[reference.output] if reference.output < len(returns) else ""
+        return self._calls.result(number, reference.action, reference.output, kind), kind

@@ -56,16 +56,16 @@ _AST: Final[dict[Operator, type[ast.cmpop]]] = {
 }
 
 
-def _comparison(variables: Sequence[str], one: Comparison) -> ast.expr:
+def _comparison(variables: Sequence[str], comparison: Comparison) -> ast.expr:
     variable, *others = variables
     if others:
-        return ast.Compare(name(variable), [_AST[one.operator]()], [name(others[0])])
-    if isinstance(one.value, bool):
-        return name(variable) if one.value else ast.UnaryOp(ast.Not(), name(variable))
-    if one.operator in RANGES:
-        above, below = (_AST[operator]() for operator in RANGES[one.operator])
-        return ast.Compare(_number(one.value), [above, below], [name(variable), _number(one.upper)])
-    return ast.Compare(name(variable), [_AST[one.operator]()], [_number(one.value)])
+        return ast.Compare(name(variable), [_AST[comparison.operator]()], [name(others[0])])
+    if isinstance(comparison.value, bool):
+        return name(variable) if comparison.value else ast.UnaryOp(ast.Not(), name(variable))
+    if comparison.operator in RANGES:
+        above, below = (_AST[operator]() for operator in RANGES[comparison.operator])
+        return ast.Compare(_number(comparison.value), [above, below], [name(variable), _number(comparison.upper)])
+    return ast.Compare(name(variable), [_AST[comparison.operator]()], [_number(comparison.value)])
 
 
 def _number(value: Value | None) -> ast.expr:

@@ -65,9 +65,9 @@ def _files_below(folder: Path) -> Iterator[Path]:
             yield path
 
 
-def _module_names(one: PackageType, folder: Path) -> tuple[str, str]:
+def _module_names(package_type: PackageType, folder: Path) -> tuple[str, str]:
     """Return the dotted names of a driver's folder and of the type's module in it ("" for the folder itself)."""
-    module = one.entry_point.partition(":")[0].split(".")
+    module = package_type.entry_point.partition(":")[0].split(".")
     for end in range(1, len(module) + 1):
         *between, last = module[end:] or [""]
         files = (folder.joinpath(*between, f"{last}.py"), folder.joinpath(*between, last, "__init__.py"))
@@ -76,55 +76,63 @@ def _module_names(one: PackageType, folder: Path) -> tuple[str, str]:
             return ".".join(module[:end]), ".".join(module[end:])
     raise InvalidProject(
         "object type {name}: its entry point {entry_point} is not in its folder {folder_name}",
-        name=one.name,
-        entry_point=one.entry_point,
+        name=package_type.name,
+        entry_point=package_type.entry_point,
         folder_name=folder.name,
     )
 
 
-def _check_imports(one: PackageType, path: Path, content: bytes, own: str) -> None:
+def _check_imports(package_type: PackageType, path: Path, content: bytes, own_name: str) -> None:
     """Raise InvalidProject if a driver imports itself by its full name, or a module outside of its folder.
 
     With such an import the package would run the installed code instead of its copy.
     """
-    if path.suffix != ".py" or one.folder is None:
+    if path.suffix != ".py" or package_type.folder is None:
         return
     imports = _imports(content)
-    if imports.level > len(path.relative_to(one.folder).parts):
+    if imports.level > len(path.relative_to(package_type.folder).parts):
         raise InvalidProject(
             "object type {name}: {path_name} imports from outside of the folder {folder_name}",
-            name=one.name,
+            name=package_type.name,
             path_name=path.name,
-            folder_name=one.folder.name,
+            folder_name=package_type.folder.name,
         )
-    vendor = own.partition(".")[0]
+    vendor = own_name.partition(".")[0]
     for name in imports.absolute:
-        if name == own or name.startswith(f"{own}.") or (vendor != "arcor2_hw" and name.partition(".")[0] == vendor):
+        if (
+            name == own_name
+            or name.startswith(f"{own_name}.")
+            or (vendor != "arcor2_hw" and name.partition(".")[0] == vendor)
+        ):
             raise InvalidProject(
                 "object type {name}: {path_name} imports {other_name}; a driver must import its own folder relatively",
-                name=one.name,
+                name=package_type.name,
                 path_name=path.name,
                 other_name=name,
             )
 
 
-def _import_module(one: PackageType, own: str, copied: str, inner: str, kinds: Iterable[Enumeration]) -> bytes:
+def _import_module(
+    package_type: PackageType, own_name: str, copied: str, inner: str, kinds: Iterable[Enumeration]
+) -> bytes:
     """Return a module that imports an installed type and the enumerations of its actions from the copied folder."""
     place = f".{copied}{'.' if inner else ''}{inner}"
-    imported = {one.entry_point.partition(":")[2] or one.name: place}
+    imported = {package_type.entry_point.partition(":")[2] or package_type.name: place}
     for kind in kinds:
-        inside = kind.module == own or kind.module.startswith(f"{own}.")
-        source = f".{copied}{kind.module.removeprefix(own)}" if inside else kind.module
+        inside = kind.module == own_name or kind.module.startswith(f"{own_name}.")
+        source = f".{copied}{kind.module.removeprefix(own_name)}" if inside else kind.module
         name = kind.name.partition(".")[0]
         if "." in kind.name and imported.get(name) == place:
             continue  # nested in the type itself
         if imported.setdefault(name, source) != source:
             raise InvalidProject(
                 "object type {name}: two parameter types of its actions have the name {other_name}",
-                name=one.name,
+                name=package_type.name,
                 other_name=name,
             )
-    about = docstring(f"{one.name} of {one.distribution} {one.version}, as it was when this package was built.")
+    about = docstring(
+        f"{package_type.name} of {package_type.distribution} {package_type.version}, as of the build of this package."
+    )
     lines = [f"from {source} import {name} as {name}" for name, source in imported.items()]
     return "\n".join([about, "", *lines, ""]).encode()
 

@@ -58,20 +58,20 @@ def _cross(a: Vector, b: Vector) -> Vector:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def overlap(one: Obstacle, other: Obstacle) -> bool:
+def overlap(first: Obstacle, second: Obstacle) -> bool:
     """Return whether two bodies overlap. A cylinder counts as the box around it."""
-    spheres = [each for each in (one, other) if isinstance(each.model, Sphere)]
+    spheres = [each for each in (first, second) if isinstance(each.model, Sphere)]
     if len(spheres) == 2:
         reach = math.fsum(each.model.radius for each in spheres if isinstance(each.model, Sphere))
-        return one.pose.position.distance_to(other.pose.position) < reach - _TOUCHING
+        return first.pose.position.distance_to(second.pose.position) < reach - _TOUCHING
     if spheres:
-        ball, block = (one, other) if isinstance(one.model, Sphere) else (other, one)
+        ball, block = (first, second) if isinstance(first.model, Sphere) else (second, first)
         assert isinstance(ball.model, Sphere)
         found = _block(block.model, block.pose)
         way = [a - b for a, b in zip(_vector(ball.pose.position), found.centre, strict=True)]
         beyond = [max(abs(_dot(way, axis)) - half, 0.0) for axis, half in zip(found.axes, found.half, strict=True)]
         return math.hypot(*beyond) < ball.model.radius - _TOUCHING
-    a, b = _block(one.model, one.pose), _block(other.model, other.pose)
+    a, b = _block(first.model, first.pose), _block(second.model, second.pose)
     way = [j - i for i, j in zip(a.centre, b.centre, strict=True)]
     crossed = (_cross(i, j) for i in a.axes for j in b.axes)
     for axis in (*a.axes, *b.axes, *crossed):  # the separating axis theorem
@@ -225,14 +225,14 @@ class _Walk:
                             other_zone=self.name(second.zone),
                         )
 
-    def _refuse_kept(self, action: str, robot: str, zone: str, other: str, other_action: str) -> None:
+    def _refuse_kept(self, action: str, robot: str, zone: str, second: str, other_action: str) -> None:
         raise InvalidProject(
             "Possible deadlock: {action!r} moves {robot} into {zone}, in which {other} stays after {other_action!r}. "
             "Let {other} leave it first.",
             action=action,
             robot=self.name(robot),
             zone=self.name(zone),
-            other=self.name(other),
+            other=self.name(second),
             other_action=other_action,
         )
 

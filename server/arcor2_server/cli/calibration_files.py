@@ -92,15 +92,15 @@ async def compute(task: Task[R]) -> R:
 
 
 @contextmanager
-def progress(what: str) -> Iterator[ProgressCallback]:
+def progress(label: str) -> Iterator[ProgressCallback]:
     """Show a progress bar on standard error if it is a terminal."""
     console = Console(stderr=True)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as shown:
-        bar = shown.add_task(what, total=1.0)
+        bar = shown.add_task(label, total=1.0)
 
         def on_progress(share: float, message: str) -> None:
-            shown.update(bar, completed=share, description=message or what)
+            shown.update(bar, completed=share, description=message or label)
 
         yield on_progress
 
@@ -111,9 +111,9 @@ def show_json(result: Any) -> None:
     sys.stdout.write(msgspec.json.format(msgspec.json.encode(result)).decode() + "\n")
 
 
-def pose_table(what: str, pose: Pose) -> Table:
+def pose_table(label: str, pose: Pose) -> Table:
     """Return a table with the position, the rotation angles and the quaternion of a pose."""
-    table = Table(what, "", box=None, pad_edge=False, show_header=True)
+    table = Table(label, "", box=None, pad_edge=False, show_header=True)
     x, y, z = (f"{1e3 * value:.2f}" for value in pose.position)
     table.add_row("position", f"x {x} mm   y {y} mm   z {z} mm")
     roll, pitch, yaw = (f"{math.degrees(value):.2f}" for value in angles(pose))

@@ -188,18 +188,20 @@ async def compare(
     return fail(f"{kind} diff", f"{old} and {new} differ in {len(found)} places", ExitStatus.DIFFERENT)
 
 
-def _show(one: Difference, names: dict[str, str]) -> None:
-    old, new = (("" if value is msgspec.UNSET else describe(value, names)) for value in (one.old, one.new))
+def _show(difference: Difference, names: dict[str, str]) -> None:
+    old, new = (
+        ("" if value is msgspec.UNSET else describe(value, names)) for value in (difference.old, difference.new)
+    )
     values = ""
-    if not isinstance(one.text, Unset):
+    if not isinstance(difference.text, Unset):
         values = ":"
-    elif one.change == "changed":
+    elif difference.change == "changed":
         values = f": {old} → {new}"
     elif old or new:
         values = f" ({old or new})"
-    entry = escape(printable(" › ".join(one.path) + values))
-    console().print(f"{_MARKS[one.change]} {entry}", soft_wrap=True)
-    for line in [] if isinstance(one.text, Unset) else one.text:
+    entry = escape(printable(" › ".join(difference.path) + values))
+    console().print(f"{_MARKS[difference.change]} {entry}", soft_wrap=True)
+    for line in [] if isinstance(difference.text, Unset) else difference.text:
         style, shown = _LINES.get(line[:1], ""), escape(_indented(line))
         console().print(f"    [{style}]{shown}[/]" if style else f"    {shown}", soft_wrap=True)
 

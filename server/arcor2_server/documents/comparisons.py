@@ -73,28 +73,28 @@ class Comparisons(NamedTuple):
     match: Match = Match.ALL
 
 
-def is_result(what: str) -> bool:
+def is_result(link: str) -> bool:
     """Return whether a compared value is the result of an action, not a project parameter."""
-    return "/" in what
+    return "/" in link
 
 
-def decoded(one: LogicComparison) -> tuple[Value, int | float | None]:
+def decoded(comparison: LogicComparison) -> tuple[Value, int | float | None]:
     """Return the value and the upper limit of a comparison; an empty text for one with another value.
 
     Raises:
         InvalidData: one of them is not JSON of a boolean, number or string, there is no limit where one is needed, or
             there is one next to another value.
     """
-    if not isinstance(one.other, Unset):
-        if one.value or not isinstance(one.upper, Unset) or one.operator in RANGES:
+    if not isinstance(comparison.other, Unset):
+        if comparison.value or not isinstance(comparison.upper, Unset) or comparison.operator in RANGES:
             raise InvalidData("A comparison with another value has no constants.")
         return "", None
     try:
-        value = msgspec.json.decode(one.value, type=bool | int | float | str)
-        upper = None if isinstance(one.upper, Unset) else msgspec.json.decode(one.upper, type=int | float)
+        value = msgspec.json.decode(comparison.value, type=bool | int | float | str)
+        upper = None if isinstance(comparison.upper, Unset) else msgspec.json.decode(comparison.upper, type=int | float)
     except msgspec.DecodeError:
-        raise InvalidData("A comparison has an invalid value: {value}.", value=one.value[:40]) from None
-    if (upper is None) == (one.operator in RANGES):
+        raise InvalidData("A comparison has an invalid value: {value}.", value=comparison.value[:40]) from None
+    if (upper is None) == (comparison.operator in RANGES):
         raise InvalidData("A range has two limits, any other comparison has one value.")
     return value, upper
 
@@ -214,12 +214,13 @@ def condition_key(item: LogicItem) -> object:
 def text_of(when: LogicWhen, name: Callable[[str], str]) -> str:
     """Return comparisons as text, such as `3 <= n < 7 and passed`; `name` returns the name of a compared value."""
 
-    def text(one: LogicComparison) -> str:
-        called = name(one.what)
-        if one.operator in RANGES:
-            above, below = RANGES[one.operator]
-            return f"{one.value} {above} {called} {below} {one.upper}"
-        return f"{called} {one.operator} {one.value if isinstance(one.other, Unset) else name(one.other)}"
+    def text(comparison: LogicComparison) -> str:
+        called = name(comparison.what)
+        if comparison.operator in RANGES:
+            above, below = RANGES[comparison.operator]
+            return f"{comparison.value} {above} {called} {below} {comparison.upper}"
+        other = comparison.value if isinstance(comparison.other, Unset) else name(comparison.other)
+        return f"{called} {comparison.operator} {other}"
 
     return (" and " if when.match is Match.ALL else " or ").join(map(text, when.comparisons))
 
@@ -239,17 +240,17 @@ def what_of(text: str) -> tuple[str, int] | str:
 
 
 # ------------------------------------------------------------------------------------------------ completeness
-def _holds(one: Comparison, values: Mapping[Reference, Value]) -> bool:
-    value = values[one.what]
-    limit = one.value if one.other is None else values[one.other]
-    match one.operator:
+def _holds(comparison: Comparison, values: Mapping[Reference, Value]) -> bool:
+    value = values[comparison.what]
+    limit = comparison.value if comparison.other is None else values[comparison.other]
+    match comparison.operator:
         case Operator.EQUAL:
             return value == limit
         case Operator.DIFFERENT:
             return value != limit
     assert isinstance(value, int | float), "only numbers are ordered"
     assert isinstance(limit, int | float), "only numbers are ordered"
-    match one.operator:
+    match comparison.operator:
         case Operator.LESS:
             return value < limit
         case Operator.LESS_EQUAL:
@@ -258,10 +259,10 @@ def _holds(one: Comparison, values: Mapping[Reference, Value]) -> bool:
             return value > limit
         case Operator.GREATER_EQUAL:
             return value >= limit
-    assert one.upper is not None, "a range has an upper limit"
-    above, below = RANGES[one.operator]
+    assert comparison.upper is not None, "a range has an upper limit"
+    above, below = RANGES[comparison.operator]
     return (value > limit or (above is Operator.LESS_EQUAL and value == limit)) and (
-        value < one.upper or (below is Operator.LESS_EQUAL and value == one.upper)
+        value < comparison.upper or (below is Operator.LESS_EQUAL and value == comparison.upper)
     )
 
 

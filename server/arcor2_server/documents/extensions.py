@@ -51,23 +51,23 @@ def keep_extensions(sent: Project, stored: Project) -> Project:
     variables = {parameter.id for parameter in stored.parameters if parameter.variable}
     steps = {item.id: item for item in logic if item.is_error_exit or item.has_comparisons}
 
-    def action(one: Action) -> Action:
-        if isinstance(one.error_output, Unset) and one.id in errors:
-            one = replace(one, error_output=errors[one.id])
-        if isinstance(one.retry, Unset) and one.id in retries:
-            one = replace(one, retry=retries[one.id])
-        elif one.retry and one.retry.count == 0:
-            one = replace(one, retry=UNSET)
-        if isinstance(one.branches, Unset) and one.id in branches:
-            one = replace(one, branches=branches[one.id])
-        return one
+    def action(action: Action) -> Action:
+        if isinstance(action.error_output, Unset) and action.id in errors:
+            action = replace(action, error_output=errors[action.id])
+        if isinstance(action.retry, Unset) and action.id in retries:
+            action = replace(action, retry=retries[action.id])
+        elif action.retry and action.retry.count == 0:
+            action = replace(action, retry=UNSET)
+        if isinstance(action.branches, Unset) and action.id in branches:
+            action = replace(action, branches=branches[action.id])
+        return action
 
-    def item(one: LogicItem) -> LogicItem:
-        if (known := steps.get(one.id)) is None:
-            return one
-        kinds = known.error_kinds if isinstance(one.error_kinds, Unset) else one.error_kinds
-        missing = isinstance(one.when, Unset) and isinstance(one.condition, Unset)
-        return replace(one, error_kinds=kinds, when=known.when if missing else one.when)
+    def item(item: LogicItem) -> LogicItem:
+        if (known := steps.get(item.id)) is None:
+            return item
+        kinds = known.error_kinds if isinstance(item.error_kinds, Unset) else item.error_kinds
+        missing = isinstance(item.when, Unset) and isinstance(item.condition, Unset)
+        return replace(item, error_kinds=kinds, when=known.when if missing else item.when)
 
     if variables:
         parameters = [

@@ -134,15 +134,15 @@ class _Copies:
     def _mapped(self, link: tuple[str, str, int]) -> str | None:
         return f"{self._ids[link[0]]}/{link[1]}/{link[2]}" if link[0] in self._ids else None
 
-    def _parameter(self, one: ActionParameter) -> ActionParameter:
-        if one.type != ActionParameterType.FUNCTION_PARAMETER:
-            return one
-        given = self._given.get(text_of(one))
+    def _parameter(self, parameter: ActionParameter) -> ActionParameter:
+        if parameter.type != ActionParameterType.FUNCTION_PARAMETER:
+            return parameter
+        given = self._given.get(text_of(parameter))
         if given is None:
             raise RequestRefused(
-                "{name} has no value for the parameter {parameter}.", name=self._call.name, parameter=text_of(one)
+                "{name} has no value for the parameter {parameter}.", name=self._call.name, parameter=text_of(parameter)
             )
-        return ActionParameter(one.name, given.type, given.value)
+        return ActionParameter(parameter.name, given.type, given.value)
 
     def logic(self, following: Sequence[LogicItem]) -> list[LogicItem]:
         """Return the logic of the copies. `following`: the logic items that leave the call."""

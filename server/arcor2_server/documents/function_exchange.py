@@ -247,10 +247,10 @@ class _FunctionImport:
             branches=mapped_branches(action, self._actions),
         )
 
-    def _parameter(self, one: ActionParameter) -> ActionParameter:
-        if one.type not in ("position", *_POINT_ITEMS, ActionParameterType.PROJECT_PARAMETER):
-            return one
-        return replace(one, value=encoded(self._ids[one.type, text_of(one)]))
+    def _parameter(self, parameter: ActionParameter) -> ActionParameter:
+        if parameter.type not in ("position", *_POINT_ITEMS, ActionParameterType.PROJECT_PARAMETER):
+            return parameter
+        return replace(parameter, value=encoded(self._ids[parameter.type, text_of(parameter)]))
 
     def _step(self, item: LogicItem) -> LogicItem:
         start, end = (

@@ -71,14 +71,14 @@ class Names:
 def with_links(action: Action, changed: Callable[[tuple[str, str, int]], str | None]) -> Action:
     """Return an action whose links are replaced where `changed` returns a replacement."""
 
-    def parameter(one: ActionParameter) -> ActionParameter:
-        if one.type != ActionParameterType.LINK:
-            return one
+    def parameter(parameter: ActionParameter) -> ActionParameter:
+        if parameter.type != ActionParameterType.LINK:
+            return parameter
         try:
-            link = changed(parse_link(text_of(one)))
+            link = changed(parse_link(text_of(parameter)))
         except (InvalidData, ValueError):
-            return one  # the checks report a malformed link
-        return one if link is None else replace(one, value=encoded(link))
+            return parameter  # the checks report a malformed link
+        return parameter if link is None else replace(parameter, value=encoded(link))
 
     return replace(action, parameters=[parameter(one) for one in action.parameters])
 
@@ -86,11 +86,11 @@ def with_links(action: Action, changed: Callable[[tuple[str, str, int]], str | N
 def with_condition(item: LogicItem, changed: Callable[[tuple[str, str, int]], str | None]) -> LogicItem:
     """Return a logic item whose condition refers to other results where `changed` returns a replacement."""
 
-    def link(what: str) -> str:
+    def link(value: str) -> str:
         try:
-            return changed(parse_link(what)) or what
+            return changed(parse_link(value)) or value
         except ValueError:
-            return what  # a project parameter, or malformed, which the checks report
+            return value  # a project parameter, or malformed, which the checks report
 
     if not isinstance(item.condition, Unset):
         item = replace(item, condition=ProjectLogicIf(link(item.condition.what), item.condition.value))

@@ -95,10 +95,10 @@ def update_parameter(
     return changes
 
 
-def _given(one: ActionParameter, name: str, wanted: str, value: Parameter | Unset) -> ActionParameter:
-    if one.name != name:
-        return one
-    source = one if isinstance(value, Unset) else value
+def _given(parameter: ActionParameter, name: str, wanted: str, value: Parameter | Unset) -> ActionParameter:
+    if parameter.name != name:
+        return parameter
+    source = parameter if isinstance(value, Unset) else value
     return ActionParameter(wanted, source.type, source.value)
 
 

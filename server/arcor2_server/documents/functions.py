@@ -170,15 +170,15 @@ class _Parameters:
         meta = action_meta(action, self._document, self._types)
         kinds = {each.name: each.type for each in meta.parameters}
 
-        def parameter(one: ActionParameter) -> ActionParameter:
-            if one.type == ActionParameterType.LINK:
-                source, flow, index = parse_link(text_of(one))
+        def parameter(parameter: ActionParameter) -> ActionParameter:
+            if parameter.type == ActionParameterType.LINK:
+                source, flow, index = parse_link(text_of(parameter))
                 if source in ids:
-                    return replace(one, value=encoded(f"{ids[source]}/{flow}/{index}"))
-            elif one.type not in EXTERNAL_VALUES:
-                return one
-            name = self._name(one, kinds[meta.present_name(one.name)])
-            return replace(one, type=ActionParameterType.FUNCTION_PARAMETER, value=encoded(name))
+                    return replace(parameter, value=encoded(f"{ids[source]}/{flow}/{index}"))
+            elif parameter.type not in EXTERNAL_VALUES:
+                return parameter
+            name = self._name(parameter, kinds[meta.present_name(parameter.name)])
+            return replace(parameter, type=ActionParameterType.FUNCTION_PARAMETER, value=encoded(name))
 
         return replace(
             action,

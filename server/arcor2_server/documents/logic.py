@@ -216,14 +216,14 @@ def _result(
 
 
 def _compared(
-    document: Document, meta_of: Callable[[Action], ObjectAction], what: str, function: str
+    document: Document, meta_of: Callable[[Action], ObjectAction], reference: str, function: str
 ) -> tuple[str, str]:
     """Return the name and the type of a compared value."""
-    if not is_result(what):
-        parameter = document.parameter(what)
+    if not is_result(reference):
+        parameter = document.parameter(reference)
         return parameter.name, parameter.type
     try:
-        link = parse_link(what)
+        link = parse_link(reference)
     except ValueError as error:
         raise InvalidData("The condition is malformed: {reason}.", reason=error) from None
     return _result(document, meta_of, link, function)

@@ -256,9 +256,9 @@ class DryRuns:
         return replace(prediction, trace=replace(trace, spans=spans), problem=problem)
 
 
-def _later(one: str, other: str) -> bool:
+def _later(timestamp: str, other: str) -> bool:
     """Return whether a timestamp is later than another."""
-    return datetime.fromisoformat(one) > datetime.fromisoformat(other)
+    return datetime.fromisoformat(timestamp) > datetime.fromisoformat(other)
 
 
 def _content(scene: Scene, project: Project) -> tuple[Any, ...]:

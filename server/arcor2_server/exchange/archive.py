@@ -317,9 +317,9 @@ def with_needed(names: Iterable[str], sources: Mapping[str, ObjectTypeSource]) -
     return dict(sorted(chosen.items()))
 
 
-def mesh_of(one: ObjectTypeSource) -> str | None:
+def mesh_of(source: ObjectTypeSource) -> str | None:
     """Return the id of the asset that the model of a type needs."""
-    if isinstance(one.model, Unset) or one.model.type is not Model3dType.MESH:
+    if isinstance(source.model, Unset) or source.model.type is not Model3dType.MESH:
         return None
-    model = one.model.model()
+    model = source.model.model()
     return model.asset_id if isinstance(model, Mesh) else None

@@ -74,10 +74,10 @@ def _project(project: Project) -> dict[str, Any]:
     return found | {"script": _Text(project.script)} if project.script else found
 
 
-def _type(one: ObjectTypeSource) -> dict[str, Any]:
-    model = UNSET if isinstance(one.model, Unset) else msgspec.to_builtins(one.model)
-    modules = {name: _Text(text) for name, text in one.own_modules.items()}
-    return {"source": _Text(one.source), "modules": modules, "model": model}
+def _type(source: ObjectTypeSource) -> dict[str, Any]:
+    model = UNSET if isinstance(source.model, Unset) else msgspec.to_builtins(source.model)
+    modules = {name: _Text(text) for name, text in source.own_modules.items()}
+    return {"source": _Text(source.source), "modules": modules, "model": model}
 
 
 class _Text(str):

@@ -17,16 +17,16 @@ from arcor2_hw.exceptions import Conflict, NotFound
 from arcor2_server.exchange.archive import Archive, AssetFile, mesh_of, with_needed
 
 
-def find_id(listed: Iterable[Listed], wanted: str, what: str, url: str) -> str:
+def find_id(listed: Iterable[Listed], wanted: str, kind: str, url: str) -> str:
     """Return the id of a document given by id or name. Raise NotFound, or Conflict if the name is not unique."""
     found = [one.id for one in listed if one.id == wanted] or [one.id for one in listed if one.name == wanted]
     if not found:
-        raise NotFound("the server at {url} has no {what} {wanted}", url=url, what=what, wanted=wanted)
+        raise NotFound("the server at {url} has no {what} {wanted}", url=url, what=kind, wanted=wanted)
     if len(found) > 1:
         raise Conflict(
             "{count} {what}s are named {wanted}: give an id: {found}",
             count=len(found),
-            what=what,
+            what=kind,
             wanted=wanted,
             found=", ".join(sorted(found)),
         )

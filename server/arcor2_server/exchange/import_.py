@@ -105,9 +105,9 @@ class Importer:
             if finding.level == "error":
                 raise InvalidPackage("{entry}: {text}", entry=finding.entry, text=finding.text)
 
-    def _check_overwrite(self, part: Part, what: str) -> None:
+    def _check_overwrite(self, part: Part, kind: str) -> None:
         if not {part, "all"} & set(self._overwrite):
-            self._conflicts.append(f"{what} exists and differs. Use --overwrite {part} to replace it.")
+            self._conflicts.append(f"{kind} exists and differs. Use --overwrite {part} to replace it.")
 
     def _note(self, kind: str, name: str, same: bool, new: bool, notice: str = "") -> None:
         step = Step("same" if same else "new" if new else "replaced", kind, name, notice)
@@ -233,11 +233,11 @@ class Importer:
             rollback.before_step(f"asset {key}", lambda: rest.upload_asset(key, copy, file_name=name, replace=True))
         await rest.upload_asset(key, asset.content, file_name=asset.file_name or key, replace=True)
 
-    async def _put_type(self, rollback: Rollback, one: ObjectTypeSource) -> None:
-        rest, name = self._rest, one.id
+    async def _put_type(self, rollback: Rollback, source: ObjectTypeSource) -> None:
+        rest, name = self._rest, source.id
         old = (await self._exporter.uploaded()).get(name)
         what = f"object type {name}"
-        model, old_model = _model(one), None if old is None else _model(old)
+        model, old_model = _model(source), None if old is None else _model(old)
         if model is not None:
             if old_model is None:
                 rollback.before_step(what, lambda: rest.delete_model(name))
@@ -248,7 +248,7 @@ class Importer:
             rollback.before_step(what, lambda: rest.delete_object_type(name))
         else:
             rollback.before_step(what, lambda: rest.put_object_type(name, old.source, old_model, old.own_modules))
-        await rest.put_object_type(name, one.source, model, one.own_modules)
+        await rest.put_object_type(name, source.source, model, source.own_modules)
 
     async def _put_scene(self, rollback: Rollback, scene: Scene) -> None:
         rest, old = self._rest, self._old_scene
@@ -281,8 +281,8 @@ class Importer:
         await rest.put_kept_overrides(key, archive.overrides)
 
 
-def _model(one: ObjectTypeSource) -> Models | None:
-    return None if isinstance(one.model, Unset) else one.model.model()
+def _model(source: ObjectTypeSource) -> Models | None:
+    return None if isinstance(source.model, Unset) else source.model.model()
 
 
 def _bases_first(types: dict[str, ObjectTypeSource]) -> list[str]:

@@ -13,9 +13,9 @@ class Rollback:
     def __init__(self) -> None:
         self._done: list[tuple[str, Callable[[], Awaitable[Any]]]] = []
 
-    def before_step(self, what: str, undo: Callable[[], Awaitable[Any]]) -> None:
+    def before_step(self, step: str, undo: Callable[[], Awaitable[Any]]) -> None:
         """Note a step before it is done, since its outcome is unknown if its answer is lost."""
-        self._done.append((what, undo))
+        self._done.append((step, undo))
 
     async def run(self) -> str:
         """Undo all steps in reverse order; return sentences that name what was undone, and what could not be undone."""

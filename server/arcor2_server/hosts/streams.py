@@ -39,9 +39,9 @@ class RobotStreams:
         self._rates: dict[tuple[str, str], dict[Connection, float]] = {}
         self._observers: dict[tuple[str, str], dict[str, tuple[float, Callable[[bytes], None]]]] = {}
 
-    def subscribe(self, client: Connection, robot_id: str, what: RobotEventKind, send: bool) -> None:
+    def subscribe(self, client: Connection, robot_id: str, kind: RobotEventKind, send: bool) -> None:
         """Start or stop a stream at the streaming period. Raise RequestRefused if it was not subscribed to."""
-        clients = self._subscribers.setdefault((robot_id, what), set())
+        clients = self._subscribers.setdefault((robot_id, kind), set())
         if send:
             clients.add(client)
         elif client not in clients:
@@ -50,30 +50,30 @@ class RobotStreams:
             clients.discard(client)
         self._update_host(robot_id)
 
-    def at_rate(self, client: Connection, robot_id: str, what: str, rate: float, send: bool) -> None:
+    def at_rate(self, client: Connection, robot_id: str, kind: str, rate: float, send: bool) -> None:
         """Start or stop a stream at `rate`, 1/s. Raise RequestRefused if it was not subscribed to."""
-        rates = self._rates.setdefault((robot_id, what), {})
+        rates = self._rates.setdefault((robot_id, kind), {})
         if send:
             rates[client] = rate
         elif rates.pop(client, None) is None:
             raise RequestRefused("This stream is not subscribed to.")
         self._update_host_rates(robot_id)
 
-    def observe(self, object_id: str, what: str, rate: float, receive: Callable[[bytes], None], *, owner: str) -> None:
+    def observe(self, object_id: str, kind: str, rate: float, receive: Callable[[bytes], None], *, owner: str) -> None:
         """Pass the encoded events of a stream at `rate`, 1/s, to another part of the server.
 
         It ends by `end_observing` or `clear`. `owner` names that part. A part that calls this again for the same
         stream replaces its rate and function.
         """
-        observers = self._observers.setdefault((object_id, what), {})
+        observers = self._observers.setdefault((object_id, kind), {})
         before = observers.get(owner)
         observers[owner] = rate, receive
         if before is None or before[0] != rate:
             self._update_host_rates(object_id)
 
-    def end_observing(self, object_id: str, what: str, *, owner: str) -> None:
+    def end_observing(self, object_id: str, kind: str, *, owner: str) -> None:
         """End what `observe` has started."""
-        if self._observers.get((object_id, what), {}).pop(owner, None) is not None:
+        if self._observers.get((object_id, kind), {}).pop(owner, None) is not None:
             self._update_host_rates(object_id)
 
     def publish(self, message: m.StreamEvent) -> None:

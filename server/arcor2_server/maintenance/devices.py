@@ -80,11 +80,11 @@ class Devices:
         await self._write()
 
     # -------------------------------------------------------------------------------- reports
-    def watch(self, board: DeviceBoard, what: str) -> None:
-        """Follow the devices of the online scene or of a program; `what` names which."""
+    def watch(self, board: DeviceBoard, source: str) -> None:
+        """Follow the devices of the online scene or of a program; `source` names which."""
         board.on_identified.append(self._identified)
-        board.on_report.append(lambda report: self._reported((what, report.object_id), report))
-        board.on_clear.append(lambda objects: self._gone(what, objects))
+        board.on_report.append(lambda report: self._reported((source, report.object_id), report))
+        board.on_clear.append(lambda objects: self._gone(source, objects))
 
     def _identified(self, message: m.DeviceIdentified) -> None:
         before = self._cards.get(message.object_id)
@@ -121,9 +121,9 @@ class Devices:
         else:
             self._disconnected(key)
 
-    def _gone(self, what: str, objects: Iterable[str]) -> None:
+    def _gone(self, source: str, objects: Iterable[str]) -> None:
         for object_id in objects:
-            self._disconnected((what, object_id))
+            self._disconnected((source, object_id))
 
     def _disconnected(self, key: tuple[str, str]) -> None:
         self._count(key)

@@ -253,11 +253,11 @@ class ObjectTypes(TypeCatalog):
                 "analysis cannot be stored, so the next start takes longer", file=str(file), reason=error.strerror
             )
 
-    def _missing_model(self, one: ObjectTypeSource, without_model: set[str]) -> Message | None:
+    def _missing_model(self, source: ObjectTypeSource, without_model: set[str]) -> Message | None:
         """Return the problem of a missing collision model or mesh, None if none is missing."""
-        if one.id in without_model:
-            return Message.of("its collision model {name} is missing", name=one.id)
-        mesh = UNSET if isinstance(one.model, Unset) else one.model.mesh
+        if source.id in without_model:
+            return Message.of("its collision model {name} is missing", name=source.id)
+        mesh = UNSET if isinstance(source.model, Unset) else source.model.mesh
         if isinstance(mesh, Unset) or self._assets.exists(mesh.asset_id):
             return None
         return Message.of("the mesh {name} of its collision model is missing", name=mesh.asset_id)

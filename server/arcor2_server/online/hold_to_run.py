@@ -326,10 +326,10 @@ class HoldToRun:
                           reason=reason)  # fmt: skip
         self._publish_teaching_end(robot_id, arm_id, text)
 
-    def _publish_teaching_end(self, robot_id: str, arm_id: str, why: Message) -> None:
+    def _publish_teaching_end(self, robot_id: str, arm_id: str, reason: Message) -> None:
         hub = self._hub
         hub.broadcast(make_event("HandTeachingMode", HandTeachingModeData(robot_id, False, arm_id or UNSET)))
-        notification = NotificationData(why.text, NotificationLevel.WARN, **why.translation())
+        notification = NotificationData(reason.text, NotificationLevel.WARN, **reason.translation())
         hub.broadcast(make_event("Notification", notification))
 
     def teaching_ended(self, message: m.HandTeachingEnded) -> None:

@@ -119,7 +119,9 @@ class Editing:
         if name in opened or await self._storage.name_taken(name):
             raise RequestRefused("A scene or project called {name} already exists. Choose another name.", name=name)
 
-    def require_name_free(self, kind: Kind, name: str, what: str, parent: str = "") -> None:
+    def require_name_free(self, kind: Kind, name: str, description: str, parent: str = "") -> None:
         """Raise RequestRefused if an item of this kind, of the action point `parent` if given, has the name."""
         if self._session.document.named(kind, name, parent) is not None:
-            raise RequestRefused("There is already {what} called {name}. Choose another name.", what=what, name=name)
+            raise RequestRefused(
+                "There is already {what} called {name}. Choose another name.", what=description, name=name
+            )

@@ -258,11 +258,11 @@ class AssetStore:
         return self._records / f"{hashlib.sha256(key.encode()).hexdigest()}.json"
 
     @contextlib.contextmanager
-    def _storage_errors(self, what: Literal["use", "read", "write"]) -> Iterator[None]:
+    def _storage_errors(self, operation: Literal["use", "read", "write"]) -> Iterator[None]:
         try:
             yield
         except OSError as error:
-            text = _FAILED[what]
+            text = _FAILED[operation]
             raise StorageError(text, str(error), directory=self._directory, reason=error.strerror) from error
 
 

@@ -171,7 +171,7 @@ class Database:
         if (loaded := session.identity_map.get(mapper.identity_key_from_instance(row))) is not None:
             session.expire(loaded)
 
-    def _failed(self, what: str, error: SQLAlchemyError) -> Arcor2Error:
+    def _failed(self, operation: str, error: SQLAlchemyError) -> Arcor2Error:
         cause = getattr(error, "orig", None) or error
         if isinstance(cause, Arcor2Error):  # a value was refused
             return cause
@@ -183,14 +183,18 @@ class Database:
         if isinstance(error, DataError):
             return InvalidData("A value does not fit into the database: {cause}.", detail=str(error), cause=cause)
         return StorageError(
-            "cannot {what} the database {place}: {cause}", detail=str(error), what=what, place=self.place, cause=cause
+            "cannot {what} the database {place}: {cause}",
+            detail=str(error),
+            what=operation,
+            place=self.place,
+            cause=cause,
         )
 
     @staticmethod
-    async def one(session: AsyncSession, table: type[Any], key: str, what: str) -> Any:
-        """Return the row with a key. Raise NotFound naming `what` if there is none."""
+    async def one(session: AsyncSession, table: type[Any], key: str, kind: str) -> Any:
+        """Return the row with a key. Raise NotFound naming `kind` if there is none."""
         if (row := await session.get(table, key)) is None:
-            raise NotFound("The {what} {key!r} does not exist.", what=what, key=key)
+            raise NotFound("The {what} {key!r} does not exist.", what=kind, key=key)
         return row
 
     async def with_ids(self, table: type[Any], keys: Sequence[str], decode: Any) -> list[Any]:

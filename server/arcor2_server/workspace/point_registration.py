@@ -22,20 +22,20 @@ class Fit(Data, frozen=True):
     worst: float
 
 
-def check_points(points: Sequence[Position], what: str) -> None:
+def check_points(points: Sequence[Position], name: str) -> None:
     """Raise InvalidData unless there are at least three points that are not in one line."""
     import numpy as np  # imported here, since it delays the start of the server by 0.1 s
 
     if len(points) < MIN_POINTS:
         raise InvalidData(
-            "{what}: at least {fewest} points are needed, not {count}.", what=what, fewest=MIN_POINTS, count=len(points)
+            "{what}: at least {fewest} points are needed, not {count}.", what=name, fewest=MIN_POINTS, count=len(points)
         )
     array = np.array([tuple(point) for point in points])
     if not np.isfinite(array).all():
-        raise InvalidData("{what}: a coordinate is not a finite number.", what=what)
+        raise InvalidData("{what}: a coordinate is not a finite number.", what=name)
     extent = np.linalg.svd(array - array.mean(axis=0), compute_uv=False)
     if extent[0] < MIN_DISTANCE or extent[1] < max(MIN_DISTANCE, MIN_WIDTH_RATIO * extent[0]):
-        raise InvalidData("{what}: the points are in one line or in one place and do not determine a pose.", what=what)
+        raise InvalidData("{what}: the points are in one line or in one place and do not determine a pose.", what=name)
 
 
 def fit(on_object: Sequence[Position], touched: Sequence[Position]) -> Fit:

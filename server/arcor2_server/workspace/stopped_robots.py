@@ -61,6 +61,6 @@ class StoppedRobots:
             return []
 
 
-def _differ(one: list[Joint], other: list[Joint]) -> bool:
-    values = {joint.name: joint.value for joint in one}
-    return len(one) != len(other) or any(abs(values.get(j.name, 1e9) - j.value) > STANDSTILL for j in other)
+def _differ(first: list[Joint], second: list[Joint]) -> bool:
+    values = {joint.name: joint.value for joint in first}
+    return len(first) != len(second) or any(abs(values.get(j.name, 1e9) - j.value) > STANDSTILL for j in second)

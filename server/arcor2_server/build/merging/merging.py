@@ -101,8 +101,8 @@ def merged(scene: Scene, project: Project, types: Mapping[str, TypeFacts], tree_
 
 
 def _with_sorted_parameters(project: Project) -> Project:
-    def action(one: Action) -> Action:
-        return replace(one, parameters=sorted(one.parameters, key=lambda each: each.name))
+    def action(action: Action) -> Action:
+        return replace(action, parameters=sorted(action.parameters, key=lambda each: each.name))
 
     points, functions = (
         [replace(one, actions=[action(each) for each in one.actions]) for one in of]
@@ -231,8 +231,8 @@ def _imports(parts: _Parts, generated: Sequence[ast.ImportFrom]) -> list[Edit]:
     return edits
 
 
-def _alias(one: ast.alias) -> tuple[str, str]:
-    return one.name, one.asname or one.name
+def _alias(alias: ast.alias) -> tuple[str, str]:
+    return alias.name, alias.asname or alias.name
 
 
 def _imported(statement: Statement) -> list[tuple[str, str, str]]:

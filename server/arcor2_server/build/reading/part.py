@@ -322,8 +322,8 @@ class Part:
         ]
         return LogicItem("", end, when=LogicWhen(comparisons, test.match))
 
-    def _link(self, what: Reference) -> str:
-        return what.parameter or f"{self.ids[what.action]}/default/{what.output}"
+    def _link(self, reference: Reference) -> str:
+        return reference.parameter or f"{self.ids[reference.action]}/default/{reference.output}"
 
     def _logic_if(self, condition: Condition) -> ProjectLogicIf:
         return ProjectLogicIf(f"{self.ids[condition.action]}/default/{condition.output}", json_of(condition.value))

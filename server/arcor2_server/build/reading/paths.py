@@ -255,5 +255,5 @@ class LoopReader:
         return (others, holds) if negated else (holds, others)
 
 
-def _same_result(one: Test, other: Test) -> bool:
-    return isinstance(one, Condition) and isinstance(other, Condition) and one[:2] == other[:2]
+def _same_result(test: Test, other: Test) -> bool:
+    return isinstance(test, Condition) and isinstance(other, Condition) and test[:2] == other[:2]

@@ -97,11 +97,11 @@ class Scope:
                 raise NotUnderstood(line, "{name} is already defined in line {row}", name=name, row=lines[name])
         self._lines[name] = line
 
-    def kind(self, what: Reference) -> str:
+    def kind(self, reference: Reference) -> str:
         """Return the type of a compared value."""
-        if what.parameter:
-            return next(kind for key, kind in self.values.parameters.values() if key == what.parameter)
-        return self.calls[what.action].declared.returns[what.output]
+        if reference.parameter:
+            return next(kind for key, kind in self.values.parameters.values() if key == reference.parameter)
+        return self.calls[reference.action].declared.returns[reference.output]
 
     def kinds(self, conditions: Iterable[Comparisons]) -> dict[Reference, str]:
         """Return the types of the values that conditions compare."""

@@ -8,20 +8,20 @@ from arcor2_hw.exceptions import InvalidData
 from arcor2_hw.messages import Message
 
 
-def check_name(name: str, what: str) -> None:
-    """Raise InvalidData for a name that is not valid in a program; `what` is what it names ("action point")."""
+def check_name(name: str, kind: str) -> None:
+    """Raise InvalidData for a name that is not valid in a program; `kind` is what it names ("action point")."""
     if not is_valid_name(name):
         raise InvalidData(
             "{name!r} cannot name {item}: use letters, digits and _, no digit first, no Python keyword.",
             name=name,
-            item=f"an {what}" if what[0] in "aeiou" else f"a {what}",
+            item=f"an {kind}" if kind[0] in "aeiou" else f"a {kind}",
         )
 
 
-def duplicate_names(names: Iterable[str], what: str) -> list[Message]:
-    """Return a problem for each name that occurs more than once; `what` is what the names name ("action point")."""
+def duplicate_names(names: Iterable[str], kind: str) -> list[Message]:
+    """Return a problem for each name that occurs more than once; `kind` is what the names name ("action point")."""
     return [
-        Message.of("More than one {what} is named {name}.", what=what, name=name)
+        Message.of("More than one {what} is named {name}.", what=kind, name=name)
         for name, count in Counter(names).items()
         if count > 1
     ]
