@@ -60,7 +60,7 @@ def one_of(name: str, value: T, allowed: Collection[T]) -> T:
 
 
 def within(name: str, value: N, least: float, most: float) -> N:
-    """Return a number given to a command. Raise `ValueError` unless it is in a range."""
+    """Return a numeric argument of a command. Raise `ValueError` if it is outside of the range."""
     if not least <= value <= most:
         raise ValueError(f"{name} must be {least} to {most}")
     return value
@@ -121,7 +121,7 @@ class ControlServer:
         except ConnectionError:
             pass  # the client has disconnected
         except asyncio.CancelledError:
-            pass  # by `close`; the stream server would log it as an error
+            pass  # cancelled by `close`; the stream server would log that as an error
         finally:
             self._sessions.discard(session)
             session.end()
@@ -268,12 +268,15 @@ class ControlClient:
         try:
             async with asyncio.timeout(within):
                 reader, writer = await asyncio.open_connection(host, port, limit=MAX_LINE)
-        except OSError as e:  # TimeoutError is one
+        except OSError as e:  # TimeoutError is an OSError
             raise ControlError(f"control channel {address}: {str(e) or 'timed out'}") from e
         return cls(address, reader, writer)
 
     async def do(self, command: str, within: float = 10.0, **arguments: Any) -> Any:
-        """Execute a command and return its data. Raise `ControlError` if it is refused, late, or the channel closed."""
+        """Execute a command and return its data.
+
+        Raise `ControlError` if it is refused, late, or the channel is closed.
+        """
         if self._closed.is_set():
             raise ControlError(f"{command}: the control channel {self.address} is closed")
         number = next(self._numbers)
@@ -346,7 +349,10 @@ class BlockingControlClient:
             raise ControlError(f"control channel {address}: {e}") from e
 
     def do(self, command: str, within: float = 10.0, **arguments: Any) -> Any:
-        """Execute a command and return its data. Raise `ControlError` if it is refused, late, or the channel closed."""
+        """Execute a command and return its data.
+
+        Raise `ControlError` if it is refused, late, or the channel is closed.
+        """
         number = next(self._numbers)
         deadline = time.monotonic() + within
         try:

@@ -58,7 +58,7 @@ class LockedFolder:
 def remove_leftovers(directory: Path, prefix: str) -> None:
     """Remove the locked folders of processes that were killed. Arguments as of LockedFolder."""
     for path in directory.glob(f"{prefix}*"):
-        with contextlib.suppress(OSError):  # in use, or of another user
+        with contextlib.suppress(OSError):  # the folder is in use, or belongs to another user
             lock = os.open(path, os.O_RDONLY)
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -74,7 +74,7 @@ class Command:
 
 
 class ArmLine:
-    """Connection to one arm's motion server. `ended` is None while it lives, then the reason."""
+    """Connection to one arm's motion server. `ended` is None, or the reason of its end."""
 
     def __init__(self, name: str, arm: str, host: str, port: int, on_ended: Callable[[DeviceError], None]) -> None:
         self.arm = arm
@@ -137,7 +137,7 @@ class ArmLine:
             raise
 
     def end(self, reason: DeviceError, wait: bool = True) -> None:
-        """Close the connection, unless it has ended; the server then stops its arm."""
+        """Close the connection if it is open. The server then stops its arm."""
         if self.ended is None:
             self.ended = reason
         self._over.set()
@@ -186,7 +186,7 @@ class ArmLine:
 
     # -------------------------------------------------------------------------------- commands
     def ask(self, code: Code, *values: float, within: float = ANSWER_TIMEOUT) -> tuple[float, ...]:
-        """Return the values of the server's answer. Raise DeviceTimeout, CommandRefused or why it ended."""
+        """Return the values of the server's answer. Raise DeviceTimeout, CommandRefused or the reason of the end."""
         with self._asking:
             if self._motion is not None:
                 raise Refused("{device} is moving. Its server answers at standstill.", device=self.who)
@@ -204,7 +204,7 @@ class ArmLine:
         )
 
     def start(self, code: Code, *values: float, stopped: Callable[[], bool]) -> Command | None:
-        """Start a motion, unless `stopped` returns True; then return None. Poll it to its end, then `forget` it."""
+        """Start a motion. Return None if `stopped` returns True. Poll the command to its end, then `forget` it."""
         with self._asking:
             if stopped():
                 return None
@@ -218,7 +218,10 @@ class ArmLine:
             self._motion = None
 
     def poll(self, command: Command, wait: float) -> Answer | None:
-        """Return the next answer to a command, None if none comes in `wait` s. Raise why the connection ended."""
+        """Return the next answer to a command, None if none comes in `wait` s.
+
+        Raise the reason if the connection ended.
+        """
         with contextlib.suppress(queue.Empty):
             return command.answers.get(timeout=wait)
         if self.ended is not None:
@@ -226,7 +229,7 @@ class ArmLine:
         return None
 
     def checked(self, found: Answer, command: Command) -> Answer:
-        """Return an answer with status DONE. Raise CommandRefused or DeviceFault for another one."""
+        """Return an answer with status DONE. Raise CommandRefused or DeviceFault for another status."""
         if found.status == Status.DONE:
             return found
         try:
@@ -321,7 +324,7 @@ class ArmLine:
         if not from_watch:
             command = self._waiting.get(found.sequence)
             if command is not None and command.code == found.code:
-                command.answers.put(found)  # any other is late: its command was dropped
+                command.answers.put(found)  # other answers are late: their command was dropped
             return
         self._silent = RunningTime()
         if found.code == Code.STOP and found.status == Status.DONE:

@@ -14,10 +14,10 @@ from .observer import UNITS, Sample
 from .settings import ARMS, YumiSettings
 
 JOINTS: Final = {arm: tuple(f"{unit}_{number}" for number in range(1, 8)) for arm, unit in UNITS.items()}
-"""Axes 1 to 7 of each mechanical unit; 7 is the one between 2 and 3, eax_a on the wire."""
+"""Axes 1 to 7 of each mechanical unit. Axis 7, eax_a on the wire, is between axes 2 and 3."""
 JOINT_LIMITS: Final = {arm: dict(zip(names, LIMITS, strict=True)) for arm, names in JOINTS.items()}
 LIMIT_TOLERANCE: Final = 1e-4
-"""Rounding error on the wire of a joint at its limit, rad."""
+"""Rounding error of a transmitted joint value at its limit, rad."""
 
 
 def other_arm(arm: str) -> str:
@@ -26,7 +26,7 @@ def other_arm(arm: str) -> str:
 
 
 class Arms:
-    """Both arms, as the parts of the driver share them."""
+    """Data of both arms that the parts of the driver share."""
 
     def __init__(self, robot: MultiArmRobot, settings: YumiSettings) -> None:
         self._robot = robot
@@ -45,7 +45,7 @@ class Arms:
         return self.pose * sample.targets[arm].pose * self.tools[arm]
 
     def one(self, arm_id: str | None) -> str:
-        """Return the arm. Raise InvalidData if none is named, NotFound for an unknown one."""
+        """Return the id of the arm. Raise InvalidData without an id, NotFound for an unknown one."""
         if arm_id is None:
             raise InvalidData("{name} has two arms. Specify one of {arms}.", name=self.name, arms=", ".join(ARMS))
         if arm_id not in ARMS:

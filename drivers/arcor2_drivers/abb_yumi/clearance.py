@@ -24,7 +24,7 @@ AXES: Final = (1, 3, 4, 6)
 ANGLE_STEP: Final = 0.05
 """Joint angle between two checked positions, rad."""
 MAX_APPROACH: Final = 0.002
-"""Distance by which arms that are too close already may approach further while they separate, m."""
+"""Maximum further approach of arms that are too close and are separating, m."""
 MAX_TIMING_ERROR: Final = 0.05
 """Fraction of a synchronized path by which one arm may be ahead of the other."""
 

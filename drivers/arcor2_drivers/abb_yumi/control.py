@@ -1,4 +1,4 @@
-"""Control: taking and releasing control of both arms, power, hand teaching, and why control ended."""
+"""Control: taking and releasing control of both arms, power, hand teaching, and reasons for the end of control."""
 
 import contextlib
 import logging
@@ -163,7 +163,7 @@ class Control:
 
     @property
     def rws(self) -> Rws:
-        """Return the commanding session with the controller; another one observes."""
+        """Return the session that commands the controller. Another session observes it."""
         if self._rws is None:
             each = self._arms.settings
             self._rws = Rws(self._arms.name, each.host, each.rws_port, each.user, each.password)
@@ -224,7 +224,7 @@ class Control:
         if not self._mastership or rws is None or not self._observer.observing.online:
             return
         if not release_mastership(rws, "rapid"):
-            return  # it is still ours; the next call releases it
+            return  # we still have mastership; the next call releases it
         self._mastership = False
         if (known := self._observer.known_panel) is not None:
             self._observer.note(known._replace(holder=None))
@@ -234,7 +234,7 @@ class Control:
         with contextlib.suppress(DeviceError):
             self._release_mastership()
 
-    # -------------------------------------------------------------------------------- state, and why control ended
+    # -------------------------------------------------------------------------------- state and end of control
     def safety(self, sample: Sample) -> Safety:
         """Return the safety state of a sample; a collision counts until it is acknowledged or RAPID runs again."""
         panel = self._observer.known_panel
@@ -242,7 +242,7 @@ class Control:
         return safety_of(sample.control_state, collided and not sample.running)
 
     def program_state(self, sample: Sample, panel: Panel) -> ProgramState:
-        """Return whether RAPID runs, and whether the program is ours."""
+        """Return whether RAPID runs, and whether it runs our program."""
         if not sample.running:
             return ProgramState.STOPPED
         return ProgramState.PLAYING if panel.ours else ProgramState.FOREIGN
@@ -317,7 +317,10 @@ class Control:
         return newest.get("code", ""), newest.get("title", "")
 
     def explained(self, error: DeviceError) -> DeviceError:
-        """Return why the connection to an arm ended: a stop of the controller explains more than a closed socket."""
+        """Return the reason for the end of a connection.
+
+        A stop of the controller takes precedence over a closed socket.
+        """
         if not isinstance(error, (ConnectionLost, NotInControl)):
             return error
         session = self.session
@@ -362,7 +365,7 @@ class Control:
         return bool(self._observer.panel().lead_through[arm])
 
     def set_teaching(self, arm: str, enabled: bool, moving: bool) -> None:
-        """Make an arm movable by hand, or stiff again. Raise Refused while an arm moves, or without lead-through."""
+        """Enable or disable moving an arm by hand. Raise Refused while an arm moves, or without lead-through."""
         self.current()
         if self._observer.panel().lead_through[arm] is None:
             raise Refused(
@@ -373,7 +376,7 @@ class Control:
         self._set_lead_through(arm, enabled)
 
     def check_stiff(self, arm: str) -> None:
-        """Raise Refused while an arm, or the other one, from which it must keep clear, is moved by hand."""
+        """Raise Refused while this arm or the other arm is moved by hand."""
         lead_through = self._observer.panel().lead_through
         if lead_through[arm]:
             raise Refused("The {arm} arm of {name} is in hand teaching mode.", arm=arm, name=self._arms.name)

@@ -1,4 +1,4 @@
-"""Conversion of units to those of the controller: m to mm, rad to degrees, quaternions x, y, z, w to q1 (= w) to q4.
+"""Conversion to units of the controller: m to mm, rad to degrees, quaternions from x, y, z, w to q1 (= w), ..., q4.
 
 Poses on the wire are in the controller's world frame (wobj0), which is also the frame of the object in the scene: its
 origin is at the foot of the robot, on the table; x points forward, z up.
@@ -21,7 +21,7 @@ class Configuration(NamedTuple):
 
 
 class RobTarget(NamedTuple):
-    """A pose, with configuration and arm angle (rad), which make the joints unambiguous."""
+    """A pose with configuration and arm angle (rad), which determine the joints uniquely."""
 
     pose: Pose
     configuration: Configuration

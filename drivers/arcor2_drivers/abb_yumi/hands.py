@@ -57,7 +57,7 @@ class Hands:
 
     @action
     def calibrate_gripper(self, arm: ArmId = ArmId.LEFT, *, an: str | None = None) -> None:
-        """Close the empty fingers to find their zero; needed once after the controller was started.
+        """Close the empty fingers to find their zero. Needed once after each start of the controller.
 
         :param arm: which arm
         """

@@ -44,9 +44,9 @@ RAMP_TIME: Final = 0.2
 DURATION_FACTOR: Final = 1.5
 """Factor on the computed time of a motion."""
 DURATION_MARGIN: Final = 3.0
-"""Time added to that, s."""
+"""Time added to the computed time of a motion, s."""
 MIN_SPEED_OVERRIDE: Final = 0.05
-"""Lowest speed override that extends the time of a motion in full."""
+"""Minimum speed override that extends the time limit of a motion; lower ones count as this value."""
 STANDSTILL_TIMEOUT: Final = 2.0
 """Time after which a stopped arm must be at standstill, s; from full speed it takes 0.2 s."""
 STOP_REPEAT_INTERVAL: Final = 0.15
@@ -169,7 +169,7 @@ class Motion:
                 for arm in ARMS:
                     commands[arm] = self._start(session, arm, guards[arm], Code.MOVE_TOGETHER, meeting, duration)
             except DeviceError:
-                for arm, command in commands.items():  # it waits for its partner, and must not start later
+                for arm, command in commands.items():  # this arm waits for the other one, and must not start later
                     session.lines[arm].stop()
                     session.lines[arm].forget(command)
                 raise
@@ -188,7 +188,7 @@ class Motion:
             yield
 
     def _paths(self, arm: str, start: Array, flanges: list[Pose], goal: list[float]) -> list[Array]:
-        """Return the joint paths of lines through flange poses (robot's frame), and of all axes moving together."""
+        """Return joint paths for motions to flange poses (robot's frame): in lines, or with all axes together."""
         paths, at = [joint_path(start, np.array(goal))], start
         for flange in flanges:
             path = nominal.straight(arm, at, flange.matrix())
@@ -204,7 +204,7 @@ class Motion:
         return paths
 
     def _claim(self, arm: str, paths: list[Array]) -> None:
-        """Raise Refused if paths lead too close to the other arm; else reserve them."""
+        """Reserve paths. Raise Refused if they lead too close to the other arm."""
         self.clearance.claim(arm, np.vstack(paths), self._kinematics.present(other_arm(arm)))
 
     def _send_speed(self, session: ControlSession, arm: str, speed: float) -> None:
@@ -340,7 +340,7 @@ class Motion:
         )
 
     def _await_rest(self, arms: tuple[str, ...]) -> None:
-        """Wait for standstill of arms that were ours; without observation the watchdog stops them."""
+        """Wait until the arms that we controlled are at standstill. Without observation the watchdog stops them."""
         newest, panel = self._observer.newest(), self._observer.known_panel
         if newest is None or panel is None or not panel.ours or not self._observer.observing.online:
             return
@@ -363,7 +363,7 @@ class Motion:
 
 
 def _stop_all(lines: list[ArmLine]) -> list[bool]:
-    """Stop arms concurrently; return for each whether it is at standstill."""
+    """Stop arms concurrently. Return whether each is at standstill."""
     if len(lines) == 1:
         return [lines[0].stop()]
     stopped = [False] * len(lines)

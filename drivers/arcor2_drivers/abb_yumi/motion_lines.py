@@ -131,5 +131,5 @@ def answer(raw: bytes) -> Answer:
             raise ValueError
         sequence, code, status, *values = text.split(" ")
         return Answer(int(sequence), int(code), int(status), tuple(map(float, values)))
-    except ValueError:  # UnicodeDecodeError is one
+    except ValueError:  # UnicodeDecodeError is a ValueError
         raise DeviceFault("A line of the motion server is garbled.", repr(raw[:100]), "garbled") from None

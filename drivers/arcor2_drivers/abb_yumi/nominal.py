@@ -1,4 +1,4 @@
-"""Nominal kinematics of both arms, for what the controller does not compute: reachability and clearance.
+"""Nominal kinematics of both arms for reachability and clearance, which the controller does not compute.
 
 They use the published dimensions and the usual mounting of the arms. A real arm differs by some millimetres, so no
 motion is commanded from these numbers. Joints are axes 1 to 7 in rad; axis 7 is between 2 and 3.
@@ -45,7 +45,7 @@ FEET: Final = {
     RIGHT: ((0.05355, -0.0725, 0.41492), (-0.9795, -0.5682, -2.3155)),
 }
 MAX_ERROR: Final = 0.03
-"""Maximum error of nominal kinematics, m, with which the controller is still asked for a solution."""
+"""Maximum error of nominal kinematics, m; above it, the controller is not asked for a solution."""
 
 
 def _transform(position: tuple[float, float, float], rpy: tuple[float, float, float]) -> Array:

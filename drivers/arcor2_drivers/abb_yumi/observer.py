@@ -48,7 +48,7 @@ class Panel(NamedTuple):
 
     @property
     def ours(self) -> bool:
-        """Return whether the programs of both tasks are our motion servers."""
+        """Return whether both tasks run our motion servers."""
         return self.programs == PROGRAMS
 
     @property
@@ -122,7 +122,7 @@ PARTS: Final[Mapping[str, Callable[[Rws], Any]]] = {
     "holder": holder,
     "lead_through": lambda rws: {arm: _lead_through(rws, unit) for arm, unit in UNITS.items()},
 }
-"""Fields of the panel; one is read after each sample, because reading all of them would delay the next one."""
+"""Fields of the panel. One is read after each sample, because reading all of them would delay the next sample."""
 
 
 def read_running(rws: Rws) -> bool:
@@ -219,7 +219,7 @@ class Observer(StateObserver[Sample]):
         assert self._panel is not None
         field, before = next(self._fields), self._panel
         found = PARTS[field](self.rws)
-        if self._panel is before:  # else it was read elsewhere meanwhile
+        if self._panel is before:  # otherwise another thread has read the panel in the meantime
             self._panel = before._replace(monotonic=time.monotonic(), **{field: found})
 
     def _check_not_leaving(self) -> None:

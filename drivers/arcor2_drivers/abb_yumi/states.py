@@ -1,4 +1,4 @@
-"""Terms of the controller as states of a robot: control state, operating mode, collision detection."""
+"""Conversion of the controller's states: control state, operating mode, collision detection."""
 
 from typing import Final
 

@@ -167,7 +167,7 @@ class YuMi(Hands, Connected, MultiArmRobot):
         return self._motion.last
 
     def check_if_ready_to_move(self, arm_id: str | None = None) -> None:
-        """Raise what prevents an arm, or one of them if none is named, from moving."""
+        """Raise the reason why an arm cannot move; without an id, of either arm."""
         self._motion.check_ready(self._arms.some(arm_id))
 
     def move_to_pose(
@@ -277,7 +277,7 @@ class YuMi(Hands, Connected, MultiArmRobot):
         return self._control.teaching(self._arms.one(arm_id))
 
     def set_hand_teaching_mode(self, enabled: bool, arm_id: str | None = None) -> None:
-        """Make an arm movable by hand, or stiff again. Raise Refused while an arm moves, or without lead-through."""
+        """Enable or disable moving an arm by hand. Raise Refused while an arm moves, or without lead-through."""
         self._control.set_teaching(self._arms.one(arm_id), enabled, self.move_in_progress)
 
     def power_on(self) -> None:

@@ -20,7 +20,7 @@ from .settings import BarcodeReaderSettings
 MAX_SCAN_TIME: Final = 60.0
 """Longest time a program may wait for a code in one call, s."""
 MARGIN: Final = 30.0
-"""Time beyond it for resetting the reader before and after, each with the longest time-out a setting allows, s."""
+"""Time beyond MAX_SCAN_TIME for resetting the reader before and after, with the longest allowed timeouts, s."""
 
 
 class BarcodeReader(LineDevice, Reader):
@@ -45,7 +45,7 @@ class BarcodeReader(LineDevice, Reader):
 
     # -------------------------------------------------------------------------------- connection
     def greet(self, deadline: float) -> None:
-        """Ask for the status repeatedly: the reader may still have a part of an earlier command in its buffer."""
+        """Request the status repeatedly, because the buffer of the reader may contain a part of an earlier command."""
         while True:
             left = max(deadline - time.monotonic(), 0.01)
             try:
@@ -72,7 +72,7 @@ class BarcodeReader(LineDevice, Reader):
         return self._health
 
     def disconnect(self) -> None:
-        """Close; does nothing when closed. A reading that runs is ended first."""
+        """End a running reading and close the connection. Do nothing if it is closed."""
         self.stop_waiting()
         super().disconnect()
 
@@ -100,7 +100,7 @@ class BarcodeReader(LineDevice, Reader):
                 self._reset()
                 code = self._read_until(time.monotonic() + timeout, go_on)
                 if code is None:
-                    self._reset()  # this ends the reading; its answer follows a code that was decoded just now
+                    self._reset()  # this ends the reading; the answer comes after a code that was decoded just now
                     go_on()
                     return NoRead("timeout")
                 self.observing.settled()
@@ -109,7 +109,7 @@ class BarcodeReader(LineDevice, Reader):
             self._reading.release()
 
     def _read_until(self, deadline: float, go_on: GoOn) -> str | None:
-        """Trigger repeatedly, because the timeout of the reader is shorter; None when no code was read."""
+        """Trigger repeatedly, because the timeout of the reader is shorter. Return None if no code was read."""
         buffer = lines.LineBuffer()
         self.line.send(lines.TRIGGER.encode("ascii") + lines.CR)
         while time.monotonic() < deadline:
@@ -124,7 +124,7 @@ class BarcodeReader(LineDevice, Reader):
 
     @staticmethod
     def _unless_stopped(code: str, go_on: GoOn) -> str | None:
-        """Return the code; None when the reading was stopped, so that the reader is reset first."""
+        """Return the code; None if the reading was stopped. The caller then resets the reader."""
         try:
             go_on()
         except Cancelled:
@@ -196,7 +196,7 @@ class BarcodeReader(LineDevice, Reader):
 
     @action
     def last_code(self, *, an: str | None = None) -> str:
-        """Return the code that code_present found: once, and not after another reading has started."""
+        """Return the code that code_present found, once. A new reading discards it."""
         code, self._present_code = self._present_code, ""
         if not code:
             raise Refused("{device}: no new code has been read. Call code_present first.", device=self.who)

@@ -41,7 +41,7 @@ class Bin(Connected, GenericWithPose):
 
     # -------------------------------------------------------------------------------- connection
     def open_link(self, timeout: float) -> None:
-        """Load the model of the part. Raises NotConnected when it is invalid, or when Open3D is not installed."""
+        """Load the model of the part. Raises NotConnected if the model is invalid or Open3D is not installed."""
         try:
             from . import models
         except ImportError as error:

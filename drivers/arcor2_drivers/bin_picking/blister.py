@@ -107,7 +107,7 @@ class Blister(Connected, GenericWithPose):
 
     @action(quick=True)
     def place(self, row: int, column: int, *, an: str | None = None) -> Pose:
-        """Return the pose of a place, whether there is a part or not.
+        """Return the pose of a place, with or without a part.
 
         :param row: counted from 0, along y
         :param column: counted from 0, along x

@@ -23,7 +23,7 @@ MIN_AREA: Final = 0.25
 TOO_LARGE: Final = 1.3
 """Ratio of visible area to that of one part above which it is more than one part."""
 COVERED: Final = 0.8
-"""Fraction of a part that must be visible to conclude that there is more than this part."""
+"""Visible fraction of a part from which a larger cluster is taken for more than one part."""
 MIN_SEEN: Final = 0.3
 """Fraction of the crate that must be visible."""
 MAX_CANDIDATES: Final = 12

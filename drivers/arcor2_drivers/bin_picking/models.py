@@ -30,7 +30,7 @@ class Model(NamedTuple):
         cloud: Points sampled from the surface, with normals.
         scene: Triangles for ray casting.
         vertices: Corners of the triangles, n × 3, m.
-        box: Whether a rotation by 180° about an axis does not change it.
+        box: Whether the part is unchanged by a rotation of 180° about an axis.
         low: Lower corner of the bounding box, m.
         high: Upper corner of the bounding box, m.
     """

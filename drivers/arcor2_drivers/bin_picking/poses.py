@@ -34,7 +34,7 @@ def grip_pose(part: Pose, base: Pose, top: float, above: float) -> Pose:
 
 
 def upright(rotation: "npt.NDArray[np.float64]") -> "npt.NDArray[np.float64]":
-    """Return, of the four equivalent rotations of a box, the one z most upwards, x closest to the crate's x."""
+    """Return one of the four equivalent rotations of a box: z most upwards, then x closest to the crate's x."""
     import numpy as np
 
     turns = [np.diag(signs) for signs in ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))]

@@ -182,7 +182,10 @@ class Conveyor(PolledControl[State], Machine, Axis):
     # -------------------------------------------------------------------------------- values
     @observation
     def position(self) -> Reading[float]:
-        """Return the position of the belt, m. Raises Stale when the newest is too old, NotConnected, ConnectionLost."""
+        """Return the position of the belt, m.
+
+        Raises NotConnected, ConnectionLost, or Stale if the position is too old.
+        """
         now, asked, stamp = self._observer.current()
         return Reading(self._units.metres(now.position), stamp, asked)
 
@@ -203,7 +206,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
         """Return whether the drive was homed since the last connection loss."""
         return self._homed
 
-    # -------------------------------------------------------------------------------- the base's methods
+    # -------------------------------------------------------------------------------- methods of the bases
     def move_absolute(self, position: float, velocity: float) -> None:
         """Move to `position`, m, with `velocity`, m/s; return at the position. Refused before homing."""
         what = Phrase.of("move_to {position:g} m", position=position)
@@ -274,7 +277,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
 
     # -------------------------------------------------------------------------------- machine
     def machine_state(self) -> MachineState:
-        """Return the present state. Raises Stale when the newest is too old, NotConnected, ConnectionLost."""
+        """Return the present state. Raises NotConnected, ConnectionLost, or Stale if the newest state is too old."""
         return self._unit.state(self.current())
 
     def command(self, command: MachineCommand) -> None:

@@ -211,7 +211,7 @@ class CanLink:
         return self.loss
 
     def lose(self, error: DeviceError) -> None:
-        """Mark the link as broken by `error` until it is opened again."""
+        """Mark the link as broken until it is opened again. `error` is the reason."""
         self._lose(error)
 
     def check(self) -> None:
@@ -315,5 +315,5 @@ class CanLink:
 
 
 def _again(error: DeviceError) -> DeviceError:
-    """Return a new error of the same kind: one object raised in several threads mixes their tracebacks."""
+    """Return a new error of the same kind, because raising one object in several threads mixes their tracebacks."""
     return type(error)(error.message, error.detail)

@@ -43,7 +43,8 @@ class Observer(StateObserver[State]):
         self.consumer = 0
         """Object 1016h:01 as last read: node and ms of the heartbeat that the drive monitors."""
         self.nmt: int | None = None
-        """NMT state of the drive by its heartbeat: 5 Operational, 127 Pre-operational, 4 Stopped; None: none came."""
+        """NMT state in the heartbeat of the drive: 5 Operational, 127 Pre-operational, 4 Stopped; None before the first
+        one."""
         self.pdos = pdo.PdoState(settings.node_id)
         self._by_pdo = False
         self._drop_control = lost
@@ -61,7 +62,7 @@ class Observer(StateObserver[State]):
         return time.monotonic() - self._masters.get(master, -1e9) <= within
 
     def listen(self) -> None:
-        """Make the drive send its state by PDO, when the settings say so. Raises Refused when it cannot."""
+        """Make the drive send its state by PDO if the settings require it. Raises Refused if it cannot."""
         if self._settings.pdo_period_ms:
             pdo.set_up(self.link, self._settings.node_id, self._settings.pdo_period_ms)
             self._by_pdo = True
@@ -121,7 +122,7 @@ class Observer(StateObserver[State]):
         return Snapshot.by(self._ask)
 
     def read(self) -> State | None:
-        """Read the state by SDO; None while it comes by PDO."""
+        """Read the state by SDO. Return None while the drive sends it by PDO."""
         if self.link.loss is not None:
             self.link.check()
         missed = PDO_MISSED + self._settings.pdo_period_ms / 1000.0

@@ -38,7 +38,7 @@ STATES: Final = frozenset(
 
 
 class Unit:
-    """The part of the state that the drive does not store: held, aborted, and the running command."""
+    """State that the drive does not store: held, aborted, and the running command."""
 
     def __init__(self, who: str | Message, motion: Motion, speed: int) -> None:
         self._who, self._motion, self._speed = who, motion, speed

@@ -79,7 +79,7 @@ def restore(link: CanLink, parameters: list[DeviceParameter]) -> list[ParameterF
 
 
 def _write(link: CanLink, parameter: DeviceParameter) -> Message | None:
-    """Write a parameter; return why the drive does not use it, None if it does."""
+    """Write a parameter. Return the reason if the drive does not use it, otherwise None."""
     if (known := PARAMETERS.get(parameter.name)) is None:
         return Message.of("The driver knows no parameter {parameter}.", parameter=parameter.name)
     entry, _ = known

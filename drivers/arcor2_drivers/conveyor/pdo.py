@@ -71,7 +71,7 @@ class PdoState:
         """Time of the last complete state (monotonic, s)."""
 
     def take(self, identifier: int, data: bytes) -> tuple[State, float] | None:
-        """Receive a frame; return the state that it completes, and its time (monotonic, s)."""
+        """Receive a frame. Return the completed state, if any, and its time (monotonic, s)."""
         if identifier == STATUS.base + self._node:
             values = STATUS.unpack(data)
             if values is not None:

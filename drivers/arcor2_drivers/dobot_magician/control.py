@@ -14,13 +14,13 @@ from .observer import Observer
 from .settings import DobotMagicianSettings
 
 STANDSTILL_SEEN_TIMEOUT: Final = 1.0
-"""Time in which the observer sees an arm that has just stopped at standstill, s: 0.1 s, more on a busy computer."""
+"""Time limit for the observer to detect that the arm has stopped, s: 0.1 s, more on a busy computer."""
 STANDSTILL_TIMEOUT: Final = 2.0
 """Time after which a stopped arm must be at standstill, s."""
 
 
 class Control:
-    """Control of the arm. `commands` is held while commands that belong together are sent."""
+    """Control of the arm. `commands` is a lock for sending several commands without interruption."""
 
     def __init__(self, observer: Observer, settings: DobotMagicianSettings, motion_lock: threading.Lock) -> None:
         self._observer, self._settings, self._motion_lock = observer, settings, motion_lock
@@ -75,7 +75,7 @@ class Control:
         self.drop()
 
     def drop(self) -> None:
-        """Note that control has ended, without sending anything."""
+        """Record that control has ended, without sending anything."""
         self._left_running = self._left_running or self._active
         self.ours = False
 
@@ -116,7 +116,7 @@ class Control:
 
     # -------------------------------------------------------------------------------- stopping
     def stop(self) -> None:
-        """Stop arm and belt, also what a connection loss left running, and wait for standstill of the arm.
+        """Stop arm and belt, even if they still run since a connection loss, and wait for standstill of the arm.
 
         Raises:
             NotInControl: The arm is moved by another client.

@@ -215,7 +215,7 @@ class DobotMagician(HoldsParts, SingleArm):
         (self._motion.go_around if safe else self._motion.to_joints)(q, speed, guard)
 
     def stop(self) -> None:
-        """Stop arm and belt, also what a connection loss left running. This is not a safety function.
+        """Stop arm and belt, even if they still run since a connection loss. This is not a safety function.
 
         Raise ConnectionLost, NotInControl while another client moves the arm, or DeviceTimeout.
         """

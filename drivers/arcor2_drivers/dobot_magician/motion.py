@@ -223,5 +223,5 @@ class Motion:
 
 
 def _time(distance: float, speed: float, acceleration: float) -> float:
-    """Return the longest time that a motion may take, s: half as much again as computed, and two seconds."""
+    """Return the time limit of a motion, s: 1.5 times the computed time plus 2 s."""
     return 1.5 * (distance / speed + speed / acceleration) + 2.0

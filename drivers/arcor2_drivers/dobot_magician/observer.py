@@ -44,9 +44,10 @@ class Sample(Data, frozen=True):
 
 
 class Observer(StateObserver[Sample]):
-    """Owns the port: reads the state on its own thread, and carries commands of other threads.
+    """Owns the port: reads the state on its own thread, and sends the commands of other threads.
 
-    When an answer is overdue, the port is closed and opened again, so that no late answer is taken for another one.
+    When an answer is overdue, the port is closed and opened again, so that a late answer is not taken for that to
+    another command.
     """
 
     period = busy_period = PERIOD
@@ -85,7 +86,7 @@ class Observer(StateObserver[Sample]):
         self._ask(command, WRITE, struct.pack("<" + layout, *values))
 
     def queue(self, command: Command, layout: str, *values: float) -> int:
-        """Append a command to the queue, and return its index."""
+        """Append a command to the arm's queue, and return its index."""
         answer = self._ask(command, WRITE | QUEUED, struct.pack("<" + layout, *values))
         return int(self._unpack(command, answer, "Q")[0])
 
@@ -120,7 +121,7 @@ class Observer(StateObserver[Sample]):
 
     # -------------------------------------------------------------------------------- on the observing thread
     def open(self, timeout: float) -> Snapshot[Sample]:
-        """Open the port, and read the state twice: so it is known from the start whether the arm moves."""
+        """Open the port, and read the state twice to detect whether the arm moves."""
         deadline = time.monotonic() + timeout
         with self._lock:
             port = self._port = Port(self.who, self._settings.port)
@@ -142,7 +143,7 @@ class Observer(StateObserver[Sample]):
                 port.close()
 
     def read(self) -> Sample:
-        """Read the state. Raise an error that a command found."""
+        """Read the state. Raise the error that a command has detected."""
         with self._lock:
             if self._error is not None:
                 raise self._error

@@ -13,7 +13,7 @@ from .frames import FrameBuffer, encode
 
 BAUD_RATE: Final = 115200
 READ_WAIT: Final = 0.02
-"""Time a read waits for the first byte, s."""
+"""Time limit for the first byte of a read, s."""
 WRITE_TIMEOUT: Final = 1.0
 """Time to write a command, s: long enough for a process that is not scheduled while it writes."""
 
@@ -51,7 +51,8 @@ class Port:
             control: Control byte.
             parameters: Parameters of the command.
             timeout: Time for the answer, s.
-            first: Fail with DeviceTimeout if another answer comes first: the arm answers too late.
+            first: Fail with DeviceTimeout if the answer to another command comes first, because the arm answers too
+                late.
 
         Raises:
             DeviceTimeout: No answer came in time.

@@ -39,7 +39,7 @@ SENDER_END_TIMEOUT: Final = 0.05
 MAX_WAIT: Final = 3600.0
 """Longest time a program may wait in one call, s."""
 MARGIN: Final = 65.0
-"""Time beyond it for two requests, s."""
+"""Time beyond MAX_WAIT for two requests, s."""
 MAX_TEXT: Final = 200
 MAX_QUANTITY: Final = 1_000_000
 WAITING, REFUSED, NOT_AUTHORIZED = "results_wait", "results_refused", "not_let_in"
@@ -197,12 +197,12 @@ class ErpService(Connected, Generic):
     # -------------------------------------------------------------------------------- actions
     @action(deadline=MAX_WAIT + MARGIN)
     def next_order(self, wait: float = 0.0, *, an: str | None = None) -> tuple[bool, str, str, int, int]:
-        """Return the order to work on: whether there is one, its id, product, quantity, and pieces left to report.
+        """Return the present order: whether there is one, its id, product, quantity, and pieces left to report.
 
         The order stays the same until each piece is reported or the order is closed, also while the service is down.
-        No order is taken twice, and none is lost when an answer is.
+        If an answer is lost, the order is neither lost nor taken twice.
 
-        :param wait: time to wait for an order, s; the first result is false when none came
+        :param wait: time to wait for an order, s; the first result is false without an order
         """
         assert 0.0 <= wait <= 3600.0
 
@@ -265,7 +265,7 @@ class ErpService(Connected, Generic):
 
     @action(again="safe")
     def results_waiting(self, *, an: str | None = None) -> int:
-        """Return how many results the service has not received yet."""
+        """Return the number of results that the service has not received yet."""
         return self.outbox().value.waiting
 
     @action(deadline=MAX_WAIT + MARGIN)
@@ -295,7 +295,7 @@ class ErpService(Connected, Generic):
 
     @action
     def resend_refused(self, *, an: str | None = None) -> int:
-        """Send the refused results again, after the reason was fixed at the service. Return how many there are."""
+        """Send the refused results again, after the cause was fixed at the service. Return their number."""
         count = self._outbox.resend_refused()
         self._wake()
         return count

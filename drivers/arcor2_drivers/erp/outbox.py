@@ -53,7 +53,7 @@ class Order(NamedTuple):
 
 
 class OutboxState(Data, frozen=True):
-    """Number of waiting and of refused messages, time of the oldest waiting one, and the last error of delivery."""
+    """Numbers of waiting and refused messages, time of the oldest waiting message, and the last delivery error."""
 
     waiting: int
     refused: int
@@ -218,7 +218,7 @@ class Outbox:
             database.execute("DELETE FROM message WHERE number = ?", (message.number,))
 
     def mark_refused(self, message: Message, reason: str) -> None:
-        """Mark a message that the service refused; it is sent again only after `resend_refused`."""
+        """Mark a message as refused by the service. It is sent again only after `resend_refused`."""
         with self._writing() as database:
             database.execute(
                 "UPDATE message SET state = 'refused', why = ?, since = ? WHERE number = ?",
@@ -226,12 +226,12 @@ class Outbox:
             )
 
     def resend_refused(self) -> int:
-        """Let refused messages wait for delivery again, with the same keys. Return how many there are."""
+        """Queue the refused messages for delivery again, with the same keys. Return their number."""
         with self._writing() as database:
             return database.execute("UPDATE message SET state = 'waiting' WHERE state = 'refused'").rowcount
 
     def acknowledge_refused(self) -> int:
-        """Mark refused messages as acknowledged; they stay in the file. Return how many there are."""
+        """Mark refused messages as acknowledged; they stay in the file. Return their number."""
         with self._writing() as database:
             return database.execute("UPDATE message SET state = 'noted' WHERE state = 'refused'").rowcount
 

@@ -27,7 +27,7 @@ class Pause:
         self.until = 0.0
 
     def grow(self, at_least: float = 0.0) -> None:
-        """Start a pause longer than the last one, and of at least `at_least` s."""
+        """Start a pause that is longer than the last one, and at least `at_least` s long."""
         self.until = time.monotonic() + max(self._next, at_least)
         self._next = min(2.0 * self._next, self._longest)
 
@@ -67,7 +67,7 @@ class Sender:
         return not self._thread.is_alive()
 
     def wake(self, *, back: bool = False) -> None:
-        """Check for messages to deliver now. `back`: the service answers again, which ends pauses."""
+        """Check for messages to deliver now. `back`: the service answers again, so pauses end."""
         if back and not self._has_retry_after:
             self._service_pause = Pause(self._longest)
             self._order_pauses = {}

@@ -24,7 +24,7 @@ MAX_TOKEN: Final = 8192
 KEEP_ALIVE: Final = 4.0
 """Time after which an idle connection is not used again, s: many services close it after 5 s."""
 RETRIED: Final = (408, 425, 429)
-"""HTTP statuses of the client errors that ask for another attempt."""
+"""HTTP statuses of client errors for which the request is repeated."""
 UNAUTHORIZED: Final = (401, 403, 407)
 """HTTP statuses that reject our credentials."""
 MAX_RETRY_AFTER: Final = 600.0

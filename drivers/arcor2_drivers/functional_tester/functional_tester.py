@@ -79,7 +79,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
 
     # -------------------------------------------------------------------------------- machine
     def machine_state(self) -> MachineState:
-        """Return the present state. Raises Stale when the newest is too old, NotConnected, ConnectionLost."""
+        """Return the present state. Raises NotConnected, ConnectionLost, or Stale if the newest state is too old."""
         return self.current().state
 
     def unit_mode(self) -> UnitMode:
@@ -127,7 +127,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         ]
 
     def stop_reason(self) -> str:
-        """Return why it stopped or aborted; empty when it did neither."""
+        """Return why the tester stopped or aborted; empty if it did neither."""
         inputs = self.current()
         if inputs.fault_code:
             return f"fault {inputs.fault_code}: {fault_of(inputs.fault_code).text}"
@@ -136,12 +136,12 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         return "stopped" if inputs.state in (S.STOPPED, S.STOPPING) else ""
 
     def wait_for(self, state: MachineState, timeout: float) -> None:
-        """Wait until it is in `state`. Raises DeviceTimeout after `timeout` s, DeviceFault when it aborts instead."""
+        """Wait until the tester is in `state`. Raises DeviceTimeout after `timeout` s, DeviceFault if it aborts."""
         what = f"reaching {title(state)}"
         self.reach({state}, timeout, what, self.begin(what))
 
     def command(self, command: MachineCommand, then: MachineState | None = None) -> None:
-        """Send a command; return when it is accepted and, if `then` is set, when the tester is in that state.
+        """Send a command. Return when it is accepted; with `then`, when the tester is in that state.
 
         Raises:
             Refused: The tester does not accept the command.
@@ -154,7 +154,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
             self.reach({then}, TRANSITION, name, go_on)
 
     def stop(self) -> None:
-        """Stop (PackML) and return at standstill; an unfinished test has no result.
+        """Stop (PackML) and return at standstill. An unfinished test returns no result.
 
         Calls that wait end with Cancelled. Without control nothing is sent, because another client started the test.
         """
@@ -268,5 +268,5 @@ class FunctionalTester(Tester, Machine, CollisionObject):
 
     @action
     def abort(self, *, an: str | None = None) -> None:
-        """Abort; return when the tester is aborted. It has to be cleared afterwards."""
+        """Abort, and return when the tester is aborted. It has to be cleared afterwards."""
         self.command(MachineCommand.ABORT, S.ABORTED)

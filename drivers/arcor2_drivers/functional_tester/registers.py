@@ -61,7 +61,7 @@ REFUSALS: Final = translatable(
 
 
 class Fault(NamedTuple):
-    """The meaning of a fault code, its remedy, and the condition of the tester meanwhile."""
+    """Meaning of a fault code, its remedy, and the condition of the tester during the fault."""
 
     text: str
     remedy: str
@@ -91,7 +91,7 @@ def fault_of(code: int) -> Fault:
 
 
 class Inputs(NamedTuple):
-    """All values that can be read, of one instant; V, A, Ω."""
+    """All readable values at one instant; V, A, Ω."""
 
     state: MachineState
     command_acknowledged: int

@@ -9,7 +9,7 @@ from arcor2_hw.objects.settings import Range, check_host, within
 MAX_WATCHDOG_TIMEOUT: Final = 2000
 """Longest host watchdog, ms; declared in `loss_reaction`."""
 MAX_TEST_TIME: Final = 600.0
-"""Longest test, s; the deadline of the action `test` allows for it."""
+"""Longest test, s; included in the deadline of the action `test`."""
 
 
 @dataclasses.dataclass

@@ -35,7 +35,7 @@ TRANSITION: Final = 3.0
 LIFE_TIMEOUT: Final = 1.0
 """Time without a change of the life counter after which the values are old, s."""
 WATCHDOG_MARGIN: Final = 0.2
-"""Time beyond the watchdog after which the tester has certainly detected our absence, s."""
+"""Time beyond the watchdog timeout until the tester has detected our absence, s."""
 
 
 class Tester(ModbusDevice[Inputs]):

@@ -1,4 +1,4 @@
-"""ZPL on the side of the host: builds and checks labels, parses answers. Pure functions.
+"""ZPL of the host: builds and checks labels, parses answers. Pure functions.
 
 Source: ZPL II programming guide, ~HS (host status return), ~HI (host identification), ^FH, ^BC, and SGD getvar and
 setvar; docs/devices/label-printer.md lists what is used.

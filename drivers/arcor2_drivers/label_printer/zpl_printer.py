@@ -50,7 +50,7 @@ class ZplPrinter(LineDevice, Printer):
 
     _ABSTRACT = False
     display_name = "ZPL label printer"
-    loss_reaction: ClassVar[LossReaction] = LossReaction.continues()  # it finishes what it has received
+    loss_reaction: ClassVar[LossReaction] = LossReaction.continues()  # the printer finishes what it has received
     ALARMS: ClassVar[Mapping[str, AlarmText]] = _ALARMS
     poll_period = STATUS_PERIOD
 
@@ -58,11 +58,11 @@ class ZplPrinter(LineDevice, Printer):
         super().__init__(obj_id, name, settings)
         self.use_line(settings.port, settings.baud_rate, settings.answer_timeout)
         self._print_timeout, self._template = settings.print_timeout, settings.template
-        self._unconfirmed: int | None = None  # the counter before a label whose fate is unknown
+        self._unconfirmed: int | None = None  # the counter before a label that may or may not be printed
 
     # -------------------------------------------------------------------------------- connection
     def condition(self) -> Health:
-        """Return check_function while it cannot print or a label is unconfirmed."""
+        """Return check_function while the printer cannot print or a label is unconfirmed."""
         return Health.CHECK_FUNCTION if self.alarms() else Health.NORMAL
 
     @observation
@@ -71,7 +71,7 @@ class ZplPrinter(LineDevice, Printer):
         return not self.alarms()
 
     def acknowledge(self, code: str) -> None:
-        """Acknowledge a label whose fate is unknown (code unconfirmed). Raises NotFound for another code."""
+        """Acknowledge a label that may or may not be printed (code unconfirmed). Raises NotFound for another code."""
         if code != UNCONFIRMED or self._unconfirmed is None:
             raise NotFound("{device} has no alarm {code!r} that can be acknowledged", device=self.who, code=code)
         self._settle()
@@ -111,7 +111,7 @@ class ZplPrinter(LineDevice, Printer):
         return self.ask(zpl.getvar(name), zpl.variable, f"getvar {name}")
 
     def _setvar(self, parameter: DeviceParameter) -> Message | None:
-        """Write a setting; return why the printer does not use it, None if it does."""
+        """Write a setting. Return the reason if the printer does not use it, otherwise None."""
         name, value = parameter.name, str(parameter.value)
         if name not in zpl.PARAMETERS or self._getvar(name) == zpl.UNKNOWN:
             return Message.of("The printer has no setting {parameter}.", parameter=name)
@@ -283,7 +283,7 @@ class ZplPrinter(LineDevice, Printer):
         return self.ask(zpl.getvar(zpl.COUNTER), zpl.number, f"getvar {zpl.COUNTER}")
 
     def overdue(self, error: DeviceTimeout) -> NoReply:
-        """Return the error for a printer that does not answer."""
+        """Return the error of a printer that does not answer."""
         self.set_alarm(NO_REPLY, True)
         return NoReply(
             "{device} does not answer: it is out of labels, its head is open, or the line is broken; {remedy}",
@@ -295,7 +295,7 @@ class ZplPrinter(LineDevice, Printer):
 
     @staticmethod
     def _blocked_by(found: Status) -> str:
-        """Return why the printer cannot print; empty when it can. A partial format counts last."""
+        """Return why the printer cannot print; empty when it can. A partial format has the lowest priority."""
         order = ("head_open", "paper_out", "ribbon_out", "too_hot", "too_cold", "paused", "partial_format")
         return next((name for name in order if getattr(found, name)), "")
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     import depthai as dai
 
 SUPPORTED: Final = 12
-"""Number of lens coefficients that CameraParameters holds; the two after them describe a tilted sensor."""
+"""Number of lens coefficients in CameraParameters. The next two would describe a tilted sensor."""
 INVALID: Final = "calibration"
 """Fault code of a missing or invalid calibration."""
 

@@ -29,7 +29,7 @@ ISO: Final = 400
 def find(who: str | Message, address: str, timeout: float) -> dai.DeviceInfo:
     """Return the camera with an address. Raises NotConnected.
 
-    depthai needs 11.5 s to report a missing camera when it opens one, so this searches first.
+    Opening a missing camera takes depthai 11.5 s, so this function searches first.
     """
     found = dai.Device.getAllAvailableDevices()
     matching = [info for info in found if address in ("", info.getDeviceId(), info.name)]
@@ -42,7 +42,7 @@ def find(who: str | Message, address: str, timeout: float) -> dai.DeviceInfo:
         )
     if matching:
         return matching[0]
-    if _is_ip(address):  # the search does not reach cameras behind a router
+    if _is_ip(address):  # the search does not find cameras behind a router
         try:
             socket.create_connection((address, POE_PORT), timeout).close()
         except OSError as e:
@@ -117,7 +117,7 @@ class DeviceFeed:
             stereo.setLeftRightCheck(True)
             stereo.setExtendedDisparity(True)
             depth = stereo.depth
-            if self._device.getPlatform() == dai.Platform.RVC4:  # has a separate node for alignment
+            if self._device.getPlatform() == dai.Platform.RVC4:  # this one has a separate node for alignment
                 align = pipeline.create(dai.node.ImageAlign)
                 stereo.depth.link(align.input)
                 color.link(align.inputAlignTo)

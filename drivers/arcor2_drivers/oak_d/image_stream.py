@@ -98,7 +98,7 @@ class ImageStream(Connected):
 
     @property
     def latency(self) -> float:
-        """Return how old the newest image was when it arrived, s. Raises NotConnected, ConnectionLost."""
+        """Return the age of the newest image at its arrival, s. Raises NotConnected, ConnectionLost."""
         self.observing.check()
         newest = self._newest
         return float("inf") if newest is None else self._received_at - newest.monotonic
@@ -171,9 +171,9 @@ class ImageStream(Connected):
     def _load_source(self) -> "Callable[[float], Feed]":
         """Return the function that opens the source in the settings.
 
-        It imports depthai, which takes seconds on a busy computer and does not count as time of the camera.
+        It imports depthai. That takes seconds on a busy computer, and is not part of the time limit of the camera.
         """
-        os.environ.setdefault("DEPTHAI_LEVEL", "error")  # it warns of missing USB, which is normal in a container
+        os.environ.setdefault("DEPTHAI_LEVEL", "error")  # depthai warns of missing USB, which is normal in a container
         try:
             if self._config.network is not None:
                 from .network_feed import NetworkFeed

@@ -32,7 +32,7 @@ from .stream import (
 CLOCK_PERIOD: Final = 0.5
 """Time between requests for the source's clock, s."""
 CLOCKS: Final = 20
-"""Number of answers of which the fastest is used. In these 10 s, two quartz clocks drift apart by at most 1 ms."""
+"""Number of stored answers, of which the fastest is used. In these 10 s, two quartz clocks drift by at most 1 ms."""
 
 
 class SourceFrame(NamedTuple):
@@ -110,7 +110,7 @@ class NetworkSource:
             ) from e
 
     def start(self, client: str) -> None:
-        """Request frames in the name of `client`."""
+        """Request frames. `client` is the name sent to the source."""
         self._send(Kind.START, {"client": client, "color": self._coding})
         self._ask_clock()
 
@@ -161,7 +161,7 @@ class NetworkSource:
             try:
                 if kind is not Kind.FRAME:
                     self._handle(kind, header)
-                elif self._offsets:  # else its age is unknown
+                elif self._offsets:  # otherwise the age of the frame is unknown
                     return self._frame(read_header(header, FrameHeader), payload)
             except BadStream as e:
                 raise DeviceFault("{device}: {reason}", "", "protocol", device=self.who, reason=e) from e
@@ -223,7 +223,7 @@ class NetworkSource:
         return prefix.kind, header, payload
 
     def _fill(self, buffer: memoryview, deadline: float, between: bool = False) -> None:
-        """Read until the buffer is full; `between`: no message has started yet."""
+        """Read until the buffer is full. `between`: no message has started yet."""
         link, count = self._socket, 0
         while count < len(buffer):
             if link is None:

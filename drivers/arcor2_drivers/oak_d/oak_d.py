@@ -90,7 +90,7 @@ class OakD(ImageStream, Camera):
         return self.feed.depth_range
 
     def modes(self) -> list[Mode]:
-        """Return the image sizes that can be set; for a network source the one that it sends."""
+        """Return the available image sizes; for a network source, the size that it sends."""
         if self._config.network is not None:
             return [Mode(*self.feed.size, self._config.fps)]
         sizes = [size_of(each) for each in Resolution]
@@ -116,7 +116,7 @@ class OakD(ImageStream, Camera):
     # -------------------------------------------------------------------------------- actions
     @action(again="safe")
     def color_image(self, *, an: str | None = None) -> "Image.Image":
-        """Capture a colour image whose exposure starts after the action does."""
+        """Capture a colour image whose exposure starts after the start of the action."""
         from PIL import Image
 
         shot = self._after_now()
@@ -159,7 +159,7 @@ class OakD(ImageStream, Camera):
 
     # -------------------------------------------------------------------------------- images
     def _after_now(self) -> "ImagePair":
-        """Wait for an image whose exposure starts after this call."""
+        """Return an image whose exposure starts after this call."""
         began = time.monotonic()
         newest = self.newest(self._config.frame_timeout + self._config.max_age)
         exposure = MAX_EXPOSURE_TIME if newest.exposure is None else newest.exposure

@@ -77,7 +77,7 @@ class FrameHeader(msgspec.Struct, frozen=True):
 
 
 class Clock(msgspec.Struct, frozen=True):
-    """Header of the answer to a clock request: when it was asked (our clock), and the source's clock then, s."""
+    """Header of the answer to a clock request: time of the request (our clock), and time of the source's clock, s."""
 
     asked: float
     at: float

@@ -74,7 +74,7 @@ class _Handler:
             self._changed(name, data.monitored_item.Value)
 
     def status_change_notification(self, status: ua.StatusChangeNotification) -> None:
-        """Ignore that the server ended the subscription; `Link.broken` detects it."""
+        """Ignore the end of the subscription by the server; `Link.broken` detects it."""
 
 
 class _Loop(asyncio.SelectorEventLoop):
@@ -91,7 +91,7 @@ class _Loop(asyncio.SelectorEventLoop):
         return opened
 
     def abort(self) -> None:
-        """Close the connections, also those that opened after asyncua had given up and that it does not close."""
+        """Close all connections, also those that asyncua does not close because they opened after its timeout."""
         for transport in self._opened:
             transport.abort()
 
@@ -200,7 +200,7 @@ class Link:
             load = x509.load_pem_x509_certificate if b"-----BEGIN" in content else x509.load_der_x509_certificate
             others = load(content).extensions.get_extension_for_class(x509.SubjectAlternativeName).value
             uris = others.get_values_for_type(x509.UniformResourceIdentifier)
-            client.application_uri = uris[0] if uris else client.application_uri  # a server compares the two
+            client.application_uri = uris[0] if uris else client.application_uri  # a server compares the two endpoints
             await client.set_security(
                 _POLICIES[policy],
                 ours,
@@ -213,14 +213,14 @@ class Link:
             raise NotConnected(text, str(e), device=self.who) from e
 
     def close(self) -> None:
-        """Close; calls that wait for an answer end with ConnectionLost. It does nothing when closed."""
+        """Close the connection. Waiting calls end with ConnectionLost. Do nothing if it is closed."""
         thread, self._thread = self._thread, None
         if thread is None:
             return
         up, self._up = self._up, False
         with contextlib.suppress(DeviceError):
             self._call(lambda: self._leave(up), 2.0 * CLOSE_TIMEOUT, "leaving")
-        with self._sending:  # what was sent before is cancelled, later requests fail at once
+        with self._sending:  # earlier requests are cancelled, later ones fail at once
             loop, self._loop = self._loop, None
             if loop is not None:
                 loop.call_soon_threadsafe(loop.stop)

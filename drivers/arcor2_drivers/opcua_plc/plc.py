@@ -122,7 +122,7 @@ class Plc(PolledControl[Handshake]):
         return kind
 
     def read_state(self) -> Handshake:
-        """Read the handshake, or without one whether the server works."""
+        """Read the handshake; without a handshake, check whether the server works."""
         if self.link.broken:
             raise ConnectionLost("{device}: the subscription has ended", device=self.who)
         if not self.handshake_nodes:
@@ -134,7 +134,7 @@ class Plc(PolledControl[Handshake]):
         life, owner, busy, done, error, code = map(content, read.values())
         if life != self._plc_life[0]:
             self._plc_life = (life, time.monotonic())
-        # The answer may be as old as the question: this process may have been delayed since.
+        # The answer may be as old as the request, because this process may have been delayed since.
         self.program_stopped = asked - self._plc_life[1] > self._s.life_timeout
         return Handshake(life, int(owner or 0), bool(busy), bool(done), bool(error), int(code or 0), "; ".join(bad))
 
@@ -205,7 +205,7 @@ class Plc(PolledControl[Handshake]):
         return Phrase.of("host {number}", number=owner) if owner else Phrase.of("nobody")
 
     def why_control_ended(self, state: Handshake) -> str:
-        """Return why the PLC does not obey us any more; empty while it does."""
+        """Return why the PLC no longer executes our commands; empty while it does."""
         if self.program_stopped:
             return Phrase.of("the program of the PLC was stopped")
         return super().why_control_ended(state) if state.owner else Phrase.of("the PLC has taken control away")
@@ -298,7 +298,7 @@ class Plc(PolledControl[Handshake]):
 
     def _end_request(self) -> None:
         """Reset the request, which stops a running job, and wait until the PLC is idle."""
-        with contextlib.suppress(DeviceError):  # else the PLC stops the job because our life sign is missing
+        with contextlib.suppress(DeviceError):  # otherwise the PLC stops the job because our life sign is missing
             if self.in_control:
                 self.send_stop()
                 self.wait(lambda hand: hand.idle, ANSWER_TIMEOUT, "becoming idle")

@@ -11,7 +11,7 @@ from arcor2_hw.objects.settings import Range, check_url, device_file, secret_fil
 from .points import parse_handshake, parse_points
 
 MAX_PATIENCE: Final = 2.0
-"""Longest plc_patience, s; declared in `loss_reaction`."""
+"""Maximum of plc_patience, s; declared in `loss_reaction`."""
 
 
 class Security(StrEnum):

@@ -48,7 +48,7 @@ def quality(value: ua.DataValue) -> Quality:
 
 
 def content(value: ua.DataValue) -> Any:
-    """Return what a value contains; None if it contains nothing."""
+    """Return the content of a value; None if it is empty."""
     return None if value.Value is None else value.Value.Value
 
 
@@ -66,7 +66,7 @@ def stamp(value: ua.DataValue) -> Timestamp:
 
 
 def raw(value: float, scale: float, kind: ua.VariantType) -> int | float:
-    """Return the raw value of a physical one. Raises ValueError with the range."""
+    """Return the raw value of a physical value. Raises ValueError with the range."""
     if kind in INTEGERS:
         low, high = INTEGERS[kind]
         number = value / scale

@@ -26,7 +26,7 @@ from .settings import MAX_WATCHDOG_TIMEOUT, BlockSettings
 WATCHDOG: Final = "watchdog"
 """Code of the fault of an expired watchdog."""
 REFUSALS: Final = translatable({4: "an expired watchdog holds the output"})
-"""Meaning of Modbus exceptions at this block, where it differs from the usual."""
+"""Meanings of Modbus exceptions that are specific to this block."""
 
 
 class Block(ModbusDevice[Image]):
@@ -90,7 +90,7 @@ class Block(ModbusDevice[Image]):
 
     # -------------------------------------------------------------------------------- control
     def arm(self) -> None:
-        """Start the watchdog with the safe state of each output, and read that it runs; no output is written.
+        """Start the watchdog with the safe state of each output, and check that it runs. No output is written.
 
         Raises:
             DeviceFault: The watchdog does not run, so nothing may be switched on.
@@ -122,7 +122,7 @@ class Block(ModbusDevice[Image]):
         return Phrase.of("another host (number {number} on watchdog {watchdog})", number=number, watchdog=watchdog)
 
     def why_control_ended(self, state: Image) -> str:
-        """Return why the watchdog does not run for us any more; empty while it does."""
+        """Return why our watchdog no longer runs; empty while it runs."""
         number = self._s.watchdog
         running, _ = state.watchdog(number)
         if running is WatchdogState.RUNNING:

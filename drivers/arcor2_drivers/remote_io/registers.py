@@ -17,7 +17,7 @@ WATCHDOG_STATES: Final = 9
 """Input register of the state of watchdog 0."""
 WATCHDOG: Final = 64
 WATCHDOG_SIZE: Final = 16
-"""First holding register of watchdog 0, and number of registers of a watchdog; below, two of their offsets."""
+"""First holding register of watchdog 0, number of registers of a watchdog, and two offsets in them."""
 TRIGGER: Final = 1
 COMMAND: Final = 2
 ACKNOWLEDGE: Final = 1
@@ -59,7 +59,7 @@ class Image(NamedTuple):
 
 
 def decode(words: Sequence[int]) -> Image:
-    """Return the image in input registers 0 to 16. Raises ValueError for what no block sends."""
+    """Return the image in input registers 0 to 16. Raises ValueError for invalid content."""
     if (state := max(words[9:13])) > WatchdogState.EXPIRED:
         raise ValueError(f"unknown state {state} of the watchdog")
     return Image(words)

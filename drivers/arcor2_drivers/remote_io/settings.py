@@ -27,7 +27,7 @@ DEFAULT_PATTERNS: Final = (
 )
 """Default patterns; those with missing colours are left out (meaning of colours: IEC 60204-1, 10.3)."""
 Pattern = Mapping[str, bool]
-"""The colours that are lit, each with whether it blinks."""
+"""Whether each lit colour blinks."""
 
 
 class LampColor(StrEnum):

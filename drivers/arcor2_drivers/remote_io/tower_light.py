@@ -43,7 +43,7 @@ class TowerLight(Block, Generic):
         self.use_block(settings, settings.points())
 
     def arm(self) -> None:
-        """Take control; a pattern from before a connection loss is not shown again."""
+        """Take control. A pattern shown before a connection loss is not restored."""
         with self._showing:
             self._pattern, self._lit = {}, {}
         super().arm()
@@ -64,7 +64,7 @@ class TowerLight(Block, Generic):
         return [live_point(point.io, self.newest_digital, can_force=True) for point in self.block_points.values()]
 
     def force_point(self, name: str, value: bool | float) -> None:
-        """Switch a lamp or the buzzer, and do not switch it otherwise until `release_point`."""
+        """Force a lamp or the buzzer to a state until `release_point`."""
         if name not in self.block_points:
             raise OutOfRange("{device} has no lamp {name!r}", device=self.who, name=name)
         with self._showing:

@@ -62,7 +62,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
         self._activating = False
         self._other_client = ""
         self._commanded: int | None = None
-        """Latest position that we commanded; None while the gripper need not be there."""
+        """Latest position that we commanded; None while the gripper may be elsewhere."""
         self._echoed = False
         self._held = self._lost = False
         self._fault_since: Timestamp = now()
@@ -167,7 +167,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
         return super().control_owner() or self._other_client or None
 
     def drop_control(self, reason: str = NOBODY) -> None:
-        """Note that control has ended."""
+        """Record that control has ended."""
         super().drop_control(reason)
         self._commanded = None
 
@@ -222,7 +222,9 @@ class Robotiq2F(PolledControl[Status], Gripper):
         with self._sending:
             moving = self._acting.locked() or self.fresh().moving
             if moving:
-                self._gripper.write(Command(act=not self._activating, go_to=False))  # only a reset stops an activation
+                self._gripper.write(
+                    Command(act=not self._activating, go_to=False)
+                )  # only a reset can stop an activation
         if moving:
             self._await_standstill()
 
@@ -242,7 +244,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
             self._gripper.write(command)
             self._commanded = command.position
 
-        self.send(operation, write, go_on)  # with a stop, either it is not sent or the stop follows
+        self.send(operation, write, go_on)  # if a stop was requested, the motion is not sent or the stop follows it
 
     def _reset(self, go_on: GoOn) -> None:
         self._write(Command(act=False, go_to=False), "the reset", go_on)
@@ -289,7 +291,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
             try:
                 return self.wait(at_standstill, self._s.stroke / speed + ACCEPT_TIMEOUT + MARGIN, operation, go_on)
             except DeviceTimeout:
-                with contextlib.suppress(DeviceError):  # without it the gripper finishes the motion, then holds
+                with contextlib.suppress(DeviceError):  # without control the gripper finishes the motion, then holds
                     self._write(Command(go_to=False), operation, go_on)  # no caller waits for the motion any more
                 raise
 
@@ -321,7 +323,7 @@ class Robotiq2F(PolledControl[Status], Gripper):
     def grip(
         self, width: float = 0.0, force: float = 40.0, speed: float = 0.1, *, an: str | None = None
     ) -> tuple[bool, float]:
-        """Move the fingers to a width; return whether a part is held, and the width between the fingers, m.
+        """Move the fingers to a width. Return whether a part is held, and the width between the fingers, m.
 
         :param width: width to move to if no part is between the fingers, m
         :param force: gripping force, N

@@ -23,14 +23,14 @@ from .sics import Answer
 STATUS_PERIOD: Final = 0.5
 """Time between status requests while the line is free, s."""
 MAX_SHOWN_AGE: Final = 2.0
-"""Age up to which a weight is shown as present, s."""
+"""Maximum age of a weight that is shown as present, s."""
 STABLE_PERIOD: Final = 0.03
 """Time between requests while waiting for a stable value, s; a scale measures about 20 times per second."""
 OUT_OF_RANGE_TIME: Final = 0.5
-"""Time outside the range after which it is a fault, s: placing a part exceeds its weight for a moment."""
+"""Time outside the range after which a fault is raised, s: placing a part exceeds its weight for a moment."""
 DEADLINE: Final = 90.0
 CANCEL: Final = b"@\r\n"
-"""Cancels open commands and the tare: sent only after a tare or zero that failed."""
+"""Cancel command, which also clears the tare: sent only after a failed tare or zero."""
 
 TARE_TOLERANCE: Final = 1.5e-5
 """Tolerance of the tare, kg: rounding when the unit was switched at the scale."""
@@ -63,7 +63,7 @@ class MtSicsScale(LineDevice, Scale):
         self.use_line(settings.port, settings.baud_rate, settings.answer_timeout)
         self._stable_timeout = settings.stable_timeout
         self._newest: Reading[float] | None = None
-        self._tare: float | None = None  # kg, as the scale reported it when we tared or zeroed; None before
+        self._tare: float | None = None  # tare that the scale reported at our last tare or zero, kg; None before
 
     # -------------------------------------------------------------------------------- connection
     def disconnect(self) -> None:
@@ -119,7 +119,7 @@ class MtSicsScale(LineDevice, Scale):
             return None
 
     def _write_setting(self, parameter: DeviceParameter) -> Message | None:
-        """Write a setting; return why the scale does not use it, None if it does."""
+        """Write a setting. Return the reason if the scale does not use it, otherwise None."""
         commands = {name: command for command, name in sics.PARAMETERS.items()}
         command, value = commands.get(parameter.name), parameter.value
         if command is None or self._setting(command) is None:
@@ -152,7 +152,7 @@ class MtSicsScale(LineDevice, Scale):
             return self._reading(answer, began)
 
     def _at_rest(self) -> Reading[float]:
-        """Ask until the value is stable. The command S would stay pending in the scale after a timeout."""
+        """Request the value until it is stable. The command S would stay pending in the scale after a timeout."""
         go_on, deadline = self.begin("weighing"), time.monotonic() + self._stable_timeout
         inside = time.monotonic()
         while True:
@@ -174,7 +174,7 @@ class MtSicsScale(LineDevice, Scale):
             time.sleep(STABLE_PERIOD)
 
     def _value(self) -> tuple[Answer, float]:
-        """Ask for the value now; return the answer and when it was asked for. Raises as `weigh` does."""
+        """Request the present value. Return the answer and the time of the request. Raises as `weigh` does."""
         began = time.monotonic()
         answer = self._ask("SI")
         self._watch_range(answer)
@@ -276,7 +276,7 @@ class MtSicsScale(LineDevice, Scale):
                 )
             except DeviceTimeout:
                 with contextlib.suppress(DeviceError):
-                    self.line.send(CANCEL)  # else the scale could execute it later
+                    self.line.send(CANCEL)  # otherwise the scale could execute it later
                 raise
             if answer.mark != done:
                 why = {"I": "the load is in motion, or the scale is busy", "+": "too much load", "-": "too little load"}
@@ -287,7 +287,7 @@ class MtSicsScale(LineDevice, Scale):
                     name=name,
                     mark=why.get(answer.mark, answer.mark),
                 )
-            self._newest = None  # it refers to another zero
+            self._newest = None  # the stored weight refers to another zero
             self._tare = self._ask("TA").value
             self.set_alarm(TARE_LOST, False)
 

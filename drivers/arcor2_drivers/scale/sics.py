@@ -23,7 +23,7 @@ _TEXT: Final = re.compile(r'(I[0-4]) A "([^"]*)"')
 
 @dataclasses.dataclass(frozen=True)
 class Answer:
-    """A line: the command it answers (or ES, ET, EL), its mark, and a value in kg or a text if it has one.
+    """A line: the answered command (or ES, ET, EL), its mark, and optionally a value in kg or a text.
 
     mark: S stable, D dynamic, A done, I not executable now, L wrong parameter, + above and - below the range. unit: as
     sent. number: value of a setting.

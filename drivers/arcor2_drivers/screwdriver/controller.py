@@ -253,7 +253,7 @@ class Controller(StateObserver[State]):
                 self._change(asked)
             case Mid.RESULT:
                 result = self._decoded(telegrams.result, telegram)
-                if result not in state.results:  # it is sent again when our acknowledgement was lost
+                if result not in state.results:  # the controller sends it again if our acknowledgement was lost
                     results = (*state.results, result)[-MAX_RESULTS:]
                     self._change(arrived, total=state.total + 1, results=results)
             case Mid.ALARM | Mid.ALARM_STATUS:
@@ -267,7 +267,7 @@ class Controller(StateObserver[State]):
             self.send(acknowledge)
 
     def _match(self, mid: int, reply: Telegram) -> None:
-        """Hand a reply to the thread that awaits it. Any other reply is ignored."""
+        """Pass a reply to the thread that awaits it. Other replies are ignored."""
         with self._replied:
             if mid == self._awaited:
                 self._awaited, self._reply = None, reply

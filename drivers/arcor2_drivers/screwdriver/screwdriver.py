@@ -20,7 +20,7 @@ from .telegrams import Mid, Result
 MAX_TIGHTENING_TIME: Final = 3600.0
 """Longest time that a program may wait for results in one call, s."""
 MARGIN: Final = 15.0
-"""Time beyond it for enabling and disabling the tool, s, each with the longest time limit that a setting allows."""
+"""Time beyond MAX_TIGHTENING_TIME for enabling and disabling the tool with the longest allowed time limits, s."""
 LATE_RESULT: Final = 1.0
 """Time in which the result of an interrupted tightening arrives, s. No other tightening starts until then."""
 TWO_DIGITS: Final = 99

@@ -54,7 +54,7 @@ START_REVISIONS: Final = (6, 5, 4, 3, 2, 1)
 RESULT_REVISIONS: Final = (2, 1)
 ALARM_REVISIONS: Final = (2, 1)
 FIRST_LIGHT_REVISION: Final = 900
-"""First revision of a result whose layout is not that of revision 2 with more fields at its end."""
+"""First revision of a result whose layout does not extend that of revision 2."""
 
 TOOL_DATA_REVISIONS: Final = (2, 1)
 
@@ -131,7 +131,7 @@ class TelegramBuffer:
 
 
 def _number(raw: bytes, name: str) -> int:
-    """Return a number of digits, with a sign or without. Blanks count as 0."""
+    """Parse a decimal number with an optional sign. Blanks count as 0."""
     text = raw.strip()
     if text and not text.removeprefix(b"-").isdigit():
         raise ValueError(f"{name} is {raw!r}")

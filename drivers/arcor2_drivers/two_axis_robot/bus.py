@@ -122,7 +122,7 @@ class Bus:
         self.drain()
 
     def close(self) -> None:
-        """Close the port, if it is open. `open` creates a new one: this one may report forever that it is used."""
+        """Close the port if it is open. `open` creates a new one, because a closed port may still report that it is in use."""
         port, self._port = self._port, None
         if port is not None:
             with contextlib.suppress(OSError, termios.error):
@@ -184,7 +184,7 @@ class Bus:
         return int(model)
 
     def _answer(self, port: _Port, number: int, size: int, operation: str) -> bytes:
-        """Return the data of a servo's answer. An answer of another length is a late one to another instruction."""
+        """Return the data of a servo's answer. An answer of another length belongs to an earlier instruction."""
         while True:
             packet, result = self._packets.rxPacket(port, False)
             if result != COMM_SUCCESS or packet[PKT_ID] == number:
@@ -241,7 +241,7 @@ class Bus:
         self._check(next(iter(blocks)), result, 0, f"a block at register {address}")
 
     def keep_alive(self, numbers: tuple[int, ...], period: float, quiet: float) -> KeepAlive:
-        """Keep the bus watchdog from tripping by a child process, whenever the line is quiet for `quiet` s.
+        """Start a child process that signals the bus watchdog whenever the line is quiet for `quiet` s.
 
         It writes the unused LEDs: a sync write is not answered, so it disturbs no other answer.
         """

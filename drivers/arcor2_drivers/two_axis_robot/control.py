@@ -99,8 +99,8 @@ class Control:
         self._observer.start_keep_alive()
         state = bus.again(partial(bus.sync_read, self._ids, reg.STATE))
         for number, block in zip(self._ids, state, strict=True):
-            bus.write(number, reg.BUS_WATCHDOG, 0)  # a tripped one refuses goals
-            bus.write(number, reg.GOAL, reg.decode(block).position)  # else the joint would jump
+            bus.write(number, reg.BUS_WATCHDOG, 0)  # a tripped watchdog refuses goals
+            bus.write(number, reg.GOAL, reg.decode(block).position)  # otherwise the joint would jump
             bus.write(number, reg.BUS_WATCHDOG, self._watchdog())
             bus.write(number, reg.TORQUE, 1)
 
@@ -121,12 +121,12 @@ class Control:
 
     def leave(self) -> None:
         """Release control because we disconnect."""
-        with contextlib.suppress(DeviceError):  # it cannot be reached: its watchdog stops it
+        with contextlib.suppress(DeviceError):  # the servo cannot be reached: its watchdog stops it
             self.release(timeout=0.3)
         self.drop(Phrase.of("it was released."))
 
     def drop(self, reason: str) -> None:
-        """Note that control has ended."""
+        """Record that control has ended."""
         if self.ours:
             self._why_not, self._tripped = reason, False
         self.ours = self.teaching = False
@@ -165,7 +165,7 @@ class Control:
         self.wait_rest(STANDSTILL_TIMEOUT)
 
     def brake(self, bus: Bus) -> None:
-        """Set the goal of each moving servo to where it can stop soonest."""
+        """Set the goal of each moving servo to the nearest position where it can stop."""
         blocks = {}
         asked = time.monotonic()
         for joint, block in enumerate(bus.sync_read(self._ids, reg.STATE)):

@@ -36,7 +36,7 @@ def _turned(angle: float) -> float:
 
 
 def inverse(links: tuple[float, float], x: float, y: float) -> list[tuple[float, float]]:
-    """Return the solutions, with the elbow left and right: two, one for a stretched arm, none out of reach."""
+    """Return the solutions, elbow left and right: two, one for a stretched arm, none if out of reach."""
     first, second = links
     distance = math.hypot(x, y)
     if distance > first + second + OUT_OF_REACH or distance < abs(first - second) - OUT_OF_REACH:
@@ -53,6 +53,6 @@ def inverse(links: tuple[float, float], x: float, y: float) -> list[tuple[float,
 def nearest(
     solutions: list[tuple[float, float]], seed: tuple[float, float], limits: tuple[tuple[float, float], ...]
 ) -> tuple[float, float] | None:
-    """Return the solution within the limits with the smallest greatest joint motion from the seed, or None."""
+    """Return the solution within the limits whose largest joint motion from the seed is smallest, or None."""
     allowed = [q for q in solutions if all(low <= a <= high for a, (low, high) in zip(q, limits, strict=True))]
     return min(allowed, key=lambda q: max(abs(q[0] - seed[0]), abs(q[1] - seed[1])), default=None)

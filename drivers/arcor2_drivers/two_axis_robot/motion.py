@@ -105,7 +105,7 @@ class Motion:
 
     # -------------------------------------------------------------------------------- moving
     def exclusive(self) -> contextlib.AbstractContextManager[None]:
-        """Hold the arm for one motion. Raise Refused while it moves."""
+        """Reserve the arm for one motion. Raise Refused while it moves."""
         return exclusive_motion(self._lock, self._name)
 
     def to_joints(self, q: Angles, speed: float, acceleration: float, guard: StopGuard) -> None:
@@ -140,7 +140,9 @@ class Motion:
         blocks, slowest = {}, 0.0
         for number, goal, distance in zip(self._settings.ids, goals, distances, strict=True):
             part = distance / longest if longest else 1.0
-            a, v = reg.profile(top * part, ramp * part)  # profiles of one shape, so that both arrive together
+            a, v = reg.profile(
+                top * part, ramp * part
+            )  # profiles of the same shape, so that both joints arrive together
             slowest = max(slowest, distance / (v * reg.VELOCITY) + v * reg.VELOCITY / (a * reg.ACCELERATION))
             blocks[number] = goal_block(a, v, goal)
 
@@ -228,7 +230,7 @@ class Motion:
     def jog(
         self, twist: Sequence[float] | None, velocities: Sequence[float] | None, frame: str, valid_for: float
     ) -> None:
-        """Move with a velocity that expires: the goals are where the servos stop afterwards."""
+        """Move with a velocity that expires. The goals are the positions where the servos stop afterwards."""
         check_jog(self._name, twist, velocities, JOINTS, valid_for)
         guard, until = self._control.stops.guard(), time.monotonic() + valid_for
         with self.exclusive():

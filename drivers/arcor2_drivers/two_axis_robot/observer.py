@@ -39,7 +39,7 @@ class State(NamedTuple):
 
 
 class Observer(StateObserver[State]):
-    """Observes both servos. Reading keeps their watchdog from tripping; while this process is busy, a child does."""
+    """Observes both servos. Readings signal their watchdog. While this process is busy, a child process does."""
 
     period = 0.03
     busy_period = 0.01
@@ -55,7 +55,10 @@ class Observer(StateObserver[State]):
         self._keep_alive: KeepAlive | None = None
 
     def do(self, job: Callable[[Bus], Any], urgent: bool = False, timeout: float = JOB_TIMEOUT) -> Any:
-        """Execute a job on the observing thread, an urgent one next, and return its result. Drop it after `timeout`."""
+        """Execute a job on the observing thread and return its result.
+
+        Urgent jobs come first. Drop it after `timeout` s.
+        """
         self.observing.check()
         future: Future[Any] = Future()
         (self._jobs.appendleft if urgent else self._jobs.append)((future, job))

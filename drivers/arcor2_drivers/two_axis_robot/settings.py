@@ -57,7 +57,7 @@ class TwoAxisRobotSettings(Settings):
     joint_acceleration: Annotated[float, Range(0.5, 100.0)] = 12.0
     stop_deceleration: Annotated[float, Range(10.0, 200.0)] = 30.0
     current_limit: Annotated[float, Range(0.05, 3.2)] = 1.0
-    watchdog: Annotated[float, Range(0.16, MAX_WATCHDOG_TIMEOUT)] = 0.4  # shorter: trips on a repeated request
+    watchdog: Annotated[float, Range(0.16, MAX_WATCHDOG_TIMEOUT)] = 0.4  # a shorter one trips on a repeated request
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -90,7 +90,7 @@ class TwoAxisRobot(SingleArm):
     def take_control(self) -> None:
         """Take control, unless we have it; the arm does not move. Raise DeviceFault, NotInControl or Refused."""
         if not self._control.ours:
-            self.safe_moves.prepare()  # before the watchdog is armed: meanwhile nothing signals it
+            self.safe_moves.prepare()  # before the watchdog is armed, because nothing signals it during the setup
         self._control.take()
 
     def release_control(self) -> None:

@@ -15,7 +15,7 @@ from .settings import UrSettings
 
 
 class Arm:
-    """The arm, as the parts of its driver share it."""
+    """Data of the arm that the parts of the driver share."""
 
     def __init__(self, robot: Robot, model: ArmModel, settings: UrSettings) -> None:
         self._robot = robot

@@ -22,7 +22,7 @@ from .states import MAY_MOVE, MODE_NAMES, MODE_RUNNING, REMEDIES, Runtime, progr
 from .timing import GUARD_PERIOD, PROGRAM_END_TIMEOUT, TAKE_TIMEOUT
 
 LOWER_REGISTER_VERSIONS: Final = ((5, 23), (10, 0))
-"""Versions from which on ur_rtde 1.6.5 uses the lower registers itself although its program uses the upper ones."""
+"""Versions from which ur_rtde 1.6.5 writes lower registers although its program reads upper ones."""
 MIN_INERTIA_VERSION: Final = (5, 10)
 """First controller version that accepts an inertia."""
 MAX_INERTIA: Final = 133.0
@@ -60,7 +60,7 @@ class Control:
             Refused: Something is missing.
             ConnectionLost: The connection is lost.
         """
-        with self._taking:  # devices that use our outputs may take control at the same time
+        with self._taking:  # devices at our outputs may take control at the same time
             if not self.ours:
                 self._take()
 
@@ -111,7 +111,7 @@ class Control:
         observer.observing.settled()
 
     def _program_ends(self) -> bool:
-        """Return whether the program that plays ends at once, as that of a client which has just disconnected."""
+        """Return whether the playing program ends at once, like that of a client that has just disconnected."""
         return once_within(
             lambda: not program_plays(self._observer.sample().runtime), PROGRAM_END_TIMEOUT, GUARD_PERIOD
         )
@@ -186,7 +186,7 @@ class Control:
         return ProgramState.PAUSED if sample.runtime in (Runtime.PAUSED, Runtime.PAUSING) else ProgramState.PLAYING
 
     def uses_upper_registers(self) -> bool:
-        """Return whether the session uses the upper registers: if set, and supported by the controller."""
+        """Return whether the session uses the upper registers: if they are configured and supported."""
         version = self._observer.version[:2]
         lower_only = any(version[0] == major and version >= (major, minor) for major, minor in LOWER_REGISTER_VERSIONS)
         return self._arm.settings.use_upper_range_registers and not lower_only
@@ -228,7 +228,7 @@ class Control:
             session.set("the payload", "setTargetPayload", tool.mass, list(tool.cog), list(tool.inertia))
 
     def _await_samples(self) -> None:
-        """Wait for two samples: the second was taken after now, and so with the tool that was sent."""
+        """Wait for two samples, so that the second one is based on the new tool."""
         wanted = self._observer.samples_received + 2
         once_within(lambda: self._observer.samples_received >= wanted, TOOL_REPORT_TIMEOUT, 0.002)
 

@@ -39,7 +39,7 @@ class ControlClient:
         self._who, self._on_output, self._on_exit = who, on_output, on_exit
         self._numbers = itertools.count(1)
         self.opened: Future[Any] = Future()
-        """Done when the control program plays."""
+        """Future that is done when the control program plays."""
         self._waiting: dict[int, Future[Any]] = {0: self.opened}
         self._process = subprocess.Popen(  # noqa: S603 - our own script
             [sys.executable, "-P", str(_SCRIPT), json.dumps(arguments)],
@@ -53,7 +53,7 @@ class ControlClient:
         self._listening.start()
 
     def wait(self, timeout: float) -> None:
-        """Wait at most `timeout` s until the process has ended, and with it its connections."""
+        """Wait at most `timeout` s for the end of the process and of its connections."""
         self._listening.join(timeout)
 
     def request(self, command: str, arguments: tuple[Any, ...]) -> "Future[Any]":
@@ -66,7 +66,7 @@ class ControlClient:
     def write(self, line: bytes) -> None:
         """Write a line, if the process lives."""
         assert self._process.stdin is not None
-        with contextlib.suppress(OSError, ValueError):  # it has ended: the listening thread notices
+        with contextlib.suppress(OSError, ValueError):  # the process has ended; the listening thread detects it
             os.write(self._process.stdin.fileno(), line)
 
     def _listen(self) -> None:

@@ -3,7 +3,7 @@
 `session.py` runs this script in a separate process for two reasons. First, a busy cell host must not stop the arm:
 watchdog signals and the deadline of a jog must not depend on the host's interpreter. Second, a process can be killed.
 When the connection of ur_rtde 1.6.5 breaks, it reconnects and sends its program again without the watchdog, which stops
-any program that the controller runs by then. It sometimes crashes, and its constructors and destructors hold the
+any program that the controller is running then. It sometimes crashes, and its constructors and destructors block the
 interpreter.
 
 Standard input has one request per line, `{"n": 1, "do": "moveL", "args": [...]}`, and the host's pulses. Standard
@@ -53,7 +53,7 @@ RESUME_TIMEOUT: Final = 3.0
 KICKS_PER_PERIOD: Final = 8.0
 """Watchdog signals within one period of the watchdog."""
 LATE_SIGNAL_FRACTION: Final = 0.8
-"""Part of the period of the watchdog after which it may have tripped."""
+"""Fraction of the period of the watchdog after which it may have tripped."""
 MAX_LATE_SIGNAL_AGE: Final = 2.0
 """Time for which a late signal may be the reason for a stopped program, s."""
 LAST_STOP_TIMEOUT: Final = 0.15
@@ -101,7 +101,7 @@ def main() -> None:
 
 
 def _listen(requests: "queue.SimpleQueue[bytes | int]") -> None:
-    """Queue requests, finally the exit status, and give the main thread time for its last stop."""
+    """Queue requests, then the exit status. Wait until the main thread has sent its last stop."""
     parent = Parent()
     while parent.ended is None:
         for line in parent.lines(HOST_CHECK_INTERVAL):
@@ -174,7 +174,7 @@ class ControlProgram:
         return max(min(self._written + self._period, self._jog_ends) - time.monotonic(), 0.0)
 
     def _signalled(self, since: float) -> None:
-        """Note that the library sent a signal, at an unknown time between `since` and now."""
+        """Record that the library sent a signal between `since` and now; the exact time is unknown."""
         self._written = time.monotonic()
         if self._written - since > LATE_SIGNAL_FRACTION / self._frequency:
             self._late = self._written
@@ -187,7 +187,7 @@ class ControlProgram:
         return armed
 
     def _exit_if_too_slow(self) -> None:
-        """Exit if the watchdog has tripped: the library would deny commands without telling why."""
+        """Exit if the watchdog has tripped, because the library would refuse commands without a reason."""
         now = time.monotonic()
         if now - self._written > 1.0 / self._frequency:
             os._exit(EXIT_TOO_SLOW)
@@ -195,7 +195,10 @@ class ControlProgram:
             self._late = now
 
     def _was_late(self) -> bool:
-        """Return whether the watchdog may have tripped recently: when it received a signal is not known exactly."""
+        """Return whether the watchdog may have tripped recently.
+
+        The times at which it received signals are not known exactly.
+        """
         return time.monotonic() - self._late < MAX_LATE_SIGNAL_AGE
 
     def last_stop(self) -> None:
@@ -208,12 +211,12 @@ class ControlProgram:
     def _stop(self, deceleration: float) -> Any:
         """Stop the motion. A jog is at standstill when this returns.
 
-        The asynchronous stopL is the only one of the four stops that does what its name says: ur_rtde 1.6.5 runs a
+        Of the four stops, only the asynchronous stopL works as its name says: ur_rtde 1.6.5 runs a
         synchronous stopL as stopj until the first asynchronous stop, and stopJ as stopl from then on.
         """
         if self._own:
             return self._registers.halt()
-        if self._jogs:  # stopL has no effect next to the thread that holds the velocity
+        if self._jogs:  # stopL has no effect while the thread for the velocity runs
             return self.do("speedStop", [])
         return self._control.stopL(deceleration, True)
 
@@ -222,7 +225,7 @@ class ControlProgram:
             """Move with a velocity until a time of the monotonic clock; return False if it has passed."""
             if time.monotonic() >= until:
                 return False
-            # Without the duration that the library supports: its call would block watchdog signals and a stop so long.
+            # The library's parameter `time` is not used: its call would block watchdog signals and stops for that time.
             taken = command(velocities, acceleration)
             self._jog_ends = until
             time.sleep(MIN_VELOCITY_INTERVAL)

@@ -25,7 +25,7 @@ MAX_LINE = 4096
 
 
 def is_remote(answer: str) -> bool:
-    """Decode the answer to `is in remote control`. Raise DeviceFault for garbage."""
+    """Decode the answer to `is in remote control`. Raise DeviceFault if it is invalid."""
     word = answer.strip().lower()
     if word not in ("true", "false"):
         raise DeviceFault("The controller's answer to 'is in remote control' is not valid.", answer)
@@ -43,7 +43,7 @@ def operational_mode(answer: str, remote: bool) -> Mode:
 
 
 def program_name(answer: str) -> str:
-    """Return the name in the answer to `programState`, "PLAYING name.urp". Raise DeviceFault for garbage."""
+    """Return the name in the answer to `programState`, "PLAYING name.urp". Raise DeviceFault if it is invalid."""
     word, _, name = answer.strip().partition(" ")
     if word.upper() not in ("STOPPED", "PLAYING", "PAUSED"):
         raise DeviceFault("The controller's answer to 'programState' is not valid.", answer)
@@ -73,7 +73,10 @@ class Dashboard:
             self._connected(deadline)
 
     def ask(self, command: str, timeout: float = 1.0) -> str:
-        """Send a command and return the answer. After an error the connection is closed, with any late answer."""
+        """Send a command and return the answer.
+
+        After an error the connection is closed, so that a late answer is discarded.
+        """
         deadline = time.monotonic() + timeout
         with self._locked(deadline):
             opened = self._connected(deadline)

@@ -1,10 +1,10 @@
-"""Arm models with their nominal kinematics, and conversions to the poses of the controller.
+"""Arm models with their nominal kinematics, and conversion of poses for the controller.
 
 The controller states poses in its frame "base", which is base_link rotated by 180 degrees about z, with the orientation
 as a rotation vector. The pose of an object in the scene is that of its base_link.
 
 The Denavit-Hartenberg parameters are those published by Universal Robots. A real arm differs by some millimetres. The
-controller knows its calibration; here the nominal values only bound a speed and compare tools.
+controller uses its calibration. The nominal values serve only for limiting a speed and comparing tools.
 """
 
 import math

@@ -44,7 +44,7 @@ class DigitalGripper(HoldsParts, DigitalIO):
         output, guard, above = self._gripper_output(), self._control.stops.guard(), _behind(pose, approach)
         if self.part_present():
             raise Refused("{name} cannot pick: its gripper holds a part already.", name=self.name)
-        self._switch(output, False)  # it is closed after a part was lost
+        self._switch(output, False)  # the gripper is closed after a part was lost
         self._motion.to_pose(above, False, speed, 0.5, guard)
         self._motion.to_pose(pose, True, slow_speed, 0.5, guard)
         self._switch(output, True)

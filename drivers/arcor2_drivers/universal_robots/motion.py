@@ -79,7 +79,7 @@ class Motion:
 
     @contextlib.contextmanager
     def exclusive(self) -> Iterator[None]:
-        """Hold the arm for one motion. Raise Refused while it moves or is in hand teaching mode."""
+        """Reserve the arm for one motion. Raise Refused while it moves or is in hand teaching mode."""
         with exclusive_motion(self._lock, self._arm.name):
             self.check_not_teaching()
             yield
@@ -128,7 +128,7 @@ class Motion:
     def joint_speed(self, fraction: float) -> float:
         """Return the joint speed for a fraction of the maximum, rad/s.
 
-        In manual mode the TCP keeps its limit even if every joint contributes with its whole lever.
+        In manual mode the TCP stays below its limit even if every joint moves it with its largest lever arm.
         """
         levers = 3.0 * self._arm.model.reach + len(JOINTS) * math.hypot(*self._control.stated_tool.tcp.position)
         return min(fraction * self._arm.settings.max_joint_speed, self._speed_limit() / levers)
@@ -241,7 +241,7 @@ class Budget:
         self._last: float | None = None
 
     def exceeded(self, sample: Sample) -> bool:
-        """Subtract the time between this sample and that of the last call; return whether none is left."""
+        """Subtract the time since the sample of the last call. Return whether no time is left."""
         if self._last is not None:
             self._left -= (sample.timestamp - self._last) * max(sample.speed_fraction, MIN_SPEED_FRACTION)
         self._last = sample.timestamp

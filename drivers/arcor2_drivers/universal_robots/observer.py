@@ -103,7 +103,8 @@ class Observer:
         self.samples_missed = 0
         self.ring: collections.deque[Sample] = collections.deque(maxlen=MAX_SAMPLES)
         self.unsafe: Sample | None = None
-        """The latest sample in which the safety system prevented motion; a slow reader does not miss a short stop."""
+        """Latest sample in which the safety system prevented motion, so that a slow reader does not miss a short
+        stop."""
         self._newest: Sample | None = None
         self._stream: RtdeStream | None = None
         self.observing = Observing(device_at(name, self.address), self._open, self._watch, self._close)
@@ -126,7 +127,9 @@ class Observer:
         clock = RunningTime()
         while True:
             self.observing.check()
-            newest = self.newest()  # it may have arrived, and the connection come back, since the first check
+            newest = (
+                self.newest()
+            )  # since the first check, a sample may have arrived, or the connection may have been restored
             if newest is None:
                 raise NotConnected("{device} has sent no sample yet.", device=self.who)
             if newest.age <= max_age:
@@ -165,7 +168,7 @@ class Observer:
     def _watch(self, stopping: threading.Event) -> None:
         stream = self._stream
         assert stream is not None
-        empty = 0  # reads, not seconds: while this process is not scheduled, no sample is missed
+        empty = 0  # counts reads instead of seconds, because this process may not have been scheduled for some time
         while not stopping.is_set():
             empty = 0 if self._receive(stream, READ_TIMEOUT) else empty + 1
             if empty * READ_TIMEOUT >= SAMPLE_TIMEOUT:

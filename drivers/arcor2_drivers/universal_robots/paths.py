@@ -33,7 +33,8 @@ MAX_WAYPOINTS: Final = 200
 MAX_BLEND: Final = 0.5
 """Maximum blend radius, m."""
 FORCE_LIMITS: Final = (1.0, 100.0)
-"""Force limits, N: below, the noise of the sensor triggers; above, the controller's own supervision comes first."""
+"""Range of force limits, N. Below it, the noise of the sensor triggers; above it, the controller's own limit
+applies."""
 MAX_CONTACT_DISTANCE: Final = 1.0
 """Maximum distance of a move until contact, m."""
 NO_CONTACT: Final = "no_contact"
@@ -55,7 +56,10 @@ class Paths:
         return *rotated((force[0], force[1], force[2]), world), *rotated((force[3], force[4], force[5]), world)
 
     def until_contact(self, direction: Vector3, force: float, max_distance: float, speed: float) -> MoveResult:
-        """Move along a direction of the world until the force against it is reached. Raise DeviceFault if it is not."""
+        """Move along a direction of the world until the opposing force is reached.
+
+        Raise DeviceFault without contact.
+        """
         arm, length = self._arm, math.hypot(*direction)
         if len(direction) != 3 or not math.isfinite(length) or length < 1e-9:
             raise OutOfRange("{name}: direction must be three numbers, not all zero.", name=arm.name)
@@ -145,7 +149,7 @@ class Paths:
             return self._run(session, move, guard)[0]
 
     def _check_blend(self, blend: float, points: list[list[float]]) -> None:
-        """Raise OutOfRange for blends that overlap: the controller would end the program on the way."""
+        """Raise OutOfRange for blends that overlap, because the controller would abort the program."""
         for number, (a, b) in enumerate(itertools.pairwise(points), 1):
             distance = math.dist(a[:3], b[:3])
             if len(points) > 2 and blend > 0.0 and blend >= distance / 2.0:

@@ -40,10 +40,10 @@ class Pendant:
         except NotConnected:
             if major_version < POLYSCOPE_X:
                 raise
-            self.available = False  # as PolyScope X is delivered
+            self.available = False  # the default of PolyScope X
 
     def state(self, max_age: float = MAX_AGE) -> tuple[Control, Mode]:
-        """Return who controls the robot, and its operating mode; the last known ones if no answer comes in time."""
+        """Return who controls the robot, and its operating mode. Without an answer, return the last known values."""
         if not self.available:
             return Control.REMOTE, Mode.OTHER
         if time.monotonic() - self._asked > max_age:

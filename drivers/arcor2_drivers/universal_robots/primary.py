@@ -52,7 +52,7 @@ def parts(buffer: bytes) -> tuple[list[tuple[int, bytes]], bytes]:
 
 
 def calibration_in(message: bytes) -> KinematicCalibration | None:
-    """Return the kinematics in the content of a robot state, or None. Raise ValueError for garbage."""
+    """Return the kinematics in the content of a robot state, or None. Raise ValueError for invalid data."""
     packages, _ = parts(message)
     for kind, content in packages:
         if kind == _KINEMATICS:
@@ -73,7 +73,7 @@ def read_calibration(host: str, timeout: float = TIMEOUT, port: int = PORT) -> K
     Raises:
         NotConnected: The connection is refused.
         DeviceTimeout: No kinematics arrived within `timeout` s.
-        ConnectionLost: The controller broke the exchange off.
+        ConnectionLost: The controller closed the connection.
     """
     address = f"{host}:{port}"
     with contextlib.closing(connect(NAME, host, port, timeout)) as opened, exchange(NAME, address, timeout):

@@ -14,7 +14,7 @@ from arcor2_hw.data.geometry import Pose
 from .geometry import to_vector
 
 STATES: Final = 8
-"""The output register holds the number of the run times this, plus the state of the run."""
+"""Factor in the output register, which contains `STATES` times the number of the run, plus its state."""
 
 
 class RunState(enum.IntEnum):
@@ -84,9 +84,9 @@ def tool_lines(tool: Tool) -> list[str]:
 
 
 def _push(limit: Limit) -> list[str]:
-    """Return the lines that set `push` to the change of the force since the start, and `pressed` to whether it grew.
+    """Return the lines that set `push` to the change of the force since the start, and `pressed` if it increased.
 
-    A decreasing force is a contact being released. The sign of the force does not matter.
+    A decreasing force means that a contact is released. The sign of the force does not matter.
     """
 
     def along(force: str) -> str:

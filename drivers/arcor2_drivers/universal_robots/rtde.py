@@ -1,7 +1,7 @@
 """The observing side of RTDE, port 30004: set up an output recipe, then read the stream of samples.
 
 Source: Universal Robots, "RTDE guide" (protocol version 2). The library's own receiver is not used: it wakes about ten
-times per sample and skips samples that were not fetched in time, and its constructor holds the interpreter and waits
+times per sample and skips samples that were not fetched in time, and its constructor blocks the interpreter and waits
 without limit for a controller that accepts a connection and sends nothing. docs/devices/universal-robots.md has the
 measurements.
 """
@@ -41,7 +41,10 @@ Version = tuple[int, int, int, int]
 
 
 def frames(buffer: bytes) -> tuple[list[tuple[int, bytes]], bytes]:
-    """Split a buffer into complete frames (type, payload) and the remaining bytes. Raise ValueError for garbage."""
+    """Split a buffer into complete frames (type, payload) and the remaining bytes.
+
+    Raise ValueError for invalid data.
+    """
     found, at, end = [], 0, len(buffer)
     while end - at >= _HEADER.size:
         size, kind = _HEADER.unpack_from(buffer, at)
@@ -93,7 +96,7 @@ class RtdeStream:
         Raises:
             NotConnected: The connection is refused, or the host is unreachable.
             DeviceTimeout: The controller does not answer.
-            ConnectionLost: The controller breaks the exchange off.
+            ConnectionLost: The controller closes the connection.
             DeviceFault: The controller does not have a variable.
         """
         deadline = time.monotonic() + timeout
@@ -109,7 +112,7 @@ class RtdeStream:
         return stream
 
     def read(self, wait: float) -> list[tuple[float | int, ...]]:
-        """Return the samples received, waiting at most `wait` s for the first; none if none came.
+        """Return the received samples. Wait at most `wait` s for the first one.
 
         Raises:
             ConnectionLost: The controller closed or reset the connection, or sent garbage.

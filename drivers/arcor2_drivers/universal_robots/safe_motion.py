@@ -68,7 +68,7 @@ class SafeMotion:
         move_around_obstacles(self._robot, self.moves, goal, speed, guard, move)
 
     def _free(self, pose: Pose, joints: list[Joint]) -> list[Joint]:
-        """Return the joints for a pose in a collision-free configuration; the given ones if they are free.
+        """Return joints for a pose without collision; the given joints if they are free.
 
         Raises:
             KinematicsException: Every configuration collides.
@@ -98,6 +98,6 @@ class SafeMotion:
         return Tool(FLANGE, Cylinder("tool", ROD_RADIUS, length), pose)
 
     def _model_settings(self) -> dict[str, object]:
-        """Return the TCP in the flange, by the names of the settings."""
+        """Return the settings of the model: the TCP in the flange."""
         names = ("tcp_x", "tcp_y", "tcp_z", "tcp_rx", "tcp_ry", "tcp_rz")
         return dict(zip(names, to_vector(self._control.stated_tool.tcp), strict=True))

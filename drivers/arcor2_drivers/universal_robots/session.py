@@ -38,7 +38,7 @@ _TOO_SLOW: Final = {
     3: "the watchdog was not signalled in time",
     4: f"the cell host did not work for {FROZEN_AFTER:g} s",
 }
-"""Causes by exit status of the control process, where the computer was busy."""
+"""Causes by exit status of the control process if the computer was too busy."""
 _BROKEN: Final = (b"disconnected", b"could not receive", b"closed the connection", b"lost connection", b"reconnecting")
 """Texts that ur_rtde 1.6.5 prints, in lower case, when its connection breaks and before it reconnects."""
 MAX_ATTEMPTS: Final = 3
@@ -52,7 +52,7 @@ def never() -> bool:
 
 
 class ControlSession:
-    """Control of the arm, from `open` until it ends. `ended` is None while it lives, then the reason."""
+    """Control of the arm, from `open` until it ends. `ended` is None, or the reason of its end."""
 
     def __init__(self, observer: Observer, upper: bool, watchdog_frequency: float) -> None:
         self.host = observer.host
@@ -61,7 +61,7 @@ class ControlSession:
         self.registers = Registers.of(upper)
         self.ended: DeviceError | None = None
         self.too_slow = False
-        """Whether it ended because this computer was too busy for the watchdog."""
+        """Whether the session ended because this computer was too busy for the watchdog."""
         self.own: int | None = None
         """Number of the run of a motion program that plays, or has just ended, in place of the control program."""
         self._observer = observer
@@ -145,16 +145,16 @@ class ControlSession:
             log.warning("Control of %s ended: %s", self.who, reason)
 
     def release(self, reason: DeviceError, wait: float) -> None:
-        """Stop the control program in order, waiting at most `wait` s, and end the session."""
+        """Stop the control program normally within `wait` s, and end the session."""
         self._released = True
         with contextlib.suppress(DeviceError):
             self.call("the end of control", "stopScript", timeout=wait)
         self.end(reason)
-        if self._process is not None:  # until its connections are closed, its registers are in use
+        if self._process is not None:  # the registers of the process are in use until its connections are closed
             self._process.wait(timing.PROCESS_END_TIMEOUT)
 
     def await_end(self) -> None:
-        """Wait until the guard of an ended session has finished: its last stop must not stop the next program."""
+        """Wait for the guard of an ended session, because its last stop must not stop the next program."""
         if self._guard is not None:
             guard = self._guard
             once_within(lambda: not guard.is_alive(), timing.GUARD_END_TIMEOUT, timing.GUARD_PERIOD)
@@ -178,7 +178,7 @@ class ControlSession:
             stopped: Called right before the command is sent; True cancels it.
 
         Raises:
-            DeviceError: What ended the session.
+            DeviceError: The session has ended.
             Cancelled: The command was cancelled.
             DeviceTimeout: No answer came in time.
             DeviceFault: The library failed.
@@ -209,12 +209,12 @@ class ControlSession:
         return self.call(operation, question, *arguments)
 
     def set(self, operation: str, command: str, *arguments: Any) -> None:
-        """Execute a command that sets values and returns whether it was accepted, as `ask`. Raise as `do`."""
+        """Execute a command that sets values, and repeat it like `ask`. Raise as `do` if it is not accepted."""
         if not self.ask(operation, command, *arguments):
             self._not_accepted(operation)
 
     def do(self, operation: str, command: str, *arguments: Any, **options: Any) -> None:
-        """Execute a command that returns whether it was accepted. Raise DeviceFault if not, else as `call`."""
+        """Execute a command that returns whether it was accepted. Raise DeviceFault if it was not, or as `call`."""
         if not self.call(operation, command, *arguments, **options):
             self._not_accepted(operation)
 
@@ -223,7 +223,7 @@ class ControlSession:
             self._ending.is_set, 2.0 * timing.PROGRAM_GONE_TIMEOUT + timing.PROCESS_END_TIMEOUT, timing.GUARD_PERIOD
         )
         if self.ended is not None:
-            raise self.ended  # the guard was about to find the cause
+            raise self.ended  # the guard is determining the cause
         raise DeviceFault("{device} did not accept {what}.", device=self.who, what=operation)
 
     def speed(
@@ -304,7 +304,10 @@ class ControlSession:
         return port
 
     def resume(self) -> None:
-        """Let the control program play again. Raise DeviceFault, DeviceTimeout or what ended the session."""
+        """Let the control program play again.
+
+        Raise DeviceFault, DeviceTimeout or the reason for the end of the session.
+        """
         if self.own is None or self.ended is not None:
             return
         if (newest := self._observer.newest()) is None or program_plays(newest.runtime):
@@ -319,7 +322,7 @@ class ControlSession:
             if self._dashboard is not None:
                 self._dashboard.do("stop", "Stopped")
         except DeviceError as e:
-            self.end(e)  # without signals the watchdog stops it
+            self.end(e)  # without signals the watchdog stops the program
             raise
         self.end(reason)
 
@@ -387,7 +390,7 @@ class ControlSession:
         )
         newest = self._observer.newest()
         if newest is not None and newest.robot_mode != MODE_RUNNING:
-            return gone  # the watchdog would leave the arm switched on
+            return gone  # the watchdog alone would leave the arm switched on
         assert self._process is not None
         response = self._process.request("was_late", ())
         if (
@@ -400,7 +403,7 @@ class ControlSession:
         return gone
 
     def _end_by_safety(self, safety_mode: int) -> None:
-        """Stop the program, then end: after a safeguard stop it would continue as soon as the guard closes."""
+        """Stop the program, which would continue as soon as the guard door is closed, and end the session."""
         safety = safety_of(safety_mode)
         reason = SafetyStop(
             "{safety} of {device}", REMEDIES.get(safety, ""), safety.value, safety=label(safety), device=self.who
@@ -409,11 +412,11 @@ class ControlSession:
         self.end(reason)
 
     def _last_stop(self) -> None:
-        """Leave no program of ours on the controller: a broken connection may have sent it once more."""
+        """Stop our program on the controller once more, because a broken connection may have sent it again."""
         newest = self._observer.newest()
         left_behind = newest is None or program_plays(newest.runtime)
         if self._dashboard is not None and left_behind and not self._released:
-            for _ in range(2):  # idempotent; the first attempt may meet a connection that was reset
+            for _ in range(2):  # can be repeated: the first attempt may use a connection that was reset
                 try:
                     self._dashboard.do("stop", "Stopped", timing.LAST_STOP_TIMEOUT)
                     break

@@ -15,7 +15,7 @@ MANUAL_TCP_SPEED = 0.25
 """Highest TCP speed in manual mode, m/s (ISO 10218-1, reduced speed)."""
 FULL_TURN = 2.0 * math.pi
 OUTPUTS = 18
-"""Number of digital inputs, and of digital outputs: 8 standard, 8 configurable, 2 at the tool."""
+"""Number of digital inputs and number of digital outputs: 8 standard, 8 configurable, 2 at the tool."""
 
 
 @dataclasses.dataclass

@@ -28,7 +28,9 @@ def connect(port_name: Message, host: str, port: int, timeout: float) -> socket.
         with exchange(port_name, address, timeout):
             return socket.create_connection((host, port), timeout)
     except ConnectionLost as e:
-        if isinstance(e.__cause__, ConnectionResetError):  # the port is open: a reset may overtake the acceptance
+        if isinstance(
+            e.__cause__, ConnectionResetError
+        ):  # the port is open; a reset may arrive before the connection is reported
             raise
         raise NotConnected("No {port_name} at {address}.", e.detail, port_name=port_name, address=address) from e
 

@@ -1,4 +1,4 @@
-"""Numbers of the controller as states of a robot: mode, safety, program.
+"""Conversion of the controller's numbers to states of a robot: mode, safety, program.
 
 Source: Universal Robots, "RTDE guide": robot_mode, safety_mode, runtime_state.
 """

@@ -103,7 +103,7 @@ class UniversalRobot(MoveActions, DigitalGripper, SafetySystem, SingleArm):
     def take_control(self) -> None:
         """Take control, unless we have it. Raise NotInControl, SafetyStop, Refused or ConnectionLost."""
         if not self._control.ours:
-            self.safe_moves.prepare()  # before the watchdog is armed: meanwhile nothing signals it
+            self.safe_moves.prepare()  # before the watchdog is armed, because nothing signals it during the setup
         self._control.take()
 
     def release_control(self) -> None:
@@ -169,7 +169,7 @@ class UniversalRobot(MoveActions, DigitalGripper, SafetySystem, SingleArm):
         return self._ur.max_tcp_speed
 
     def kinematic_calibration(self) -> KinematicCalibration:
-        """Read the DH parameters of this robot, in the controller's base. Raise DeviceError."""
+        """Read the calibrated DH parameters of this robot, in the controller's base. Raise DeviceError."""
         self._observer.observing.check()
         try:
             return read_calibration(self._ur.host)
@@ -231,7 +231,7 @@ class UniversalRobot(MoveActions, DigitalGripper, SafetySystem, SingleArm):
         """Move the TCP through poses in the world, in lines or by joint moves.
 
         Args:
-            waypoints: Poses; all but the last are passed.
+            waypoints: Poses; the arm passes all but the last one.
             blend: Radius at the corners, m; 0 stops at each pose. Less than half the distance to the next pose.
             linear: In lines.
             speed: Fraction of the maximum.
@@ -270,7 +270,7 @@ class UniversalRobot(MoveActions, DigitalGripper, SafetySystem, SingleArm):
         valid_for: float = 0.2,
         end_effector_id: str | None = None,
     ) -> None:
-        """Move with a velocity that expires `valid_for` s from now. Raise OutOfRange, or as a move."""
+        """Move with a velocity that expires `valid_for` s from now. Raise OutOfRange, or errors of moves."""
         check_end_effector(self.name, end_effector_id or TCP)
         self._jog.move(twist, joint_velocities, frame, valid_for)
 

@@ -72,7 +72,7 @@ class Carrier:
             nonlocal reason
             try:
                 self._found = self._look_up()
-            except NotConnected as e:  # the scene is still creating it
+            except NotConnected as e:  # the scene is still creating the carrier
                 reason = str(e)
                 return False
             reason = f"{self.name} is {self._found.connection.value}"
@@ -83,9 +83,9 @@ class Carrier:
             began = time.monotonic()
             try:
                 self.read(point)
-            except (ConnectionLost, NotConnected) as e:  # it is about to reconnect
+            except (ConnectionLost, NotConnected) as e:  # the carrier is about to reconnect
                 reason = str(e)
-                reading += time.monotonic() - began  # the clock counts only the first moment of a long call
+                reading += time.monotonic() - began  # the clock counts only the beginning of a long call
                 return False
             except OutOfRange:  # the carrier has no such point
                 pass
@@ -138,7 +138,7 @@ class Carrier:
 
     # -------------------------------------------------------------------------------- points
     def require(self, name: str, direction: PointDirection, kind: PointKind) -> IOPoint:
-        """Return a point of the carrier. Raise InvalidData if there is none of this name, direction and kind."""
+        """Return a point of the carrier. Raise InvalidData without a point of this name, direction and kind."""
         points = {p.name: p for p in self._points.points() if p.direction is direction and p.kind is kind}
         if name not in points:
             raise InvalidData(

@@ -90,7 +90,7 @@ class SuctionGripper(Connected, Suction):
         self._carrier.close()
 
     def condition(self) -> Health:
-        """Return that the function has to be checked after a part was lost."""
+        """Return check_function after a part was lost."""
         return Health.CHECK_FUNCTION if self._part_lost else Health.NORMAL
 
     def take_control(self) -> None:
@@ -113,7 +113,7 @@ class SuctionGripper(Connected, Suction):
         return PART_LOST in self.conditions
 
     def _carrying_robot(self) -> Robot | None:
-        """Return the robot that the settings name, else the carrier if it is a robot, else the only robot."""
+        """Return the robot in the settings, otherwise the carrier if it is a robot, otherwise the only robot."""
         carrier = self._carrier.object
         return carrier if isinstance(carrier, Robot) and not self._set.robot else super()._carrying_robot()
 
@@ -131,7 +131,9 @@ class SuctionGripper(Connected, Suction):
 
     @observation
     def part_held(self) -> bool:
-        """Return whether a part is held: by the sensor, else by the vacuum, else by whether the vacuum is on.
+        """Return whether a part is held, by the part sensor, the measured vacuum, or the state of the vacuum valve.
+
+        The first one that is available is used.
 
         Raises:
             DeviceError: NotConnected, ConnectionLost, DeviceTimeout or Stale.
@@ -159,7 +161,7 @@ class SuctionGripper(Connected, Suction):
         """Raise the alarm if the part has been missing for `lost_after` s. Hold `_part_lock`."""
         try:
             held = self.part_held()
-        except DeviceError:  # without an answer of the carrier nothing is known
+        except DeviceError:  # without an answer of the carrier the state of the part is unknown
             held = True
         now = time.monotonic()
         if held:
@@ -229,7 +231,7 @@ class SuctionGripper(Connected, Suction):
 
     @action(again="safe")
     def check_part(self, *, an: str | None = None) -> None:
-        """Fail unless the part is held, and has been since it was gripped."""
+        """Fail unless the part has been held since it was gripped."""
         if self._part_lost or not self.part_held():
             raise DeviceFault("{gripper} has lost its part.", "", PART_LOST, gripper=self.name)
 
@@ -240,7 +242,10 @@ class SuctionGripper(Connected, Suction):
 
     @contextlib.contextmanager
     def _act(self, operation: str) -> Iterator[GoOn]:
-        """Execute one action at a time; the value raises Cancelled after a stop, ConnectionLost after a loss."""
+        """Execute one action at a time.
+
+        The returned check raises Cancelled after a stop, ConnectionLost after a loss.
+        """
         if not self._acting.acquire(blocking=False):
             raise Refused("{gripper} is gripping or releasing already. Wait, or stop it.", gripper=self.name)
         try:
@@ -249,7 +254,7 @@ class SuctionGripper(Connected, Suction):
             self._acting.release()
 
     def _sensed(self, held: bool, seconds: float, go_on: GoOn) -> bool:
-        """Return whether the sensor detects or loses the part in time; without a sensor, wait for the time."""
+        """Return whether the sensor detects or loses the part within `seconds`. Without a sensor, wait that long."""
 
         def sensed() -> bool:
             go_on()

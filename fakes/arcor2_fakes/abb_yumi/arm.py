@@ -20,7 +20,10 @@ PART_WIDTH: Final = 0.01
 
 
 class Motion:
-    """A joint path, shape (n, 7), run in `duration` s from standstill to standstill; slower if an axis is too slow."""
+    """A joint path, shape (n, 7), from standstill to standstill.
+
+    It takes `duration` s, or longer if an axis is too slow.
+    """
 
     def __init__(self, path: Array, duration: float) -> None:
         self.path = path

@@ -117,7 +117,7 @@ class Controller:
         return True
 
     def set_lead_through(self, arm: str, on: bool) -> bool:
-        """Make an arm movable by hand, or stiff; return False if the state does not allow it."""
+        """Enable or disable moving an arm by hand. Return False if the state does not allow it."""
         if self.control_state != "motoron" or self.arms[arm].moving:
             return False
         self.wrote("lead-through")

@@ -37,8 +37,8 @@ HOME: Final = {
     "left": np.radians([0.0, -130.0, 30.0, 0.0, 40.0, 0.0, 135.0]),
     "right": np.radians([0.0, -130.0, 30.0, 0.0, 40.0, 0.0, -135.0]),
 }
-_ANGLE_WEIGHT: Final = 0.2  # m/rad: weight of an error of the arm angle against one of the position
-_TURN_WEIGHT: Final = 0.3  # m/rad: weight of an error of the orientation
+_ANGLE_WEIGHT: Final = 0.2  # weight of an error of the arm angle relative to the position, m/rad
+_TURN_WEIGHT: Final = 0.3  # weight of an error of the orientation relative to the position, m/rad
 _STEP: Final = 1e-6
 _TOLERANCE: Final = 1e-6
 
@@ -206,7 +206,7 @@ class Kinematics:
         raise NotReachable
 
     def reach(self, target: Target, present: Array) -> Array:
-        """Return joints of a robtarget: of its configuration and arm angle. Raise NotReachable."""
+        """Return joints for a robtarget with its configuration and arm angle. Raise NotReachable."""
         quadrant = dict(zip((0, 3, 5), target.configuration[:3], strict=True))
         middle = present.copy()
         for axis, number in quadrant.items():

@@ -56,7 +56,7 @@ class SynchronizedMotion(NamedTuple):
 
 
 class MotionServer:
-    """The server of one arm. `partner` is set to that of the other arm. `own_time` is the clock of the watchdog."""
+    """The server of one arm. `partner` is the server of the other arm. `own_time` is the clock of the watchdog."""
 
     def __init__(self, controller: Controller, name: str, own_time: Callable[[], float]) -> None:
         self.name = name

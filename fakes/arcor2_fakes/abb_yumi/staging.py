@@ -1,4 +1,4 @@
-"""Staged joints, targets and waypoints of one arm, and what is computed from them."""
+"""Staged joints, targets and waypoints of one arm, and values computed from them."""
 
 import math
 from typing import Final
@@ -13,12 +13,12 @@ MAX_WAYPOINTS: Final = 50
 
 
 class Staging:
-    """The data that commands 4, 5 and 20 to 24 set, until a motion uses it."""
+    """Data set by commands 4, 5 and 20 to 24, stored until a motion uses it."""
 
     def __init__(self, arm: Arm) -> None:
         self.arm = arm
         self.speed = (100.0, 50.0)
-        """Of lines: mm/s, degrees/s."""
+        """Speed of lines: mm/s, degrees/s."""
         self.clear()
 
     def clear(self) -> None:
@@ -69,7 +69,7 @@ class Staging:
         return self.describe(code, self.joints)
 
     def describe(self, code: int, q: Array) -> list[float]:
-        """Return joints, position or orientation of joint values, as a command 10 to 12 or 40 to 42 answers them."""
+        """Return joints, position or orientation for joint values, as answered to commands 10 to 12 and 40 to 42."""
         if code in (10, 40):
             return [float(value) for value in np.degrees(q)]
         target = self.arm.kinematics.describe(q)

@@ -15,7 +15,7 @@ HEALTH: tuple[Health, ...] = get_args(Health)
 
 _READ_TIME = (0.05, 0.15)
 _DIRTY_FACTOR = 5.0
-_TRANSIT = 0.005  # between decoding and the first byte of the answer; a LOFF in that time has no effect
+_TRANSIT = 0.005  # delay between decoding and the first byte of the answer; a LOFF during this time has no effect
 _MAX_LINE = 128
 _COMMANDS = ("LON", "LOFF", "VER", "STAT", "RST")
 _RESERVED = frozenset({*_COMMANDS, "ERROR"})
@@ -89,7 +89,7 @@ class Reader:
         self.received.clear()
         self.sent.clear()
 
-    # ------------------------------------------------------------------------------------------------ the line's side
+    # ------------------------------------------------------------------------------------------------ serial line
 
     def feed(self, data: bytes) -> None:
         """Receive bytes."""
@@ -170,7 +170,7 @@ class Reader:
         self._stop_reading()
         self._answer("ERROR")
 
-    # ------------------------------------------------------------------------------------------------ the world's side
+    # ------------------------------------------------------------------------------------------------ simulated world
 
     @property
     def code(self) -> str | None:
@@ -178,7 +178,7 @@ class Reader:
         return self._code
 
     def present(self, code: str | None) -> None:
-        """Set the code in front of the reader; None: there is none.
+        """Set the code in front of the reader; None: no code.
 
         Raises:
             BadCode: A reader cannot send it.

@@ -77,7 +77,7 @@ class Cell:
         control.source("truth", lambda: self.world.truth())
 
     async def follow(self) -> str:
-        """Update the world from the devices; return the reason when that fails."""
+        """Update the world from the devices. Return the reason if that fails."""
         began = time.monotonic()
         try:
             await self._fakes["robot"].client.subscribe(self._robot.take, rate=_ROBOT_RATE)
@@ -114,7 +114,7 @@ async def first_of(*waits: Any) -> Any:
 async def live(
     layout: Layout, boards: list[Board], addresses: dict[str, str], control: ControlServer, patience: float
 ) -> str:
-    """Run the world until a fake ends; return a sentence that names it."""
+    """Run the world until a fake ends. Return a sentence that names this fake."""
     async with contextlib.AsyncExitStack() as stack:
         fakes: dict[str, Fake] = {}
         for name, address in addresses.items():

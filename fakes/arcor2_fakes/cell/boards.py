@@ -14,7 +14,7 @@ MAX_BOARDS = 1000
 
 
 class Board(msgspec.Struct, frozen=True):
-    """A printed circuit board; bad if it has a defect."""
+    """A printed circuit board. It is bad if it has a defect."""
 
     code: str
     defect: Defect | None = None

@@ -49,7 +49,7 @@ class Fake:
                 await asyncio.sleep(_RETRY_PERIOD)
 
     async def gone(self) -> str:
-        """Wait until the fake ends, and return a sentence that says so."""
+        """Wait until the fake ends, and return a message about that."""
         await self.client.wait_closed()
         return f"the {self.name} at {self.address} has gone"
 

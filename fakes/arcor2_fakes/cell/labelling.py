@@ -1,4 +1,4 @@
-"""The place under the label printer, where a label lands on a board and an arm presses it on."""
+"""The place under the label printer: a label lands on a board, and an arm presses it on."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class LabelNest:
 
 
 def _nearest(start: Point, end: Point, point: Point) -> tuple[float, Point]:
-    """Return the point of a line that is nearest to another point, and its share of the length of the line."""
+    """Return the point of a line that is nearest to another point, and its position as a fraction of the line."""
     first, way = np.asarray(start), np.subtract(end, start)
     length = float(way @ way)
     share = 0.0 if length == 0.0 else float(np.clip((np.asarray(point) - first) @ way / length, 0.0, 1.0))
@@ -97,6 +97,6 @@ def _nearest(start: Point, end: Point, point: Point) -> tuple[float, Point]:
 
 
 def _passes(start: Point, end: Point, point: Point, tolerance: float) -> tuple[bool, float]:
-    """Return whether a straight motion passes a point, and at which share of its length."""
+    """Return whether a straight motion passes a point, and at which fraction of its length."""
     share, nearest = _nearest(start, end, point)
     return math.dist(nearest, point) <= tolerance, share

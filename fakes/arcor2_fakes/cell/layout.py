@@ -245,7 +245,7 @@ class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("the layout must have either a feeder or a belt")
 
     def needs(self) -> list[str]:
-        """Return the devices that the cell needs in addition to robot, tester and reader."""
+        """Return the required devices in addition to robot, tester and reader."""
         needed = {
             "conveyor": self.belt is not None,
             "io": bool(self.tower) or (self.belt is not None and bool(self.belt.barriers)),

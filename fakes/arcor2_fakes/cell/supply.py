@@ -58,7 +58,7 @@ class Magazine:
 
     def __init__(self, feeder: Feeder, things: list[Thing]) -> None:
         self._feeder = feeder
-        self._things = list(things)  # the first is on top
+        self._things = list(things)  # the first board is on top
         self._now = self._refilled_at = 0.0
 
     def advance(self, now: float, counts: float | None) -> list[tuple[Thing, str, str]]:  # noqa: ARG002 - no belt

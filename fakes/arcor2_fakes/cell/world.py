@@ -52,8 +52,8 @@ class Devices(Protocol):
 class World:
     """The boards of one run.
 
-    Call `step` with each sample of the robot, in order, and with the last states of the other devices. It also advances
-    what takes time: jaws and feeder.
+    Call `step` with each sample of the robot, in order, and with the last states of the other devices. It also
+    advances the jaws and the feeder.
     """
 
     def __init__(self, layout: Layout, boards: list[Board], devices: Devices) -> None:
@@ -117,7 +117,7 @@ class World:
 
     async def _drive_jaws(self, closing: bool) -> None:
         if not self.gripper_works:
-            self._closing, self._jaws_due = self.jaws_closed, None  # after a repair they follow the output again
+            self._closing, self._jaws_due = self.jaws_closed, None  # after a repair the jaws follow the output again
             return
         gripper = self._layout.gripper
         if closing != self._closing:

@@ -98,12 +98,12 @@ _SETUP = {
     (0x6091, 1): ("I", 5, 1, (1 << 32) - 1),
     (0x6091, 2): ("I", 1, 1, (1 << 32) - 1),
 }
-"""Format, value as delivered, lowest and highest value of each part of the setup. The motion does not use them."""
+"""Format, default, minimum and maximum of each setup value. The motion does not use them."""
 _SAVE = int.from_bytes(b"save", "little")
 
 
 class Setup:
-    """The setup of the drive: its present values, and those that it has stored."""
+    """Setup of the drive: present values and stored values."""
 
     def __init__(self) -> None:
         self.present = {key: value for key, (_, value, _, _) in _SETUP.items()}

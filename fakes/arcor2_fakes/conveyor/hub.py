@@ -85,7 +85,7 @@ class Hub:
 
     def transmit(self, identifier: int, data: bytes, sender: Member | None = None) -> None:
         """Send a frame; without a sender it comes from the drive."""
-        if not _FIRST_PDO <= identifier < _FIRST_SDO:  # they would displace all others
+        if not _FIRST_PDO <= identifier < _FIRST_SDO:  # these states would displace all other entries
             self.frames.append(
                 {"time": time.monotonic(), "id": identifier, "data": data.hex(), "from_host": sender is not None}
             )

@@ -291,7 +291,7 @@ class Station:
     def _set_door(self, *, opening: bool) -> None:
         self._door_at, self._door_since, self._door_target = float(opening), self._now, None
 
-    # ------------------------------------------------------------------------------------------------ the world's side
+    # ------------------------------------------------------------------------------------------------ simulated world
 
     @property
     def board(self) -> Board | None:

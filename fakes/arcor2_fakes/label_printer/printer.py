@@ -96,7 +96,7 @@ class LabelPrinter:
         """Return the number of formats that are not printed."""
         return len(self._queue)
 
-    # ------------------------------------------------------------------------------------------------ the line's side
+    # ------------------------------------------------------------------------------------------------ serial line
     def feed(self, data: bytes) -> None:
         """Receive bytes."""
         for item in self._stream.feed(data):
@@ -176,7 +176,7 @@ class LabelPrinter:
         self._printed()
         self.go_on()
 
-    # ------------------------------------------------------------------------------------------------ the world's side
+    # ------------------------------------------------------------------------------------------------ simulated world
     def pause(self, on: bool) -> None:
         """Press the pause key."""
         self.paused = on

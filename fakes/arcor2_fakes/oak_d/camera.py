@@ -188,7 +188,7 @@ class Camera:
             client.connection.send(messages[form])
         self.frames += 1
 
-    # ------------------------------------------------------------------------------------------------ the world's side
+    # ------------------------------------------------------------------------------------------------ simulated world
     def heat(self, temperature: float) -> None:
         """Set the chip temperature, °C; at SHUTDOWN it switches itself off until `power_cycle`."""
         if not -40.0 <= temperature <= 150.0:

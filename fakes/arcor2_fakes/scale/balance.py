@@ -87,7 +87,7 @@ class Balance:
         self.next_error: str | None = None
         self.received: deque[str] = deque(maxlen=200)
 
-    # ------------------------------------------------------------------------------------------------ the line's side
+    # ------------------------------------------------------------------------------------------------ serial line
     def feed(self, data: bytes) -> None:
         """Receive bytes; a command ends with CR LF."""
         for byte in data:
@@ -288,7 +288,7 @@ class Balance:
         text = f"{kilograms * UNITS[self.unit]:.{DECIMALS[self.unit]}f}"
         return f"{text.removeprefix('-') if float(text) == 0.0 else text:>10} {self.unit}"
 
-    # ------------------------------------------------------------------------------------------------ the world's side
+    # ------------------------------------------------------------------------------------------------ simulated world
     @property
     def stable(self) -> bool:
         """Return whether the displayed value is stable."""

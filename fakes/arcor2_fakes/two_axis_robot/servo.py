@@ -98,7 +98,7 @@ class Servo:
     def __getitem__(self, name: str) -> int:
         return self._values[name]
 
-    # ------------------------------------------------------------------------------------------------ the world's side
+    # ------------------------------------------------------------------------------------------------ simulated world
     def advance(self) -> None:
         """Advance the simulation to the present."""
         now = self._clock()

@@ -1,4 +1,4 @@
-"""Admission of clients: which role a client has, by its token, its listener or the settings of the server."""
+"""Admission of clients: determines the role of a client from its token, its listener or the server settings."""
 
 import time
 from collections import OrderedDict, deque
@@ -48,7 +48,7 @@ class TooManyAttempts(AccessRefused):
 
 
 class Admission(Data, frozen=True):
-    """The role of an admitted client; None if the client has to send a token first."""
+    """Role of an admitted client. The role is None if the client has to send a token first."""
 
     role: Role | None
     token: Token | None = None
@@ -57,7 +57,7 @@ class Admission(Data, frozen=True):
 def right(ceiling: Role, *, shared: bool, person: Role | None) -> Role:
     """Return the role of a client: the lower one of its token and of the person who is logged on.
 
-    A shared device at which nobody is logged on watches as an operator does.
+    A shared device without a logged-on person can view what an operator can view.
     """
     if person is not None:
         return min(ceiling, person)
@@ -79,7 +79,7 @@ class Access:
 
     @property
     def open_to_all(self) -> bool:
-        """Whether clients need no token: by a setting, or because only this machine reaches it and no token exists."""
+        """Whether clients need no token: by a setting, or because no token exists and only this machine reaches the server."""
         if self._settings.insecure:
             return True
         return is_local(self._settings) and not self._tokens.all() and not self._tokens.unusable
@@ -109,7 +109,7 @@ class Access:
         return Admission(token.role, token)
 
     def admit(self, connection: ASGIConnection[Any, Any, Any, Any]) -> Admission:
-        """Return the admission for a connection, by its token in header or query, else by its listener.
+        """Return the admission for a connection, by its token in header or query, or without one by its listener.
 
         Raises:
             AccessRefused: the token is not valid.

@@ -20,7 +20,7 @@ MAX_CONNECTIONS: Final = 4000
 FEWEST: Final = 64
 """Minimum number of connections, even if the system allows fewer files."""
 RESERVE: Final = 4
-"""Divisor of the total: this part of the connections is reserved for admitted clients."""
+"""Divisor of the total number of connections. One part is reserved for admitted clients."""
 
 
 class Connection:
@@ -33,7 +33,7 @@ class Connection:
         self.address = address
         self.admitted = False
         self.drop: Callable[[], object] = lambda: None
-        """Closes the connection at once. The present owner of the connection sets it."""
+        """Function that closes the connection at once, set by the present owner of the connection."""
 
     def admit(self) -> None:
         """Count the connection among the admitted ones, which are never dropped."""

@@ -1,4 +1,4 @@
-"""The token for `/metrics`. It reads metrics and nothing else; without one there are no metrics."""
+"""The token for `/metrics`. It permits only reading metrics. Without a token, metrics are disabled."""
 
 import hashlib
 import hmac

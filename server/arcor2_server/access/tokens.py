@@ -142,7 +142,9 @@ class TokenFile:
                 "A token needs the name of a user or device with at most {longest_name} characters.",
                 longest_name=MAX_NAME,
             )
-        secret = secrets.token_hex(32)  # never starts with a dash, as an option of the command line does
+        secret = secrets.token_hex(
+            32
+        )  # never starts with a dash, so that it is not taken for an option of the command line
         expires = None
         if days is not None:
             expires = (datetime.now(UTC) + timedelta(days=days)).isoformat(timespec="seconds")

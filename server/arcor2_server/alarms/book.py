@@ -1,4 +1,4 @@
-"""The book of alarms: opens, merges, clears and groups records. It does no I/O and has no clock of its own."""
+"""The alarm book: opens, merges, clears and groups records. It does no I/O and has no clock of its own."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any, Final
@@ -38,7 +38,8 @@ class Occurrence(Struct, frozen=True):
     """Something that raises an alarm.
 
     source: object id, empty for the system and the program. stamp: monotonic clock of this computer, s. momentary: an
-    error or event without an end, not a condition that persists. session: what the alarms of a group have in common.
+    error or event without an end, not a condition that persists. session: run or online scene that the alarms of a
+    group have in common.
     """
 
     source: str
@@ -103,7 +104,7 @@ class AlarmBook:
                 yield record
 
     def frequencies(self, since: Timestamp, at: float, seconds_of: Any) -> list[AlarmFrequency]:
-        """Return how often and how long each alarm of each object was active since a time.
+        """Return the number of occurrences and the active time of each alarm of each object since a time.
 
         Args:
             since: the start of the period.
@@ -142,7 +143,7 @@ class AlarmBook:
         return self._new(occurrence)
 
     def ended(self, source: str, code: str, at: Timestamp) -> list[AlarmRecord]:
-        """Handle that a condition has ended."""
+        """Handle the end of a condition."""
         return [
             self._put(entry, active=False, cleared=at)
             for entry in self._active(source)
@@ -150,7 +151,7 @@ class AlarmBook:
         ]
 
     def all_ended(self, sources: Iterable[str], at: Timestamp) -> list[AlarmRecord]:
-        """Handle that the devices of a scene or a program are no longer observed."""
+        """Handle the end of the observation of the devices of a scene or program."""
         return [
             self._put(entry, active=False, cleared=at) for source in sources for entry in list(self._active(source))
         ]
@@ -313,7 +314,7 @@ def _context(occurrence: Occurrence) -> dict[str, Any]:
 
 
 def _described(occurrence: Occurrence) -> dict[str, Any]:
-    """Return what a record states about its alarm. Texts of the declaration take precedence."""
+    """Return the description of the alarm for its record. Texts of the declaration take precedence."""
     kind = occurrence.kind
     text = Message.of(kind.text) if kind.text else occurrence.text or Message.of(occurrence.code)
     remedy = Message.of(kind.remedy) if kind.remedy else occurrence.remedy or Message.of("")

@@ -56,7 +56,7 @@ class Alarms:
         self.on_changed: list[Callable[[AlarmRecord], None]] = []
         """Called with each changed record after it was stored."""
         self.on_raised: list[Callable[[AlarmRecord, float], None]] = []
-        """Called with the record of each occurrence, and when it was, on the monotonic clock, s."""
+        """Called with the record of each occurrence and its time on the monotonic clock, s."""
 
     async def open(self) -> None:
         """Read the stored records. Conditions that were active when the server ended count as ended.
@@ -84,7 +84,7 @@ class Alarms:
 
     # -------------------------------------------------------------------------------- devices
     def watch(self, board: DeviceBoard, source: str) -> None:
-        """Record the alarms of the devices of the online scene or of a program; `source` names which."""
+        """Record the alarms of devices. `source` names the online scene or the program."""
         board.on_report.append(lambda report: self._reported(board, source, report))
         board.on_clear.append(lambda objects: self._gone(source, objects))
 
@@ -96,7 +96,7 @@ class Alarms:
         try:
             device = board.object(report.object_id)
         except Arcor2Error:
-            return  # the names are not known yet; the board repeats its reports then
+            return  # the names are not known yet; the board repeats its reports when they are
         key = (source, report.object_id)
         before = self._seen.get(key, set())
         alarms = {alarm.code: alarm for alarm in report.alarms}
@@ -168,7 +168,7 @@ class Alarms:
         )
 
     def decided(self, decided: HoldDecidedData) -> None:
-        """Acknowledge the ended alarms of a run, as far as an operator may: a person has decided about their cause."""
+        """Acknowledge the ended alarms of a run that an operator may acknowledge, because a person has decided about their cause."""
         for record in self._book.records(AlarmFilter.RETAINED):
             if (
                 record.run == decided.run
@@ -276,7 +276,7 @@ class Alarms:
 
     def _raised(self, occurrence: Occurrence) -> None:
         changed = self._book.raised(occurrence)
-        for record in changed[:1]:  # the others have another first-up
+        for record in changed[:1]:  # the other records have a new first-up
             for notify in self.on_raised:
                 notify(record, occurrence.stamp)
         self._changed(changed)

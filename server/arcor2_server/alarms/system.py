@@ -31,7 +31,7 @@ MAX_CHECK_DELAY: Final = 3.0
 RECOVERED_AFTER: Final = 30.0
 """Time without such a delay after which the overload counts as ended, s."""
 LAG_OF: Final = 60
-"""Number of checks whose largest delay is shown as the lag of the event loop."""
+"""Number of recent checks, of which the largest delay is shown as the lag of the event loop."""
 CERTIFICATE_EXPIRES: Final = 14.0
 """Time before the certificate expires at which it is reported, days."""
 
@@ -44,7 +44,7 @@ class SystemAlarms:
         hub: the connected clients.
         data_dir: the directory whose disk is checked.
         certificate: the certificate of the server, None without TLS.
-        starter: returns who started the running program; empty if none runs.
+        starter: returns the user who started the running program; empty if none runs.
         lost_nodes: returns the nodes that the open scene needs and that cannot be used, each with its objects.
     """
 
@@ -138,7 +138,7 @@ class SystemAlarms:
             )
 
     def check_nodes(self, lost: Mapping[str, list[str]]) -> None:
-        """Check which nodes that the open scene needs cannot be used. Each has an alarm of its own."""
+        """Check the required nodes of the open scene. Each node that cannot be used has an alarm of its own."""
         for node in self._lost - lost.keys():
             self._alarms.system(f"node_lost:{node}", False)
         for node in sorted(lost.keys() - self._lost):

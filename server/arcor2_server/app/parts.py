@@ -314,7 +314,7 @@ class Server:
         execution.before_start.append(lambda _: self.online.forces.require_none())
 
     async def _build_production(self) -> None:
-        """Build the records of what is produced: recipes, units, and times of the cell."""
+        """Build the production records: recipes, units, and times of the cell."""
         recipes = self.recipes = Recipes(
             self.hub, RecipeStore(self.storage), self._packages, self.persons, released_only=self.settings.released_only
         )
@@ -376,7 +376,7 @@ class Server:
         system_alarms.start()
 
     async def _build_plant(self) -> None:
-        """Build the cell as plant systems see it, and the connections to them."""
+        """Build the model of the cell for plant systems, and the connections to them."""
         stop_all = self.stop_all = StopAll(self.session, self.online, self.execution)
         self.storage.on_deleted += [self.view_states.forget, self.breakpoints.forget, self.session.forget_history]
         package_runs = PackageRuns(

@@ -1,4 +1,4 @@
-"""Connects parts of the server that do not know each other: what one reports, the other follows."""
+"""Connects independent parts of the server: forwards the reports of one part to others."""
 
 import os
 from collections.abc import Awaitable, Callable
@@ -118,7 +118,7 @@ def connect_devices(
 
 
 def connect_production(recipes: Recipes, units: Units, cell_time: CellTime, execution: Execution) -> None:
-    """Let recipes decide what runs, and let the records of units and the times of the cell follow the program."""
+    """Let recipes select what runs, and update units and cell times from the program."""
     execution.before_run.append(recipes.prepare_run)
     execution.before_replacing.append(recipes.require_unused)
     execution.on_begin.append(units.begin_run)

@@ -1,8 +1,8 @@
 """The file of the audit trail: entries chained by digests, so that a removed or edited entry is noticed.
 
 The digest of an entry covers its content and the digest of the entry before it. A small second file, the head, states
-the number and digest of the newest entry, so that entries removed at the end are noticed too. Nothing here keeps
-somebody who may write both files from writing a new chain: compare with an exported digest to detect that.
+the number and digest of the newest entry, so that entries removed at the end are noticed too. A user who may write
+both files can replace the whole chain. Compare with an exported digest to detect that.
 """
 
 import hashlib
@@ -24,9 +24,9 @@ from arcor2_server.files import FILE_MODE, ensure_private
 log = structlog.get_logger(__name__)
 
 HEAD: Final = ".head"
-"""Ending of the name of the second file."""
+"""Suffix of the name of the second file."""
 LIMIT: Final = 200_000
-"""Number of entries that are kept."""
+"""Maximum number of entries in the file."""
 _PRUNED_AT_ONCE: Final = 10_000
 """Number of entries above the limit at which the oldest are deleted."""
 _HEAD_SIZE: Final = 96
@@ -210,7 +210,7 @@ class AuditFile:
         try:
             return (int(text[0]), bytes.fromhex(text[1])) if text else (0, _NO_DIGEST)
         except (ValueError, IndexError):
-            return 1, _UNREADABLE  # reported as a difference
+            return 1, _UNREADABLE  # `check` reports it as a difference
 
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection]:

@@ -19,11 +19,11 @@ class Change(Protocol):
 
     @property
     def before(self) -> Any:
-        """The item before, None if it was added."""
+        """The item before the change, None if it was added."""
 
     @property
     def after(self) -> Any:
-        """The item afterwards, None if it was removed."""
+        """The item after the change, None if it was removed."""
 
 
 _COLLECTED: Final[ContextVar[list[Change] | None]] = ContextVar("changes of the request", default=None)

@@ -1,4 +1,4 @@
-"""Which requests the audit trail contains, and what they concern."""
+"""Selects the requests for the audit trail, and determines their targets."""
 
 from typing import Any, Final
 

@@ -32,7 +32,7 @@ RETRY: Final = expressions.dotted("res", ("retry",))
 """The method that returns a device whose actions are repeated after they have failed."""
 
 PARALLEL: Final = expressions.dotted("res", ("parallel",))
-"""The method that runs several calls at once."""
+"""The method that runs several calls concurrently."""
 
 NO_RESULT: Final = "_"
 """The variable for the result of a branch that is not stored."""
@@ -66,7 +66,7 @@ class Calls:
         self.layout, self.natural = arrange(self.nodes.edges)
         self.numbers = {action.id: number for number, action in enumerate(flow.actions)}
         self.branches = {branch: one for one, branches in flow.parallel.items() for branch in branches}
-        """The parallel action of each of its branches."""
+        """Parallel action by the number of its branch."""
         self._calls = [frame.resolve(action) for action in flow.actions]
         self.results = [self._name_results(number) for number in range(len(flow.actions))]
         """The variables for the results of each action."""
@@ -92,7 +92,7 @@ class Calls:
         return [self._variable(action, output, kind) for output, kind in zip(outputs, returns, strict=False)]
 
     def _variable(self, action: Action, output: str, kind: str) -> str:
-        """Return the Python variable for a result: that of the project's variable with its name, or a new one."""
+        """Return the Python variable for a result: the one of the project variable with its name, or a new one."""
         stored = self.frame.variables.get(output) if not self.scope.function else None
         if stored is None:
             return self.scope.names.claim(output)
@@ -166,7 +166,7 @@ class Calls:
                 return ast.Assign([_targets(names)], call, lineno=0)
 
     def _parallel(self, number: int) -> ast.stmt:
-        """Return the statement that runs calls at once, `found, _ = res.parallel(lambda: find(an="find"), ...)`."""
+        """Return the statement that runs calls concurrently, `found, _ = res.parallel(lambda: find(an="find"), ...)`."""
         branches = self.flow.parallel[number]
         action = self.flow.actions[number]
         if action.parameters:

@@ -12,7 +12,7 @@ from arcor2_server.documents.comparisons import Comparisons
 from arcor2_server.documents.logic_graph import END_NODE, Condition, Test
 
 CAUGHT: Final = expressions.dotted("res", ("caught",))
-"""The method that returns what happened, for an error exit."""
+"""The method that returns the error for an error exit."""
 
 Block = list[ast.stmt]
 Stack = list[tuple[int, Block]]

@@ -1,4 +1,4 @@
-"""The nodes of a layout: actions, and for an action with error exits its success and each exit as nodes of their own.
+"""The nodes of a layout: actions. An action with error exits has additional nodes for its success and each exit.
 
 So an exit and the success are branches of the call. The dominator tree then also states where the results are set
 (after the success) and where the error is set (after an exit).
@@ -18,7 +18,7 @@ class Nodes:
     Args:
         edges: the edges of each node.
         actions: the action of each node.
-        names: what follows the name of the action in the name of a node; empty for the node of the call.
+        names: suffix after the name of the action in the name of each node; empty for the node of the call.
         call: the node of the call of each action.
         success: the node after the success of each action, the same as `call` without error exits.
         exits: the nodes of the error exits of each action.

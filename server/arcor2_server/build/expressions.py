@@ -69,7 +69,7 @@ def _comparison(variables: Sequence[str], comparison: Comparison) -> ast.expr:
 
 
 def _number(value: Value | None) -> ast.expr:
-    """Return a literal; one of a negative number as Python reads it."""
+    """Return a literal. A negative number is a unary minus, as in Python's syntax tree."""
     if isinstance(value, int | float) and value < 0:
         return ast.UnaryOp(ast.USub(), ast.Constant(-value))
     return ast.Constant(value)

@@ -243,7 +243,7 @@ class Frame:
         """Return the metadata of the calls of a function. Its parameters have the values of their first use."""
         if (facts := self.function_facts.get(function.id)) is not None:
             return facts
-        # Known before its actions are read, so that a function that calls itself ends the search.
+        # Stored before its actions are read, so that the search ends at a function that calls itself.
         meta = ObjectAction(CALL, returns=[result.type for result in function.returns])
         self.function_facts[function.id] = TypeFacts("", function.name, {CALL: meta})
         parameters: list[ParameterMeta] = []

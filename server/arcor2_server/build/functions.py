@@ -29,7 +29,7 @@ HINTS: Final = {
     "string_enum": ("builtins", "str"),
     "integer_enum": ("builtins", "int"),
 }
-"""Module and name of the type hint of each type; for parameters that are enumerations it is their own class."""
+"""Module and name of the type hint of each type. Enumerations use their own class."""
 _DECORATOR: Final = expressions.dotted("res", ("function",))
 
 

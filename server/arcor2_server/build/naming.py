@@ -56,7 +56,7 @@ class Names:
         return name
 
     def shadow(self, text: str) -> str:
-        """Reserve and return a name, also if the scope around has it, which must not use it inside this scope."""
+        """Reserve and return a name, even if the enclosing scope has it. That scope must not use it inside this one."""
         name = identifier(text)
         return self.claim(text) if name in self._taken else self._take(name)
 

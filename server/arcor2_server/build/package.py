@@ -22,7 +22,8 @@ MAX_READ: Final = 64 * 1024 * 1024
 """Maximum total size of the files read from a package, bytes, counted while unpacking: a zip may state false sizes."""
 _CHUNK: Final = 1 << 20
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
-"""Time stamp of all entries, the earliest one of the format. Real times would make equal archives differ."""
+"""Time stamp of all entries, the earliest one of the format. With real times, archives of the same files would
+differ."""
 _MODE: Final = (stat.S_IFREG | 0o644) << 16
 
 

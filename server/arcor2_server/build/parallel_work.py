@@ -1,4 +1,4 @@
-"""Checks that calls that run at once use different devices."""
+"""Checks that concurrent calls use different devices."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple

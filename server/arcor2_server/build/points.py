@@ -60,7 +60,7 @@ def _class(name: str, title: str, fields: Sequence[str], properties: Sequence[tu
 
 
 def _point(point: ActionPoint, names: PointNames, classes: Names) -> tuple[str, list[str]]:
-    """Return the name of an action point's class, and the classes it needs, itself last."""
+    """Return the name of an action point's class, and all required classes; its own class is the last one."""
     own = classes.claim(class_name(point.name))
     attribute = names.positions[point.id][0]
     parts: list[str] = []

@@ -90,7 +90,7 @@ class ScriptEditing:
         facts = self._facts(session.require_scene(), all_actions=True)
         later = inverse_changes(session.history.since(revision))
         found = await asyncio.to_thread(_changes, source, document.items(), later, facts)
-        # Added items follow those that others have added meanwhile.
+        # Added items come after those that other users have added in the meantime.
         return [
             document.add(each.kind, each.id, each.after, each.parent) if each.before is None else each for each in found
         ]
@@ -99,7 +99,7 @@ class ScriptEditing:
 def _changes(
     source: str, items: Sequence[Item], later: Sequence[Change], facts: Mapping[str, TypeFacts]
 ) -> list[Change]:
-    """Return the changes that a script makes to these items without later changes."""
+    """Return the changes that a script makes to these items, ignoring later changes."""
     base = Document(items)
     base.apply(later)
     scene, project = base.scene, base.project

@@ -67,7 +67,7 @@ def type_facts(
         try:
             actions[name][method] = types.action(name, method)
         except NotFound:
-            continue  # `Frame.resolve` reports it if the logic uses the action
+            continue  # `Frame.resolve` reports the missing action if the logic uses it
     facts: dict[str, TypeFacts] = {}
     for name, used in actions.items():
         code_of = packaged.get(name)

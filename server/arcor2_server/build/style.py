@@ -163,7 +163,7 @@ def _signature(node: ast.FunctionDef, indent: str) -> list[str]:
 
 
 def _reads(test: ast.expr, before: ast.stmt) -> bool:
-    """Return whether a condition uses a variable that the statement before it assigns."""
+    """Return whether a condition uses a variable that the previous statement assigns."""
     if not isinstance(before, ast.Assign):
         return False
     assigned = {name.id for target in before.targets for name in ast.walk(target) if isinstance(name, ast.Name)}

@@ -1,4 +1,4 @@
-"""Checks of zones before a program runs: zones that overlap, and robots that may wait for each other for ever."""
+"""Checks of zones before a program runs: zones that overlap, and robots that may wait for each other forever."""
 
 import itertools
 import math
@@ -102,7 +102,7 @@ class _Need(NamedTuple):
 
 
 _State = dict[str, frozenset[_Stay]]
-"""Where each robot may be; a robot whose place is unknown is missing."""
+"""Possible places of each robot. A robot whose place is unknown is missing."""
 
 
 class _Walk:
@@ -123,12 +123,12 @@ class _Walk:
             state = self._run(self._project.logic, state, frozenset(), [])
 
     def _run(self, logic: Sequence[LogicItem], start: _State, elsewhere: frozenset[str], needs: list[_Need]) -> _State:
-        """Return where the robots may be at the end of a program or function.
+        """Return the possible places of the robots at the end of a program or function.
 
         Args:
             logic: its logic items.
-            start: where they may be at its start.
-            elsewhere: robots that other branches move meanwhile.
+            start: their possible places at its start.
+            elsewhere: robots that other branches move at the same time.
             needs: is extended by the zones that its actions need.
         """
         following: dict[str, list[str]] = {}
@@ -283,7 +283,7 @@ def _merged(states: Iterable[_State]) -> _State:
 def check_zones(
     scene: Scene, project: Project, model_of: Callable[[str], Models | None], is_robot: Callable[[str], bool]
 ) -> None:
-    """Raise InvalidProject if zones overlap, or if robots may wait for each other's zone for ever.
+    """Raise InvalidProject if zones overlap, or if robots may wait for each other's zone forever.
 
     The targets of actions are the positions of their poses and joints. Those that a program computes are not known.
 

@@ -81,7 +81,7 @@ class Devices:
 
     # -------------------------------------------------------------------------------- reports
     def watch(self, board: DeviceBoard, source: str) -> None:
-        """Follow the devices of the online scene or of a program; `source` names which."""
+        """Follow devices. `source` names the online scene or the program."""
         board.on_identified.append(self._identified)
         board.on_report.append(lambda report: self._reported((source, report.object_id), report))
         board.on_clear.append(lambda objects: self._gone(source, objects))

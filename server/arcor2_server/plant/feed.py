@@ -229,7 +229,7 @@ class CellFeed:
             try:
                 found = host.board.object(key)
             except NotFound:
-                continue  # the names are not known yet; the board repeats its reports then
+                continue  # the names are not known yet; the board repeats its reports when they are
             robot = self._robot_type(host, key)
             if key not in identities and not robot and not self._is_device(found.type):
                 continue

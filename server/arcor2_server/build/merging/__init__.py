@@ -1,1 +1,1 @@
-"""Keeps the comments and the formatting of a script that a person has edited."""
+"""Preserves comments and formatting of a script that a person has edited."""

@@ -12,7 +12,7 @@ Parts = list[tuple[object, list[ast.stmt]]]
 
 
 def parts_of(node: ast.stmt) -> Parts:
-    """Return the blocks of a compound statement, with the keys that `Block` has; none for a simple statement."""
+    """Return the blocks of a compound statement with the keys of `Block`; none for a simple statement."""
     match node:
         case ast.If():
             return [("body", node.body), ("else", node.orelse)]
@@ -44,7 +44,7 @@ def names_in(node: ast.stmt) -> list[str]:
 
 
 def _key(node: ast.stmt) -> Hashable | None:
-    """Return what identifies a statement in a script; None if only its place does."""
+    """Return the key that identifies a statement in a script; None if only its position identifies it."""
     if name := action_name(node):
         return "call", name
     match node:

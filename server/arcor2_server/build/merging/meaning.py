@@ -1,4 +1,4 @@
-"""Decides whether a generated statement and one that a person has written mean the same."""
+"""Decides whether a generated statement and a hand-written statement are equivalent."""
 
 import ast
 from collections.abc import Callable, Mapping, Sequence
@@ -42,7 +42,7 @@ def action_name(node: ast.AST) -> str:
 
 # ---------------------------------------------------------------------------------------------- conditions
 def condition(test: ast.expr) -> Meaning:
-    """Return a form of a condition that is the same for all ways to write it: `not x`, `x == False`, `False == x`."""
+    """Return the normal form of a condition, which is the same for `not x`, `x == False` and `False == x`."""
     match test:
         case ast.Name(name):
             return ast.Eq, name, _value(True)
@@ -97,7 +97,7 @@ def _text(node: ast.expr) -> Any:
 
 # ---------------------------------------------------------------------------------------------- statements
 def same(generated: ast.stmt, written: ast.stmt, declared: DeclaredOf) -> bool:
-    """Return whether two simple statements, or the heads of two compound ones, mean the same."""
+    """Return whether two simple statements, or the heads of two compound statements, are equivalent."""
     match generated, written:
         case (ast.If(test=one), ast.If(test=other)):
             return condition(one) == condition(other)

@@ -1,4 +1,4 @@
-"""Merges a generated script with the one that a person has written, so that their comments and formatting survive."""
+"""Merges a generated script with a hand-edited script, and preserves its comments and formatting."""
 
 import ast
 import contextlib
@@ -57,7 +57,7 @@ class _Parts:
 def merged(scene: Scene, project: Project, types: Mapping[str, TypeFacts], tree_of: TreeOf) -> str | None:
     """Return the script of a project with the text of `project.script`, None if this is not possible.
 
-    Statements that mean the same keep the text that a person has written. Others are generated in the same place, with
+    Equivalent statements keep the hand-written text. Other statements are generated in the same place, with
     the comments around them. The result is read back: it states exactly the logic of the project.
 
     Args:

@@ -139,7 +139,7 @@ class Text:
             place = statement.end
         block.tail = block.end = place
         if line.startswith("elif", len(block.indent)):
-            return  # its indentation is that of the statement after the whole condition
+            return  # the comment is indented like the statement after the whole condition
         width = _width(block.indent)
         for row in range(place, limit):
             text = self.lines[row]

@@ -41,7 +41,7 @@ class MergingWriter(Writer):
             self._adopt(statement)
 
     def _adopt(self, statement: Statement) -> None:
-        """Let the comments of lines that vanish move to the first action to which these lines led."""
+        """Move the comments of removed lines to the first action to which these lines led."""
         node = self._matching.generated.get(statement)
         text = self._text
         if node is None:
@@ -89,7 +89,7 @@ class MergingWriter(Writer):
         self._lines += lines if statement is None else self.head(node, statement, lines, indent)
 
     def head(self, node: ast.stmt, statement: Statement, lines: Sequence[str], indent: str) -> Lines:
-        """Return the lines of a statement, or of its head: those of a person if they mean the same as `lines`."""
+        """Return the lines of a statement or of its head: the hand-written ones if they are equivalent to `lines`."""
         text = self._text
         own = text.lines[statement.start : statement.head_end]
         if statement.alone and same(node, statement.node, self._declared):

@@ -51,7 +51,7 @@ class CallReader:
         raise NotUnderstood(node.lineno, "{node} is not a call of an action", node=excerpt(node))
 
     def add_parallel(self, call: ast.Call, what: ActionCall) -> int:
-        """Add an action that runs calls at once. Return its number."""
+        """Add an action that runs calls concurrently. Return its number."""
         number = len(self._scope.calls)
         name = self._name(call)
         self._scope.calls.append(Call(call.lineno, name, what.object_id, what.type_name, what.meta, {}, []))

@@ -73,7 +73,7 @@ class FunctionReader(LoopReader):
                 given.lineno, "{hint} cannot be the type of the parameter {name}", hint=excerpt(hint), name=given.arg
             )
         if old is not None and HINTS.get(old.type) == HINTS.get(kind.name):
-            return old  # an enumeration that no action of the function uses has the hint of its values
+            return old  # an enumeration that no action of the function uses has the type hint of its values
         return ActionParameter(name, kind.name, value)
 
     def facts(self) -> TypeFacts:

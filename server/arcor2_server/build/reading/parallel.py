@@ -12,7 +12,7 @@ from arcor2_server.documents.logic_graph import branches_problem
 
 
 def parallel_call(node: ast.stmt, resources: str) -> ast.Call | None:
-    """Return the call of a statement that runs several calls at once, None if it does not.
+    """Return the call of a statement that runs several calls concurrently, None for another statement.
 
     Args:
         node: the statement.

@@ -51,7 +51,7 @@ class Variables:
 
 
 class Part:
-    """The program or a function, as the script states it and as it was before.
+    """The program or a function, as in the script and as in the old project.
 
     Args:
         reader: the calls and paths in the script.
@@ -114,7 +114,7 @@ class Part:
 
     # ------------------------------------------------------------------------------------------------ actions
     def updated(self, old: Action) -> Action | None:
-        """Return an action of the old project as the script states it, None if it is removed."""
+        """Return an action of the old project updated from the script, None if it was removed."""
         number = self._number_of.get(old.name)
         if number is not None and self.ids[number] == old.id:
             return self.action(number, old)
@@ -210,7 +210,7 @@ class Part:
         last = {branches[-1]: number for number, branches in self._parallel.items()}
         for after, paths in self._paths.items():
             if after in inner:
-                continue  # the chain of an action and the calls that it runs at once
+                continue  # the chain of an action and the calls that it runs concurrently
             number = last.get(after, after)
             start = START if number == START_NODE else self.ids[number]
             old = old_items.get(start, [])
@@ -291,7 +291,7 @@ class Part:
         return None
 
     def _completes(self, tests: list[Comparisons], last: LogicItem) -> bool:
-        """Return whether the condition of an old step is true whenever those of the others are not."""
+        """Return whether the condition of an old step is true whenever the conditions of the other steps are false."""
         numbers = {action_id: number for number, action_id in enumerate(self.ids)}
         parameters = {key for key, _ in self._values.parameters.values()}
         try:

@@ -121,7 +121,7 @@ class LoopReader:
         exits.append(ErrorExit(target, path.kinds))
 
     def _step(self, node: ast.stmt, open_paths: list[_OpenPath]) -> list[_OpenPath]:
-        """Read a statement that calls an action, or several at once."""
+        """Read a statement that calls one action, or several concurrently."""
         if (call := parallel_call(node, self.scope.script.resources)) is None:
             return self._reach(self._calls.read(node), open_paths)
         number, *branches = read_parallel(self._calls, self.scope, node, call)
