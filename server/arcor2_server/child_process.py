@@ -28,8 +28,8 @@ class LockedFolder:
     If they are killed, `remove_leftovers` removes the directory as soon as nobody has locked it.
 
     Args:
-        directory: contains the new one.
-        prefix: of its name.
+        directory: parent directory of the new one.
+        prefix: prefix of its name.
 
     Raises:
         OSError: it cannot be created.

@@ -27,7 +27,7 @@ Load = tuple[float, tuple[float, float, float]]
 
 
 class ControlSession:
-    """Control of both arms. `ended` is None, or the reason of its end; `ended_at` is the time of the end (monotonic)."""
+    """Control of both arms. `ended` is None or the reason of its end; `ended_at` is the time of the end (monotonic)."""
 
     def __init__(self, name: str, settings: YumiSettings) -> None:
         self.name = name

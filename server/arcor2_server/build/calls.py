@@ -166,7 +166,7 @@ class Calls:
                 return ast.Assign([_targets(names)], call, lineno=0)
 
     def _parallel(self, number: int) -> ast.stmt:
-        """Return the statement that runs calls concurrently, `found, _ = res.parallel(lambda: find(an="find"), ...)`."""
+        """Return the statement of concurrent calls, `found, _ = res.parallel(lambda: find(an="find"), ...)`."""
         branches = self.flow.parallel[number]
         action = self.flow.actions[number]
         if action.parameters:

@@ -88,7 +88,7 @@ def _lower_priority() -> None:
 
 
 def _owner_problem(directory: Path) -> str | None:
-    """Return why this user should not open the data: the server could not read files that others create in it."""
+    """Return the reason if this user should not open the data, because the server could not read files of this user."""
     try:
         owner = directory.stat().st_uid
     except OSError as error:

@@ -148,8 +148,8 @@ def _show_camera(found: CameraPose, out: Console) -> None:
 def check_lens(*pictures: ViewPictures, view: MarkerView, json: AsJson = False, output: Output = None) -> int:
     """Check the focal length of a camera by pictures of markers with known poses.
 
-    Prints whether the markers confirm it, and the one that fits best; -o writes the parameters with it. Fails with
-    status 19 if the markers contradict the given one.
+    Prints whether the markers confirm it, and the focal length that fits best; -o writes parameters with that one.
+    Fails with status 19 if the markers contradict the given focal length.
     """
 
     async def work() -> ExitStatus:

@@ -142,7 +142,7 @@ def check(
 
 
 async def _record(client: Client, name: str, key: str) -> CalibrationRecord:
-    """Return the calibration with an id, else the newest one of the object with a pose.
+    """Return the calibration with an id; without an id, the newest one of the object that has a pose.
 
     Raises:
         NotFound: the calibration does not exist.

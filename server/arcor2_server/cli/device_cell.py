@@ -90,7 +90,10 @@ def check(
 
 
 def check_devices(file: Path, cell: Cell) -> list[Checked]:
-    """Check all devices in one process. If a driver ends it, check each remaining device in its own process."""
+    """Check all devices in one process.
+
+    If a driver ends this process, check each remaining device in its own process.
+    """
     found, _ = _run_check(file)
     for device in cell.devices:
         if device.name not in found:

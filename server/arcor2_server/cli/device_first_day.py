@@ -30,7 +30,7 @@ STATUSES: Final = {
     3: ExitStatus.DEVICE_UNREACHABLE,
     130: ExitStatus.INTERRUPTED,
 }
-"""Exit status by that of the session; any other: FAILED."""
+"""Exit status by status of the session. Others are FAILED."""
 
 
 def first_day(file: Path, name: str, plan: bool, report: Path | None) -> int:
@@ -118,7 +118,7 @@ def _show(terminal: Console, message: Say | Show) -> None:
 
 
 def _answer(terminal: Console, question: Ask) -> str:
-    """Return the answer that is typed after the question; earlier keys do not count."""
+    """Return the answer typed after the question. Earlier keys are ignored."""
     terminal.print()
     with contextlib.suppress(termios.error):
         termios.tcflush(sys.stdin, termios.TCIFLUSH)

@@ -234,7 +234,7 @@ def _described(name: str, point: Point) -> str:
 
 
 def _range(name: str, point: Point) -> list[str]:
-    """Return the assertion of the range of a parameter, if it is one that the analysis can read."""
+    """Return the assertion of the range of a parameter, if the analysis supports this form."""
     low, high = point.limits
     if point.kind not in (int, float) or low < 0 or (point.is_float and isinstance(point.maximum, Unset)):
         return []

@@ -28,7 +28,7 @@ MAX_TIME: Final = 3600.0
 """Longest time in a map, s."""
 MAX_NAME: Final = 40
 MAX_TEXT: Final = 80
-"""Maximum lengths of texts, which become lines of the source code."""
+"""Maximum lengths of texts that become lines of the source code."""
 TEXT: Final = r'[^"\\\n]*'
 Text = Annotated[str, msgspec.Meta(min_length=1, max_length=MAX_TEXT, pattern=f"^{TEXT}$")]
 
@@ -58,7 +58,7 @@ class Command(_Part, frozen=True):
 
 
 class FaultText(_Part, frozen=True):
-    """What a fault means, and how to remedy it."""
+    """Meaning and remedy of a fault."""
 
     text: str
     remedy: str
@@ -79,7 +79,7 @@ class Heartbeat(_Part, frozen=True):
 
 
 class Control(_Part, frozen=True):
-    """What is written to take and to release control, and the point that shows the owner."""
+    """Values that are written to take and to release control, and the point that shows the owner."""
 
     take: Values = field(default_factory=dict)
     release: Values = field(default_factory=dict)
@@ -150,7 +150,7 @@ def read_map(file: Path) -> DeviceMap:
 
 # ---------------------------------------------------------------------------------------------------- YAML
 def _check_unique(node: yaml.Node | None, path: Keys) -> None:
-    """Check that no key is repeated: YAML would take the last one."""
+    """Check that no key is repeated, because YAML would silently use the last one."""
     if not isinstance(node, yaml.MappingNode):
         return
     keys = [key.value for key, _ in node.value]

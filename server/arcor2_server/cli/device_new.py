@@ -41,7 +41,7 @@ class Wire(NamedTuple):
         fields: the settings as name, type, default (empty: none) and description.
         address: the settings in a test, as an expression with `address`.
         absent: an address without a device.
-        check: the line that checks the settings.
+        check: line of code that checks the settings.
     """
 
     title: str

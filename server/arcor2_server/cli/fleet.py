@@ -56,13 +56,13 @@ def serve(
 ) -> int:
     """Show all cells of a broker on one page, until Ctrl-C or SIGTERM.
 
-    Prints `ready URL` on standard output when the page is served. Nobody can command a cell through it.
+    Prints `ready URL` on standard output when the page is served. The page cannot command a cell.
 
     Parameters
     ----------
     broker
-        Address of a broker (nats-server) without `fleet broker`, with tls:// if it is on another computer. User and
-        password are part of it; set the variable instead of the option to hide them from other users.
+        Address of a broker (nats-server) without `fleet broker`, with tls:// if it is on another computer. It
+        contains user and password; set the variable instead of the option to hide them from other users.
     ca
         Certificate to trust for such a broker.
     host

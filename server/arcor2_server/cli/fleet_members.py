@@ -25,7 +25,7 @@ def add_to(app: App) -> None:
 
 
 def fleet_data_dir(data_dir: Path | None) -> Path:
-    """Return the data directory of the server of the page, or the one that was given."""
+    """Return the given data directory, or the default one of the server of the page."""
     return data_dir or default_data_dir().with_name("arcor2-hw-fleet")
 
 

@@ -92,7 +92,7 @@ def upgrade(
             directory = bundle
             if not bundle.is_dir():
                 directory = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix=".bundle-", dir=here.programs)))
-                # A file without compression, which this accepts only, is not larger when it is unpacked.
+                # Only files without compression are accepted, which are not larger when they are unpacked.
                 with tarfile.open(bundle, "r:") as archive:
                     archive.extractall(directory, filter="data")
             new = checked(directory, here.public_key, unsigned)

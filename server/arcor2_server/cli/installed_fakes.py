@@ -25,7 +25,10 @@ class InstalledFake(Struct, frozen=True):
 
 
 def installed_fakes() -> list[InstalledFake]:
-    """Return the fakes of all installed distributions, sorted by name. Of two with the same name the first is used."""
+    """Return the fakes of all installed distributions, sorted by name.
+
+    If two have the same name, the first one is used.
+    """
     found: dict[str, InstalledFake] = {}
     for point in entry_points(group=GROUP):
         found.setdefault(point.name, _read(point))

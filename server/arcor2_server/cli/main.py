@@ -107,7 +107,7 @@ def main() -> None:
     except KeyboardInterrupt:
         status = ExitStatus.INTERRUPTED
     except BrokenPipeError:
-        # The reader of the output has ended (`| head`); the interpreter must not try to flush it.
+        # The process that reads the output has ended (`| head`), so the interpreter must not flush the output.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         status = ExitStatus.OK
     sys.exit(status if isinstance(status, int) else ExitStatus.OK)

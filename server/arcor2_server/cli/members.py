@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 
 
 def run(group: str, work: Callable[[], Any]) -> int:
-    """Do the work of a command of a group and print errors; return its exit status."""
+    """Run the function of a command, print errors, and return the exit status."""
     if find_spec("nats") is None:
         return fail(group, "install the extra `nodes` of arcor2-hw", ExitStatus.FAILED)
-    logging.getLogger("asyncio").setLevel(logging.ERROR)  # it warns of each end of a TLS connection
+    logging.getLogger("asyncio").setLevel(logging.ERROR)  # asyncio warns of each end of a TLS connection
     try:
         work()
     except StorageError as error:
@@ -44,7 +44,7 @@ def run(group: str, work: Callable[[], Any]) -> int:
 
 
 def credentials_for(file: Path, broker: str | None, ca: Path | None) -> "Credentials":
-    """Return the credentials for a broker: of a file if it exists and no address is given.
+    """Return the credentials for a broker. The file is used if it exists and no address is given.
 
     Raises:
         Arcor2Error: they are invalid.
@@ -57,7 +57,7 @@ def credentials_for(file: Path, broker: str | None, ca: Path | None) -> "Credent
 
 
 def trusted_authority(settings: ServerSettings, ca: Path | None) -> str:
-    """Return the certificates to trust: those of a file, or of the server's authority, if it has one; else none.
+    """Return the certificates to trust: those in a file, otherwise those of the server's authority, if it has one.
 
     Raises:
         InvalidData: the file cannot be read.
@@ -90,14 +90,14 @@ def accept(
     """Show a code, wait for a member that knows it, and accept it.
 
     Args:
-        settings: name the audit trail.
-        accounts: accept it.
-        group: of the commands.
+        settings: settings with the path of the audit trail.
+        accounts: the accounts to which the member is added.
+        group: group of the commands.
         place: where to run the other command, for the message.
-        name: of the member.
+        name: name of the member.
         host: address to listen on; None for all.
         port: port to listen on; None for the default one.
-        kind: what it is.
+        kind: kind of the member.
         same_version: whether its version must be that of this computer.
 
     Raises:
@@ -149,9 +149,9 @@ def show(accounts: "Accounts", empty: str, *, kinds: bool = False) -> None:
     """Print the members.
 
     Args:
-        accounts: have accepted them.
-        empty: text if there are none.
-        kinds: whether to show what each one is.
+        accounts: the accounts of the members.
+        empty: text to print without members.
+        kinds: whether to show the kind of each member.
 
     Raises:
         StorageError: the file cannot be used.

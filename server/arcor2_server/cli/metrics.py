@@ -21,7 +21,7 @@ DataDir = Annotated[Path | None, Parameter(help="Data directory of the server ($
 def token(*, data_dir: DataDir = None) -> int:
     """Create the token for `/metrics` and print it. A previous token becomes invalid.
 
-    It cannot be shown again, since only its hash is stored. It reads metrics and nothing else.
+    It cannot be shown again, since only its hash is stored. It permits only reading metrics.
     """
     settings = ServerSettings(data_dir=data_dir or default_data_dir())
     try:

@@ -36,7 +36,7 @@ def mqtt_settings(
         address: the option `--mqtt`; None: the variable ARCOR2_HW_MQTT_URL.
         sparkplug: group and edge node, separated by `/`.
         primary_host: id of the host application to wait for.
-        prefix: of the topics with plain JSON.
+        prefix: prefix of the topics with plain JSON.
         unencrypted: whether a broker on another machine may be used without TLS.
         environment: the environment variables.
 

@@ -116,11 +116,11 @@ async def _serve(name: str, credentials: "Callable[[], Credentials]", sessions: 
         sys.stdout.write(f"ready {name}\n")
         sys.stdout.flush()
 
-    manager = ServiceManager.from_environment()  # first: hosts must not report to it
+    manager = ServiceManager.from_environment()  # first, because hosts must not report to the service manager
     serving = asyncio.create_task(NodeService(name, credentials, sessions, ready=ready).run())
     for number in (signal.SIGTERM, signal.SIGINT):
         asyncio.get_running_loop().add_signal_handler(number, serving.cancel)
-    manager.ready()  # also without a broker, to which the service connects again and again
+    manager.ready()  # ready even without a broker: the service retries the connection
     try:
         with contextlib.suppress(asyncio.CancelledError):
             await serving
@@ -234,7 +234,7 @@ def revoke(name: str, *, data_dir: DataDir = None) -> int:
 
 
 def _run(work: Callable[[], Any]) -> int:
-    """Do the work of a command and print errors; return its exit status."""
+    """Run the function of a command, print errors, and return the exit status."""
     return members.run("node", work)
 
 

@@ -30,7 +30,7 @@ def _read(file: Path) -> str:
 def _class_in(source: str, file: Path, name: str | None) -> str:
     """Return the name under which a file is uploaded.
 
-    It is the given class, else the class that matches the file name, else its only object type. A helper module
+    It is the given class, the class that matches the file name, or the only object type, in this order. A helper module
     without an object type has the name of the file.
     """
     try:

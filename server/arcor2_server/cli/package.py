@@ -100,7 +100,7 @@ def trace_of_run(
     ] = None,
     server: Server = HERE,
 ) -> int:
-    """Show when each device executed which action in a run, or write it to a file for a trace viewer."""
+    """Show the actions of each device in a run with their times, or write them to a file for a trace viewer."""
 
     async def work() -> None:
         async with server.rest() as rest:
@@ -230,7 +230,7 @@ def decide(
     yes: Annotated[bool, Parameter(help="Repeat an action that may have been executed partly.")] = False,
     server: Server = HERE,
 ) -> int:
-    """Decide how a program continues that is held at a failed action."""
+    """Decide how a program that is held at a failed action continues."""
 
     async def work() -> ExitStatus:
         async with server.client() as client:

@@ -69,7 +69,7 @@ def add(
 
 @app.command(name="list")
 def list_persons(*, data_dir: DataDir = None) -> int:
-    """List the persons, how they log on, and where they are locked out."""
+    """List the persons, their means to log on, and the devices where they are locked out."""
     table = Table("name", "role", "logs on with", "locked out", box=None, pad_edge=False)
 
     async def work(persons: Persons) -> str:
@@ -101,7 +101,7 @@ def remove(name: Name, /, *, data_dir: DataDir = None) -> int:
 
 @app.command
 def unlock(name: Name, /, *, data_dir: DataDir = None) -> int:
-    """Let a person log on again who entered too many wrong PINs."""
+    """Unlock a person who entered too many wrong PINs."""
 
     async def work(persons: Persons) -> str:
         person = await _named(persons, name)
@@ -118,7 +118,7 @@ async def _named(persons: Persons, name: str) -> StoredPerson:
 
 
 def _secret(prompt: str, *, twice: bool = False) -> str:
-    """Return a PIN or the number of a card from the terminal without echo, else a line of standard input.
+    """Return a PIN or the number of a card, from the terminal without echo, or from a line of standard input.
 
     Raises:
         EOFError: standard input has ended.
@@ -139,10 +139,13 @@ def _settings(data_dir: Path | None) -> ServerSettings:
 
 
 def _run(data_dir: Path | None, work: Callable[[Persons], Awaitable[str]], command: str) -> int:
-    """Call a function with the persons of a data directory; note what it changed if `command` is not empty."""
+    """Call a function with the persons of a data directory.
+
+    Add its change to the audit trail if `command` is not empty.
+    """
 
     async def opened(settings: ServerSettings) -> str:
-        storage = await Storage.open(settings, exclusive=False)  # the server may run
+        storage = await Storage.open(settings, exclusive=False)  # the server may be running
         try:
             return await work(Persons(PersonStore(storage), CardHashes(settings.data_dir)))
         finally:

@@ -38,7 +38,7 @@ USER: Final = "import of a function"
 
 
 class _Point(NamedTuple):
-    """An action point of the exported function, and that of the project."""
+    """An action point of the exported function, and the one of the project that replaces it."""
 
     exported: str
     own: str

@@ -190,7 +190,7 @@ def serve(
 
             require_tls(settings.fleet_broker)
         server_logging.set_up(log_level)
-        # They may contain a password, which devices and programs must not see.
+        # These variables may contain a password, which devices and programs must not see.
         for variable in (DATABASE_URL, MQTT_URL, FLEET_BROKER):
             os.environ.pop(variable, None)
     except (InvalidData, KeyError) as error:
@@ -210,7 +210,8 @@ def serve(
                 plc = sockets.enter_context(contextlib.closing(listen(settings.plc.host, settings.plc.port)))
             plant = None
             if settings.opcua is not None:
-                from arcor2_server.opcua.certificate import issue_certificate  # takes time, and few servers need it
+                from arcor2_server.opcua.certificate import issue_certificate  # imported only if needed, because it
+                takes time
 
                 plant = sockets.enter_context(contextlib.closing(listen(settings.opcua.host, settings.opcua.port)))
                 issue_certificate(settings)
@@ -227,14 +228,14 @@ def serve(
 
 
 def _editor_address(settings: ServerSettings, port: int) -> str:
-    """Return the address of the editor for other computers, else that for this computer."""
+    """Return the address of the editor for other computers, if there is one, otherwise that for this computer."""
     if addresses := server_addresses(settings, port).addresses:
         return addresses[0]
     return f"{'https' if settings.certificate else 'http'}://127.0.0.1:{port}"
 
 
 def _markers(given: Path | None, path: Path | None, cell: Cell | None) -> CalibrationConfiguration | None:
-    """Return the poses of the markers from their file, else from cell.yaml.
+    """Return the poses of the markers from their file, or without a file from cell.yaml.
 
     Raises:
         NotFound: the file does not exist.
@@ -251,8 +252,8 @@ def _markers(given: Path | None, path: Path | None, cell: Cell | None) -> Calibr
 def welcome(settings: ServerSettings, port: int) -> None:
     """At the first start on a network, create the token of the first device and print an address with it.
 
-    The device asks for an administrator. Later it needs a person who logs on, so the address gives no more rights.
-    `port` is the bound port.
+    The device asks for an administrator. Later, rights on this device require that a person logs on, so the address
+    alone grants none. `port` is the bound port.
 
     Raises:
         StorageError: the tokens cannot be read or written.

@@ -59,7 +59,7 @@ class Server:
             return None
         try:
             return ssl.create_default_context(cafile=self.ca)
-        except OSError as error:  # ssl.SSLError is one
+        except OSError as error:  # ssl.SSLError is an OSError
             raise Failed(ExitStatus.CERTIFICATE_UNUSABLE, f"{self.ca} cannot be used: {error}") from error
 
 
@@ -85,7 +85,7 @@ def printable(text: str) -> str:
 
 
 def run(command: str, work: Callable[[], Awaitable[Any]]) -> int:
-    """Run a command and print errors; return the status that it returns, else OK, or the status for its error."""
+    """Run a command, print errors, and return its status: the returned one, OK without one, or the status of the error."""
 
     async def working() -> Any:
         return await work()

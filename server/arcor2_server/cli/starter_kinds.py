@@ -34,7 +34,7 @@ class Kind(NamedTuple):
         does: description of the actions.
         fake: name of the template of the fake.
         rest_value: value of the fake at the start.
-        acts: calls that act until the process is killed, where `run_long` is empty.
+        acts: calls that act until the process is killed, if `run_long` is empty.
         not_run: cases of the conformance suite that the device does not have, with the reason.
     """
 

@@ -58,7 +58,8 @@ def add(
     days
         Number of days for which it is valid. The default is until it is revoked.
     shared
-        The token belongs to a device at which persons log on, see `arcor2-hw person`. Nobody exceeds its role there.
+        The token belongs to a device at which persons log on, see `arcor2-hw person`. This role is the maximum for all
+        persons on the device.
     """
     try:
         _, secret = _file(data_dir).add(name, Role[role.upper()], days, shared=shared)

@@ -1,4 +1,4 @@
-"""Which modules belong to which of the object types that `arcor2-hw object-type add` uploads."""
+"""Assigns modules to the object types that `arcor2-hw object-type add` uploads."""
 
 from collections.abc import Mapping, Sequence
 
@@ -106,7 +106,7 @@ def _with_stored_modules(
 
 
 def _reachable(file: SourceFile, helpers: Mapping[str, str]) -> dict[str, str]:
-    """Return the helper modules, and modules of the file, that a file imports relatively, directly or by others."""
+    """Return the helper modules, and the modules of the file, that it imports relatively, directly or indirectly."""
     texts = {**helpers, **{each.module.rpartition(".")[2]: _text(each) for each in file.modules}}
     found: dict[str, str] = {}
     waiting = sibling_modules(_text(file))

@@ -1,1 +1,1 @@
-"""What connected users share: presence, locks, previews, view states and tasks."""
+"""Data shared by connected users: presence, locks, previews, view states and tasks."""

@@ -18,7 +18,7 @@ SERVER: Final = "SERVER"
 """The pseudo user that holds locks while a scene is started or stopped."""
 
 OWN_ROOTS: Final = frozenset({SCENE, PROJECT, ACTION, ADDING_OBJECT, "START", "END"})
-"""Ids of which each is the root of its own tree."""
+"""Ids that are each the root of a tree of their own."""
 
 
 _NAMES: Final = translatable(
@@ -31,7 +31,7 @@ _NAMES: Final = translatable(
         "END": "The end of the program",
     }
 )
-"""Names of ids that do not belong to an item, for refusals."""
+"""Names, for refusals, of ids that do not belong to an item."""
 
 
 class Locked(RequestRefused):
@@ -177,7 +177,7 @@ class LockTable:
     def drop(self, ids: Iterable[str]) -> dict[str, list[str]]:
         """Remove all locks on removed items. Their removal event implies that they are unlocked.
 
-        Return the other ids that are unlocked thereby, by owner: the rest of a tree locked through a removed item.
+        Return the other ids that this unlocks, by owner: the rest of a tree that was locked through a removed item.
         """
         ids = list(ids)
         freed: dict[str, set[str]] = {}
@@ -256,7 +256,7 @@ class LockTable:
         return root is not None and root.writers.get(item) == user
 
     def _is_announced(self, user: str, root_id: str, item: str) -> bool:
-        """Return whether the lock that covers an id is one of a client, not of a request that is being handled."""
+        """Return whether a client holds the lock that covers an id, and not a request that is being handled."""
         announced = self._announced.get(user, {})
         return item in announced or any(writer in announced for writer in self._roots[root_id].writers)
 

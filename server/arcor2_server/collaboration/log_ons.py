@@ -1,4 +1,4 @@
-"""Who is logged on at which device, and when that ends."""
+"""The persons who are logged on at devices, and the end of their sessions."""
 
 import asyncio
 import hashlib
@@ -51,7 +51,7 @@ class LogOns:
         hub: publishes LogOnChanged.
         users: registers the persons by their names.
         persons: the persons.
-        audit: notes when a person is logged off, and why.
+        audit: records when and why a person is logged off.
         log_off_after: time without activity after which a person is logged off, s; 0: never.
     """
 
@@ -63,8 +63,8 @@ class LogOns:
         self.log_off_after = log_off_after
         self._by_person: dict[str, LogOn] = {}
         self._by_session: dict[str, LogOn] = {}
-        """By the digest of the session, so that a look-up reveals nothing by its duration."""
-        self._starting = asyncio.Lock()  # a name is registered for one person after the other
+        """Log-ons by the digest of the session, so that the duration of a look-up reveals nothing."""
+        self._starting = asyncio.Lock()  # serializes the registration of names
         self.on_end: list[Callable[[Connection, Message], None]] = []
         """Called with the connection at which a person was logged off, and the reason."""
         hub.on_leave.append(self._disconnected)
@@ -73,7 +73,7 @@ class LogOns:
     async def log_on(self, client: Connection, person: StoredPerson) -> tuple[LogOnData, list[Event]]:
         """Log a person on; return the answer, and events for the client.
 
-        Whoever is logged on at this device, and the same person at another device, is logged off.
+        Another person at this device, and the same person at another device, are logged off.
 
         Raises:
             RequestRefused: a connected client has registered the name of the person.
@@ -105,7 +105,7 @@ class LogOns:
             if found.client is not None and found.client is not client:
                 self._detach(found.client)
             events = await self._users.register(client, found.person.name)
-            if self._by_person.get(found.person.id) is not found:  # logged off meanwhile
+            if self._by_person.get(found.person.id) is not found:  # logged off in the meantime
                 self._users.unregister(client)
                 raise LogOnRefused(ENDED)
             self._attach(found, client)
@@ -119,7 +119,7 @@ class LogOns:
         return found if found is not None and found.client is client else None
 
     def person_of(self, session: str, device: str, *, active: bool) -> StoredPerson | None:
-        """Return the person of a session of a device, None if it has ended; `active`: whether this is an activity."""
+        """Return the person of a session of a device, None if it has ended. `active`: whether the call counts as activity."""
         found = self._by_session.get(_digest(session))
         if found is None or found.device != device:
             return None
@@ -128,7 +128,7 @@ class LogOns:
         return found.person
 
     def touch(self, client: Connection) -> None:
-        """Note an activity of the person at a connection."""
+        """Record an activity of the person at a connection."""
         if (found := self.at(client)) is not None:
             found.active = time.monotonic()
 
@@ -136,7 +136,7 @@ class LogOns:
         started.client = client
         client.person = shown(started.person)
         started.active = time.monotonic()
-        if client not in self._hub.clients:  # lost meanwhile
+        if client not in self._hub.clients:  # lost in the meantime
             started.client = None
         self._watch(started)
         log.info("person logged on", person=started.person.name, device=started.device, client=client.number)

@@ -44,7 +44,7 @@ class Persons:
     def __init__(self, store: PersonStore, cards: CardHashes) -> None:
         self._store = store
         self._cards = cards
-        self._checking = asyncio.Lock()  # no guesses in parallel, and one computation at a time
+        self._checking = asyncio.Lock()  # prevents parallel guesses, and limits the load to one computation at a time
 
     # ------------------------------------------------------------------------------------------------ reading
     async def all(self) -> list[StoredPerson]:
@@ -117,7 +117,7 @@ class Persons:
         return after
 
     async def change_own_pin(self, key: str, pin: str, new_pin: str, device: str) -> StoredPerson:
-        """Replace the PIN of a person who knows the present one; `device` is where they entered it.
+        """Replace the PIN of a person who knows the present one. `device`: the device where it was entered.
 
         Raises:
             NotFound: the person does not exist.
@@ -169,7 +169,7 @@ class Persons:
 
     # ------------------------------------------------------------------------------------------------ checking
     async def check_pin(self, key: str, pin: str, device: str) -> StoredPerson:
-        """Return the person with this id and PIN; `device` is where it was entered.
+        """Return the person with this id and PIN. `device`: the device where it was entered.
 
         Raises:
             NotFound: the person does not exist.
@@ -189,7 +189,10 @@ class Persons:
         return person
 
     async def check_card(self, card: str, device: str) -> StoredPerson:
-        """Return the person with this card; `device` is where it was read. Raise LogOnRefused if nobody has it."""
+        """Return the person with this card. `device`: the device that read it.
+
+        Raise LogOnRefused for an unknown card.
+        """
         async with self._checking:
             before = await self._require_not_locked_out(_CARDS, device)
             digest = self._cards.of(card)

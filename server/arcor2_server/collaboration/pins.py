@@ -1,4 +1,4 @@
-"""Hashes of PINs and cards. Neither is stored, logged or exported as it is."""
+"""Hashes of PINs and cards, which are never stored, logged or exported in clear text."""
 
 import hashlib
 import hmac
@@ -40,7 +40,7 @@ def hash_pin(pin: str) -> PinHash:
 
 
 def matches(pin: str, stored: PinHash) -> bool:
-    """Return whether a PIN has this hash, in a time that does not depend on it. Call it in a thread."""
+    """Return whether a PIN has this hash. The duration does not depend on the PIN. Call it in a thread."""
     digest = _scrypt(pin, bytes.fromhex(stored.salt), stored.n, stored.r, stored.p)
     return hmac.compare_digest(digest, bytes.fromhex(stored.digest))
 

@@ -1,4 +1,4 @@
-"""Presence: connected users, and what each of them views and edits."""
+"""Presence: connected users, and the items that they view and edit."""
 
 from collections.abc import Iterable
 from typing import Final

@@ -57,7 +57,7 @@ class Previews:
             self._check_timer = asyncio.get_running_loop().call_later(CHECK_PERIOD, self._check_holders)
 
     def changed(self, items: Iterable[str]) -> None:
-        """Note that items were changed or removed, so that `end_changed` ends their previews."""
+        """Record that items were changed or removed, so that `end_changed` ends their previews."""
         if self._dragged:
             for item in items:
                 if (dragged := self._dragged.get(item)) is not None:

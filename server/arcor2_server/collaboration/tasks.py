@@ -77,7 +77,7 @@ class Tasks:
 
     @contextmanager
     def running(self, kind: TaskKind, title: Message, started_by: str | None = None) -> Iterator[Task]:
-        """Show the enclosed work as a task, which fails with the raised error."""
+        """Show the enclosed block as a task. If the block raises an error, the task fails with it."""
         task = self.begin(kind, title, started_by)
         try:
             yield task

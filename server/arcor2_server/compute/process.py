@@ -23,10 +23,10 @@ from arcor2_server.child_process import ChildProcess, describe_exit
 log = structlog.get_logger(__name__)
 
 ProgressCallback = Callable[[float, str], None]
-"""Receives the progress of a computation, 0 to 1, and what it is doing."""
+"""Receives the progress of a computation, 0 to 1, and its present step."""
 
 START_TIMEOUT: Final = 15.0
-"""Time added to the limit of a task, s: for the start of Python on a busy machine. The process keeps the limit."""
+"""Time added to the limit of a task for the start of Python on a busy machine, s. The process itself uses the limit."""
 EXIT_TIMEOUT: Final = 3.0
 """Time limit for a process to end after its socket is closed, before it is killed, s."""
 COMMAND: Final = ("-P", "-m", "arcor2_hw.compute")

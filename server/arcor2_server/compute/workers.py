@@ -67,7 +67,7 @@ class _Worker:
     async def _serve(self) -> None:
         try:
             while (job := await self._next()) is not None:
-                if not job.result.done():  # it is done if the caller was cancelled
+                if not job.result.done():  # the future is done if the caller was cancelled
                     await self._run(job)
         finally:
             self._serving = None
@@ -158,8 +158,8 @@ class Compute:
     ) -> R:
         """Return the result of a task.
 
-        If the caller is cancelled, a started computation still runs to its end, unless the task is cancellable: then
-        its worker is stopped.
+        If the caller is cancelled, a started computation still runs to its end. Only for a cancellable task, the
+        worker is stopped.
 
         Args:
             task: the task.

@@ -18,7 +18,7 @@ Ready = Mapping[str, Any]
 _UR_PORTS: Final = (30004, 30003, 29999)
 _FAST: Final = ("--time-scale", "3")
 _PICTURES: Final = ("--width", "640", "--height", "360", "--fps", "5")
-"""Enough to see boards on the conveyor. The whole cell must run on two cores."""
+"""Picture size that shows boards on the conveyor. It is small, because the whole cell must run on two cores."""
 
 
 class Fake(Struct, frozen=True):

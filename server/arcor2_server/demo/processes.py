@@ -45,7 +45,7 @@ class Child:
         return self._process.pid
 
     async def start(self) -> str:
-        """Start it and return the rest of its ready line. Raise ChildFailed with the last line of its log."""
+        """Start the process and return the rest of its ready line. Raise ChildFailed with the last line of its log."""
         with self._log.open("wb") as log:
             self._process = await self._launch(log)
         assert self._process.stdout is not None
@@ -83,7 +83,7 @@ class Child:
         )
 
     async def start_json(self) -> dict[str, Any]:
-        """Start it and return the addresses in its ready line."""
+        """Start the process and return the addresses in its ready line."""
         addresses: dict[str, Any] = msgspec.json.decode(await self.start())
         return addresses
 
@@ -99,7 +99,7 @@ class Child:
         return ""
 
     async def stop(self) -> None:
-        """Terminate it, and kill it after END_TIMEOUT."""
+        """Terminate the process, and kill it after END_TIMEOUT."""
         process = self._process
         if process is None:
             return

@@ -84,7 +84,7 @@ class Point(Struct, frozen=True, forbid_unknown_fields=True):
 class Step(Struct, frozen=True, forbid_unknown_fields=True):
     """An action.
 
-    An object that is the name of a function stands for a call of it. A parameter "@point" is the pose of an action
+    If the object is the name of a function, the action calls it. A parameter "@point" is the pose of an action
     point, "$name" a project parameter or a variable, "#result" the result of an earlier step, "#error.text" a part of
     the error named `error`. A result with the name of a variable is stored in it.
     """
@@ -114,7 +114,7 @@ class Link(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Function(Struct, frozen=True, forbid_unknown_fields=True):
-    """A function of connected steps. call: name of the action that calls it in their place."""
+    """A function made of connected steps. call: name of the action that replaces these steps."""
 
     name: str
     steps: list[str]
@@ -122,7 +122,7 @@ class Function(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Parallel(Struct, frozen=True, forbid_unknown_fields=True):
-    """An action that runs calls of functions at once."""
+    """An action that calls functions concurrently."""
 
     name: str
     calls: list[str]
@@ -347,7 +347,7 @@ class Creation:
         )
         await self._client.call("AddAction", args)
         while (added := (await self._client.next_event("ActionChanged")).data).name != step.name:
-            pass  # the actions of a function that was made before
+            pass  # the actions of a function that was created before
         places.actions[step.name] = added.id
         places.results |= {result: f"{added.id}/default/{number}" for number, result in enumerate(step.results)}
         if step.error:

@@ -37,7 +37,7 @@ MAX_ENTRIES: Final = 1_000_000
 MAX_MANIFEST: Final = 256 * 1024 * 1024
 BUSY_TIMEOUT: Final = 5.0
 ATTEMPTS: Final = 5
-"""Number of attempts to read all files before one of them is deleted."""
+"""Number of attempts to read all files, which may be deleted during the backup."""
 _CHUNK: Final = 1024 * 1024
 _PAGES: Final = 256
 """Number of pages of an SQLite file that are copied at once."""
@@ -45,11 +45,11 @@ _SQLITE: Final = b"SQLite format 3\0"
 _LOG_HEADER: Final = 32
 """Length of the header of a write-ahead log, bytes (sqlite.org/fileformat.html)."""
 JOURNAL: Final = "journal.sqlite"
-"""The SQLite file that a server locks for itself alone."""
+"""The SQLite file that a server locks exclusively."""
 _DERIVED: Final = frozenset({"analysis.msgpack", "problems.msgpack", "prepared"})
 """Files that the server can compute again."""
 _READ_FIRST: Final = (".position", ".head")
-"""Endings of files that name the newest entry of an SQLite file. They may be older than it, but not newer."""
+"""Suffixes of files that name the newest entry of an SQLite file. They may be older than that file, but not newer."""
 _UNPACKING: Final = ".restore-unpacking"
 """A backup that is being unpacked. After an interruption it is deleted."""
 _READY: Final = ".restore-ready"
@@ -73,7 +73,7 @@ class Manifest(Data, frozen=True):
     Attributes:
         format: Version of the format.
         version: Version of ARCOR2-HW that wrote it.
-        created: When the backup was made (UTC).
+        created: Time of the backup (UTC).
         host: Name of the machine.
         files: The files by their path in the data directory.
     """
@@ -138,7 +138,7 @@ def _write(data_dir: Path, file: IO[bytes], version: str, scratch: Path) -> Mani
         first = [path for path in paths if path.endswith(_READ_FIRST)]
         for path in first:
             entries[path] = _add(archive, file, path, data_dir / path)
-        # The journal first: a document that is saved in between is then in both, as after a crash.
+        # The journal first, so that a document saved in between is in both, as after a crash.
         databases.sort(key=lambda path: path != JOURNAL)
         snapshots = [
             (
@@ -147,7 +147,7 @@ def _write(data_dir: Path, file: IO[bytes], version: str, scratch: Path) -> Mani
             )
             for path in databases
         ]
-        # A snapshot may list files, such as those of the history: those that exist now are the ones that it lists.
+        # A snapshot may list files, such as those of the history. The files that exist now are those in its list.
         present = sorted(_files(data_dir))
         if missing := set(paths).difference(present):
             raise _FileDeleted(", ".join(sorted(missing)))
@@ -204,7 +204,7 @@ def _snapshot(path: Path, _scratch: Path) -> Iterator[sqlite3.Connection]:
 def _exclusive_snapshot(path: Path, scratch: Path) -> Iterator[sqlite3.Connection]:
     """Copy an SQLite file that another process has locked, and connect to the copy.
 
-    The write-ahead log contains all pages that changed since it was started anew. If that did not happen while the
+    The write-ahead log contains all pages that changed since its last restart. If it was not restarted while the
     database and then the log were copied, the copies together have a consistent state: that of the last transaction
     that is complete in the log.
     """
@@ -229,7 +229,7 @@ def _exclusive_snapshot(path: Path, scratch: Path) -> Iterator[sqlite3.Connectio
 
 
 def _log_start(log: Path) -> bytes:
-    """Return the header of a write-ahead log, which is different each time that it is started anew."""
+    """Return the header of a write-ahead log, which changes with each restart of the log."""
     try:
         with log.open("rb") as file:
             return file.read(_LOG_HEADER)
@@ -246,7 +246,7 @@ def _copied(snapshot: sqlite3.Connection, directory: Path) -> Iterator[Path]:
         with contextlib.closing(sqlite3.connect(path)) as copy:
             copy.execute("pragma synchronous=off")
             snapshot.backup(copy, pages=_PAGES)
-            # The copy is one file, also if its header states that it has a write-ahead log.
+            # The copy is one file, although its header may state that there is a write-ahead log.
             copy.execute("pragma journal_mode=delete")
         yield path
     finally:
@@ -267,7 +267,7 @@ def _add(archive: zipfile.ZipFile, file: IO[bytes], name: str, path: Path) -> Ba
             digest.update(chunk)
             size += len(chunk)
             target.write(chunk)
-            # Flushed in small parts, the backup does not delay the server, which flushes edits to the same disk.
+            # Flushing in small parts avoids delaying the server, which flushes edits to the same disk.
             file.flush()
             os.fdatasync(file.fileno())
     return BackupEntry(size, digest.hexdigest())

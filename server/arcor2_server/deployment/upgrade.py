@@ -16,7 +16,7 @@ from arcor2_server.deployment.installation import NAME, UNIT, CommandFailed, Ins
 log = structlog.get_logger(__name__)
 
 READY_TIMEOUT: Final = 60.0
-"""Time limit for the start of the new version, s. Half of the two minutes in which a failed upgrade is undone."""
+"""Time limit for the start of the new version, s. It is half of the 2 min within which a failed upgrade is reverted."""
 STOPPED_TIMEOUT: Final = 30.0
 BACKUP_TIMEOUT: Final = 600.0
 
@@ -32,7 +32,7 @@ class Services(Protocol):
 
 
 class Systemd:
-    """The services of systemd: the server unless it is disabled, and the nodes and the page that ran."""
+    """The services of systemd: the server unless it is disabled, and the nodes and fleet pages that were running."""
 
     def __init__(self) -> None:
         self._others: set[str] = set()
@@ -70,16 +70,16 @@ def upgrade(
     """Replace the running version by that of a checked bundle.
 
     Args:
-        installation: what is installed.
+        installation: the present installation.
         bundle: the checked bundle.
         version: its version.
         services: the services.
-        report: is told each step.
+        report: called with a description of each step.
         user: the owner of the data; None: the present user.
 
     Raises:
         NotFound: nothing is installed.
-        Conflict: the bundle is not newer than what is installed.
+        Conflict: the bundle is not newer than the installed version.
         CommandFailed: the new version cannot be installed. The old one was not stopped.
         UpgradeFailed: the new version does not start. The old one runs again with its data.
     """

@@ -22,7 +22,10 @@ from arcor2_hw.data.scene import Scene, SceneObject, SceneObjectOverride
 
 
 class Kind(enum.StrEnum):
-    """Kinds of item. SCENE, PROJECT and FUNCTION carry their own fields, their lists of other items stay empty."""
+    """Kinds of items.
+
+    SCENE, PROJECT and FUNCTION contain only their own fields; their lists of other items are empty.
+    """
 
     SCENE = "scene"
     OBJECT = "object"
@@ -99,7 +102,7 @@ class EditKind(enum.StrEnum):
     REDO = "redo"
     RESTORE = "restore"
     EXTERNAL = "external"
-    """The stored document was changed while it was closed; such an edit has no user."""
+    """The stored document was changed while it was closed. The edit has no user."""
 
 
 FILE_NAMES: Final = {"kind": "how", "target": "of"}
@@ -111,13 +114,13 @@ class Edit(Struct, frozen=True, rename=FILE_NAMES):
 
     Attributes:
         number: Grows by one per edit.
-        time: When the edit was made.
-        user: Who made it.
+        time: Time of the edit.
+        user: Author of the edit.
         changes: In the order in which they are applied.
         request: The request that made the edit; for an undo or redo, the request of the edit that it reverts.
         kind: The kind of the edit.
-        target: The number of the edit that an undo or redo reverts, or the restored revision; for an edit, the number
-            of the one that started its step, 0 if it is itself a step.
+        target: The number of the edit that an undo or redo reverts, or the restored revision; for an edit, the
+            number of the edit that started its step, 0 if it is a step itself.
     """
 
     number: int

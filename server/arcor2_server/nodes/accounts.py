@@ -47,7 +47,7 @@ class Members(NamedTuple):
 class AcceptedMember(msgspec.Struct, frozen=True):
     """A member that may connect.
 
-    key: its public key. accepted: when (UTC). address: of its computer at that time. kind: what it is.
+    key: its public key. accepted: when (UTC). address: of its computer at that time. kind: kind of the member.
     """
 
     key: str
@@ -186,7 +186,7 @@ class Accounts:
             name: its name.
             key: its public key.
             address: where it is, for the list.
-            kind: what it is.
+            kind: kind of the member.
 
         Raises:
             InvalidData, NotFound, Conflict: as of `check_new`.

@@ -52,7 +52,7 @@ class ConditionReader:
         self._scope = scope
 
     def read(self, test: ast.expr, *, more: bool) -> tuple[Test, bool]:
-        """Return a condition, and whether it is negated: by `not`, or by a single `!=` without another branch after it."""
+        """Return a condition, and whether it is negated: by `not`, or by a single `!=` that no other branch follows."""
         match test:
             case ast.UnaryOp(ast.Not(), operand) if not isinstance(operand, ast.Name):
                 condition, negated = self.read(operand, more=False)
