@@ -191,7 +191,7 @@ class LogicComparison(Data, frozen=True):
     other: str | Unset = UNSET
 
     def compared(self) -> list[str]:
-        """Return what is compared: `what`, and `other` if there is one."""
+        """Return the compared values: `what`, and `other` if there is one."""
         return [self.what] if isinstance(self.other, Unset) else [self.what, self.other]
 
 

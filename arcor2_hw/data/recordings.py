@@ -76,7 +76,7 @@ class RecordedAction(Data, frozen=True):
     """An action, or a call of a method of a device in an online scene.
 
     number: of the action in its run; negative for a call. begin, end: ms after the event; `end` is omitted if it was
-    running at the end of the recording. error: why it failed. results: each as JSON. branch: of the program.
+    running at the end of the recording. error: reason of a failure. results: each as JSON. branch: of the program.
     """
 
     number: int

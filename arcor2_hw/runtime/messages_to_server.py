@@ -152,7 +152,7 @@ class ActionFailed(ToServer, frozen=True):
 class ProgramChanged(ToServer, frozen=True):
     """The state of the program: running, pausing, paused, or stopped when it has ended.
 
-    finished: whether the script reached its end or a flow action finished it. error: why it failed.
+    finished: whether the script reached its end or a flow action finished it. error: reason of a failure.
     """
 
     state: str

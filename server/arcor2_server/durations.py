@@ -6,16 +6,16 @@ from time import perf_counter
 from typing import Final
 
 BOUNDS: Final = (0.001, 0.005, 0.025, 0.1, 0.5, 2.5, 10.0)
-"""Upper bounds of the classes of durations, s. A last class has none."""
+"""Upper bounds of the classes of durations, s. There is one more class without an upper bound."""
 
 
 class Durations:
-    """How many times something took how long, by name. The names come from a fixed set.
+    """Histograms of durations by name. The names come from a fixed set.
 
     Attributes:
         counts: Number of durations in each class of BOUNDS, and above.
         sums: Sum of the durations, s.
-        failures: How many of them failed or were refused.
+        failures: Number of failed or refused requests.
     """
 
     def __init__(self) -> None:

@@ -8,10 +8,10 @@ from arcor2_hw.messages import Message
 
 
 class RequestRefused(Arcor2Error):
-    """The server cannot grant a request; the text becomes the message of the answer.
+    """The server refuses a request. The text becomes the message of the answer.
 
     Args:
-        message: what is wrong and what to do about it; a template when there are values.
+        message: the problem and its remedy; a template if there are values.
         data: the data of the answer. Only DeleteScene and DeleteObjectTypes return data with result=false.
     """
 

@@ -24,7 +24,7 @@ def make_event(name: str, data: Any = UNSET, change: ChangeType | None = None, p
 
 
 class Connection(Protocol):
-    """One connected client, as the parts below the websocket see it."""
+    """One connected client: the interface for the layers below the websocket."""
 
     number: int
     user: str | None
@@ -37,11 +37,11 @@ class Connection(Protocol):
 
     @property
     def role(self) -> Role:
-        """What the client may do: the lower role of its token and of the person who is logged on."""
+        """Role of the client: the lower one of the roles of its token and of the logged-on person."""
 
     @property
     def device(self) -> str:
-        """The id of its token, else its address."""
+        """The id of its token, or its address without a token."""
 
     def put(self, message: bytes) -> None:
         """Queue an encoded message."""

@@ -29,7 +29,7 @@ def ensure_private(path: Path) -> None:
 
 
 def restrict_permissions(directory: Path) -> None:
-    """Remove the permissions of group and others from a directory and its entries. Log what cannot be changed."""
+    """Remove the permissions of group and others from a directory and its entries. Log failures."""
     for path in (directory, *directory.iterdir()):
         try:
             status = path.lstat()

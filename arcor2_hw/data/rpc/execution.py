@@ -43,7 +43,7 @@ class RunPackageArgs(IdArgs, frozen=True):
     """Arguments of RunPackage.
 
     shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
-    on_error: what the program does when an action fails and no error exit applies. checkpoints: whether the state is
+    on_error: reaction of the program if an action fails and no error exit applies. checkpoints: whether the state is
     stored before and after each action; default: true. continues: whether the program continues where it was
     interrupted, which requires that it is held on errors. continue_at: position in the cycle of another action at which
     it continues (see Restart). recipe_id: the recipe, whose package this must be.
@@ -67,7 +67,7 @@ class TemporaryPackageArgs(Data, frozen=True):
     """Arguments of TemporaryPackage.
 
     shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
-    on_error: what the program does when an action fails and no error exit applies. checkpoints: as in RunPackage.
+    on_error: reaction of the program if an action fails and no error exit applies. checkpoints: as in RunPackage.
     """
 
     start_paused: bool = False

@@ -79,7 +79,7 @@ class Access:
 
     @property
     def open_to_all(self) -> bool:
-        """Whether clients need no token: by a setting, or if no token exists and only this machine reaches the server."""
+        """Whether clients need no token: by a setting, or if none exists and only this machine reaches the server."""
         if self._settings.insecure:
             return True
         return is_local(self._settings) and not self._tokens.all() and not self._tokens.unusable

@@ -168,7 +168,7 @@ class Alarms:
         )
 
     def decided(self, decided: HoldDecidedData) -> None:
-        """Acknowledge the ended alarms of a run, as far as operators may, after a person has decided about their cause."""
+        """Acknowledge the ended alarms of a run, as far as operators may: a person has decided about their cause."""
         for record in self._book.records(AlarmFilter.RETAINED):
             if (
                 record.run == decided.run

@@ -210,8 +210,7 @@ def serve(
                 plc = sockets.enter_context(contextlib.closing(listen(settings.plc.host, settings.plc.port)))
             plant = None
             if settings.opcua is not None:
-                from arcor2_server.opcua.certificate import issue_certificate  # imported only if needed, because it
-                takes time
+                from arcor2_server.opcua.certificate import issue_certificate  # slow to import, and rarely needed
 
                 plant = sockets.enter_context(contextlib.closing(listen(settings.opcua.host, settings.opcua.port)))
                 issue_certificate(settings)

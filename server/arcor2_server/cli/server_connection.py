@@ -85,7 +85,7 @@ def printable(text: str) -> str:
 
 
 def run(command: str, work: Callable[[], Awaitable[Any]]) -> int:
-    """Run a command, print errors, and return its status: the returned one, OK without one, or the status of the error."""
+    """Run a command and print errors. Return its status: the returned one, otherwise OK or that of the error."""
 
     async def working() -> Any:
         return await work()

@@ -50,7 +50,7 @@ def show_trace(trace: RunTrace) -> None:
 
 
 def show_comparison(first: RunTrace, second: RunTrace, titles: tuple[str, str]) -> None:
-    """Print two traces side by side: each action, the cycle, and the fraction of time for which each device was busy."""
+    """Print two traces side by side: actions, cycles, and the fraction of time for which each device was busy."""
     old, new = summarize(first), summarize(second)
     names = {device.id: device.name for device in (*first.devices, *second.devices)}
     out = console()

@@ -119,7 +119,7 @@ class LogOns:
         return found if found is not None and found.client is client else None
 
     def person_of(self, session: str, device: str, *, active: bool) -> StoredPerson | None:
-        """Return the person of a session of a device, None if it has ended. `active`: whether the call counts as activity."""
+        """Return the person of a session, None if it has ended. `active`: whether the call counts as activity."""
         found = self._by_session.get(_digest(session))
         if found is None or found.device != device:
             return None

@@ -133,7 +133,7 @@ class Edit(Struct, frozen=True, rename=FILE_NAMES):
 
 
 def net(changes: Iterable[Change]) -> list[Change]:
-    """Combine changes into one per item, from before the first to after the last; drop those without effect."""
+    """Combine changes into one change per item. Drop changes without effect."""
     found: dict[tuple[Kind, str], Change] = {}
     for change in changes:
         key = (change.kind, change.id)

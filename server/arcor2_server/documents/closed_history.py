@@ -35,7 +35,7 @@ from arcor2_server.storage.damage_notices import DataDamage
 log = structlog.get_logger(__name__)
 
 CLOSED_LIMIT: Final = 100
-"""Number of closed documents whose history is stored; the document that was closed first is dropped first."""
+"""Maximum number of closed documents whose history is stored. The document that was closed first is dropped first."""
 
 
 class ClosedHistory(msgspec.Struct, frozen=True):
@@ -88,7 +88,10 @@ class ClosedHistories:
             log.warning("undo history is not stored", document=item.id, reason=str(error))
 
     async def reopen(self, scene: Scene, project: Project | None) -> tuple[Document, list[Edit]]:
-        """Return the document of a scene or project with its history, which is empty if no stored one leads to it."""
+        """Return the document of a scene or project with its history.
+
+        The history is empty if no stored one leads to it.
+        """
         opened = project or scene
         closed = self._latest
         if closed is None or closed.document != opened.id:
@@ -122,7 +125,7 @@ class ClosedHistories:
             oldest.unlink()
 
     def _path(self, document: str) -> Path:
-        # An id may hold characters that a file name cannot.
+        # An id may contain characters that are not allowed in file names.
         return self._directory / f"{hashlib.sha256(document.encode()).hexdigest()}.history"
 
 
@@ -161,9 +164,9 @@ def continue_history(
 ) -> tuple[Document, list[Edit]] | None:
     """Return the saved document and its history; None if the history does not lead to it.
 
-    Changes that were made outside the editor since the document was closed become a last edit without a user.
+    Changes made outside of the editor since the document was closed become a last edit without a user.
     """
-    # Only the items are needed: a second document with its indexes would double the time.
+    # Only the items are needed. A second document with its indexes would double the time.
     saved = [
         Item(change.kind, change.id, change.parent, change.rank, change.after)
         for change in Document().changes_to_fill(scene, project)

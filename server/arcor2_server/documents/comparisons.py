@@ -62,12 +62,12 @@ class Comparison(NamedTuple):
     other: Reference | None = None
 
     def compared(self) -> tuple[Reference, ...]:
-        """Return what is compared: `what`, and `other` if there is one."""
+        """Return the compared values: `what`, and `other` if there is one."""
         return (self.what,) if self.other is None else (self.what, self.other)
 
 
 class Comparisons(NamedTuple):
-    """A condition of at least one comparison. It is true if all of them are, or if any is."""
+    """A condition of at least one comparison. It is true if all comparisons are true, or if any is."""
 
     comparisons: tuple[Comparison, ...]
     match: Match = Match.ALL
@@ -82,8 +82,8 @@ def decoded(comparison: LogicComparison) -> tuple[Value, int | float | None]:
     """Return the value and the upper limit of a comparison; an empty text for one with another value.
 
     Raises:
-        InvalidData: one of them is not JSON of a boolean, number or string, there is no limit where one is needed, or
-            there is one next to another value.
+        InvalidData: one of them is not JSON of a boolean, number or string, a required limit is missing, or
+            a limit is combined with another value.
     """
     if not isinstance(comparison.other, Unset):
         if comparison.value or not isinstance(comparison.upper, Unset) or comparison.operator in RANGES:
@@ -226,7 +226,7 @@ def text_of(when: LogicWhen, name: Callable[[str], str]) -> str:
 
 
 def what_of(text: str) -> tuple[str, int] | str:
-    """Return action id and output index of the result, or the id of the parameter, that a comparison is about.
+    """Return action id and output index of the compared result, or the id of the compared parameter.
 
     Raises:
         ValueError: the text is malformed.
@@ -273,12 +273,12 @@ def holds(condition: Comparisons, values: Mapping[Reference, Value]) -> bool:
 
 
 def _samples(kind: str, constants: Sequence[Value], kinds: Sequence[str]) -> list[Value]:
-    """Return values of a type that stand for all values, which differ only in comparisons.
+    """Return sample values of a type that represent all values with respect to the comparisons.
 
     Args:
         kind: the type.
         constants: the constants with which the values are compared.
-        kinds: the types of the values that are compared with each other, this one included. Between two constants
+        kinds: the types of the values that are compared with each other, including this one. Between two constants
             there are as many samples as values, so that these have any order.
     """
     if kind == "boolean":
@@ -305,12 +305,12 @@ def _samples(kind: str, constants: Sequence[Value], kinds: Sequence[str]) -> lis
 
 
 class Cases(NamedTuple):
-    """What conditions that are tested in order do for all values.
+    """Coverage of all values by conditions that are tested in order.
 
     Args:
         unused: the numbers of the conditions that never apply.
         gap: values for which no condition is true; None if there are none.
-        known: whether all values were tested. There may be too many combinations.
+        known: whether all values were tested. It is false if there are too many combinations.
     """
 
     unused: tuple[int, ...]
@@ -348,7 +348,7 @@ def _all_values(kinds: Mapping[Reference, str], conditions: Sequence[Comparisons
 
 
 def cases_of(conditions: Sequence[Comparisons], kinds: Mapping[Reference, str]) -> Cases:
-    """Return what valid conditions, tested in order, do for all values of the types `kinds`."""
+    """Return the coverage of all values of the types `kinds` by valid conditions that are tested in order."""
     unused = set(range(len(conditions)))
     gap: dict[Reference, Value] | None = None
     known = False

@@ -36,7 +36,7 @@ def check_consistent(document: Document, changes: Sequence[Change], types: Types
     """Check that the document is consistent with the changes applied, and leave it unchanged.
 
     Raises:
-        Inconsistent: It would not be.
+        Inconsistent: It would be inconsistent.
     """
     document.apply(changes)
     try:
@@ -53,7 +53,7 @@ def check_consistent(document: Document, changes: Sequence[Change], types: Types
 
 
 def title(change: Change) -> str:
-    """Return the name and kind of the changed item, as users know it: `home (action point)`."""
+    """Return the name and kind of the changed item for users: `home (action point)`."""
     value = change.before if change.after is None else change.after
     name = getattr(value, "name", "")
     what = {Kind.LOGIC: "step of the logic", Kind.OVERRIDE: "override"}.get(change.kind, change.kind.replace("_", " "))
@@ -214,7 +214,7 @@ def _check_loops(document: Document, steps: list[LogicItem]) -> None:
     try:
         check_no_loops(document, steps)
     except InvalidData as error:
-        # Any of the other steps may close the loop; the caller blames the latest edit.
+        # Any of the other steps may close the loop; the caller reports the latest edit.
         own = {step.id for step in steps}
         raise Inconsistent(error.message, {item.id for item in document.of_kind(Kind.LOGIC)} - own) from None
 

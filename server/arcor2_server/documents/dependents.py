@@ -94,7 +94,7 @@ class Dependents:
         self._session = session
 
     async def after_saving(self, save: Callable[[], Awaitable[None]]) -> list[ObjectTypeMeta]:
-        """Save the open scene; mark joints at moved objects as invalid in all its projects but the open one.
+        """Save the open scene. Mark joints at moved objects as invalid in all its projects except the open one.
 
         Items of removed objects are removed from these projects. Return the deleted object types.
         """

@@ -35,7 +35,7 @@ _TITLES: Final = {
     Kind.LOGIC: "logic item",
     Kind.OVERRIDE: "override of the object",
 }
-"""Kinds as users know them, where their name differs."""
+"""Names of kinds for users, where they differ."""
 
 OUTPUT: Final = "output"
 """Scope of the names of results and errors in `Document.named`."""
@@ -63,7 +63,7 @@ class Document:
         self._scene: Scene | None = None
         self._project: Project | None = None
         self._functions: dict[str, ProjectFunction] = {}
-        """Functions with their actions and logic, as far as they were requested since the last change."""
+        """Cache of functions with their actions and logic, filled on request and cleared by changes."""
         for item in items:
             self._put(item)
 
@@ -125,7 +125,7 @@ class Document:
 
     @contextmanager
     def retiring(self) -> Iterator[None]:
-        """Refuse further changes while this document is closed, and afterwards unless closing fails."""
+        """Refuse changes while this document is being closed, and afterwards unless closing fails."""
         self._retired = True
         try:
             yield
@@ -374,7 +374,7 @@ class Document:
         return parameter if parameter is not None and parameter.variable else None
 
     def naming(self, output: str) -> Action | None:
-        """Return an action of the program or a function that names a result or its error so, None if there is none."""
+        """Return an action of the program or function whose result or error has this name, None if there is none."""
         return next((self.action(key) for key in self._indexes.names.get((OUTPUT, output), ())), None)
 
     def storing(self, parameter: ProjectParameter) -> list[Action]:
@@ -387,8 +387,8 @@ class Document:
     def users_of(self, target_id: str) -> list[Action | LogicItem | ProjectFunction]:
         """Return the actions with a parameter that refers to this id, and the logic items with a condition on it.
 
-        The users of an action are also the function that returns a result of it, and the parallel action of which it is
-        a branch; those of a function are its calls.
+        The users of an action include the function that returns a result of it, and the parallel action of which it
+        is a branch. The users of a function are its calls.
         """
         actions, logic, functions = (self._items[kind] for kind in (Kind.ACTION, Kind.LOGIC, Kind.FUNCTION))
         return [(actions.get(i) or logic.get(i) or functions[i]).value for i in self._indexes.users.get(target_id, ())]
@@ -398,7 +398,7 @@ class Document:
         return [user for user in self.users_of(function_id) if isinstance(user, Action)]
 
     def parallel_of(self, action_id: str) -> Action | None:
-        """Return the parallel action of which an action is a branch, None if it is none."""
+        """Return the parallel action of which an action is a branch, None for an action that is not a branch."""
         users = (user for user in self.users_of(action_id) if isinstance(user, Action))
         return next((user for user in users if action_id in (user.branches or ())), None)
 
@@ -427,5 +427,5 @@ class Document:
 
 
 def reduce_to(base: type[T], value: Any) -> T:
-    """Return an instance of a base class of a struct with the fields that it has."""
+    """Return an instance of a base class of a struct, with the fields of this base class."""
     return base(**{name: getattr(value, name) for name in base.__struct_fields__})

@@ -1,4 +1,4 @@
-"""Notifies observers of edits, and users of what they can undo and redo."""
+"""Notifies observers of edits, and users of the edits that they can undo and redo."""
 
 import asyncio
 from collections.abc import Callable, Sequence
@@ -21,7 +21,7 @@ NAME: Final = "HistoryChanged"
 
 
 class EditNotifications:
-    """Collects changes, and publishes to each subscriber of HistoryChanged what the user can undo and redo."""
+    """Collects changes, and publishes to subscribers of HistoryChanged the edits that the user can undo and redo."""
 
     def __init__(self, hub: EventHub, session: Session) -> None:
         self.on_edit: list[Callable[[Sequence[Change]], None]] = []
@@ -38,7 +38,7 @@ class EditNotifications:
         session.on_change.append(self._changed)
 
     def history_of(self, client: Connection) -> Event:
-        """Return the event with what the user of a client can undo and redo."""
+        """Return the event with the edits that the user of a client can undo and redo."""
         return self._history(client.user)
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Fields of projects that clients of the original do not know, and that survive when such a client stores a project."""
+"""Extensions: project fields that clients of the original do not know, and that are kept when these store a project."""
 
 from typing import Final
 
@@ -21,7 +21,7 @@ _NAMES: Final = translatable(
 
 
 def extensions_of(project: Project) -> list[Message]:
-    """Return the names of what a project contains that clients of the original cannot show or edit."""
+    """Return the names of the extensions in a project, which clients of the original cannot show or edit."""
     actions = list(project.all_actions())
     logic = [*project.logic, *(item for function in project.functions for item in function.logic)]
     contained = {

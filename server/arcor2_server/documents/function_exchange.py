@@ -1,4 +1,4 @@
-"""Exports a function with what its actions refer to, and imports it into another project."""
+"""Exports a function with the items to which its actions refer, and imports it into another project."""
 
 from collections.abc import Iterator, Mapping
 from typing import Final
@@ -29,7 +29,7 @@ from arcor2_server.documents.parallel_work import mapped_branches
 from arcor2_server.errors import RequestRefused
 
 OBJECT: Final = "object"
-"""Kind of a reference to an object of the scene. The kinds of the others are types of parameters."""
+"""Kind of a reference to an object of the scene. Kinds of other references are types of parameters."""
 _POINT_ITEMS: Final = {"pose": Kind.ORIENTATION, "joints": Kind.JOINTS}
 
 

@@ -30,14 +30,14 @@ def encoded(value: object) -> str:
 
 
 def free_name(name: str, is_taken: Callable[[str], bool]) -> str:
-    """Return a name, with `_2`, `_3` ... if it is taken."""
+    """Return a name, with the suffix `_2`, `_3` ... if it is taken."""
     if not is_taken(name):
         return name
     return next(free for number in itertools.count(2) if not is_taken(free := f"{name}_{number}"))
 
 
 class Names:
-    """Free names of new items, which are different from each other, too."""
+    """Free names of new items, which also differ from each other."""
 
     def __init__(self, document: Document, function: str = "") -> None:
         self._document = document
@@ -90,7 +90,7 @@ def with_condition(item: LogicItem, changed: Callable[[tuple[str, str, int]], st
         try:
             return changed(parse_link(value)) or value
         except ValueError:
-            return value  # a project parameter, or malformed, which the checks report
+            return value  # a project parameter, or a malformed link, which the checks report
 
     if not isinstance(item.condition, Unset):
         item = replace(item, condition=ProjectLogicIf(link(item.condition.what), item.condition.value))

@@ -162,11 +162,11 @@ class _Parameters:
         """The parameters of the call."""
         self._document, self._types, self._selection = document, types, selection
         self._names: dict[tuple[str, str], str] = {}
-        """The names of parameters, by type and target of what they pass on."""
+        """The names of parameters, by type and target of the value that they pass on."""
         self._taken = {name for action in selection.actions.values() for name in action.names()}
 
     def replaced(self, action: Action, ids: dict[str, str]) -> Action:
-        """Return an action of the function with a new id, its own links, and parameters of the function."""
+        """Return an action for the function, with a new id, and with its links and parameters adapted to the function."""
         meta = action_meta(action, self._document, self._types)
         kinds = {each.name: each.type for each in meta.parameters}
 

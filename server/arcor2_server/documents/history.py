@@ -1,4 +1,4 @@
-"""The latest edits of the open document, and which of them each user can undo."""
+"""The latest edits of the open document; determines which edits each user can undo."""
 
 import itertools
 from collections import defaultdict, deque
@@ -10,8 +10,8 @@ from arcor2_server.documents.changes import Change, Edit, EditKind
 class History:
     """Edits with consecutive numbers, oldest first. The oldest are dropped if there are more than `limit`.
 
-    An undo is an edit that reverts another one; a redo is an edit that reverts an undo. Edits that one action of the
-    user causes form a step: they are undone together, and the number of the first is that of the step.
+    An undo is an edit that reverts another one; a redo is an edit that reverts an undo. Edits caused by one action
+    of the user form a step: they are undone together. The number of the step is that of its first edit.
     """
 
     def __init__(self, limit: int) -> None:
@@ -33,7 +33,7 @@ class History:
 
     # ------------------------------------------------------------------------------------------ changes
     def append(self, edit: Edit, step: str = "") -> None:
-        """Append the next edit, which later edits with the same name of a step continue."""
+        """Append the next edit. Later edits with the same step name continue its step."""
         if self._edits and len(self._edits) == self._edits.maxlen:
             self._remove_from_lists(self._edits[0])
         self._edits.append(edit)
@@ -93,7 +93,8 @@ class History:
     def start_of_step(self, user: str, step: str, changes: Iterable[Change]) -> int:
         """Return the number of the step that an edit continues, 0 if it starts a new one.
 
-        An edit does not continue a step if it was undone or dropped, or if another edit changed one of the items since.
+        An edit starts a new step if the step was undone or dropped, or if another edit has changed one of the items
+        since then.
         """
         name, number = self._latest_step.get(user, ("", 0))
         if name != step or not self.can_undo(user, number):

@@ -24,7 +24,7 @@ _Job = tuple[Edit | Base | None, int, "asyncio.Future[None]"]
 class Journal:
     """The journal of the open document: a thread with one file. Waiting jobs are written in one commit, in order.
 
-    After a failure all jobs of the same epoch fail, also later ones, since the edits that they build on are lost.
+    After a failure all jobs of the same epoch fail, also later ones, because they depend on the lost edits.
 
     Args:
         path: The SQLite file.
@@ -75,7 +75,7 @@ class Journal:
         return self._put(edit)
 
     def rebase(self, base: Base) -> "asyncio.Future[None]":
-        """Replace the document that the edits start from: by another one, or by the same one after a later edit."""
+        """Replace the base document of the edits by another document, or by its state after a later edit."""
         return self._put(base)
 
     def clear(self) -> "asyncio.Future[None]":

@@ -176,7 +176,9 @@ class JournalFile:
         try:
             with connection:
                 connection.execute("begin immediate")
-                connection.execute("drop table if exists extent")  # left by a server that was killed here
+                connection.execute(
+                    "drop table if exists extent"
+                )  # left over from a server that was killed at this point
                 connection.execute("create table extent (content blob)")
                 connection.execute("insert into extent values (zeroblob(?))", (CHECKPOINT_PAGES * 4096,))
             with connection:
@@ -279,7 +281,7 @@ def _is_damage(error: BaseException, path: Path) -> bool:
 
 
 def _recover(connection: sqlite3.Connection) -> JournalContent:
-    """Convert the file to the present format, and read what is intact. Raise JournalDamaged if nothing is."""
+    """Convert the file to the present format, and read the intact records. Raise JournalDamaged if there are none."""
     # Refuses a second server on the same directory, and needs no shared memory file.
     connection.execute("pragma locking_mode = exclusive")
     connection.execute("pragma journal_mode = wal")

@@ -33,7 +33,7 @@ EDIT_COLUMNS: Final = "number, time, user, changes, request, how, target"
 
 
 class Times(msgspec.Struct, frozen=True):
-    """Times at which a document was created, saved, and changed after it was saved; empty for what did not happen."""
+    """Times at which a document was created, saved, and changed after saving; empty if that did not happen."""
 
     created: str = ""
     modified: str = ""
@@ -54,7 +54,7 @@ class Times(msgspec.Struct, frozen=True):
         return replace(self, changed=time if differs or not self.modified else "")
 
     def after_comparison(self, *, differs: bool, saved: BareScene | BareProject | None = None) -> "Times":
-        """Return the times after the document was compared with the saved one, or was saved as `saved`."""
+        """Return the times after the document was compared with the saved version, or was saved at `saved`."""
         changed = self.changed if differs or (saved is None and not self.modified) else ""
         return replace(self if saved is None else Times.of(saved), changed=changed)
 
@@ -129,11 +129,11 @@ class Position(msgspec.Struct, frozen=True):
 
 
 class JournalLoss(msgspec.Struct, frozen=True):
-    """What a damaged journal lost, as sentences for users.
+    """Data lost by a damaged journal, described for users.
 
     Attributes:
-        reason: How the damage was detected, a clause.
-        lost: What is lost.
+        reason: How the damage was detected, as a clause.
+        lost: The lost data.
         stored_as: The path of the damaged file.
         incomplete: The reopened document differs from the last acknowledged state.
     """
@@ -145,7 +145,7 @@ class JournalLoss(msgspec.Struct, frozen=True):
 
     @property
     def message(self) -> Message:
-        """The reason, what was lost, and where the damaged file is, as sentences."""
+        """Sentences about the reason, the lost data, and the path of the damaged file."""
         damaged = Message.of("The journal of unsaved changes is damaged: {reason}.", reason=self.reason)
         stored = [Message.of("The damaged file is stored as {path}.", path=self.stored_as)] if self.stored_as else []
         return Message.joined([damaged, self.lost, *stored])
@@ -160,9 +160,9 @@ class JournalContent(msgspec.Struct):
 
     Attributes:
         serial: See `Position`.
-        recovered: What is intact.
-        damage: How the damage was detected, a clause; None if nothing is damaged.
-        lost: What is lost, as sentences.
+        recovered: The intact document.
+        damage: How the damage was detected, as a clause; None without damage.
+        lost: The lost data, as sentences.
         incomplete: The intact part differs from the last acknowledged state.
     """
 
@@ -267,7 +267,7 @@ def read_content(connection: sqlite3.Connection) -> JournalContent:
 
 
 def note_missing(content: JournalContent, expected: Position) -> None:
-    """Note in `content` which acknowledged changes are missing from it."""
+    """Add the missing acknowledged changes to the description in `content`."""
     found = content.recovered
     if not expected.document and content.serial <= expected.serial:
         # The document was closed, so the content of the file is saved or discarded.

@@ -28,7 +28,7 @@ from arcor2_hw.messages import Message
 from arcor2_server.documents.comparisons import Comparison, Comparisons, Reference, decoded, what_of
 
 END_NODE: Final = -1
-"""The number of END, next to the numbers of actions."""
+"""Number that represents END; actions have numbers from 0."""
 
 BRANCHABLE: Final[dict[str, type]] = {"boolean": bool, "integer": int, "integer_enum": int, "string_enum": str}
 """The types of results that conditions can test, with the type of the compared value (docs/protocol.md)."""
@@ -73,9 +73,9 @@ class Flow:
 
     `edges[n]` is one unconditional edge, or several that are tested in order. The last one applies if no other does.
     Whether edges with comparisons are complete is not checked, because this depends on the types of the values.
-    `exits[n]` are the error exits in the order in which they apply. `parallel[n]` are the calls that action `n` runs at
-    once. An edge leads from the action to the first of them, from each to the next one, and from the last one to what
-    follows the action: so their results are set where the action has succeeded.
+    `exits[n]` are the error exits in the order in which they apply. `parallel[n]` are the calls that action `n`
+    runs concurrently. Edges lead from the action to its first call, from each call to the next one, and from the
+    last call to the successor of the action, so their results are set where the action has succeeded.
     """
 
     actions: list[Action]
@@ -216,7 +216,7 @@ def _ordered(edges: list[Edge], source: Action, actions: Sequence[Action]) -> tu
 
 
 def never_taken(source: Action, edge: Edge, actions: Sequence[Action]) -> InvalidProject:
-    """Return the error for an edge whose condition never decides."""
+    """Return the error for an edge that is never followed."""
     where = Message.of("the end") if edge.target == END_NODE else repr(actions[edge.target].name)
     return InvalidProject("action {name!r}: the connection to {place} is never taken", name=source.name, place=where)
 
@@ -294,7 +294,7 @@ def _number(first: int, edges: list[list[int]], actions: Sequence[Action]) -> li
 
 
 def _chains(actions: Sequence[Action], known: Mapping[str, int], logic: Iterable[LogicItem]) -> dict[int, list[int]]:
-    """Return the calls that each parallel action runs at once. Raise InvalidProject if they are invalid."""
+    """Return the calls that each parallel action runs concurrently. Raise InvalidProject if they are invalid."""
     found: dict[int, list[int]] = {}
     owners: dict[str, str] = {}
     for number, action in enumerate(actions):

@@ -51,20 +51,20 @@ class OpenDocument:
         return self.project
 
     def require_scene_open(self) -> Document:
-        """Return the document if a scene is open, with or without a project, else raise RequestRefused."""
+        """Return the document if a scene is open, with or without a project. Otherwise raise RequestRefused."""
         if not self.document.count(Kind.SCENE):
             raise RequestRefused("No scene is open: open one first.")
         return self.document
 
     def require_scene_alone(self) -> Document:
-        """Return the document if a scene is open without a project, else raise RequestRefused."""
+        """Return the document if a scene is open without a project. Otherwise raise RequestRefused."""
         document = self.require_scene_open()
         if document.count(Kind.PROJECT):
             raise RequestRefused("The scene cannot be changed while a project is open: close the project first.")
         return document
 
     def require_project_open(self) -> Document:
-        """Return the document if a project is open, else raise RequestRefused."""
+        """Return the document if a project is open. Otherwise raise RequestRefused."""
         self.require_scene_open()
         if not self.document.count(Kind.PROJECT):
             raise RequestRefused("No project is open: open one first.")

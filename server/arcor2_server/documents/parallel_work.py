@@ -1,4 +1,4 @@
-"""Parallel actions, which run several calls of functions at once: changes that make and dissolve them."""
+"""Parallel actions, which run several function calls concurrently: changes that create and dissolve them."""
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
@@ -43,7 +43,7 @@ def with_branches(document: Document, action_ids: Iterable[str]) -> list[str]:
 
 
 def make_parallel(document: Document, name: str, action_ids: Sequence[str]) -> tuple[list[Change], str]:
-    """Return the changes that let calls run at once, and the id of the parallel action.
+    """Return the changes that make calls run concurrently, and the id of the parallel action.
 
     Args:
         document: the open document.
@@ -51,7 +51,7 @@ def make_parallel(document: Document, name: str, action_ids: Sequence[str]) -> t
         action_ids: the calls. They follow each other, or are not connected.
 
     Raises:
-        RequestRefused: the actions cannot run at once.
+        RequestRefused: the actions cannot run concurrently.
         NotFound: an action does not exist.
     """
     calls = [document.action(key) for key in dict.fromkeys(action_ids)]

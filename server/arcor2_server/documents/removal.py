@@ -76,7 +76,7 @@ def require_unused(document: Document, action: Action, without: Collection[str] 
 
 
 def title_of(user: Action | LogicItem | ProjectFunction) -> str:
-    """Return the user of a result, at the start of a sentence."""
+    """Return a name for the user of a result, for the start of a sentence."""
     match user:
         case Action():
             return f"The action {user.name}"

@@ -14,7 +14,7 @@ class Types(Protocol):
     """Access to the actions of object types."""
 
     def action(self, type_name: str, name: str) -> ObjectAction:
-        """Return the action that has a name or had it formerly. Raise NotFound if there is none."""
+        """Return the action with this present or former name. Raise NotFound if there is none."""
 
 
 def with_present_name(action: Action, meta: ObjectAction) -> Action:

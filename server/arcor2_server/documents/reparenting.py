@@ -46,8 +46,8 @@ def check_parent(lookup: ProjectLookup, parent_id: str, name: str) -> None:
 def changes_for_parent(document: Document, point_id: str, new_parent: str) -> tuple[list[Change], list[str]]:
     """Return the changes that set the parent of an action point, and the ids of the changed action points.
 
-    Positions and orientations are converted to the new frame, so that nothing moves. If the frames are turned to each
-    other, those of descendants are converted, too.
+    Positions and orientations are converted to the new frame, so that nothing moves. If the frames have different
+    orientations, those of descendants are converted, too.
 
     Args:
         document: The open document.

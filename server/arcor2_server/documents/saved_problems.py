@@ -32,8 +32,8 @@ class Checked(Data, frozen=True, array_like=True):
     """The problems of a document.
 
     Attributes:
-        sources: When the document and its scene were modified, and the digest of the types.
-        problems: In the order found; empty if the document can be opened.
+        sources: Modification times of the document and its scene, and the digest of the types.
+        problems: Problems in the order of their detection; empty if the document can be opened.
     """
 
     sources: tuple[str, ...]

@@ -74,7 +74,7 @@ class Session(OpenDocument):
 
     # ------------------------------------------------------------------------------------------ start and stop
     async def open(self) -> None:
-        """Reopen the document in the journal, and report what a damaged journal lost.
+        """Reopen the document in the journal, and report data lost by a damaged journal.
 
         Raises:
             StorageError: The journal cannot be read or written.
@@ -138,7 +138,7 @@ class Session(OpenDocument):
                 saved_project = with_present_names(saved, await storage.project(project.id), self._types)
                 self._project_times = replace(Times.of(saved_project), changed=self._project_times.changed)
         except NotFound:
-            pass  # never saved, or deleted
+            pass  # the document was never saved, or it was deleted
         except StorageError as error:
             log.warning("open document cannot be compared with the saved version", reason=str(error))
         self._unsaved = Unsaved.between(Document.of(saved, saved_project), self.document)
@@ -169,7 +169,7 @@ class Session(OpenDocument):
         """Apply changes as one edit; return when they are on disk. Other requests see them at once.
 
         Args:
-            user: Who makes the edit.
+            user: Author of the edit.
             changes: The changes.
             request: See `Edit`.
             kind: See `Edit`.
@@ -268,9 +268,9 @@ class Session(OpenDocument):
         await self._closed.forget(document)
 
     def set_aside(self) -> Callable[[], None]:
-        """Hide the document and return the function that shows it again with its unsaved changes.
+        """Hide the document. Return the function that opens it again with its unsaved changes.
 
-        No other document may be opened meanwhile. The document stays in the journal, so it is open after a restart.
+        No other document may be opened until then. The document stays in the journal, so it is open after a restart.
 
         Raises:
             RequestRefused: An edit is being written.
@@ -306,7 +306,7 @@ class Session(OpenDocument):
             notify(None)
 
     async def save(self) -> None:
-        """Save the scene, the project, or both, as far as they have changes. Raise StorageError on failure."""
+        """Save the scene and the project if they have changes. Raise StorageError on failure."""
         storage = self._storage
         if self.scene_changed:
             saved = await self._save(storage.put_scene(self.require_scene()), scene=True)

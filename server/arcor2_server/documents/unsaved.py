@@ -48,7 +48,7 @@ class Unsaved:
         return bool(self._of_project)
 
     def note(self, change: Change) -> None:
-        """Note a change that is applied."""
+        """Record an applied change."""
         values, key = self._of(change.kind), (change.kind, change.id)
         if key not in values:
             values[key] = change.before
@@ -56,7 +56,7 @@ class Unsaved:
             del values[key]
 
     def begin_saving(self, *, scene: bool) -> _Values:
-        """Compare with the present state from now on, since it is being saved; return the earlier differences."""
+        """Use the present state, which is being saved, for comparison from now on. Return the earlier differences."""
         if scene:
             before, self._of_scene = self._of_scene, {}
         else:

@@ -18,7 +18,7 @@ Method = str
 
 
 def durations(traces: Sequence[RunTrace], methods: Mapping[str, Method]) -> dict[str, KnownDuration]:
-    """Return the durations of actions: the median of the action itself, otherwise that of the same method.
+    """Return the durations of actions: the median of the action, otherwise the median of the same method.
 
     Failed actions are not counted.
 
@@ -49,7 +49,7 @@ def durations(traces: Sequence[RunTrace], methods: Mapping[str, Method]) -> dict
 def branches(trace: RunTrace, edges: Mapping[str, list[str]]) -> dict[str, UsualBranch]:
     """Return the branches that a run took most often, by id of the action. Repetitions after an error do not count.
 
-    The branches of a function are those of all its executions by the same call.
+    For a function, all executions by the same call are counted together.
 
     Args:
         trace: the trace of the run.

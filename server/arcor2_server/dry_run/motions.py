@@ -1,4 +1,4 @@
-"""The motions of an action, from the names and types of its parameters.
+"""Determines the motions of an action from the names and types of its parameters.
 
 Object types declare no motions. The convention that the drivers share is documented in docs/how-to/add-a-robot.md, and
 docs/decisions/0023-dry-run.md explains it.

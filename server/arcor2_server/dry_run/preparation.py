@@ -52,8 +52,8 @@ class Experience(Struct, frozen=True):
 
     Args:
         traces: the traces of the newest runs of the project, the newest first.
-        unchanged: those of them after which neither the project nor the scene was edited.
-        additions: by how much the motions of a method took longer than planned before, s, by method.
+        unchanged: the traces of runs since the last edit of project or scene.
+        additions: measured additional time of motions compared with their plans, s, by method.
     """
 
     traces: Sequence[RunTrace]
@@ -137,7 +137,7 @@ def _steps(flow: Flow, first: int, functions: Collection[str]) -> list[Step]:
     for number, action in enumerate(flow.actions):
         object_id, _, _ = action.type.partition("/")
         branches = flow.parallel.get(number, ())
-        # What follows parallel work, which the graph of the logic has after the last branch.
+        # The successor of parallel work, which is after the last branch in the graph of the logic.
         edges = flow.edges[branches[-1] if branches else number]
         function = object_id if object_id in functions else ""
         device = "" if function or branches else object_id

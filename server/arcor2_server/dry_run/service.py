@@ -55,7 +55,7 @@ class RunHistory(Protocol):
 class _Stored(Struct):
     head: DryRunHead
     content: tuple[Any, ...]
-    """What was checked; another content makes the result outdated."""
+    """The checked content. The result is outdated if the content has changed."""
     prediction: Prediction | Unset = UNSET
 
 
@@ -83,7 +83,7 @@ class DryRuns:
         self._runs = runs
         self._stored: OrderedDict[int, _Stored] = OrderedDict()
         self._additions: dict[str, float] = {}
-        """By how much the motions of a method took longer than planned, s."""
+        """Additional time of motions compared with their plans, s, by method."""
         self._number = 0
         self._preparing = False
         self._running: asyncio.Task[None] | None = None

@@ -23,7 +23,7 @@ _ID: Final = re.compile(r"[a-z]+_[0-9a-f]{32}")
 
 
 class Difference(Data, frozen=True):
-    """One entry that is only in one of two exports, or differs.
+    """An entry that differs between two exports, or is missing from one of them.
 
     Attributes:
         change: The kind of difference.

@@ -34,7 +34,7 @@ GREETING_TIMEOUT: Final = 5.0
 
 
 class Step(Data, frozen=True):
-    """One item of an export, and what the import does with it. `notice`: further information for the user."""
+    """One item of an export, and its treatment by the import. `notice`: further information for the user."""
 
     verb: ImportOutcome
     kind: str
@@ -191,7 +191,7 @@ class Importer:
     async def run(self) -> None:
         """Run the planned steps, referenced items first; undo them if one fails.
 
-        The message of the error names what was undone, and what could not be undone.
+        The message of the error lists the steps that were undone, and those that could not be undone.
         """
         rollback = Rollback()
         try:

@@ -14,11 +14,14 @@ class Rollback:
         self._done: list[tuple[str, Callable[[], Awaitable[Any]]]] = []
 
     def before_step(self, step: str, undo: Callable[[], Awaitable[Any]]) -> None:
-        """Note a step before it is done, since its outcome is unknown if its answer is lost."""
+        """Record a step before it is executed, because its outcome is unknown if its answer is lost."""
         self._done.append((step, undo))
 
     async def run(self) -> str:
-        """Undo all steps in reverse order; return sentences that name what was undone, and what could not be undone."""
+        """Undo all steps in reverse order.
+
+        Return sentences that name the undone steps and those that could not be undone.
+        """
         results: dict[str, bool] = {}
         while self._done:
             what, undo = self._done.pop()

@@ -59,7 +59,7 @@ class ProgramHold:
         self._deciding = asyncio.Lock()
 
     def reset(self) -> None:
-        """Forget the holds of the run before."""
+        """Discard the holds of the previous run."""
         self.present, self._record, self._last, self.seconds = None, None, None, 0.0
 
     @property
@@ -68,7 +68,7 @@ class ProgramHold:
         return self._last is not None and self._last.choice is HoldChoice.END
 
     def begin(self, run: int, held: HeldData) -> None:
-        """Handle that the program is held."""
+        """Handle the start of a hold."""
         self.present = replace(held, run=run)
         self._last = None  # an action before which the program was held may fail afterwards
         self._began = time.monotonic()
@@ -84,7 +84,7 @@ class ProgramHold:
             self._hub.broadcast(make_event(HELD, self.present))
 
     def end(self) -> HoldDecidedData | None:
-        """Handle that the program continues or is stopped. Return the decision; without one, it was stopped."""
+        """Handle the end of a hold. Return the decision; None if the program was stopped."""
         if self._record is None or self.present is None:
             return None
         duration = time.monotonic() - self._began

@@ -32,7 +32,9 @@ class _SceneId(msgspec.Struct):
 
 
 class PartInventories:
-    """The part inventory. During a run the cell host keeps that of its scene, otherwise it is read from disk.
+    """The part inventory.
+
+    During a run the cell host manages the inventory of its scene; otherwise it is read from disk.
 
     Args:
         hub: publishes them.
@@ -77,7 +79,7 @@ class PartInventories:
         Args:
             scene_id: the scene.
             package_id: the package of the program.
-            at: position in the cycle of the action at which it continues; None for where it was interrupted.
+            at: position in the cycle of the action at which it continues; None for the interrupted action.
 
         Raises:
             RequestRefused: it cannot. The message names the missing condition.
@@ -108,7 +110,7 @@ class PartInventories:
         return run.run
 
     def begin_run(self, scene_id: str) -> None:
-        """Handle the start of a run. The cell host keeps the inventory of its scene."""
+        """Handle the start of a run. From now on, the cell host manages the inventory of its scene."""
         self._scene_id, self._live = scene_id, None
 
     def changed(self, inventory: PartInventory) -> None:
@@ -144,7 +146,7 @@ class PartInventories:
         ]
 
     async def confirm(self, host: HostGroup | None, args: ConfirmPartsArgs, by: str) -> None:
-        """Record where a person has found parts. Nothing moves.
+        """Record the places at which a person has found parts. Nothing moves.
 
         Args:
             host: runs the program; None if no program runs.
@@ -219,7 +221,7 @@ def _published(inventory: PartInventory) -> PartInventory:
 
 
 def _restarts(inventory: PartInventory, run: RunCheckpoint) -> list[Restart]:
-    """Return the actions of the program that the interrupted cycle has done, and why it cannot continue there."""
+    """Return the completed actions of the interrupted cycle, and for each why the program cannot continue there."""
     if not run.complete or not run.confirmed or run.cycle < 1:
         return []
     found = []

@@ -1,4 +1,4 @@
-"""One run of a package: what its program reports, its error, and its entry in the history of runs."""
+"""One run of a package: the reports of its program, its error, and its entry in the history of runs."""
 
 import asyncio
 from collections.abc import Set
@@ -46,7 +46,7 @@ class ProgramRun:
         self.action: bytes | None = None
         """The encoded ActionStateBefore of the running action, or of the action before which the program is paused.
 
-        Of the actions of a function it is that of the outermost call.
+        For actions of a function, it is that of the outermost call.
         """
         self._runs = runs
         self._statistics: RunStatisticsCollector | None = None
@@ -85,13 +85,13 @@ class ProgramRun:
         self._runs.collect_spans(self._number, info)
 
     def handle_held(self, seconds: float) -> None:
-        """Store for how long the program was held so far, s."""
+        """Store the time for which the program has been held, s."""
         if self._statistics is not None:
             self._statistics.set_held(seconds)
             self._runs.set_statistics(self._number, self._statistics.statistics())
 
     def handle_paused(self) -> None:
-        """Handle that the program is paused."""
+        """Handle a pause of the program."""
         if self._statistics is not None:
             self._statistics.handle_paused()
 

@@ -1,4 +1,4 @@
-"""How other parts of the server check and follow runs."""
+"""Hooks with which other parts of the server check and follow runs."""
 
 from collections.abc import Awaitable, Callable
 
@@ -29,7 +29,7 @@ class RunObservers:
         self.on_state: list[Callable[[], None]] = []
         """Called after each change of `state` and `hold`."""
         self.on_part_step: list[Callable[[m.PartStep], None]] = []
-        """Called with each report that an action has concerned a part."""
+        """Called with each report of an action that concerned a part."""
         self.on_action_end: list[Callable[[int], None]] = []
         """Called with the number of each action that has ended or failed."""
         self.on_device_action: list[Callable[[str], None]] = []

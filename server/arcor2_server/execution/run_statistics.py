@@ -1,4 +1,4 @@
-"""What a run has produced: cycles and their durations, good and bad parts, counters."""
+"""Statistics of a run: cycles and their durations, good and bad parts, counters."""
 
 import contextlib
 import time

@@ -57,7 +57,7 @@ class RunTraceCollector:
         self._running[announced.number] = announced
 
     def set_hold(self, number: int, hold: ActionHold) -> None:
-        """Set how long the program was held at an action."""
+        """Set the time for which the program was held at an action."""
         self._holds[number] = hold
 
     def ended(self, number: int, duration: float, waited: float, error: str | Unset = UNSET) -> None:
@@ -66,8 +66,8 @@ class RunTraceCollector:
         Args:
             number: the number of the action in the run.
             duration: the duration, s.
-            waited: the time between announcement and start, s, for which the program was paused.
-            error: why it failed.
+            waited: pause between announcement and start, s.
+            error: reason of a failure.
         """
         before = self._running.pop(number, None)
         if before is None:

@@ -33,7 +33,7 @@ log = structlog.get_logger(__name__)
 MAX_RUNS: Final = 1000
 """Maximum number of stored runs."""
 MAX_TRACES: Final = 10
-"""Number of traces that are kept in memory while the database cannot be reached."""
+"""Maximum number of traces in memory while the database cannot be reached."""
 TRACE: Final = "ExecutionTrace"
 """The additional event with the start and end of actions."""
 STATISTICS: Final = "RunStatistics"
@@ -97,10 +97,10 @@ class RunStart(Struct, frozen=True):
         breakpoints: ids of action points and actions.
         shared_breakpoints: pause also at the shared breakpoints of the project.
         by: name of the user.
-        on_error: what the program does when an action fails and no error exit applies.
+        on_error: reaction of the program if an action fails and no error exit applies.
         checkpoints: store the state before and after each action.
         continues: continue where the program was interrupted.
-        continue_at: how many actions of the interrupted cycle are not repeated; None for all.
+        continue_at: number of actions of the interrupted cycle that are not repeated; None for all.
         role: role of the user.
         by_plc: whether the PLC above the cell starts it.
         recipe_id: the recipe; empty for none.
@@ -291,12 +291,12 @@ class Runs:
         return None if call is None else call.entry(self._trace_of)
 
     def starter(self, number: int) -> str:
-        """Return who started a run; empty if it is unknown."""
+        """Return the user who started a run; empty if unknown."""
         run = self._runs.get(number)
         return "" if run is None or isinstance(run.started_by, Unset) else run.started_by
 
     def last_action(self, number: int) -> str:
-        """Return the name of the action of a run that started last; empty if there is none."""
+        """Return the name of the last started action of a run; empty if there is none."""
         if self._trace_of != number or not self._trace:
             return ""
         return next(reversed(self._trace.values())).entry(number).name

@@ -113,7 +113,7 @@ class Execution(PackageLibrary, RunObservers):
 
     @property
     def busy(self) -> bool:
-        """Whether no document may be opened and no other program run, including the time before and after a run."""
+        """Whether opening documents and running other programs is refused: during a run, and shortly before and after it."""
         return self._reserved or self.active
 
     @property
@@ -173,13 +173,13 @@ class Execution(PackageLibrary, RunObservers):
     async def run_through(
         self, package_id: str, how: RunStart, *, temporary: bool = True, started: "asyncio.Future[None] | None" = None
     ) -> None:
-        """Run a package and wait for its end. Clients are not sent to the list of packages afterwards.
+        """Run a package and wait for its end. Clients do not show the list of packages afterwards.
 
         Args:
             package_id: the package.
             how: options of the run.
             temporary: whether the package is deleted after the run.
-            started: is set to done when the program has started.
+            started: future that is set when the program has started.
         """
         over = self._over = asyncio.get_running_loop().create_future()
         try:
@@ -271,7 +271,7 @@ class Execution(PackageLibrary, RunObservers):
             self._killing = asyncio.get_running_loop().call_later(self.stop_within, self._kill, self._host.host)
 
     def begin_stop_all(self, by: str) -> HostGroup | None:
-        """Start stopping the program in any state; return its host, None if there is no host."""
+        """Begin to stop the program in any state. Return its host, None if there is no host."""
         if self.state in RUN_STATES | {S.STARTED}:
             self._stop(by)
         return self._host.host
@@ -360,7 +360,7 @@ class Execution(PackageLibrary, RunObservers):
 
     async def close(self) -> None:
         """Mark the running program as lost when the server ends. The online scene closes the hosts."""
-        self._host.host = None  # its end is expected
+        self._host.host = None  # the end of the host is expected
         if self.state not in _IDLE:
             message = Message.of("The server ended during the run.")
             self.program.error = m.ErrorData("error", "ConnectionLost", message)
@@ -383,7 +383,7 @@ class Execution(PackageLibrary, RunObservers):
                     self._show_devices(message.encoded)
                 if message.frames or message.event == "ActionStateAfter":
                     self._publish_position()
-                if message.call:  # other clients do not know the actions of functions
+                if message.call:  # actions of functions are unknown to other clients
                     for client in self._hub.subscribers(POSITION):
                         client.put(message.encoded)
                 else:
@@ -429,7 +429,7 @@ class Execution(PackageLibrary, RunObservers):
     def _held(self, message: m.ProgramHeld) -> None:
         if self.state is S.STOPPING:
             return
-        if self.state is not S.PAUSING:  # until no action runs
+        if self.state is not S.PAUSING:  # wait until no action runs
             self._enter(S.PAUSING)
         run = self.program.number
         self.hold.begin(run, message.held)

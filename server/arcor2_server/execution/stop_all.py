@@ -58,7 +58,7 @@ class StopAll:
         self._execution = execution
 
     async def stop_all(self, by: str) -> StopAllData:
-        """Stop everything that moves or runs, in any state; return what was stopped and what was not."""
+        """Stop everything that moves or runs, in any state. Return which parts were stopped and which were not."""
         execution = self._execution
         active, action = execution.active, self._online.running_action
         program, scene = execution.begin_stop_all(by), self._online.begin_stop_all(by)
@@ -86,7 +86,7 @@ class StopAll:
         for stop in devices:
             if stop.object_id == running.object_id and stop.reason is not None:
                 reason = stop.reason
-                devices.remove(stop)  # reported with the action
+                devices.remove(stop)  # the failure is reported with the action
                 break
         if cell.running_action is not running:  # it has ended
             reason = None
@@ -97,5 +97,5 @@ class StopAll:
     def _name(self, action_id: str) -> str:
         try:
             return self._session.document.action(action_id).name
-        except NotFound:  # deleted while it ran
+        except NotFound:  # the package was deleted while it ran
             return action_id

@@ -79,7 +79,7 @@ class _Run:
             await self._run()
             await self._delete()
             await self._open_again(project)
-        except BaseException:  # the server ends: the project must be open at its next start
+        except BaseException:  # the server ends: the project has to be open at the next start
             await self._discard_package()
             await self._open_again(project)
             raise
@@ -174,7 +174,7 @@ class TemporaryRuns:
     tasks: Tasks
 
     async def run(self, how: RunStart) -> None:
-        """Run the open project and close it for the time of the run; return when the package is built.
+        """Run the open project, which is closed during the run. Return when the package is built.
 
         Raises:
             RequestRefused: the project has unsaved changes, or something is running.

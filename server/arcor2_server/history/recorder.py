@@ -21,11 +21,11 @@ MAX_TEXT: Final = 200
 """Maximum length of a recorded text, characters."""
 _NUMBERS: Final = {quality: number for number, quality in enumerate(PointQuality)}
 _UNKNOWN: Final = (PointQuality.BAD, PointQuality.NOT_CONNECTED)
-"""Qualities with which a value does not count."""
+"""Qualities with which a value is treated as unknown."""
 
 
 class RecordedPoint:
-    """A point and its value that was recorded last. number: in the database, 0 until it is known."""
+    """A point and its last recorded value. number: number in the database, 0 until it is known."""
 
     __slots__ = ("band", "digital", "name", "number", "object_id", "object_name", "quality", "time", "unit", "use",
                  "value")  # fmt: skip
@@ -64,7 +64,7 @@ class PointRecorder:
         """Number of values that were lost because they could not be stored."""
 
     def reported(self, object_id: str, object_name: str, points: Iterable[LivePoint], at: int) -> None:
-        """Record what has changed of all points of a device. at: time of the report, ms since 1970."""
+        """Record the changed points of a device. at: time of the report, ms since 1970."""
         known = self._points.setdefault(object_id, {})
         for point in points:
             recorded = known.get(point.name)
@@ -82,7 +82,7 @@ class PointRecorder:
                     continue
                 time = at
             elif 0 <= since < self._interval and recorded.quality is point.quality:
-                continue  # if it lasts, the next report records it
+                continue  # the next report records the change if it persists
             self._record(recorded, time, value, point.quality)
 
     def lost(self, object_id: str, quality: PointQuality, at: int) -> None:
@@ -105,7 +105,9 @@ class PointRecorder:
         return RecordedPoint(object_id, object_name, point, band)
 
     def _record(self, recorded: RecordedPoint, time: int, value: PointValue, quality: PointQuality) -> None:
-        if recorded.time - 2000 < time <= recorded.time:  # two values in one ms; a clock that was set back more counts
+        if (
+            recorded.time - 2000 < time <= recorded.time
+        ):  # two values in one ms; a clock set back by more than that is accepted
             time = recorded.time + 1
         if isinstance(value, bool):
             recorded.digital = True
@@ -119,12 +121,12 @@ class PointRecorder:
             self.dropped += dropped
 
     def take(self) -> list[Waiting]:
-        """Return the values that wait, which are then no longer stored here."""
+        """Remove and return the waiting values."""
         waiting, self._waiting = self._waiting, []
         return waiting
 
     def put_back(self, values: list[Waiting]) -> None:
-        """Store values again that could not be written, before newer ones."""
+        """Put back values that could not be written, before newer ones."""
         kept = values[max(0, len(values) + len(self._waiting) - MAX_WAITING) :]
         self.dropped += len(values) - len(kept)
         self._waiting = kept + self._waiting

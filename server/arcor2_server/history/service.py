@@ -52,13 +52,13 @@ R = TypeVar("R")
 WRITE_PERIOD: Final = 0.5
 """Time for which values are collected before they are stored together, s. The end of the process loses them."""
 MAINTAIN_PERIOD: Final = 60.0
-"""Time between two checks for what can be moved or deleted, s."""
+"""Time between two checks for data that can be moved or deleted, s."""
 HOUR: Final = 3_600_000
 DAY: Final = 24 * HOUR
 LATE: Final = 60_000
 """Time after the end of an hour at which its values are moved, ms: some may still wait to be stored."""
 MAX_MERGED_ROWS: Final = 5_000_000
-"""Maximum number of rows of a file that is made from others: queries wait while it is written."""
+"""Maximum number of rows of a merged file, because queries wait while it is written."""
 FEW_RUNS: Final = 10_000
 """Number of runs below which a file is merged with newer runs."""
 MAX_RUNS_WAITING: Final = 1000
@@ -107,7 +107,7 @@ class History:
         return self._settings.point_history
 
     async def open(self) -> None:
-        """Open the history and start to record. A history that cannot be used is reported in the log only."""
+        """Open the history and start to record. If the history cannot be used, only the log reports it."""
         if not self._settings.point_history:
             return
         try:
@@ -337,7 +337,7 @@ class History:
 
 
 def dead_bands(settings: ServerSettings) -> list[DeadBand]:
-    """Return the dead bands in the order in which they count: those of cell.yaml, then those of the variable."""
+    """Return the dead bands in order of precedence: those of cell.yaml, then those of the environment variable."""
     devices = [] if settings.cell is None else settings.cell.devices
     of_devices = [
         DeadBand(f"{device.name}.{point}", band)
@@ -357,7 +357,7 @@ def _milliseconds(stamp: Timestamp) -> int:
 
 
 def _mergeable(files: Sequence[ColdFile], today: int) -> list[list[ColdFile]]:
-    """Return the files of each closed day that has several."""
+    """Return the files of each closed day with several files."""
     days: dict[int, list[ColdFile]] = {}
     for file in files:
         if file.last // DAY < today:

@@ -1,4 +1,4 @@
-"""The cell hosts of one scene or program: one for each computer on which its objects run, used as if they were one."""
+"""The cell hosts of one scene or program, one for each computer with its objects. They are used like one host."""
 
 import asyncio
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -32,43 +32,43 @@ JOINED_WITHIN: Final = 10.0
 
 
 class GroupUser(Protocol):
-    """The user of a group, which receives the messages of all hosts as if they came from one."""
+    """The user of a group. It receives the messages of all hosts as if they were one host."""
 
     def host_message(self, host: "HostGroup", message: m.ServerBound) -> None:
         """Handle a message."""
 
     def host_silent(self, host: "HostGroup", silent: bool) -> None:
-        """Handle that a host stopped answering, or that all answer again."""
+        """Handle that a host has stopped answering, or that all hosts answer again."""
 
     def host_ended(self, host: "HostGroup", reason: Message) -> None:
-        """Handle the end of a host, with which the others end. This is the last call."""
+        """Handle the end of a host, which ends the other hosts, too. This is the last call."""
 
 
 @dataclass(slots=True, eq=False)
 class _Member:
-    """A host of the group, and what it has reported."""
+    """A host of the group, and its reported state."""
 
     host: CellHost
     silent: bool = False
     opened: bool = False
     leaving: bool = False
-    """Whether it was told to end, or has said that it will."""
+    """Whether the host was requested to end, or has announced its end."""
     closed: asyncio.Event = field(default_factory=asyncio.Event)
-    """Set when it has closed its devices, or has ended."""
+    """Set when the host has closed its devices, or has ended."""
     error: m.ErrorData | None = None
     calls: dict[int, str] = field(default_factory=dict)
-    """The calls of its objects by the main host, by number: what is called."""
+    """Names of the methods that the main host is calling on objects of this host, by call number."""
 
 
 class HostGroup:
     """The hosts of a scene or program.
 
     The main host has the robots, the interlocks and the program. Its calls of objects of other hosts pass through this
-    class. If one host ends, all others end, on which they stop their devices.
+    class. If one host ends, all others stop their devices and end.
 
     Args:
         user: receives the messages.
-        placement: where the objects run.
+        placement: nodes of the objects.
         hosts: a host for each node of the placement.
         retire: closes a host in the background.
     """
@@ -79,7 +79,7 @@ class HostGroup:
         self.user = user
         self.placement = placement
         self.reason: Message | None = None
-        """Why it has ended."""
+        """Reason for the end of the group; None while it runs."""
         self._members = {host.node: _Member(host) for host in hosts}
         self._main = self._members[placement.main]
         self.rings: Rings = [host.ring for host in hosts]
@@ -91,7 +91,7 @@ class HostGroup:
         self._forces: dict[int, _Member] = {}
         self._sent_stops = 0
         self._stopped: dict[str, int] = {}
-        """Number of the last stop by id of the object; with the key "" of all."""
+        """Number of the last stop by id of the object; key "" for stops of all objects."""
         self._runs_package = self._scene_closed = False
         self._retire = retire
         self._background = BackgroundTasks()
@@ -121,7 +121,7 @@ class HostGroup:
             opening: the scene.
 
         Raises:
-            ConnectionLost: the host or the scene has ended meanwhile.
+            ConnectionLost: the host or the scene has ended in the meantime.
             DeviceTimeout: the host does not open the scene.
         """
         member = _Member(host, opened=True)
@@ -191,7 +191,7 @@ class HostGroup:
         return replace(message, records="", continues=False, breakpoints=[], shared_breakpoints=[])
 
     def _note_stop(self, object_id: str) -> None:
-        """Note a stop that is also sent to the main host, which counts them."""
+        """Record a stop that is also sent to the main host, because the main host counts stops."""
         self._sent_stops += 1
         self._stopped[object_id] = self._sent_stops
 
@@ -208,7 +208,7 @@ class HostGroup:
     ) -> bytes:
         """Call a method of a device as `CellHost.call`.
 
-        What interlocks may prevent, and poses, which robots avoid, pass the main host.
+        Calls that interlocks may prevent, and changes of poses, which robots avoid, pass through the main host.
         """
         through_main = method == "set_pose" or (object_id in self._interlocked and (control or cancel))
         member = self._main if through_main else self._owner(object_id)
@@ -223,7 +223,10 @@ class HostGroup:
         await member.host.stop_motion(object_id)
 
     async def stop_all(self) -> list[m.DeviceStop]:
-        """Stop all hosts at the same time as `CellHost.stop_all`. The outcomes of hosts that do not answer say so."""
+        """Stop all hosts at the same time as `CellHost.stop_all`.
+
+        For hosts that do not answer, the outcome states this.
+        """
         self._note_stop("")
         members = list(self._members.values())
         stops = await asyncio.gather(*(each.host.stop_all() for each in members), return_exceptions=True)
@@ -271,7 +274,7 @@ class HostGroup:
 
         Args:
             opening: the scene.
-            node: where the object runs. One of the hosts is there.
+            node: node on which the object runs. One of the hosts runs on this node.
         """
         (added,) = opening.scene.objects
         member = self._owners[added.id] = self._members[node]
@@ -289,7 +292,7 @@ class HostGroup:
             each.host.kill()
 
     async def close(self) -> None:
-        """Close all hosts, on which they stop all motion, disconnect and end; wait for their end."""
+        """Close all hosts and wait for their end. The hosts stop all motion, disconnect and end."""
         self.reason = self.reason or Message.of("the devices were closed")
         await asyncio.gather(*(each.host.close() for each in self._members.values()))
 
@@ -322,7 +325,7 @@ class HostGroup:
         self.reason = reason
         for each in self._members.values():
             if each is not member:
-                each.host.send(m.StopAll(0))  # overtakes what waits before the end of the connection
+                each.host.send(m.StopAll(0))  # is sent before waiting messages, at the end of the connection
                 self._retire(each.host)
         self.user.host_ended(self, reason)
 
@@ -335,7 +338,7 @@ class HostGroup:
                 self._call_remote(message)
             case m.DeviceChanged():
                 if self._owner(message.object_id) is not member:
-                    return  # what the main host knows of it comes from here
+                    return  # the main host receives the state of this device from here
                 if member is not self._main:
                     self._main.host.send(_state(message))
                 self.user.host_message(self, message)

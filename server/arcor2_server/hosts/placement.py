@@ -1,4 +1,4 @@
-"""Placement: on which computer each object of a scene runs."""
+"""Placement: the computer on which each object of a scene runs."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -45,16 +45,16 @@ def place(
     derives: Callable[[str, str], bool],
     running: str | None = None,
 ) -> Placement:
-    """Return where the objects of a scene run.
+    """Return the placement of the objects of a scene.
 
-    Robots and grippers decide where the main host is; without them, the place of most objects does, the computer of
-    the server if it is one of several. Obstacles and zones are in the main host.
+    Robots and grippers determine the node of the main host. Without them, it is the node of most objects; if
+    several nodes have equally many, the server is preferred. Obstacles and zones are in the main host.
 
     Args:
         cell: the cell file, which overrides the nodes of the scene.
         objects: the objects.
         derives: returns whether a type derives from a base class.
-        running: where the main host already runs, so that the number of objects does not matter.
+        running: node on which the main host already runs, so that the number of objects does not matter.
 
     Raises:
         SeveralNodes: robots and grippers are on different computers.

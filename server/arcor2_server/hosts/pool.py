@@ -65,11 +65,13 @@ class CellHosts:
         return node_of(self._cell, scene_object)
 
     def place(self, objects: Iterable[SceneObject], running: str | None = None) -> Placement:
-        """Return where the objects of a scene run. Raise SeveralNodes if they cannot work together like this.
+        """Return the placement of the objects of a scene.
+
+        Raise SeveralNodes if they cannot work together on these nodes.
 
         Args:
             objects: the objects.
-            running: where the main host already runs.
+            running: node on which the main host already runs.
         """
 
         def derives(name: str, base: str) -> bool:
@@ -85,7 +87,7 @@ class CellHosts:
 
         Args:
             user: receives the messages of the hosts.
-            placement: where the objects run.
+            placement: nodes of the objects.
 
         Raises:
             Arcor2Error: one of the hosts cannot be started. The others are closed.
@@ -113,11 +115,11 @@ class CellHosts:
 
         Args:
             group: the hosts of the scene.
-            node: where the new one runs.
-            opening: the scene, none of whose objects is there.
+            node: node of the new host.
+            opening: the scene without objects on this node.
 
         Raises:
-            Arcor2Error: the host cannot be started, or the scene went offline meanwhile.
+            Arcor2Error: the host cannot be started, or the scene went offline in the meantime.
         """
         if group.has(node):
             return
@@ -139,7 +141,7 @@ class CellHosts:
 
         Args:
             user: receives the messages of the host.
-            node: on which it runs; empty for this computer.
+            node: node on which it runs; empty for this computer.
         """
         host = await self._take(node)
         host.user = user
@@ -165,7 +167,7 @@ class CellHosts:
             except Arcor2Error:
                 if new:
                     raise
-                continue  # it failed earlier, for example because it was killed while it was starting
+                continue  # the spare host has failed, for example because it was killed while it was starting
             if host.alive:
                 return host
             await host.wait_or_kill()
@@ -197,7 +199,7 @@ class CellHosts:
     async def _start(self, node: str = "") -> CellHost:
         environment = dict(self._environment)
         if not node:
-            for variable in (BROKER_URL, BROKER_CREDENTIALS):  # not for devices and programs
+            for variable in (BROKER_URL, BROKER_CREDENTIALS):  # devices and programs must not inherit these
                 environment.pop(variable, None)
         host = await CellHost.start(environment, node)
         try:

@@ -33,7 +33,7 @@ EXIT_TIMEOUT: Final = 3.0
 DEVICE_EXIT_TIMEOUT: Final = 2.0
 """Time limit for the processes of devices to end after their host, before they are killed, s."""
 LATE_TIMEOUT: Final = 0.2
-"""Time limit for the second sign of the end after the first one, s: closed socket and exit of the process."""
+"""Time limit between the two signs of the end, closed socket and exit of the process, s."""
 HOLD_TIMEOUT: Final = 15.0
 """Time limit for the start of a hold, including taking control, or for a robot to stop, s."""
 STOP_TIMEOUT: Final = 3.0
@@ -60,7 +60,7 @@ class HostUser(Protocol):
         """Handle a message."""
 
     def host_silent(self, host: "CellHost", silent: bool) -> None:
-        """Handle that the host stopped answering, or answers again."""
+        """Handle that the host has stopped answering, or answers again."""
 
     def host_ended(self, host: "CellHost", reason: Message) -> None:
         """Handle the end of the host. This is the last call."""
@@ -360,7 +360,7 @@ class CellHost:
         self.process.kill()
 
     async def close(self, timeout: float = EXIT_TIMEOUT) -> None:
-        """Close the socket, on which the host stops all motion, disconnects and ends; wait for the end."""
+        """Close the socket and wait for the end. The host stops all motion, disconnects and ends."""
         if self._connection.transport is not None:
             self._connection.transport.close()
         await self.wait_or_kill(timeout)
@@ -424,7 +424,7 @@ class CellHost:
         for future, why in [*failed, *((each, error) for _, each in self._waiting), (self.ready, error)]:
             if not future.done():
                 future.set_exception(why)
-                future.exception()  # marks it as retrieved, in case nothing awaits it
+                future.exception()  # marks the exception as retrieved, in case no caller awaits it
         self._waiting.clear()
         if self.user is not None:
             self.user.host_ended(self, reason)

@@ -34,7 +34,7 @@ class HostSession:
     Args:
         hub: publishes the states and streams of the devices.
         pool: provides the hosts.
-        what: names the session in the log, "scene" or "program".
+        what: name of the session in the log, "scene" or "program".
         to_all_clients: send streams at the streaming period to all clients, as the protocol requires for a program.
     """
 
@@ -49,7 +49,7 @@ class HostSession:
         self.deaths = 0
         """Number of hosts that have ended by themselves since the start of the server."""
         self.on_death: list[Callable[[Message], None]] = []
-        """Called with the reason when the host has ended by itself, before the devices are gone."""
+        """Called with the reason when the host has ended by itself, before the devices are removed."""
         self._on_message: Callable[[HostGroup, m.ServerBound], None] = lambda _host, _message: None
         self._on_end: Callable[[Message], None] = lambda _reason: None
         self._pool = pool
@@ -76,10 +76,10 @@ class HostSession:
         return await self._pool.take_all(self, placement)
 
     def place(self, objects: Iterable[SceneObject]) -> Placement:
-        """Return where the objects of a scene run. While it is online, the main host stays where it is.
+        """Return the placement of the objects of a scene. The main host of an online scene keeps its node.
 
         Raises:
-            SeveralNodes: they cannot work together like this.
+            SeveralNodes: they cannot work together on these nodes.
         """
         running = self.host.placement.main if self.online and self.host is not None else None
         return self._pool.place(objects, running)
@@ -124,7 +124,7 @@ class HostSession:
                 self._on_message(host, message)
 
     def host_silent(self, host: HostGroup, silent: bool) -> None:
-        """Note whether the host answers."""
+        """Record whether the host answers."""
         if host is self.host:
             self.board.set_answering(not silent)
             log.warning(f"{self._what} does not answer" if silent else f"{self._what} answers again", pid=host.pid)

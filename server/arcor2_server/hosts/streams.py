@@ -62,8 +62,8 @@ class RobotStreams:
     def observe(self, object_id: str, kind: str, rate: float, receive: Callable[[bytes], None], *, owner: str) -> None:
         """Pass the encoded events of a stream at `rate`, 1/s, to another part of the server.
 
-        It ends by `end_observing` or `clear`. `owner` names that part. A part that calls this again for the same
-        stream replaces its rate and function.
+        `end_observing` or `clear` ends this. `owner` is the name of that part. A second call with the same owner
+        and stream replaces rate and function.
         """
         observers = self._observers.setdefault((object_id, kind), {})
         before = observers.get(owner)
@@ -72,7 +72,7 @@ class RobotStreams:
             self._update_host_rates(object_id)
 
     def end_observing(self, object_id: str, kind: str, *, owner: str) -> None:
-        """End what `observe` has started."""
+        """End a stream that `observe` has started."""
         if self._observers.get((object_id, kind), {}).pop(owner, None) is not None:
             self._update_host_rates(object_id)
 

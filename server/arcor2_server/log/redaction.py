@@ -20,7 +20,10 @@ _IN_TEXT: Final = (
 
 
 def hide(value: Any) -> Any:
-    """Return JSON data with secrets hidden. A value is secret by its key, or by the `name` next to a `value`."""
+    """Return JSON data with secrets hidden.
+
+    A value is secret because of its key, or because of the `name` next to a `value`.
+    """
     if isinstance(value, list):
         return [hide(item) for item in value]
     if not isinstance(value, dict):
@@ -60,7 +63,10 @@ class LogRedaction:
         self._secrets: Callable[[], Set[str]] = frozenset
 
     def hide(self, secrets: Callable[[], Set[str]]) -> None:
-        """Hide the secrets that a function returns. The log exists before the secrets are read."""
+        """Hide the secrets that a function returns.
+
+        It is called later, because the log exists before the secrets are read.
+        """
         self._secrets = secrets
 
     def in_text(self, text: str) -> str:

@@ -13,7 +13,7 @@ from arcor2_server.log.redaction import REDACTION
 
 
 class _StandardError:
-    """The present `sys.stderr`: loggers are cached, but the stream may be replaced."""
+    """Writes to the present `sys.stderr`, because loggers are cached and the stream may be replaced."""
 
     def write(self, text: str) -> None:
         """Write a text. Errors are ignored: a closed stream must not stop the caller."""

@@ -1,1 +1,1 @@
-"""Maintenance of devices: which device is connected, how long it has worked, and backups of its parameters."""
+"""Maintenance of devices: identity, operating hours, and backups of parameters."""

@@ -23,7 +23,7 @@ from arcor2_server.storage.maintenance import MaintenanceStore
 log = structlog.get_logger(__name__)
 
 PERIOD: Final = 60.0
-"""Time between two stores of hours and cycles, s. After the end of the server, at most this time is missing."""
+"""Time between two stores of hours and cycles, s. If the server crashes, at most this time is lost."""
 _CONNECTED: Final = (Connection.ONLINE, Connection.BACK)
 
 
@@ -56,7 +56,7 @@ class Devices:
         self._hub, self._store, self._send, self._clock = hub, store, send, clock
         self._cards: dict[str, DeviceCard] = {}
         self._connected: dict[tuple[str, str], float] = {}
-        """When the connected devices were last counted, by session and object."""
+        """Times at which the connected devices were last counted, by session and object."""
         self._unwritten: set[str] = set()
         self._writing = asyncio.Lock()
         self._background = BackgroundTasks()
@@ -166,7 +166,7 @@ class Devices:
 
         Raises:
             NotFound: the device was never identified.
-            RequestRefused: it is the confirmed one, or meanwhile another one than `identity` is connected.
+            RequestRefused: it is already confirmed, or a device other than `identity` is connected by now.
         """
         card = self.get(object_id)
         if isinstance(card.found, Unset):
@@ -177,7 +177,7 @@ class Devices:
             )
         before, at = card.identity, now()
         if set(card.differing) - {"firmware"}:
-            self._count_hours()  # those of the previous device
+            self._count_hours()  # hours and cycles of the previous device
             card = replace(card, hours=0.0, cycles=0, counters={}, counted_since=at)
         card = replace(card, identity=identity, found=UNSET, differing=[], confirmed_at=at, confirmed_by=by)
         await self._store.put([card])
@@ -219,6 +219,6 @@ class Devices:
 
 
 def _completed(known: Identity, found: Identity) -> Identity:
-    """Return an identity with the fields that are reported now, and the others as they were."""
+    """Return the known identity, updated with the reported fields."""
     fields = {name: getattr(found, name) or getattr(known, name) for name in Identity.__struct_fields__}
     return Identity(**fields)

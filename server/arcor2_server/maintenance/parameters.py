@@ -64,7 +64,7 @@ class Parameters:
 
         Raises:
             NotFound: the device was never identified.
-            InvalidData: the file was changed, or is of another model.
+            InvalidData: the file was changed, or belongs to another model.
         """
         card = self._devices.get(object_id)
         if backup.digest != backup.computed_digest():
@@ -112,7 +112,7 @@ class Parameters:
         return differences(backup.parameters, await self._dump(card))
 
     async def restore(self, object_id: str, key: str, by: str) -> RestoreParametersData:
-        """Write those parameters of a backup that differ to the connected device, and read them again.
+        """Write the parameters that differ from the backup to the connected device, and read them again.
 
         Raises:
             NotFound: the device or the backup does not exist.

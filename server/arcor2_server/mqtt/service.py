@@ -25,7 +25,7 @@ class Mqtt:
 
     Args:
         settings: settings of the server, with a broker.
-        feed: what is published.
+        feed: source of the published data.
         alarms: the alarms.
     """
 
@@ -33,7 +33,7 @@ class Mqtt:
         self._settings, self._feed, self._alarms = settings, feed, alarms
         self.process: PlantProcess | None = None
         self._lost: dict[str, asyncio.TimerHandle] = {}
-        """Timers of the alarm of the links without a connection."""
+        """Timers for the alarms of links without a connection."""
         self.connected: dict[str, bool] = {}
         """Whether each link is connected to the broker."""
         self.dropped = 0

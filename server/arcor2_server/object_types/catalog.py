@@ -56,8 +56,8 @@ class AnalysisResults(Struct, frozen=True):
 class KnownTypes:
     """The results of the last analysis.
 
-    The registry of object types reads its storage, and the storage hides settings that the types declare as secret. So
-    that neither waits for the other, both receive this object.
+    The registry of object types reads the storage, and the storage hides settings that types declare as secret.
+    Both use this object, which avoids a circular dependency.
     """
 
     def __init__(self) -> None:
@@ -114,7 +114,7 @@ class TypeCatalog:
         return name in self._known.metas
 
     def shown_name(self, name: str) -> str:
-        """Return the name of a type for users; of an unknown type the given name."""
+        """Return the name of a type for users. For an unknown type, return the given name."""
         return self.meta(name).shown_name if self.known(name) else name
 
     def metas(self) -> list[ObjectTypeMeta]:

@@ -8,7 +8,7 @@ from arcor2_hw.data.object_type import ObjectTypeMeta
 
 
 class Changes(Struct, frozen=True):
-    """Types for ChangedObjectTypes remove, update and add, in this order."""
+    """Types for the events ChangedObjectTypes with the change types remove, update and add."""
 
     removed: list[ObjectTypeMeta] = []
     updated: list[ObjectTypeMeta] = []
@@ -38,7 +38,7 @@ class PendingChanges:
         return changes
 
     def skip(self, name: str) -> None:
-        """Remove a type from the changes, since the caller notifies the clients of it."""
+        """Remove a type from the changes, because the caller notifies the clients."""
         sent = {key: meta for key, meta in self._sent.items() if key != name}
         if (meta := self._current.get(name)) is not None:
             sent[name] = meta

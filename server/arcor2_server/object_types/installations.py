@@ -12,7 +12,8 @@ from arcor2_server.object_types.notifications import TypeNotifications
 from arcor2_server.object_types.registry import ObjectTypes
 
 PERIOD: Final = 2.0
-"""Time between two checks of the installed distributions, s. They are read when two checks agree: pip has finished."""
+"""Time between two checks of the installed distributions, s. They are read when two checks agree, so that pip has
+finished."""
 
 log = structlog.get_logger(__name__)
 

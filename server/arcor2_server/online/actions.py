@@ -46,7 +46,7 @@ class RunningAction:
         self.requested_at = requested_at
         self.cancelled = False
         self.stop_requested = False
-        """Whether everything was stopped while it ran. Then the scene may go offline before the action returns."""
+        """Whether everything was stopped during the action. Then the scene may go offline before the action returns."""
 
 
 class PreparedAction(Data, frozen=True):

@@ -43,7 +43,7 @@ class _Outcome:
                 pass
 
     def host_silent(self, host: CellHost, silent: bool) -> None:
-        """Ignore it: the time limit ends the check."""
+        """Do nothing, because the time limit ends the check."""
 
     def host_ended(self, host: CellHost, reason: Message) -> None:  # noqa: ARG002
         if not self.opened.done():
@@ -61,7 +61,7 @@ class ConnectionCheck:
         """Check the connection to a device that need not be in the scene.
 
         Raises:
-            Arcor2Error: the device cannot be connected; the message says why.
+            Arcor2Error: the device cannot be connected; the message states the reason.
         """
         message, _ = await self._opening.prepare(Scene("", objects=[obj]), False)
         began = time.monotonic()

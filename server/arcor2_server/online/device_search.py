@@ -23,12 +23,12 @@ async def search(kind: Search, where: str = "", port: int | None = None) -> list
     """Search for devices of one kind.
 
     Args:
-        kind: What is searched for.
+        kind: The kind of devices.
         where: The CAN bus (as `device scan --can`), or the addresses in the network.
         port: Port of Modbus TCP; by default 502.
 
     Raises:
-        RequestRefused: The search failed or took too long; the message says why.
+        RequestRefused: The search failed or took too long; the message states the reason.
     """
     command = [sys.executable, "-P", "-m", "arcor2_hw.runtime.scanning", kind.value, *([where] if where else [])]
     if port is not None:
@@ -48,7 +48,7 @@ async def search(kind: Search, where: str = "", port: int | None = None) -> list
         *_, last = errors.splitlines() or [b""]
         try:
             raise RequestRefused(msgspec.json.decode(last, type=Message))
-        except msgspec.MsgspecError:  # a library ended the process
+        except msgspec.MsgspecError:  # a library has ended the process
             text = last.decode(errors="replace").strip()
             raise RequestRefused(text or f"The library ended the process with status {process.returncode}.") from None
     return msgspec.json.decode(output, type=list[Found])

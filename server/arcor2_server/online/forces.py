@@ -1,4 +1,4 @@
-"""Forced outputs: which person forces which output from which client, and why a force ends.
+"""Forced outputs: their persons and clients, and the reasons for their end.
 
 The cell host switches an output back when its lease expires. This module handles persons and connections.
 """
@@ -31,7 +31,7 @@ CHANGED: Final = "ForcesChanged"
 
 
 class ForceChange(Data, frozen=True):
-    """The value of a forced output before and afterwards, for the audit trail."""
+    """The values of an output before and after forcing, for the audit trail."""
 
     kind: str
     id: str
@@ -43,8 +43,8 @@ class Force:
     """A forced output.
 
     Args:
-        client: the client whose lease it is.
-        point: what the clients know of it.
+        client: the client that holds the lease.
+        point: the published data.
         number: its number in the cell host.
         before: value of the output before.
     """
@@ -55,11 +55,11 @@ class Force:
         self.number = number
         self.before = before
         self.reason: Message | None = None
-        """Why the server ended it."""
+        """Reason if the server ended it."""
 
     @property
     def output(self) -> str:
-        """The output as the audit trail names it."""
+        """Name of the output in the audit trail."""
         return f"{self.point.object}: {self.point.point}"
 
     def change(self, before: PointValue, after: PointValue) -> ForceChange:
@@ -81,7 +81,7 @@ class Forces:
 
     Args:
         host: the devices.
-        hub: publishes ForcesChanged, and a Notification for clients that do not know it.
+        hub: publishes ForcesChanged, and a Notification for clients that do not support this event.
         background: the tasks that end forces.
     """
 
@@ -158,7 +158,7 @@ class Forces:
         )
         if early is not None:
             self.ended(early)
-        elif self._host.host is not host:  # it ended meanwhile, and all forces with it
+        elif self._host.host is not host:  # the host has ended in the meantime, and with it all forces
             self._finish(force, Message.of("the scene is offline"))
         elif client not in self._hub.clients:
             self._end(force, Message.of("{user} is no longer connected", user=user))
@@ -167,7 +167,10 @@ class Forces:
         return point.id
 
     def renew(self, client: Connection, ids: list[str], valid_ms: int) -> None:
-        """Renew the forces of a client. Raise NotFound for one that has ended, RequestRefused for that of another."""
+        """Renew the forces of a client.
+
+        Raise NotFound for an ended force, RequestRefused for a force of another client.
+        """
         found = []
         for force_id in ids:
             force = self._require(force_id)
@@ -177,7 +180,7 @@ class Forces:
         self._host.send(m.RenewForces(found, self._until(valid_ms)))
 
     async def end(self, force_id: str) -> None:
-        """End a force; return when the output has its value from before.
+        """End a force. Return when the output has its previous value again.
 
         Raises:
             NotFound: it has ended.
@@ -232,7 +235,10 @@ class Forces:
             notify(force, reason)
 
     def _changed(self, level: NotificationLevel, message: Message, *, surprising: bool = False) -> None:
-        """Publish the forces, and a message to clients that do not show them; to all if it is surprising."""
+        """Publish the forces, and a message to clients that do not show them.
+
+        Unexpected changes are reported to all clients.
+        """
         hub = self._hub
         hub.broadcast(make_event(CHANGED, self.states()))
         event = make_event("Notification", NotificationData(message.text, level, **message.translation()))

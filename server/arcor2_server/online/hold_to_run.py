@@ -1,4 +1,4 @@
-"""Hold-to-run: which user moves which robot, and which messages arrive too late.
+"""Hold-to-run: assigns moving robots to users, and refuses messages that arrive too late.
 
 The cell host stops the robot when a lease expires (deadman timeout). This module handles users, presses of the button
 and connections.
@@ -79,7 +79,7 @@ class _Press:
         self.started = False
         self.over = False
         self.reason: Message | None = None
-        """Why the server ended it; None if it did not, or after a release of the button."""
+        """Reason if the server ended the press; None otherwise, for example after a release of the button."""
         self.allowed: asyncio.Future[None] = loop.create_future()
         self.ended: asyncio.Future[None] = loop.create_future()
 
@@ -106,10 +106,10 @@ class HoldToRun:
     _numbers: Iterator[int] = field(init=False, default_factory=lambda: itertools.count(1))
     _held: dict[str, _Press] = field(init=False, default_factory=dict)
     _spent: dict[Connection, int] = field(init=False, default_factory=dict)
-    """The number of the newest ended press by client. Messages of it and earlier presses are refused."""
+    """Number of the newest ended press by client. Messages of this press and of earlier ones are refused."""
     _delays: dict[Connection, Delay] = field(init=False, default_factory=dict)
     _taught: dict[tuple[str, str], tuple[Connection, str]] = field(init=False, default_factory=dict)
-    """Who has switched on HandTeachingMode of an arm: client and user, by robot and arm."""
+    """Client and user who switched on the hand teaching mode, by robot and arm."""
 
     def holder(self, robot_id: str) -> str | None:
         """Return the user who holds a robot, None if it is not held."""
@@ -225,7 +225,7 @@ class HoldToRun:
             self._finish(press, None)
             refusal = error if isinstance(error, Arcor2Error) else RequestRefused("The motion could not start.")
             press.allowed.set_exception(refusal)
-            press.allowed.exception()  # marks it as retrieved, in case nothing awaits it
+            press.allowed.exception()  # marks the exception as retrieved, in case no caller awaits it
             raise
         self._moving.add(robot_id)
         press.allowed.set_result(None)
@@ -302,7 +302,7 @@ class HoldToRun:
 
     # -------------------------------------------------------------------------------- hand teaching mode
     def teaching_changed(self, client: Connection, user: str, data: HandTeachingModeData) -> None:
-        """Record who has switched hand teaching mode on, so that it ends with the client."""
+        """Record the client that switched hand teaching mode on, so that the mode ends with the connection."""
         key = data.robot_id, data.arm_id or ""
         if data.enabled:
             self._taught[key] = client, user

@@ -35,7 +35,7 @@ FEATURES = {
     "jog": "be jogged",
     "acknowledge_stop": "be acknowledged from here. Acknowledge the stop at the robot",
 }
-"""What a robot without a feature cannot do, by feature."""
+"""Functions that a robot without a feature does not have, by feature."""
 
 MoveEventData = Callable[[MoveEventType, str | Unset], Any]
 """Creates the data of the event for a phase of the motion."""
@@ -161,7 +161,7 @@ class RobotMotion:
             joints: list[Joint] = await cell.ask(list[Joint], args.robot_id, "inverse_kinematics", arguments)
         except CellError as error:
             robot = cell.robot(args.robot_id)
-            # Some controllers compute it only for the client in control. Then use the kinematic model.
+            # Some controllers compute it only for the client in control. In other cases use the kinematic model.
             if error.code != NotInControl.code or self._robots.model_of_type(robot.type) is None:
                 raise
             return await self._kinematics.inverse(robot, args)

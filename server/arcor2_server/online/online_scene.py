@@ -240,7 +240,7 @@ class OnlineScene:
         self.host.prepare()
 
     async def prepare_addition(self, obj: SceneObject, *, dry_run: bool = False) -> None:
-        """Start a host where an object will run that will be added to the online scene, unless there is one.
+        """Start a host for an object that will be added to the online scene, unless a host runs on its node.
 
         Args:
             obj: the object.
@@ -274,8 +274,8 @@ class OnlineScene:
             message, overlaid = await self._opening.prepare(replace(self._session.require_scene(), objects=[obj]), True)
             self.board.add(obj, overlaid.get(obj.id, []))
             await self.host.add(message, self.host.place(self._session.require_scene().objects).nodes[obj.id])
-        except Arcor2Error as error:  # ObjectState has reported the reason, unless the scene went offline meanwhile
-            log.warning("added object is not connected", object=obj.name, reason=str(error))
+        except Arcor2Error as error:  # ObjectState has reported the reason, unless the scene went offline in the
+        meantime log.warning("added object is not connected", object=obj.name, reason=str(error))
 
     def _edited(self, edit: Edit | None) -> None:
         """Let the host use changed interlocks at once."""
@@ -325,7 +325,7 @@ class OnlineScene:
             except TimeoutError:
                 problem = Message.of("The devices could not be closed in time.")
                 host.kill()
-            self.host.host = None  # its end is expected from now on
+            self.host.host = None  # the end of the host is expected from now on
             await host.wait_or_kill()
         self._gone_offline(problem)
 
@@ -388,7 +388,7 @@ class OnlineScene:
         self.held.stop(by)
         if self.running_action is not None:
             self.running_action.stop_requested = True
-            self.running_action.cancelled = True  # its end is published as ActionCancelled
+            self.running_action.cancelled = True  # the end of the action is published as ActionCancelled
         return self.host.host
 
     async def ask(self, kind: type[Any], object_id: str, method: str, args: Mapping[str, Any] | None = None) -> Any:
@@ -412,7 +412,7 @@ class OnlineScene:
         return self._robots.robot(robot_id)
 
     def arm(self, robot_id: str, arm_id: str | None) -> dict[str, Any]:
-        """Return the argument for the arm. Raise RequestRefused unless an arm is given only for multi-arm robots."""
+        """Return the argument for the arm. Raise RequestRefused unless exactly multi-arm robots have an arm."""
         return self._robots.arm(robot_id, arm_id)
 
     def action_ended(self, action: RunningAction, results: list[str] | None, error: Message | None) -> None:

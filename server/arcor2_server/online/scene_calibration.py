@@ -41,7 +41,7 @@ CAMERA_CALIBRATION: Final = "CameraCalibration"
 ROBOT_CALIBRATION: Final = "RobotCalibration"
 """Name of the robot calibration in ProcessState events."""
 MOVE_METHOD: Final = "move_to_calibration_pose"
-"""Method of robots that have a pose in which a camera sees them well."""
+"""Method of robots that have a pose in which they are well visible for a camera."""
 PICTURES: Final = 3
 """Number of pictures for a camera calibration. Averaging reduces the noise of a single picture."""
 DEPTH_FRAMES: Final = 10
@@ -133,7 +133,7 @@ class SceneCalibration:
         Args:
             user: the user, who must hold the lock of the robot.
             robot_id: the robot.
-            camera_id: the camera, which is locked meanwhile; the first camera of the scene if unset.
+            camera_id: the camera, which is locked during the calibration; the first camera of the scene if unset.
             move: whether the robot first moves to its calibration pose, if it has one.
             requested_at: time of the request, s of the monotonic clock.
 

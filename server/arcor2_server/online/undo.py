@@ -32,7 +32,7 @@ class Undo:
     _dependents: Dependents
 
     def find_edit(self, user: str, number: int | Unset, kind: EditKind) -> Edit:
-        """Return the edit that a user can undo or redo: the one with a number, else the latest.
+        """Return the edit that a user can undo or redo, by its number, or without a number the latest one.
 
         Raises:
             RequestRefused: the edit does not exist.
@@ -54,7 +54,7 @@ class Undo:
 
     @asynccontextmanager
     async def locked(self, user: str, changes: Sequence[Change]) -> AsyncIterator[None]:
-        """Hold the locks that ordinary requests for such changes take. Raise Locked if that is impossible."""
+        """Hold the locks that ordinary requests for such changes need. Raise Locked if that is impossible."""
         async with self._locks.auto_skip_held(user, *ids_to_lock(self._session.document, changes)):
             for item in moved_ids(self._session.document, changes):
                 if others := self._locks.holders_of(item) - {user}:

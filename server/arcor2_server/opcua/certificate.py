@@ -13,9 +13,9 @@ log = structlog.get_logger(__name__)
 
 
 def issue_certificate(settings: ServerSettings) -> None:
-    """Let the local authority issue the certificate of the OPC UA server if it is missing, or was issued by another.
+    """Let the local authority issue the certificate of the OPC UA server if it is missing or from another authority.
 
-    Without an authority that may do so, the process of the OPC UA server signs its certificate with its own key.
+    Without a permitted authority, the process of the OPC UA server signs its certificate with its own key.
     """
     if settings.opcua is None or settings.authority is None:
         return

@@ -21,7 +21,7 @@ from arcor2_server.packml.states import COMMANDS
 MAX_REQUEST_ID: Final = 100
 MAX_NOTE: Final = 500
 SET_MODE: Final = RPCS["SetCellMode"].role
-"""The least role that changes the mode, as on the screens."""
+"""Minimum role for changing the mode, as on the screens."""
 
 
 class PlantRequests:
@@ -46,7 +46,7 @@ class PlantRequests:
         return self._access.open_to_all
 
     async def log_on(self, request: m.LogOn) -> m.LogOnAnswer:
-        """Check a person with a PIN, or a token as the password of any other name."""
+        """Log on a person by PIN, or under any other name with a token as the password."""
         outcome, reason, role, user = AuditOutcome.DONE, "", None, None
         try:
             user = m.User(request.name, await self._key(request))
@@ -76,7 +76,7 @@ class PlantRequests:
         return (await self._persons.get(user.key)).role
 
     async def command(self, request: m.Command) -> m.CallAnswer:
-        """Execute a command. A request with an identifier is executed once."""
+        """Execute a command. A request with an identifier is executed only once."""
         user, address, role = request.user, request.address, None
         text: Message | None
         try:

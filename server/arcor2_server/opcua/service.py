@@ -25,9 +25,9 @@ class OpcUa:
 
     Args:
         settings: settings of the server.
-        feed: what the OPC UA server shows.
+        feed: source of the data of the OPC UA server.
         requests: executes requests of its clients.
-        cell: the cell, whose authority may then be given to the plant.
+        cell: the cell; the plant can then have its authority.
         alarms: the alarms.
     """
 

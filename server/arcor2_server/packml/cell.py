@@ -114,7 +114,7 @@ class PackmlCell:
 
     @property
     def last_job(self) -> tuple[int, JobEnd]:
-        """The last job of the PLC, 0 for none, and how it ended."""
+        """The last job of the PLC, 0 for none, and its outcome."""
         return self._file.record.job, self._file.record.job_end
 
     @property
@@ -124,7 +124,7 @@ class PackmlCell:
 
     @property
     def person_needed(self) -> bool:
-        """Whether the program is held at a failed action, about which a person decides."""
+        """Whether the program is held at a failed action until a person decides."""
         return self._execution.hold.present is not None
 
     def data(self) -> CellStatus:
@@ -259,7 +259,7 @@ class PackmlCell:
 
     @contextlib.contextmanager
     def starting(self, job: int) -> Iterator[None]:
-        """Mark the program that is started in this context as a job of the PLC, unless the start fails."""
+        """Mark the program started in this context as a job of the PLC, unless the start fails."""
         self.job = job
         try:
             yield
@@ -271,7 +271,7 @@ class PackmlCell:
         """Pause the program before its next action.
 
         Args:
-            by_plc: whether the PLC commands it and therefore has to resume it.
+            by_plc: whether the PLC requests it, so that it has to resume the program.
 
         Raises:
             RequestRefused: no program is running.

@@ -38,7 +38,7 @@ LIFE_RATE: Final = 10.0
 CHECKS: Final = 8
 """Number of checks of the PLC's life counter within its time limit."""
 MAX_WAITING: Final = 16
-"""Maximum number of requests that wait until the one before is executed."""
+"""Maximum number of requests that wait for the execution of the previous one."""
 MAX_PLANT_REQUESTS: Final = 64
 """Number of stored requests of plant systems."""
 SILENT: Final = "plc_silent"
@@ -131,7 +131,7 @@ class Plc:
         self._answered = record.request, record.result
         """The last executed request and its result."""
         self._job = record.job, record.job_end
-        """The last job and how it ended. The file follows."""
+        """The last job and its outcome. The file is updated afterwards."""
         self._waiting: asyncio.Queue[tuple[int, int, int]] = asyncio.Queue(MAX_WAITING)
         self._executing = asyncio.Lock()
         self._background = BackgroundTasks()
@@ -240,7 +240,7 @@ class Plc:
             due = time.monotonic() + period
             await asyncio.sleep(period)
             if time.monotonic() - due > period:
-                continue  # the server was late, so requests of the PLC may wait to be read
+                continue  # the server was delayed, so unread requests of the PLC may be waiting
             if self._alive is not was_alive:
                 was_alive = self._alive
                 self._cell.changed()
@@ -248,7 +248,7 @@ class Plc:
                 self._frozen()
 
     def _frozen(self) -> None:
-        """Raise the alarm, and hold the program of the PLC, once until the life counter changes again."""
+        """Raise the alarm and hold the program of the PLC, once until the life counter changes again."""
         if self._silent:
             return
         self._silent = self._hold_pending = True
@@ -273,7 +273,7 @@ class Plc:
                 self._hold_pending = False
                 try:
                     self._cell.hold(by_plc=False)
-                except RequestRefused as error:  # it has just ended
+                except RequestRefused as error:  # the program has just ended
                     log.warning("program not held", reason=str(error))
             case PackageStateEnum.STARTED | PackageStateEnum.RESUMING:
                 pass  # it runs soon
@@ -324,7 +324,7 @@ class Plc:
             log.error("stop of the PLC not stored", reason=str(error))
 
     async def execute_once(self, command: int, job: int, by: str, request: str) -> tuple[RequestResult, Message | None]:
-        """Execute a command of a plant system, whose life is not supervised; return result and reason.
+        """Execute a command of a plant system, which has no life counter. Return result and reason.
 
         Args:
             command: number of the command.

@@ -1,4 +1,4 @@
-"""What the cell stores: mode, authority, jobs, and the last request of the PLC."""
+"""Stored state of the cell: mode, authority, jobs, and the last request of the PLC."""
 
 import asyncio
 import enum
@@ -36,7 +36,7 @@ class RequestResult(enum.IntEnum):
 
 
 class JobEnd(enum.IntEnum):
-    """How the last job of the PLC ended."""
+    """Outcome of the last job of the PLC."""
 
     NONE = 0
     RUNNING = 1
@@ -90,7 +90,7 @@ class CellFile:
         self.record = CellRecord()
 
     def load(self, damage: DataDamage) -> None:
-        """Read the file. The PLC loses the authority, and nobody has it if the file is damaged.
+        """Read the file. If the file is damaged, nobody has the authority. The PLC always loses it.
 
         Raises:
             StorageError: the file cannot be read.

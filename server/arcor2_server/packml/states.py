@@ -41,7 +41,7 @@ class CellStates:
 
         Args:
             state: its state.
-            outcome: how it ended, if it is stopped.
+            outcome: outcome of the program, if it is stopped.
         """
         following = _OF_PROGRAM.get(state)
         if following is None:
@@ -65,7 +65,7 @@ class CellStates:
 
         Args:
             command: Reset, Clear, Stop or Abort.
-            active: whether a program is active, whose end then completes the command.
+            active: whether a program is active; its end then completes the command.
 
         Raises:
             RequestRefused: PackML does not allow the command in the present state.

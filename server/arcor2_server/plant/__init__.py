@@ -1,1 +1,1 @@
-"""The data of the cell for plant systems, and the processes that show it to them."""
+"""The data of the cell for plant systems, and the processes that provide it."""

@@ -35,7 +35,7 @@ POINTS_RATE: Final = 5.0
 MAX_WAITING_UNITS: Final = 1000
 """Maximum number of units that wait for a process, such as while it restarts. The oldest are dropped."""
 OWNER: Final = "plant"
-"""Names this part as an observer of streams."""
+"""Name of this part as an observer of streams."""
 _CONNECTED: Final = (Connection.ONLINE, Connection.BACK)
 _START: Final = "1970-01-01T00:00:00+00:00"
 
@@ -46,7 +46,7 @@ class FeedReader:
     def __init__(self, feed: "CellFeed", *, with_streams: bool) -> None:
         self._feed = feed
         self._watched: frozenset[str] | None = None if with_streams else frozenset()
-        """The devices whose points and joints it gets; None: all."""
+        """The devices whose points and joints the reader receives; None: all."""
         self._devices: list[DeviceInfo] = []
         self._states: dict[str, DeviceState] = {}
         self._unit: UnitData | None = None
@@ -55,16 +55,16 @@ class FeedReader:
         self.left: deque[Unit] = deque(maxlen=MAX_WAITING_UNITS)
 
     def wants(self, object_id: str) -> bool:
-        """Return whether it gets the points and joints of a device."""
+        """Return whether the reader receives the points and joints of a device."""
         return self._watched is None or object_id in self._watched
 
     def watch(self, devices: Iterable[str]) -> None:
-        """Get the points and joints of these devices, and of no others."""
+        """Receive only the points and joints of these devices."""
         self._watched = frozenset(devices)
         self._feed.observe_wanted()
 
     async def everything(self) -> Update:
-        """Return the present state for a process that has started, and the units that left while none was running."""
+        """Return the present state for a started process, and the units that left the cell while no process was running."""
         self.streams, self.alarms = {}, {}
         update = await self.changes()
         # Records that were not stored yet are reported once more when they are.
@@ -128,7 +128,10 @@ class CellFeed:
         self._readers: list[FeedReader] = []
 
     def reader(self, *, with_streams: bool = True) -> FeedReader:
-        """Return a new reader. It gets all changes from now on; points and joints `with_streams` or by `watch`."""
+        """Return a new reader.
+
+        It receives all changes from now on; points and joints with `with_streams` or after `watch`.
+        """
         if not self._readers:
             self._start()
         reader = FeedReader(self, with_streams=with_streams)
@@ -192,7 +195,7 @@ class CellFeed:
             if reader.wants(object_id):
                 reader.streams[object_id, kind] = encoded
 
-    # -------------------------------------------------------------------------------- what readers send
+    # -------------------------------------------------------------------------------- data for readers
     async def retained_alarms(self) -> list[AlarmRecord]:
         """Return the alarms that need attention, oldest first."""
         alarms = await self._alarms.find(ListAlarmsArgs(show=AlarmFilter.RETAINED, limit=1000))

@@ -28,7 +28,7 @@ FIRST_PAUSE: Final = 0.5
 MAX_PAUSE: Final = 30.0
 """Shortest and longest time before a restart, s. It doubles each time, until the process has run for MAX_PAUSE."""
 ALARM_AFTER: Final = 3
-"""Number of ends in a row after which an alarm is raised. It ends when a process has run for MAX_PAUSE."""
+"""Number of consecutive ends after which an alarm is raised. The alarm ends when a process has run for MAX_PAUSE."""
 EMPTY: Final = Update()
 
 
@@ -36,9 +36,9 @@ class PlantProcess:
     """A process for plant systems, from `start` to `close`.
 
     Args:
-        name: what logs and alarms call it.
+        name: its name in logs and alarms.
         module: the Python module that it runs.
-        reader: what it has not received yet.
+        reader: changes that it has not received yet.
         alarms: the alarms.
         alarm: code of the alarm when it ends repeatedly.
         setup: returns the first message to it.
@@ -62,7 +62,7 @@ class PlantProcess:
         self.running = False
         """Whether the process is running."""
         self.ends = 0
-        """Number of times that it has ended by itself."""
+        """Number of unexpected ends."""
 
     def start(self, *, inherited: Sequence[int] = ()) -> None:
         """Start the process in the background, with file descriptors that it inherits."""
@@ -129,7 +129,7 @@ class PlantProcess:
             await tasks.cancel()
 
     async def _send(self, writer: asyncio.StreamWriter) -> None:
-        """Send the state of the cell, then changes. A slow process gets merged changes, never a queue of them."""
+        """Send the state of the cell, then changes. A slow process receives merged changes, never a queue."""
         writer.write(encode(await self._reader.everything()))
         sent = time.monotonic()
         while True:

@@ -19,7 +19,7 @@ from arcor2_server.storage.units import UnitStore
 log = structlog.get_logger(__name__)
 
 PERIOD: Final = 30.0
-"""Time between two stores of the present time, s. After the end of the server, at most this time is missing."""
+"""Time between two stores of the present time, s. If the server crashes, at most this time is lost."""
 RETENTION: Final = 400 * 86_400.0
 """Time for which activities are stored, s."""
 DEFAULT_PERIOD: Final = 8 * 3600.0
@@ -47,7 +47,7 @@ class CellTime:
 
     Args:
         store: stores the times, and the units that were produced.
-        activity: returns what the cell does now.
+        activity: returns the present activity of the cell.
         clock: the time, s since the epoch.
     """
 
@@ -72,7 +72,7 @@ class CellTime:
         await self._store_present()
 
     def changed(self) -> None:
-        """Handle that the cell may do something else now."""
+        """Handle a possible change of the activity."""
         if (activity := self._activity()) is not self._present:
             at = self._clock()
             self._unwritten[self._since] = at, self._present
@@ -102,7 +102,7 @@ class CellTime:
                 log.warning("times of the cell not stored", reason=str(error))
 
     async def production(self, args: GetProductionArgs) -> Production:
-        """Return what the cell has produced in a period.
+        """Return the production of the cell in a period.
 
         Raises:
             InvalidData: the period ends before it starts.
@@ -141,7 +141,7 @@ def effectiveness(period: float, running: float, left: list[tuple[UnitState, flo
     Args:
         period: the time that was planned for production, s.
         running: the time for which the program ran, s.
-        left: how many units left the cell, by state and planned rate, 1/h.
+        left: numbers of units that left the cell, by state and planned rate, 1/h.
     """
     availability = running / period if period > 0.0 else UNSET
     produced = sum(count for _, _, count in left)

@@ -52,7 +52,7 @@ _SIGNER: Final = {
     RecipeState.RELEASED: Role.TECHNICIAN,
     RecipeState.RETIRED: Role.TECHNICIAN,
 }
-"""The least role of the person who signs, by the state that the signature sets."""
+"""Minimum role of the signing person, by the state that the signature sets."""
 _STATES: Final[Mapping[RecipeState, str]] = translatable(
     {
         RecipeState.DRAFT: "a draft",
@@ -125,7 +125,7 @@ class Recipes:
 
     @property
     def changeover(self) -> Changeover:
-        """What the cell produces. Deleted recipes are left out."""
+        """The present recipes of the cell, without deleted ones."""
         known = [each for each in self._changeovers if each.recipe_id in self._recipes]
         if not known:
             return Changeover(self._released_only)
@@ -260,7 +260,7 @@ class Recipes:
 
         Args:
             args: the recipe, its new state, and the person with their PIN.
-            device: where the PIN was entered.
+            device: device on which the PIN was entered.
             logged_on: id of the person who is logged on at this device; empty if nobody is.
 
         Raises:
@@ -318,7 +318,7 @@ class Recipes:
         )
 
     async def _problem(self, recipe: Recipe) -> Message | None:
-        """Return why a recipe cannot be used: it or its package was changed or deleted. None if it can."""
+        """Return why a recipe cannot be used: it or its package was changed or deleted. None if it can be used."""
         if (manipulated := self._manipulated(recipe)) is not None:
             return manipulated
         try:

@@ -1,4 +1,4 @@
-"""Records of units: which steps each part has gone through, with which results, and where it went."""
+"""Records of units: the steps of each part with their results, and the place where the part left the cell."""
 
 import asyncio
 from collections import Counter, OrderedDict
@@ -52,18 +52,18 @@ class Units:
         self._hub, self._store, self._runs = hub, store, runs
         self._packages, self._calibrations = packages, calibrations
         self._in_cell: dict[tuple[str, int], UnitRecord] = {}
-        """By scene and number of the part."""
+        """Records by scene and number of the part."""
         self._recent: OrderedDict[int, UnitRecord] = OrderedDict()
         """The last units that have left the cell, by number."""
         self.left: Counter[UnitState] = Counter()
-        """Number of units that have left the cell since the start of the server, by where they went."""
+        """Number of units that have left the cell since the start of the server, by state."""
         self.on_left: list[Callable[[Unit], None]] = []
         """Called with each unit that has left the cell, without its steps."""
         self._next = 1
         self._inventories: dict[str, PartInventory] = {}
         """The last known inventory of each scene."""
         self._run: dict[str, Any] = {}
-        """What new units get from the present run."""
+        """Data of the present run for new units."""
         self._run_number = 0
         self._scene_id = ""
         self._run_calibrations: list[UsedCalibration] = []
@@ -134,7 +134,7 @@ class Units:
         self._run_calibrations = [
             UsedCalibration(each.id, each.object_id, each.object_name, each.kind.value, each.date) for each in latest
         ]
-        for record in list(self._in_cell.values()):  # those that entered in the meantime
+        for record in list(self._in_cell.values()):  # units that entered in the meantime
             if record.runs == [number] and not record.package_name:
                 self._put(replace(record, **self._described(record)))
 
@@ -143,7 +143,7 @@ class Units:
         return self._run | {"order": order, "calibrations": self._run_calibrations}
 
     def concern(self, step: PartStep) -> None:
-        """Handle that an action that ends now has concerned a part."""
+        """Record that the action that is ending concerns a part."""
         self._concerned[step.action] = step
 
     def action_ended(self, number: int) -> None:
@@ -207,7 +207,7 @@ class Units:
             self._put(replace(record, serial=part.serial, verdict=part.good), publish=True)
 
     def _leave(self, record: UnitRecord, inventory: PartInventory) -> None:
-        """Handle that a part is no longer in the cell."""
+        """Handle the departure of a part from the cell."""
         before = self._inventories.get(record.scene_id)
         shown = record.serial or f"#{record.part}"
         state = UnitState.UNKNOWN
@@ -249,7 +249,7 @@ class Units:
         return await self._store.get(number)
 
     async def left_between(self, since: Timestamp, until: Timestamp) -> dict[UnitState, int]:
-        """Return how many units left the cell in a period, by state."""
+        """Return the number of units that left the cell in a period, by state."""
         await self.flush()
         counts = dict.fromkeys(UnitState, 0)
         for state, _, count in await self._store.left_between(since, until):

@@ -45,7 +45,7 @@ class _Open:
     def __init__(self, info: RecordingInfo, rings: Rings) -> None:
         self.info, self.rings = info, rings
         self.ended: float | None = None
-        """When the host has ended, on the monotonic clock, s."""
+        """Time at which the host ended, on the monotonic clock, s."""
         self.over = asyncio.Event()
 
 
@@ -67,12 +67,12 @@ class Recordings:
         self._open: _Open | None = None
         self._background = BackgroundTasks()
         self._counts: dict[int, int] = {}
-        """How often the condition of each alarm of this server has occurred."""
+        """Number of occurrences of each alarm since the start of the server."""
         self._writing = asyncio.Lock()
         self._closed = False
 
     async def open(self, error_of: Callable[[int], Message | None]) -> None:
-        """Read which recordings exist, and store those of runs that the end of the server has interrupted.
+        """Read the list of recordings, and store recordings of runs that were interrupted by the end of the server.
 
         Args:
             error_of: returns why a run has failed; None if it has not.
@@ -201,7 +201,7 @@ class Recordings:
         return self._files.put(replace(info, begin=begin, end=round((end - info.stamp) * 1000)), values)
 
     def _superfluous(self, newest: RecordingInfo) -> list[int]:
-        """Delete a recording of an alarm that has too many; the first and the newest ones remain."""
+        """Delete a recording of an alarm that has too many. The first one and the newest ones are kept."""
         if not newest.alarms:
             return []
         alarm = newest.alarms[0].number

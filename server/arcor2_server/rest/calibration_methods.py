@@ -342,7 +342,7 @@ class CalibrationMethodOperations:
         if isinstance(record_as, Unset):
             return
         result: dict[str, Any] = msgspec.to_builtins(found)
-        result.pop("picture", None)  # it can be drawn again
+        result.pop("picture", None)  # the picture can be drawn again
         await self._calibration_records.put(
             CalibrationRecord(
                 kind,

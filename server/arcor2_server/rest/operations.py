@@ -123,7 +123,7 @@ class Operation:
 SPECIAL: Final = frozenset({"query", "body", "upload", "uploads", "port", "person"})
 """Parameters of handlers that are not parts of the path."""
 OPERATIONS: Final[list[Operation]] = []
-"""All declared operations; their handlers are methods that are not bound yet."""
+"""All declared operations. Their handlers are unbound methods."""
 
 
 def operation(
@@ -169,7 +169,7 @@ def route(declared: Operation, tasks: Tasks, audit: AuditTrail) -> HTTPRouteHand
     def note(
         outcome: AuditOutcome, request: Request[Any, Any, Any], reason: str = "", changes: Sequence[Change] = ()
     ) -> None:
-        """Note an operation, unless it only reads."""
+        """Record an operation in the audit trail, unless it only reads."""
         if declared.method == "GET":
             return
         audit.note(

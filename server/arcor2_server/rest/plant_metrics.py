@@ -1,4 +1,4 @@
-"""Metrics of what connects the cell to the plant: nodes, fleet, history, OPC UA and MQTT. Each exists if it is used."""
+"""Metrics of nodes, fleet, history, OPC UA and MQTT. Only those in use exist."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -127,7 +127,7 @@ def _counter(name: str, text: str, value: float | Mapping[str, float], label: st
 
 
 def _filled(kind: Any, name: str, text: str, value: float | Mapping[str, float], label: str) -> "Metric":
-    """Return a metric with one value, or with those of each value of its label."""
+    """Return a metric with one value, or with one for each value of its label."""
     family = kind(f"arcor2_hw_{name}", text, labels=[label] if label else [])
     for key, each in value.items() if isinstance(value, Mapping) else [("", value)]:
         family.add_metric([key] if label else [], each)

@@ -28,5 +28,5 @@ class UnitRequests:
 
     @rpc("GetProduction")
     async def get_production(self, context: Context, args: GetProductionArgs | None) -> Production:
-        """Return what the cell has produced in a period."""
+        """Return the production of the cell in a period."""
         return await self._cell_time.production(args or GetProductionArgs())

@@ -125,7 +125,7 @@ class Client:
 
     @property
     def role(self) -> Role:
-        """What the client may do: the lower role of its token and of the person who is logged on."""
+        """Role of the client: the lower one of the roles of its token and of the logged-on person."""
         person = None if self.person is None else Role[self.person.role.upper()]
         return right(self.ceiling, shared=self.shared, person=person)
 

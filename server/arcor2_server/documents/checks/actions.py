@@ -37,7 +37,7 @@ from arcor2_server.documents.document import OUTPUT, Document
 from arcor2_server.documents.renamed_actions import with_present_name
 
 _PARALLEL: Final = ObjectAction("parallel")
-"""The metadata of an action that runs several calls at once."""
+"""The metadata of an action that runs several calls concurrently."""
 
 
 def check_action(action: Action, lookup: ProjectLookup, types: Types, function: ProjectFunction | None = None) -> None:
@@ -208,7 +208,7 @@ def check_retry(action: Action, meta: ObjectAction) -> None:
 def check_outputs_unique(document: Document, action: Action, function: str = "") -> None:
     """Raise InvalidData for a result name that another action of the program, or of the same function, uses.
 
-    Results become variables. Actions of the program may store results in a variable of the project by its name.
+    Results become variables. Actions of the program may store results in a project variable of the same name.
     function: the id of the function, empty for an action of the program.
     """
     for output in action.names():

@@ -24,7 +24,7 @@ FindObject = Callable[[str], SceneObject]
 
 
 def check_interlock(interlock: Interlock, find: FindObject, types: Types) -> None:
-    """Raise InvalidData or NotFound if an interlock refers to something that does not exist, or compares wrongly."""
+    """Raise NotFound if an interlock refers to a missing item, or InvalidData if it compares unsuitable values."""
     if not interlock.name.strip():
         raise InvalidData("The interlock needs a name.")
     target = find(interlock.object_id)
@@ -103,7 +103,7 @@ def using(object_id: str, interlocks: Iterable[Interlock]) -> list[Interlock]:
 
 
 def keep_interlocks(sent: Scene, stored: Scene) -> Scene:
-    """Return a sent scene with the interlocks that it lacks, because its client does not know them.
+    """Return a sent scene with the stored interlocks added that it lacks because its client does not support them.
 
     Raises:
         InvalidData: an interlock uses an object that the sent scene does not contain.

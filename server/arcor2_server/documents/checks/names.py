@@ -9,7 +9,7 @@ from arcor2_hw.messages import Message
 
 
 def check_name(name: str, kind: str) -> None:
-    """Raise InvalidData for a name that is not valid in a program; `kind` is what it names ("action point")."""
+    """Raise InvalidData for a name that is not valid in a program. `kind`: kind of the item, such as "action point"."""
     if not is_valid_name(name):
         raise InvalidData(
             "{name!r} cannot name {item}: use letters, digits and _, no digit first, no Python keyword.",
@@ -19,7 +19,7 @@ def check_name(name: str, kind: str) -> None:
 
 
 def duplicate_names(names: Iterable[str], kind: str) -> list[Message]:
-    """Return a problem for each name that occurs more than once; `kind` is what the names name ("action point")."""
+    """Return a problem for each name that occurs more than once. `kind`: kind of the items, such as "action point"."""
     return [
         Message.of("More than one {what} is named {name}.", what=kind, name=name)
         for name, count in Counter(names).items()
