@@ -122,7 +122,7 @@ class Bus:
         self.drain()
 
     def close(self) -> None:
-        """Close the port if it is open. `open` creates a new one, because a closed one may still report being in use."""
+        """Close the port if it is open. `open` creates a new one, as a closed one may report being in use."""
         port, self._port = self._port, None
         if port is not None:
             with contextlib.suppress(OSError, termios.error):

@@ -166,7 +166,7 @@ class _Parameters:
         self._taken = {name for action in selection.actions.values() for name in action.names()}
 
     def replaced(self, action: Action, ids: dict[str, str]) -> Action:
-        """Return an action for the function, with a new id, and with its links and parameters adapted to the function."""
+        """Return an action for the function, with a new id, and its links and parameters adapted to the function."""
         meta = action_meta(action, self._document, self._types)
         kinds = {each.name: each.type for each in meta.parameters}
 

@@ -113,7 +113,7 @@ class Execution(PackageLibrary, RunObservers):
 
     @property
     def busy(self) -> bool:
-        """Whether opening documents and running other programs is refused: during a run, and shortly before and after it."""
+        """Whether documents must not be opened and other programs not run: during, and shortly before and after a run."""
         return self._reserved or self.active
 
     @property

@@ -24,7 +24,7 @@ def change_events(changes: Changes) -> list[Event]:
 
 
 class TypeNotifications:
-    """Publishes new and changed object types: at once when a document is opened, otherwise after a series of uploads."""
+    """Publishes new and changed object types: when a document is opened, otherwise after a series of uploads."""
 
     def __init__(self, types: ObjectTypes, hub: EventHub) -> None:
         self._types = types

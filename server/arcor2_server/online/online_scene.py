@@ -274,8 +274,8 @@ class OnlineScene:
             message, overlaid = await self._opening.prepare(replace(self._session.require_scene(), objects=[obj]), True)
             self.board.add(obj, overlaid.get(obj.id, []))
             await self.host.add(message, self.host.place(self._session.require_scene().objects).nodes[obj.id])
-        except Arcor2Error as error:  # ObjectState has reported the reason, unless the scene went offline in the
-        meantime log.warning("added object is not connected", object=obj.name, reason=str(error))
+        except Arcor2Error as error:  # ObjectState has reported the reason, unless the scene has gone offline
+            log.warning("added object is not connected", object=obj.name, reason=str(error))
 
     def _edited(self, edit: Edit | None) -> None:
         """Let the host use changed interlocks at once."""

@@ -64,7 +64,7 @@ class FeedReader:
         self._feed.observe_wanted()
 
     async def everything(self) -> Update:
-        """Return the present state for a started process, and the units that left the cell while no process was running."""
+        """Return the present state for a started process, and the units that left while no process was running."""
         self.streams, self.alarms = {}, {}
         update = await self.changes()
         # Records that were not stored yet are reported once more when they are.
