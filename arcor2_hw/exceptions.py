@@ -94,7 +94,7 @@ class NotInControl(Refused):
 
 
 class DifferentDevice(Refused):
-    """Another device than the confirmed one is connected. A technician has to confirm it."""
+    """The connected device is not the confirmed one. A technician has to confirm it."""
 
     code = "different_device"
 
@@ -192,7 +192,8 @@ ERROR_KINDS: Final[Mapping[str, type[Arcor2Error]]] = MappingProxyType(
         )
     }
 )
-"""The kinds of errors that an error exit of an action can name, in the order in which exits apply; `error` is any."""
+"""The kinds of errors that an error exit of an action can name, in the order in which exits apply. `error` is any
+error."""
 
 ENDS_PROGRAM: Final = (
     *(NotConnected, ConnectionLost, NotInControl, DifferentDevice),
@@ -245,25 +246,25 @@ class PartError(Conflict):
 
 
 class PlaceOccupied(PartError):
-    """There is a part already where the action puts one."""
+    """The place at which the action puts a part is occupied."""
 
     code = "place_occupied"
 
 
 class PlaceEmpty(PartError):
-    """There is no part where the action takes one."""
+    """The place from which the action takes a part is empty."""
 
     code = "place_empty"
 
 
 class WrongPart(PartError):
-    """Another part is at the place than expected, or the part does not belong where the action puts it."""
+    """The part at the place is not the expected one, or the action must not put the part at this place."""
 
     code = "wrong_part"
 
 
 class PartUnconfirmed(PartError):
-    """It is not known where a part is. A person has to confirm its place."""
+    """The place of a part is unknown. A person has to confirm it."""
 
     code = "part_unconfirmed"
 

@@ -8,7 +8,7 @@ PREFIX_SIZE: Final = _PREFIX.size
 
 
 def prefix(length: int) -> bytes:
-    """Return the length prefix of a message of so many bytes."""
+    """Return the length prefix of a message of `length` bytes."""
     return _PREFIX.pack(length)
 
 

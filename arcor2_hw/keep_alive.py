@@ -20,7 +20,7 @@ from arcor2_hw.messages import Message
 PULSE_PERIOD: Final = 0.05
 """Time between pulses for drivers without a cycle of their own, s."""
 BUSY_FOR: Final = 0.3
-"""Running time that a caller waits for a fresh reading which a busy process may not have taken yet, s."""
+"""Running time for which a caller waits for a fresh reading, because a busy process may be late, s."""
 STARTS_WITHIN: Final = 5.0
 """Time limit of the start of the child process, s; it takes 0.03 s on an idle computer."""
 LONGEST_STEP: Final = 0.05
@@ -80,7 +80,9 @@ class KeepAlive:
     def pulse(self) -> None:
         """Report that the device is supervised; call it at least every 0.1 s."""
         assert self._process.stdin is not None
-        with contextlib.suppress(OSError, ValueError):  # closed, or the child died: the device has its watchdog
+        with contextlib.suppress(
+            OSError, ValueError
+        ):  # the line is closed, or the child has ended; the watchdog of the device then stops it
             os.write(self._process.stdin.fileno(), pulse())
 
     def close(self) -> None:
@@ -94,7 +96,7 @@ class KeepAlive:
 class RunningTime:
     """A stopwatch of the time in which this process ran: a longer gap between two readings counts as LONGEST_STEP.
 
-    It judges time limits of another thread of this process, which a stall of the process delays as well.
+    Use it for time limits of another thread of this process, because a stall of the process delays both threads.
     """
 
     def __init__(self) -> None:
@@ -133,7 +135,7 @@ async def awaited_within(work: Coroutine[Any, Any, T], timeout: float) -> T:
     clock, task = RunningTime(), asyncio.ensure_future(work)
     try:
         while True:
-            late = clock() >= timeout  # then look once more: this process may have been suspended
+            late = clock() >= timeout  # check once more, because this process may have been suspended
             await asyncio.wait({task}, timeout=LONGEST_STEP / 2.0)
             if task.done():
                 return task.result()
@@ -144,7 +146,7 @@ async def awaited_within(work: Coroutine[Any, Any, T], timeout: float) -> T:
 
 
 def acquire_within(lock: threading.Lock, timeout: float) -> bool:
-    """Return whether a lock was acquired within `timeout` s of running time, because its owner may be delayed too."""
+    """Return whether a lock was acquired within `timeout` s of running time, in which its owner may be delayed, too."""
     clock = RunningTime()
     while not lock.acquire(timeout=LONGEST_STEP / 2.0):
         if clock() >= timeout:

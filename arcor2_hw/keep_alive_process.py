@@ -1,6 +1,6 @@
-"""The child process of `KeepAlive`, and how any child process judges whether its parent is alive, busy or frozen.
+"""The child process of `KeepAlive`, and the detection of a dead, busy or frozen parent for any child process.
 
-A busy parent may hold its interpreter for some tenths of a second. That must not trip a device's watchdog, so a child
+A busy parent may block its interpreter for some tenths of a second. That must not trip a device's watchdog, so a child
 process feeds it. The parent reports by pulses that its supervising thread works. The child ends at once when the parent
 dies (end of its standard input), and when no pulse was sent for FROZEN_AFTER s.
 
@@ -19,14 +19,14 @@ FROZEN_AFTER = 0.8
 NICENESS = -10
 """Requested niceness; most computers refuse it."""
 PULSE = b"="
-"""First byte of a line that is a pulse; the time it was sent follows, in seconds of the monotonic clock."""
+"""First byte of a line that is a pulse. The time of sending follows, in seconds of the monotonic clock."""
 
 
 def hurry() -> None:
     """Run before other processes, if permitted. A service needs LimitNICE for it.
 
-    Where the kernel groups processes by session, niceness counts only within a session. So that of the session is set,
-    too: this process has one of its own.
+    Where the kernel groups processes by session, niceness counts only within a session. Therefore the niceness of
+    the session is set, too. This process has a session of its own.
     """
     try:
         os.setpriority(os.PRIO_PROCESS, 0, NICENESS)
@@ -58,7 +58,7 @@ class Parent:
         left = self.pulse + FROZEN_AFTER - time.monotonic()
         ready, _, _ = select.select([self._fd], [], [], max(min(timeout, left), 0.0))
         if not ready:
-            if left <= 0.0:  # pulses that waited while this process was not running have been read by now
+            if left <= 0.0:  # pulses that arrived while this process was not running have been read by now
                 self.ended = ParentEnd.FROZEN
             return []
         data = os.read(self._fd, 65536)
@@ -87,7 +87,7 @@ def main(message: bytes, period: float, quiet: float) -> None:
             try:
                 os.write(1, message)
             except BlockingIOError:
-                pass  # the line is full: other messages trigger the watchdog, too
+                pass  # the line is full; its other messages also trigger the watchdog
             except OSError:  # the line is closed; the parent detects that itself
                 return
             sent = time.monotonic()

@@ -1,4 +1,4 @@
-"""Messages for users: the English text, and the template and values from which clients translate it."""
+"""Messages for users: the English text, with the template and values for translation by clients."""
 
 from collections.abc import Sequence
 from string import Formatter
@@ -26,7 +26,7 @@ def translatable(texts: _T) -> _T:
 
 
 class Message(Struct, frozen=True, omit_defaults=True):
-    """A text for users, with what is needed to translate it. `str(message)` is the text.
+    """A text for users with the data for its translation. `str(message)` is the text.
 
     Attributes:
         text: The English text.

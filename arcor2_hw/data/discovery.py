@@ -10,7 +10,7 @@ from arcor2_hw.data.device import Alarm, Connection, Health, Identity
 
 
 class Search(enum.StrEnum):
-    """What can be searched for: serial ports, nodes of a CAN bus, OAK cameras, devices in a network."""
+    """Kinds of searches: serial ports, nodes of a CAN bus, OAK cameras, devices in a network."""
 
     SERIAL = "serial"
     CAN = "can"
@@ -24,7 +24,7 @@ NETWORK: Final = (Search.UR, Search.MODBUS)
 
 
 class Found(Data, frozen=True):
-    """A device found: its kind, its address (as in a setting), and its identity. node: number on a CAN bus."""
+    """A detected device: its kind, its address (as in a setting), and its identity. node: number on a CAN bus."""
 
     kind: str
     address: str
@@ -34,7 +34,7 @@ class Found(Data, frozen=True):
 
 
 class Checked(Data, frozen=True):
-    """State of one device of a cell. seconds: time to connect, s. problem: what went wrong, or empty."""
+    """State of one device of a cell. seconds: time to connect, s. problem: description of the problem, or empty."""
 
     name: str
     type: str

@@ -23,7 +23,7 @@ class DurationSource(enum.StrEnum):
     """Source of the duration of an action.
 
     planned: the timing of its planned motion. action: the median of this action in earlier runs. method: the median of
-    other actions of the same object type that call the same method. unknown: there is none, and 0 s are counted.
+    other actions of the same object type that call the same method. unknown: no duration is known, and 0 s are counted.
     """
 
     PLANNED = "planned"
@@ -41,14 +41,14 @@ class ActionDuration(Data, frozen=True):
 
 
 class Assumption(TranslatableData, frozen=True):
-    """An assumption of a dry run, as a sentence. action_id: the action that it concerns."""
+    """An assumption of a dry run, as a sentence. action_id: the action to which it applies."""
 
     text: str
     action_id: str | Unset = UNSET
 
 
 class DryRunProblem(TranslatableData, frozen=True):
-    """The first action that would fail. reason: why, as a sentence. pose: where, in the world."""
+    """The first action that would fail. reason: a sentence. pose: pose in the world at which it fails."""
 
     action_id: str
     name: str

@@ -40,7 +40,7 @@ class ViewState(Data, frozen=True):
 
 # ---------------------------------------------------------------------------------------------- shared breakpoints
 class ProjectBreakpoints(Data, frozen=True):
-    """The shared breakpoints of a project: ids of its action points and actions, and who changed them last."""
+    """The shared breakpoints of a project: ids of its action points and actions, and the user of the last change."""
 
     project_id: str
     ids: set[str]
@@ -135,7 +135,7 @@ class TaskStateData(TranslatableData, frozen=True):
 
 # ---------------------------------------------------------------------------------------------- history
 class HistoryStep(TranslatableData, frozen=True):
-    """The edit that Undo or Redo of a user would revert.
+    """The edit that the next undo or redo of a user reverts.
 
     request: request that made the edit. text: label of the button, without `Undo` or `Redo`.
     """
@@ -155,7 +155,7 @@ class HistoryChangedData(Data, frozen=True):
 
 # ---------------------------------------------------------------------------------------------- runs
 class RunEnd(enum.StrEnum):
-    """How a run ended: completed, stopped by a user, by an error, or with the server or its host."""
+    """Outcome of a run: completed, stopped by a user, failed, or ended with the server or its host."""
 
     RUNNING = "running"
     FINISHED = "finished"
@@ -181,7 +181,7 @@ class VariableValue(Data, frozen=True):
 
 
 class RunStatistics(Data, frozen=True):
-    """What a run has produced so far.
+    """Statistics of a run up to now.
 
     cycles: completed passes of the program from its start to its end. last_cycle, mean_cycle: durations of the last
     cycle and of all cycles, s, without cycles during which the program was paused; omitted before the first one. good,
@@ -273,7 +273,7 @@ class TraceEntry(TranslatableData, frozen=True):
 
 # ---------------------------------------------------------------------------------------------- reachability
 class Reach(enum.StrEnum):
-    """How an end effector reaches a pose."""
+    """Reachability of a pose by an end effector."""
 
     REACHABLE = "reachable"
     NEAR_LIMIT = "near_limit"
@@ -283,7 +283,7 @@ class Reach(enum.StrEnum):
 
 
 class ReachOfItem(TranslatableData, frozen=True):
-    """How an end effector reaches an orientation or joints; `reason` is a sentence when it does not.
+    """Reachability of an orientation or joints by an end effector. `reason` is a sentence if they are not reachable.
 
     `key` and `values` are those of the reason.
     """
@@ -296,7 +296,7 @@ class ReachOfItem(TranslatableData, frozen=True):
 class ReachabilityData(Data, frozen=True):
     """Answer to Reachability for each end effector, and data of the event ReachabilityChanged.
 
-    revision: revision of the document for which it holds. items: orientations and joints of the open project; in the
+    revision: revision of the document to which it applies. items: orientations and joints of the open project; in the
     event, those that changed.
     """
 

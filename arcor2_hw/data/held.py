@@ -9,14 +9,14 @@ from arcor2_hw.data.object_type import Again
 
 
 class OnError(enum.StrEnum):
-    """What a program does when an action fails and no error exit applies: end, or hold until a person decides."""
+    """Reaction of a program if an action fails and no error exit applies: end, or hold until a person decides."""
 
     END = "end"
     HOLD = "hold"
 
 
 class HoldChoice(enum.StrEnum):
-    """How a held program continues.
+    """The continuation of a held program.
 
     RETRY repeats the action, or starts it if the program is held before it. RESULT continues with results that a person
     supplies. SKIP continues as if an action without results had succeeded. ERROR_EXIT takes an error exit although it
@@ -74,7 +74,7 @@ class HeldData(TranslatableData, frozen=True):
 
 
 class HoldDecidedData(Data, frozen=True):
-    """Data of the event HoldDecided: who decided about the action with this number, and how."""
+    """Data of the event HoldDecided: the decision about the action with this number, and its author."""
 
     run: int
     number: int
@@ -83,7 +83,7 @@ class HoldDecidedData(Data, frozen=True):
 
 
 class ActionHold(Data, frozen=True):
-    """How long a program was held at an action, and who decided.
+    """Duration of a hold at an action, and the author of the decision.
 
     duration: s; omitted while the program is held. choice, by: the decision, and the name of a user or token; omitted
     while the program is held, and if it was stopped.

@@ -63,8 +63,8 @@ class HistoryPoint(Data, frozen=True):
 class PointSummary(Data, frozen=True):
     """The values of a point in equal parts of a period: one entry in each list for each part with a known value.
 
-    times: start of the part. lowest, highest: of all values that were in effect. mean: weighted by how long each value
-    was in effect. counts: number of recorded values.
+    times: start of the part. lowest, highest: of all values that were in effect. mean: weighted by the time for
+    which each value was in effect. counts: number of recorded values.
     """
 
     since: int
@@ -114,7 +114,7 @@ class PastRun(Data, frozen=True):
 
 
 class HistoryState(Data, frozen=True):
-    """What the history contains, and whether it is recorded.
+    """Content of the history, and whether it is being recorded.
 
     recording: false if the server was started without `--history`. hot_bytes, cold_bytes: sizes of the database and of
     the Parquet files. rows: number of values and runs in these files. dropped: values that could not be stored since

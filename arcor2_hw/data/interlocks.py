@@ -14,14 +14,14 @@ MAX_WAIT: Final = 3600.0
 
 
 class InterlockTarget(enum.StrEnum):
-    """What an interlock applies to: actions of an object, or a zone."""
+    """Target of an interlock: actions of an object, or a zone."""
 
     ACTION = "action"
     ZONE = "zone"
 
 
 class Unmet(enum.StrEnum):
-    """What an action does while a condition is not met: wait, then hold the program; or hold it at once."""
+    """Reaction of an action to a condition that is not met: wait, then hold the program; or hold it at once."""
 
     WAIT = "wait"
     HOLD = "hold"

@@ -27,14 +27,14 @@ class DeviceParameter(Data, frozen=True):
 
 
 class ParameterFailure(TranslatableData, frozen=True):
-    """A parameter that could not be written, and why."""
+    """A parameter that could not be written, and the reason."""
 
     name: str
     reason: str
 
 
 class ParameterDifference(Data, frozen=True):
-    """A parameter with different values in a backup and in the device; omitted where there is none."""
+    """A parameter with different values in a backup and in the device. A missing value is omitted."""
 
     name: str
     backup: ParameterValue | Unset = UNSET
@@ -61,7 +61,7 @@ class BackupInfo(Data, frozen=True):
 
 
 class ParameterBackup(Data, frozen=True):
-    """The parameters of a device, as they are stored and written to a file. Fields as in BackupInfo."""
+    """The parameters of a device in the form of the file. Fields as in BackupInfo."""
 
     object_type: str
     identity: Identity
@@ -76,18 +76,18 @@ class ParameterBackup(Data, frozen=True):
 
 
 class DeviceCard(TranslatableData, frozen=True):
-    """What is known about a device of the workplace.
+    """Identity and state of a device of the workplace.
 
     Attributes:
         object_id: Id of the scene object.
         name: Its name.
         object_type: Its object type.
-        identity: The confirmed identity; the one that was seen first needs no confirmation.
+        identity: The confirmed identity; the first one needs no confirmation.
         found: The identity of the connected device, if it is not the confirmed one. Then it is not commanded.
         differing: The fields of `found` that differ.
-        first_seen: When the device was connected first.
-        seen: When its identity was last read.
-        confirmed_at: When a technician confirmed the identity; omitted if it was seen first.
+        first_seen: Time of the first connection of the device.
+        seen: Time at which its identity was last read.
+        confirmed_at: Time at which a technician confirmed the identity; omitted if it was seen first.
         confirmed_by: Who confirmed it.
         parameters: Whether the driver can read the parameters.
         restores: Whether it can write them.

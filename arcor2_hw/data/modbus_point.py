@@ -1,4 +1,4 @@
-"""Points of a device on Modbus: where they are, and how registers become values and values registers."""
+"""Points of a device on Modbus: their addresses, and the conversion between registers and values."""
 
 import math
 import struct
@@ -138,7 +138,7 @@ class Point(Data, frozen=True, forbid_unknown_fields=True):
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Return the least and the greatest value that can be written."""
+        """Return the minimum and the maximum value that can be written."""
         ends = sorted(float(f"{end * self.scale:.15g}") for end in self._ends)
         return (
             ends[0] if isinstance(self.minimum, Unset) else max(ends[0], self.minimum),
@@ -147,7 +147,7 @@ class Point(Data, frozen=True, forbid_unknown_fields=True):
 
     @property
     def _ends(self) -> tuple[float, float]:
-        """Return the least and the greatest number in the registers."""
+        """Return the minimum and the maximum number in the registers."""
         if self.is_float:
             return -LARGEST[str(self.type)], LARGEST[str(self.type)]
         width, signed = WORD_BITS * self.size, self._format[1].islower()

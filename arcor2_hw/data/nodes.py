@@ -19,9 +19,9 @@ class NodeState(StrEnum):
 
     CONNECTED = auto()
     SILENT = auto()
-    """It has announced nothing for some seconds, or never."""
+    """The node has not announced itself for some seconds, or never."""
     OTHER_VERSION = auto()
-    """It runs another version than the server, which refuses it."""
+    """The node runs another version than the server, so the server does not use it."""
 
 
 class NodeSession(Data, frozen=True):
@@ -37,14 +37,14 @@ class NodeSession(Data, frozen=True):
 
 
 class NodeError(TranslatableData, frozen=True):
-    """The last error of a node: its text, and when it happened. `key` and `values` translate the text."""
+    """The last error of a node: its text and time. `key` and `values` translate the text."""
 
     text: str
     at: Timestamp
 
 
 class NodeStatus(Data, frozen=True):
-    """A node, as it was announced last.
+    """A node according to its last announcement.
 
     Attributes:
         name: Its name.

@@ -131,7 +131,7 @@ class ParameterMeta(Data, frozen=True):
 
 
 class Again(enum.StrEnum):
-    """Whether an action may be repeated after it has failed: always, if a person agrees, or never."""
+    """Whether an action may be repeated after a failure: always, after confirmation by a person, or never."""
 
     SAFE = "safe"
     ASK = "ask"
@@ -139,7 +139,7 @@ class Again(enum.StrEnum):
 
 
 class ActionMetadata(Data, frozen=True):
-    """How an action is executed. `composite` actions may call others; `hidden` ones are not offered to users.
+    """Properties of an action. `composite` actions may call others; `hidden` actions are not offered to users.
 
     verdict (not in ARCOR2): whether the returned boolean says that a part is good. again (not in ARCOR2): whether the
     action may be repeated after it has failed; ask if it is omitted.
@@ -168,7 +168,7 @@ class ObservationMeta(Data, frozen=True):
 
 
 class Disableable(TranslatableData, frozen=True, kw_only=True):
-    """Base of what a problem in a source disables; `key` and `values` translate the problem."""
+    """Base of items that a problem in their source disables. `key` and `values` translate the problem."""
 
     disabled: bool = False
     problem: str | Unset = UNSET
@@ -210,7 +210,7 @@ class ObjectAction(Disableable, frozen=True):
 
 
 def find_action(actions: Iterable[ObjectAction], name: str) -> ObjectAction | None:
-    """Return the action of a name, otherwise one with that former name, None if there is neither."""
+    """Return the action with a name, or with this former name; None if there is neither."""
     actions = list(actions)
     present = next((action for action in actions if action.name == name), None)
     formerly = (each for each in actions if not isinstance(each.former_names, Unset) and name in each.former_names)
@@ -245,7 +245,7 @@ class ObjectTypeMeta(Disableable, frozen=True):
 
     @property
     def shown_name(self) -> str:
-        """The name for users: the display name, else the name of the class."""
+        """The name for users: the display name, or without one the name of the class."""
         return self.type if isinstance(self.display_name, Unset) else self.display_name
 
 

@@ -59,7 +59,7 @@ OLDER_NAMES: Final[dict[str, dict[str, tuple[str, str]]]] = {
         f"{_OLDER}.rest", "Method", "RestException", "RestHttpException", "Timeout", "call", "get_image"
     ),
 }
-"""By module and name: our module and name."""
+"""Our module and name, by module and name in ARCOR2."""
 
 OLDER_PACKAGES: Final = frozenset(name for name in OLDER_NAMES if "." not in name)
 

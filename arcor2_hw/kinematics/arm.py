@@ -52,7 +52,7 @@ class Step(NamedTuple):
 
 
 class Dexterity(Data, frozen=True):
-    """How well an arm moves in a configuration.
+    """Dexterity of an arm in a configuration.
 
     Attributes:
         manipulability: Yoshikawa's measure, the square root of det(J Jᵀ), of the commanded directions.
@@ -112,7 +112,7 @@ class Arm:
         self.centre = self._moving[0][0][:3, 3]
         self.reach = self.length + self._slides
 
-    # -------------------------------------------------------------------------------- where
+    # -------------------------------------------------------------------------------- poses
     def forward(self, q: Array) -> Array:
         """Return the pose of the tip, (4, 4)."""
         if self._factors is not None:

@@ -47,7 +47,8 @@ NEARLY: Final = 0.02
 """Maximum deviation of the axes from the ideal geometry, rad and m; calibrations deviate less."""
 
 _Started = tuple[float, float, float, float, float, complex]
-"""Squared distance of joints 1, 5 and 6 from the seed; these joints; the sum of joints 2 to 4; joint 4 from joint 2."""
+"""Squared distance of joints 1, 5 and 6 from the seed; these joints; the sum of joints 2 to 4; joint 4 seen from joint
+2."""
 
 
 class ThreeParallel:
@@ -108,8 +109,8 @@ class ThreeParallel:
         """Yield the configurations that move the tip to a pose (4, 4), nearest to the seed first.
 
         Each angle is shifted by whole turns, as `nearest_turn` does. At a singularity, where only the sum of two joints
-        is determined, one of them is taken from the seed. The distance of joints 1, 5 and 6 from the seed shows for
-        which of them the other joints have to be computed before the next result is known.
+        is determined, one of them is taken from the seed. The distance of joints 1, 5 and 6 from the seed
+        determines for which of them the other joints are computed first.
         """
         started = sorted(self._started(target, seed, lower, upper), key=itemgetter(0))
         ready: list[tuple[float, Values]] = []
@@ -127,7 +128,7 @@ class ThreeParallel:
                 yield ready.pop()[1]
 
     def _started(self, target: Array, seed: Values, lower: Values, upper: Values) -> Iterator[_Started]:
-        """Yield joints 1, 5 and 6, and what remains for joints 2 to 4."""
+        """Yield joints 1, 5 and 6, and the remaining target of joints 2 to 4."""
         numbers = self._linear.dot(target.reshape(16)).view(np.complex128).tolist()
         cosine, sine, constant = numbers[:6], numbers[6:12], numbers[12:]
         for q1 in solved(cosine[5].imag, sine[5].imag, -constant[5].imag, seed[0]):
@@ -159,7 +160,8 @@ class ThreeParallel:
     def _free(self, x: complex, y: complex, z: complex, shoulder: complex, height: float, if_free: float) -> Values:
         """Return angles of joint 6 where its axis is parallel to those of joints 2 to 4, and only their sum counts.
 
-        These are `if_free`, and the angles at which the links just reach, since they may not with the former.
+        These are `if_free`, and the angles at which the links just reach the target, because they may not reach it with
+        `if_free`.
         """
         far, short = abs(shoulder), abs(self._tail)
         if min(far, short) < TINY:

@@ -1,9 +1,9 @@
 """Denavit-Hartenberg parameters: the calibration of one robot, applied to its nominal model.
 
 Rows use the classic convention, as manufacturers publish them: rotate by theta about z, move by d along z, move by a
-along x, rotate by alpha about x. For nearly parallel axes, d can be several metres in one row and back in the next.
-Joints are therefore not placed at the frames of the rows, but on the same axes, as near as possible to their nominal
-places. The shapes of links stay where they are, and the end is exactly where the rows put it.
+along x, rotate by alpha about x. For nearly parallel axes, d can be several metres in one row and the opposite in the
+next row. Joints are therefore not placed at the frames of the rows, but on the same axes, as near as possible to their
+nominal places. The shapes of links do not move, and the end is exactly at the end of the rows.
 """
 
 import math

@@ -2,8 +2,8 @@
 
 Arms like the UR, or with a spherical wrist, have up to eight configurations computed in closed form (see
 `closed_form`) and then refined. Other arms are solved by damped least squares (Levenberg-Marquardt), from the seed
-and, if needed, from up to 40 random starts. The starts are the same in every call, so that the same question has the
-same answer.
+and, if needed, from up to 40 random starts. The starts are the same in every call, so that equal calls return the
+same result.
 """
 
 import itertools
@@ -39,7 +39,7 @@ _SLACK: Final = 1e-6
 """Rounding error beyond a limit that is clipped, rad or m."""
 _PATIENCE: Final = 8
 _PROGRESS: Final = 0.9
-"""Maximum share of the error that may remain after _PATIENCE iterations."""
+"""Maximum fraction of the error that may remain after _PATIENCE iterations."""
 _STEP: Final = 0.7
 """Maximum change of a joint in one iteration, rad or m."""
 
@@ -163,7 +163,9 @@ class InverseKinematics:
                 if not self.arm.within(q, _SLACK):
                     continue
                 q = np.clip(q, self.arm.lower, self.arm.upper)
-                is_late = math.dist(q.tolist(), values) > 1.0  # still beyond a limit, thus turned away from the seed
+                is_late = (
+                    math.dist(q.tolist(), values) > 1.0
+                )  # still beyond a limit, and therefore shifted by a turn away from the seed
             if self._known(q, given):
                 continue
             given.append(q)

@@ -22,7 +22,7 @@ _Z_FROM_UP: Final = {
     "X": np.array(((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0))),
     "Y": np.array(((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))),
 }
-"""Rotations from the named up axis to z up; with X_UP in COLLADA, y is to the left and z towards the viewer."""
+"""Rotations from the named up axis to z up. With X_UP in COLLADA, y points left and z towards the viewer."""
 _FARTHEST: Final = 1e4
 """Maximum coordinate of a vertex, m; larger ones mean wrong units."""
 _NO_COLOUR: Final = ((102, 102, 102, 255),)
@@ -213,7 +213,7 @@ def _checked_format(content: bytes, name: str, most_bytes: int) -> str:
 
 
 def _checked(vertices: Array, triangles: Triangles, name: str, most_triangles: int) -> Array:
-    """Return the vertices; those that no triangle uses are made finite."""
+    """Return the vertices. Unused vertices are replaced by finite ones."""
     if not len(triangles):
         raise BadMesh("The mesh {name} has no triangles.", name=name)
     if len(triangles) > most_triangles:
@@ -236,7 +236,7 @@ def _refuse_far(used: Array, name: str) -> None:
 
 
 def _refuse_entities(content: bytes, name: str) -> None:
-    """Reject what makes an XML parser read other files or expand without bounds."""
+    """Reject XML entities, which could make a parser read other files or expand without bounds."""
     if b"\0" in content[:4096]:
         raise BadMesh("The mesh {name} must be encoded in UTF-8.", name=name)
     lowered = content.lower()

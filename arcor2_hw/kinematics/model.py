@@ -62,7 +62,7 @@ class RobotModel(JointSet):
         self._refuse_zero_lengths()
         self.visual, self.collision = self._shapes()
 
-    # -------------------------------------------------------------------------------- making
+    # -------------------------------------------------------------------------------- creation
     @classmethod
     def load(
         cls,

@@ -38,8 +38,8 @@ class Package:
         """Open a folder, a zip archive or a URDF file, or the bytes of an archive or URDF file.
 
         Raises:
-            ModelError: It is none of them, or cannot be read.
-            UnsafeDescription: It is too large, or has encrypted files or files outside of it.
+            ModelError: The source is none of these, or cannot be read.
+            UnsafeDescription: The archive is too large, or has encrypted files or paths outside of it.
         """
         if isinstance(source, bytes):
             return cls._of_bytes(source, name or "upload")
@@ -145,7 +145,7 @@ class Package:
             UnsafeDescription: The file is too large.
         """
         found = [name for name in self.names if name.lower().endswith(".urdf") and not name.startswith("__MACOSX/")]
-        if len(found) > 1:  # the one nearest to the top, if there is only one
+        if len(found) > 1:  # the file nearest to the top, if there is only one at this level
             depth = min(name.count("/") for name in found)
             found = [name for name in found if name.count("/") == depth]
         if not found:

@@ -15,7 +15,7 @@ TINY: Final = 1e-9
 SINGULAR: Final = 1e-10
 """Product of two sines below which an angle is undetermined."""
 COSINE_TOLERANCE: Final = 0.02
-"""Excess of a cosine over 1 that is still accepted; the result is refined later."""
+"""Maximum excess of a cosine over 1. The result is refined later."""
 
 Vector = tuple[float, float, float]
 Rows = tuple[Vector, Vector, Vector]
@@ -35,7 +35,7 @@ def nearest_turn(angle: float, seed: float, lower: float, upper: float) -> float
 
 
 def around(middle: float, cosine: float) -> Values:
-    """Return the angles, on both sides of `middle`, of which the distance from it has a cosine."""
+    """Return the two angles on both sides of `middle` whose distance from it has the given cosine."""
     if not abs(cosine) <= 1.0 + COSINE_TOLERANCE:
         return ()
     half = math.acos(max(-1.0, min(1.0, cosine)))
@@ -43,7 +43,7 @@ def around(middle: float, cosine: float) -> Values:
 
 
 def solved(cosine: float, sine: float, height: float, if_free: float) -> Values:
-    """Return the angles of which the cosine and sine, multiplied by factors, add up to a height."""
+    """Return the angles x with `cosine * cos(x) + sine * sin(x) = height`."""
     size = math.hypot(cosine, sine)
     if size < TINY:
         return (if_free,) if abs(height) < COSINE_TOLERANCE else ()
@@ -53,7 +53,7 @@ def solved(cosine: float, sine: float, height: float, if_free: float) -> Values:
 def level(
     axis: Vector, turned: Vector, along: Vector, height: float, if_free: float, *, backwards: bool = False
 ) -> Values:
-    """Return the angles about `axis` by which `turned` reaches a height along `along`; with `backwards`, negated."""
+    """Return the angles about `axis` that rotate `turned` to a height along `along`; with `backwards`, their negatives."""
     across = cross(axis, turned)
     sine = dot(along, across)
     height -= dot(along, axis) * dot(axis, turned)
@@ -70,7 +70,7 @@ def between(axis: Vector, start: Vector, target: Vector, if_free: float) -> floa
 
 
 def folded(axis: Vector, outer: Vector, inner: Vector, to: Vector) -> Values:
-    """Return the angles about `axis` between two links at which both together span the length of `to`."""
+    """Return the angles about `axis` between two links at which their ends are the length of `to` apart."""
     outer, inner, to = (subtract(each, scaled(axis, dot(axis, each))) for each in (outer, inner, to))
     height = (dot(to, to) - dot(inner, inner) - dot(outer, outer)) / 2.0
     return solved(dot(inner, outer), dot(inner, cross(axis, outer)), height, 0.0)

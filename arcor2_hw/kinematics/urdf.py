@@ -242,7 +242,7 @@ def _mimic(element: Element, place: str | Message) -> Mimic | None:
     )
 
 
-# ------------------------------------------------------------------------------------------------ the whole
+# ------------------------------------------------------------------------------------------------ whole description
 def _tree(robot: str, links: Mapping[str, Link], joints: Iterable[Joint]) -> tuple[str, tuple[Joint, ...]]:
     """Return the root link, and the joints ordered from there outwards.
 

@@ -16,7 +16,7 @@ from arcor2_hw.plant.streams import decode_stream, time_of
 
 _CONNECTED: Final = (Connection.ONLINE, Connection.BACK)
 _NOT_ALLOWED: Final = frozenset("+#/.*>$\0")
-"""Characters that MQTT, or NATS as its broker, does not allow in a level of a topic. Neither is space."""
+"""Characters that MQTT, or NATS as its broker, does not allow in a topic level. Spaces are not allowed either."""
 
 
 @dataclass(slots=True)
@@ -47,7 +47,7 @@ class Device:
 
 
 class PointName(NamedTuple):
-    """Names a point, or a joint, of a device."""
+    """Name of a point or joint of a device."""
 
     device: str
     joint: bool
@@ -56,7 +56,7 @@ class PointName(NamedTuple):
 
 @dataclass(slots=True)
 class Changes:
-    """What an update has changed: ids of devices, points, and whether the cell as a unit."""
+    """Changes by an update: ids of devices, points, and whether the state of the cell has changed."""
 
     devices: set[str] = field(default_factory=set)
     removed: list[Device] = field(default_factory=list)

@@ -98,7 +98,7 @@ class ValueQueue:
         return taken
 
     def mark_historical(self, owner: str, born: Iterable[Metric]) -> None:
-        """Mark the waiting values of an owner as historical, without those that its birth certificate contains."""
+        """Mark the waiting values of an owner as historical, except those in its birth certificate."""
         if values := self._values.pop(owner, None):
             newest = {(metric.alias, metric.time_ms, metric.value, metric.quality) for metric in born}
             kept = deque(
@@ -116,7 +116,7 @@ class ValueQueue:
 
 @dataclass(slots=True)
 class _Owner:
-    """The edge node or a device: its metrics by name, and a version that changes with names and types of metrics."""
+    """The edge node or a device: its metrics by name, and a version that changes with the names and types of metrics."""
 
     level: str
     alive: bool = False
@@ -128,7 +128,7 @@ class EdgeNode:
     """Publishes birth certificates, data and death certificates.
 
     Args:
-        setup: of the process.
+        setup: settings of the process.
         cell: the state of the cell. `changed` has to be called after each change.
         report: sends a message to the server.
     """
@@ -297,7 +297,7 @@ class EdgeNode:
             while self._dying:
                 await self._send(connected, "DDEATH", self._dying.pop(), [])
             for key, owner in list(self._owners.items()):
-                if self._owners.get(key) is owner:  # it may have been removed meanwhile
+                if self._owners.get(key) is owner:  # the device may have been removed in the meantime
                     await self._publish_owner(connected, key, owner)
 
     async def _receive(self, connected: Client) -> None:
@@ -313,7 +313,7 @@ class EdgeNode:
                     state = _decode_state(content)
                 except msgspec.DecodeError:
                     continue
-                if state.timestamp >= self._host_time:  # not the late will of an older connection of the host
+                if state.timestamp >= self._host_time:  # ignore a late will of an older connection of the host
                     self._host_time, self._host_online = state.timestamp, state.online
             self._wake.set()
 
@@ -336,7 +336,7 @@ class EdgeNode:
             self._queue.dropped = 0
 
     async def _publish_owner(self, connected: Client, key: str, owner: _Owner) -> None:
-        """Publish what has changed of the node or a device: its death or birth, then values."""
+        """Publish the changes of the node or a device: its death or birth, then values."""
         if not owner.alive:
             if key in self._born:
                 await self._publish_values(connected, key, owner)
@@ -379,7 +379,7 @@ class EdgeNode:
             return 255
 
     def _store_session(self) -> None:
-        with contextlib.suppress(OSError):  # then a host may confuse two sessions after a restart
+        with contextlib.suppress(OSError):  # without the file, a host may confuse two sessions after a restart
             self._file.write_text(str(self._session))
 
 

@@ -1,4 +1,4 @@
-"""Connections to the broker, which are established again and again."""
+"""Connections to the broker, which are re-established after each loss."""
 
 import asyncio
 import contextlib
@@ -15,8 +15,8 @@ FIRST_PAUSE: Final = 1.0
 MAX_PAUSE: Final = 30.0
 """Shortest and longest pause between two attempts to connect, s. The pause doubles after each failed attempt."""
 KEEP_ALIVE: Final = 10
-"""Time without a message after which the broker is asked for a sign of life, s. It publishes the will after 1.5 times
-this time without one of ours."""
+"""Time without a message after which the client pings the broker, s. The broker publishes the will after 1.5 times
+this time without a message of the client."""
 TIMEOUT: Final = 10.0
 """Time limit for an answer of the broker, s."""
 MAX_INCOMING: Final = 100
@@ -29,8 +29,8 @@ async def connection(broker: Broker, identifier: str, will: Will) -> AsyncIterat
 
     Args:
         broker: how to connect.
-        identifier: of the client. The broker ends an older connection with the same identifier.
-        will: what the broker publishes when the connection is lost.
+        identifier: identifier of the client. The broker ends an older connection with the same identifier.
+        will: message that the broker publishes when the connection is lost.
 
     Raises:
         MqttError: the broker cannot be reached, does not answer, or refuses the client.
@@ -76,7 +76,7 @@ class Link:
     """Runs sessions with the broker, one after the other.
 
     Args:
-        name: which link it is in LinkChanged.
+        name: name of the link in LinkChanged.
         report: sends a message to the server.
     """
 

@@ -9,7 +9,7 @@ from arcor2_hw.plant.messages import Update
 
 
 class Broker(Struct, frozen=True):
-    """How to connect to the broker.
+    """Connection to the broker.
 
     tls: whether to use TLS. user, password: empty if it needs none. authority: file of the certificate to trust; empty
     for those that the system trusts. certificate, key: files of the client certificate; empty for none.
@@ -56,7 +56,7 @@ class LinkChanged(Struct, frozen=True, tag=True):
 
 
 class ValuesDropped(Struct, frozen=True, tag=True):
-    """So many values were dropped, because too many waited for the broker or the host."""
+    """Number of values that were dropped because too many waited for the broker or the host."""
 
     count: int
 

@@ -104,7 +104,7 @@ class PlainJson:
     """Publishes the cell as plain JSON.
 
     Args:
-        setup: of the process.
+        setup: settings of the process.
         cell: the state of the cell. `changed` has to be called after each change.
         report: sends a message to the server.
     """
@@ -129,7 +129,7 @@ class PlainJson:
             self._changed |= {"state", "counts"}
         if changes.alarms:
             self._changed.add("alarms")
-        if self._known:  # at first the server sends all alarms that need attention
+        if self._known:  # the first update contains all alarms that need attention
             for alarm in changes.alarms:
                 self._put_event("alarms/changed", _encode(alarm))
         for unit in changes.left:
@@ -201,7 +201,7 @@ class PlainJson:
             topic, content = self._events[0]
             await connected.publish(f"{self._prefix}/{topic}", content, qos=1)
             if self._events and self._events[0][1] is content:
-                self._events.popleft()  # the broker has it
+                self._events.popleft()  # the broker has received it
         for topic in sorted(self._changed):
             self._changed.discard(topic)
             for name, value in self._contents(topic):

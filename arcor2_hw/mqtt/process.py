@@ -15,7 +15,7 @@ from arcor2_hw.plant.process import ServerLink, run_until_closed
 
 
 class Publisher(Protocol):
-    """What publishes the cell in one form."""
+    """A publisher of the cell in one format."""
 
     def changed(self, changes: Changes) -> None:
         """Follow a change of the cell."""
@@ -31,7 +31,7 @@ def main(arguments: Sequence[str]) -> int:
 
 
 async def run(descriptor: int) -> None:
-    """Publish until the server closes the connection, then say goodbye to the broker.
+    """Publish until the server closes the connection, then publish death certificates and disconnect.
 
     Raises:
         IncompleteReadError: it has closed the connection.
@@ -69,7 +69,7 @@ async def run(descriptor: int) -> None:
             change(cell.apply(update))
             for task in tasks:
                 if task.done():
-                    task.result()  # a fault: the server starts this process again
+                    task.result()  # an internal error; the server restarts this process
     finally:
         for task in tasks:
             task.cancel()

@@ -73,7 +73,7 @@ class Session:
         self._powered = False
         self._sources = report.digest(bench.quality_file().parent)
 
-    # -------------------------------------------------------------------------------- the whole
+    # -------------------------------------------------------------------------------- whole description
     def run(self) -> bool:
         """Execute all steps; return whether no case failed.
 

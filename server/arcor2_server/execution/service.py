@@ -113,7 +113,7 @@ class Execution(PackageLibrary, RunObservers):
 
     @property
     def busy(self) -> bool:
-        """Whether documents must not be opened and other programs not run: during, and shortly before and after a run."""
+        """Whether no document may be opened and no other program started: during a run, and shortly before and after it."""
         return self._reserved or self.active
 
     @property

@@ -50,7 +50,7 @@ export default function HeldCard({ held }: { held: HeldData }) {
       {aboutParts && <PartsCard all />}
       <p>
         {t`Fix the cause first. The program starts nothing until you decide.`}{" "}
-        {t`What is switched on stays on, such as a belt.`}
+        {t`Outputs that are on stay on, for example a belt.`}
       </p>
       {entering ? (
         <ResultForm held={held} onClose={() => setEntering(false)} />

@@ -22,7 +22,7 @@ export function EndForce({ force }: { force: ForcedPoint }) {
       </Button>
       {asking && (
         <Confirm title={t`End the force of ${output}?`} yes={t`End force`} onClose={() => setAsking(false)} onYes={end}>
-          <p>{t`${user} forces it. It is switched back to its value from before, and what it drives may move.`}</p>
+          <p>{t`${user} forces it. It returns to its previous value, and connected devices may move.`}</p>
         </Confirm>
       )}
     </>

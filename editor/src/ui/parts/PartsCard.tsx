@@ -235,7 +235,7 @@ export function whyNot(missing: string, present: boolean): string {
   const start = t`Press Start to start it from its beginning.`;
   if (!present) return t`It cannot continue, because it was started from an open project, or its package was deleted.`;
   if (missing) return `${t`It cannot continue: ${missing} would have to be repeated.`} ${start}`;
-  return `${t`It cannot continue: what it had done is not stored.`} ${start}`;
+  return `${t`It cannot continue, because its progress is not stored.`} ${start}`;
 }
 
 const shown = (part: Part): string => part.serial || `#${part.number}`;
