@@ -53,7 +53,7 @@ def solved(cosine: float, sine: float, height: float, if_free: float) -> Values:
 def level(
     axis: Vector, turned: Vector, along: Vector, height: float, if_free: float, *, backwards: bool = False
 ) -> Values:
-    """Return the angles about `axis` that rotate `turned` to a height along `along`; with `backwards`, their negatives."""
+    """Return the angles about `axis` that rotate `turned` to a height along `along`, negated with `backwards`."""
     across = cross(axis, turned)
     sine = dot(along, across)
     height -= dot(along, axis) * dot(axis, turned)

@@ -116,7 +116,7 @@ class ValueQueue:
 
 @dataclass(slots=True)
 class _Owner:
-    """The edge node or a device: its metrics by name, and a version that changes with the names and types of metrics."""
+    """The edge node or a device: its metrics by name, and a version that changes with names and types of metrics."""
 
     level: str
     alive: bool = False

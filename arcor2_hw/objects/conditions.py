@@ -49,7 +49,7 @@ class Conditions:
         return [alarm for alarm, _ in list(self._active.values())]
 
     def raised(self, code: str) -> float | None:
-        """Return when a condition became active, on the monotonic clock, s; None if it is not active."""
+        """Return the time at which a condition became active, on the monotonic clock, s; None if it is not active."""
         found = self._active.get(code)
         return None if found is None else found[1]
 

@@ -15,7 +15,7 @@ NOT_OBSERVED: Final = (Connection.LOST, Connection.FAILED)
 
 
 class AlarmText(NamedTuple):
-    """Text of an alarm and how to remedy it."""
+    """Text and remedy of an alarm."""
 
     text: str
     remedy: str

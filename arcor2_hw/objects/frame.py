@@ -26,7 +26,7 @@ UNDISTORT_ITERATIONS: Final = 10
 
 
 class PictureNote(Data, frozen=True):
-    """How an image was taken: lens parameters, pose of the camera's optical frame in the world, time and camera."""
+    """Data about an image: lens parameters, pose of the camera's optical frame in the world, time and camera."""
 
     parameters: CameraParameters
     pose: Pose

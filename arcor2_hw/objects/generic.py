@@ -29,7 +29,7 @@ class Generic(abc.ABC):
 
     Class Attributes:
         _ABSTRACT: Whether the type cannot be added to a scene.
-        loss_reaction: What the device does when it loses the connection.
+        loss_reaction: Reaction of the device to a connection loss.
         loss_ends_program: Whether the running program ends when this device is disconnected.
         own_process: Whether instances run in their own process, so that their computations do not delay other devices.
         DYNAMIC_PARAMS: {parameter: (method that returns its values, names of the parameters it needs)}.
@@ -37,8 +37,8 @@ class Generic(abc.ABC):
         display_name: Name of the type in the editor, such as "Luxonis OAK-D"; not inherited. Default: the class name.
         category: Category in the editor.
         icon: Icon in the editor.
-        place_kind: As what kind of place of parts the object counts; None if it holds no parts.
-        place_capacity: How many parts fit in it; 0: any number.
+        place_kind: Kind of place for parts; None if the object holds no parts.
+        place_capacity: Maximum number of parts in it; 0: unlimited.
     """
 
     _ABSTRACT: ClassVar[bool] = True
@@ -149,17 +149,17 @@ class Generic(abc.ABC):
         return None
 
     def identify(self) -> Identity:
-        """Read the identity of the device. It is called after each connection and acts on nothing."""
+        """Read the identity of the device. It is called after each connection, and must change nothing."""
         raise Arcor2NotImplemented("identify")
 
     def counters(self) -> dict[str, int]:
-        """Read what the device itself counts, by name in plain words, such as "labels printed". It acts on nothing."""
+        """Read the counters of the device, by name in plain words, such as "labels printed". Change nothing."""
         raise Arcor2NotImplemented("counters")
 
     def parameters_dump(self) -> list[DeviceParameter]:
-        """Read the parameters that the device stores, for a backup. It acts on nothing.
+        """Read the parameters that the device stores, for a backup. Change nothing.
 
-        Include what a technician has set up and another device of this model needs. Leave out the identity, the
+        Include what a technician has set up and a replacement device of this model needs. Leave out the identity, the
         address, values that the driver writes from its settings, and values that change by themselves.
 
         Raises:
@@ -170,7 +170,7 @@ class Generic(abc.ABC):
     def parameters_restore(self, parameters: list[DeviceParameter]) -> list[ParameterFailure]:
         """Write parameters of a backup that this model has. Return those that could not be written, with the reason.
 
-        It moves and enables nothing. A parameter that is unknown or rejected does not prevent the others.
+        Do not move or enable anything. Write the other parameters if one is unknown or rejected.
 
         Raises:
             Refused: No parameter can be written in the present state.

@@ -167,7 +167,7 @@ class Line:
             clock, received = RunningTime(), b""
             late = False
             while not late:
-                late = clock() >= limit  # then read once more: this process may have been suspended
+                late = clock() >= limit  # read once more, because this process may have been suspended
                 if data := self.receive():
                     received = (received + data)[-MAX_ANSWER:]
                     if (found := answer(received)) is not None:
@@ -188,7 +188,7 @@ class Line:
         return self.ask(question.encode("ascii") + end, first_line, question)
 
     def broken(self, error: DeviceError) -> DeviceError:
-        """Note what broke the line, and return it."""
+        """Store the error that broke the line, and return it."""
         self.loss = self.loss or error
         return error
 

@@ -77,5 +77,5 @@ class Machine(abc.ABC):
         raise Arcor2NotImplemented("stop_reason")
 
     def permissives(self) -> list[tuple[str, bool]]:
-        """Return the conditions for a start, each with whether it is met."""
+        """Return the conditions for a start, and for each whether it is met."""
         raise Arcor2NotImplemented("permissives")

@@ -51,10 +51,10 @@ class MappedDevice(ModbusDevice[dict[str, Any]]):
     BUSY: ClassVar[Values] = {}
     """Values of points while the device executes a command."""
     STOP: ClassVar[Values] = {}
-    """What is written to stop it."""
+    """Values that are written to stop the device."""
     TAKE_CONTROL: ClassVar[Values] = {}
     RELEASE_CONTROL: ClassVar[Values] = {}
-    """What is written to take and to release control."""
+    """Values that are written to take and to release control."""
     OWNER: ClassVar[str] = ""
     """Point with the texts `us`, `nobody`, and others for other owners of control; empty: not reported."""
     FAULT: ClassVar[str] = ""
@@ -69,7 +69,7 @@ class MappedDevice(ModbusDevice[dict[str, Any]]):
         self._blocks = blocks(self.POINTS)
         self._debounced: dict[str, Debounced] = {}
         self._beats, self._beat_at = 0, 0.0
-        # A reading in progress and one more; each request may be repeated, after draining a serial line.
+        # A reading in progress and another one. Each request may be repeated after draining a serial line.
         self.answers_within = 3.0 * settings.request_timeout * (len(self._blocks) + 1)
         self.use_link(self.link)
 
@@ -165,7 +165,7 @@ class MappedDevice(ModbusDevice[dict[str, Any]]):
             self.set_alarm(code, code == str(self.fault_of(snapshot.value)))
 
     def after_reading(self) -> None:
-        """Write the heartbeat, again if no answer came. A device that refuses it no longer obeys us."""
+        """Write the heartbeat, and repeat it without an answer. If the device refuses it, we have lost control."""
         now = time.monotonic()
         if not self.HEARTBEAT or not self.in_control or now - self._beat_at < self.HEARTBEAT_PERIOD:
             return
@@ -241,11 +241,11 @@ class MappedDevice(ModbusDevice[dict[str, Any]]):
 
         Args:
             what: Name of the command, for errors.
-            write: What starts it.
+            write: Values that start the command.
             acknowledge: Values by which the device shows that it has accepted the command.
             done: Values by which it shows that it has finished.
             ok: Values at the end of a successful execution.
-            after: What is written in any case at the end, such as the start signal off.
+            after: Values that are written at the end in any case, such as the start signal off.
 
         Raises:
             Refused: The device is busy.

@@ -347,7 +347,7 @@ class ModbusLink:
             return _NoAnswer(f"{problem} within {timeout:.3g} s ({what})")
         if isinstance(error, OSError | ValueError):  # a reset, or a socket closed by `close`
             return self._lost(error)
-        self._give_up()  # decoding an invalid answer may raise anything
+        self._give_up()  # decoding an invalid answer may raise any exception
         return _NoAnswer(f"no valid answer ({what}: {type(error).__name__})")
 
     def _not_connected(self) -> NotConnected:

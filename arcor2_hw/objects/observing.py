@@ -232,7 +232,7 @@ class Observing:
         except DeviceError as e:
             return e
         except Exception as e:
-            if self._state is not Connection.LOST:  # otherwise it is in the log already
+            if self._state is not Connection.LOST:  # otherwise the error is in the log already
                 log.exception("%s: internal error of the driver", self.what)
             return ConnectionLost("{what}: internal error of the driver", f"{type(e).__name__}: {e}", what=self.what)
         return None

@@ -80,9 +80,9 @@ class ObstacleSnapshot:
         return ObstacleSnapshot(self.obstacles, robots)
 
     def changed_since(self, before: "ObstacleSnapshot", robot: str) -> "ObstacleSnapshot":
-        """Return what appeared or moved since `before`, and what `robot` holds.
+        """Return the obstacles that appeared or moved since `before`, and the parts that `robot` holds.
 
-        If the robot holds something new, return the whole snapshot, because the part may collide with anything.
+        If the robot holds a new part, return the whole snapshot, because the part may collide with any obstacle.
         """
         obstacles = {name: one for name, one in self.obstacles.items() if before.obstacles.get(name) != one}
         if any(one.attachment is not None and one.attachment.robot == robot for one in obstacles.values()):

@@ -70,7 +70,7 @@ class PathMonitor:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with self._stopping:  # a stop that was sent must not reach the next motion
+        with self._stopping:  # a stop that was already sent must not end the next motion
             self._over.set()
         self._thread.join(JOIN_TIMEOUT)
         blocked = self._contact is not None or self._problem is not None

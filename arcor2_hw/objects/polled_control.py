@@ -54,7 +54,7 @@ class PolledControl(Connected, typing.Generic[T]):
     """Time limit from a stop to standstill, s."""
     in_control: bool = False
     why_not: str = NOBODY
-    """Why control was not taken or has ended."""
+    """Reason why control was not taken or has ended."""
     _link: Link
 
     def use_link(self, link: Link, observer: StateObserver[T] | None = None) -> None:
@@ -266,7 +266,7 @@ class PolledControl(Connected, typing.Generic[T]):
         self.drop_control(Phrase.of("control ended when the connection was lost"))
 
     def check_control(self, snapshot: Snapshot[T]) -> None:
-        """End control if a state requested after it was taken shows that the device no longer obeys us."""
+        """End control if a state requested after taking control shows that the device no longer executes our commands."""
         if self.in_control and snapshot.asked > self._control_since and (why := self.why_control_ended(snapshot.value)):
             self.drop_control(why)
 

@@ -26,7 +26,7 @@ class RobotTools:
     """Model, arms and meshes of a robot, and models of other robots.
 
     Attributes:
-        made_of: Settings, package and calibration. When they change, a new object is created.
+        made_of: Settings, package and calibration. A change of these creates a new object.
 
     Raises:
         Refused: The robot has no package, or the extra `kinematics` is not installed.

@@ -62,7 +62,7 @@ class Settings:
     A stored secret is sent only to the address that it was entered for. A str whose name indicates an address (`host`,
     `url`, `address`, `port`, ...) is part of that address; metadata `"address": True` or `False` overrides this.
 
-    A setting with the metadata `"for_control": True` must be set before the device can be controlled. Its default means
+    A setting with metadata `"for_control": True` must be set before the device can be controlled. Its default means
     "not set". The editor asks for it when a device is added, and names it where it is missing.
 
     The metadata `"found_by"` names the search (arcor2_hw.data.discovery.Search) that finds values of a setting:

@@ -17,7 +17,7 @@ from arcor2_hw.objects.surroundings import Surroundings
 
 @dataclasses.dataclass
 class Recording:
-    """A motion in progress; `end` is how it ended, None while unknown."""
+    """A motion in progress. `end` is its outcome, None while unknown."""
 
     end: MoveEnd | None = None
 

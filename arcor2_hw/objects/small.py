@@ -132,7 +132,7 @@ class PointDirection(enum.StrEnum):
 
 
 class OnLoss(enum.StrEnum):
-    """What an output does when the device loses the connection."""
+    """Reaction of an output to a connection loss of the device."""
 
     HOLD = "hold"
     OFF = "off"
@@ -369,7 +369,7 @@ class Scale(Generic):
 
     @abc.abstractmethod
     def zero(self) -> None:
-        """Use the present weight as zero."""
+        """Set the present weight to zero."""
 
 
 class Printer(Generic):

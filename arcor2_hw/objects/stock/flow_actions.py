@@ -13,7 +13,7 @@ log = logging.getLogger(__name__)
 
 
 class AlarmLevel(StrEnum):
-    """How urgent an alarm of a program is."""
+    """Urgency of an alarm of a program."""
 
     INFO = "info"
     WARNING = "warning"

@@ -15,7 +15,7 @@ from arcor2_hw.objects.small import HasPoints
 
 
 class Outcome(StrEnum):
-    """How the parts in a box are counted."""
+    """Category in which the parts in a box are counted."""
 
     GOOD = "good"
     BAD = "bad"

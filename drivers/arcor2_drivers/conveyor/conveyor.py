@@ -303,7 +303,7 @@ class Conveyor(PolledControl[State], Machine, Axis):
         return self._unit.reason(self.current())
 
     def permissives(self) -> list[tuple[str, bool]]:
-        """Return the conditions of a start, each with whether it is met."""
+        """Return the conditions of a start, and for each whether it is met."""
         now = self.current()
         return [
             ("control is taken", self.in_control),

@@ -116,7 +116,7 @@ class FunctionalTester(Tester, Machine, CollisionObject):
         ]
 
     def permissives(self) -> list[tuple[str, bool]]:
-        """Return the conditions of a test, each with whether it is met."""
+        """Return the conditions of a test, and for each whether it is met."""
         inputs = self.current()
         return [
             ("door closed", inputs.door_closed),

@@ -113,7 +113,7 @@ class Execution(PackageLibrary, RunObservers):
 
     @property
     def busy(self) -> bool:
-        """Whether no document may be opened and no other program started: during a run, and shortly before and after it."""
+        """Whether documents and other programs must not be opened or started: around and during a run."""
         return self._reserved or self.active
 
     @property
