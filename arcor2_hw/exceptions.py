@@ -32,7 +32,7 @@ class Arcor2Error(Exception):
 
     def with_message(self, message: Message) -> Self:
         """Return an error like this one with another message."""
-        error = type(self).__new__(type(self))  # its constructor may want other arguments
+        error = type(self).__new__(type(self))  # its constructor may require other arguments
         vars(error).update(vars(self))
         error.args = (message.text,)
         error.message = message

@@ -35,9 +35,9 @@ class ActionReader:
         self._resolver = hierarchy.resolver
         self._known_marks: dict[ClassInfo, list[tuple[FunctionNode, ActionMetadata | AnalysisStopped]]] = {}
 
-    # -------------------------------------------------------------------------------- which methods are actions
+    # -------------------------------------------------------------------------------- detection of actions
     def mark(self, owner: ClassInfo, name: str, node: FunctionNode) -> ActionMetadata | None:
-        """Return the metadata of an action, marked by the decorator or by `method.__action__ = ActionMetadata()`."""
+        """Return the metadata of a method that is marked as an action by the decorator or `method.__action__ = ActionMetadata()`."""
         expression = owner.marks.get((name, "__action__"))
         if expression is not None:
             if not isinstance(expression, ast.Call):
@@ -304,7 +304,7 @@ class _Limits:
 
 
 def _ranges(node: FunctionNode) -> dict[str, _Limits]:
-    """Return the ranges that a body asserts for its parameters, for each parameter the first one.
+    """Return the ranges that a body asserts for its parameters: the first one for each parameter.
 
     As in the protocol, only plain literals count. A negative bound (an operator and a literal) is not a range.
     """
@@ -327,7 +327,7 @@ def _ranges(node: FunctionNode) -> dict[str, _Limits]:
 @functools.lru_cache(maxsize=1024)
 def described_parameters(docstring: str | None) -> Mapping[str, str]:
     """Return the description of each parameter in a docstring, in any of the usual styles."""
-    # Imported here: a start of the server that restores its stored analysis does without.
+    # Imported here, because a server start with a stored analysis does not need it.
     from docstring_parser import DocstringStyle, ParseError, parse as parse_docstring
 
     if not docstring:

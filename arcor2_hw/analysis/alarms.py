@@ -53,13 +53,13 @@ def read(folder: Path) -> list[AlarmKind]:
 
 
 def _picture(folder: Path, name: str) -> Path:
-    """Return the file of a picture; the folder itself for a name that is not one of an SVG file below it."""
+    """Return the file of a picture; the folder itself for a name that is not that of an SVG file in it."""
     file = folder / name
     return file if file.suffix == ".svg" and folder in file.resolve().parents else folder
 
 
 def kind_of(code: str, *declared: Iterable[AlarmKind]) -> AlarmKind | None:
-    """Return the declaration of a code: exact before pattern, then by the order of the lists, then by length."""
+    """Return the declaration of a code: exact matches before patterns, earlier lists first, then longer patterns first."""
     found = [
         (kind.code == code, -rank, len(kind.code.replace("*", "")), kind)
         for rank, kinds in enumerate(declared)

@@ -87,7 +87,7 @@ def constant(
     """Return the value of an expression.
 
     Raises:
-        AnalysisStopped: It cannot be determined without running it; the error has the line.
+        AnalysisStopped: The value cannot be determined without running the code; the error has the line.
     """
 
     def again(part: ast.expr) -> Any:

@@ -12,7 +12,7 @@ from arcor2_hw.analysis.symbols import External, Resolver, framework_name, is_fr
 Ancestors = list["ClassInfo | External"]
 
 DRIVER_BASES: Final = ("Connected", "PointActions")
-"""Bases for drivers: mixins that implement what an object type base leaves to the driver."""
+"""Bases for drivers: mixins that implement methods which an object type base leaves to the driver."""
 
 
 class Hierarchy:
@@ -97,7 +97,7 @@ class Hierarchy:
         return name in self._ours[info]
 
     def find(self, info: ClassInfo, name: str) -> tuple[ClassInfo, Binding] | None:
-        """Return the class that binds a member as seen from `info`, and the binding."""
+        """Return the binding of a member as seen from `info`, and the class that contains it."""
         for each in self.ancestors(info):
             if name in each.members:
                 binding = each.members[name]
@@ -179,7 +179,7 @@ class Hierarchy:
     def implemented_hooks(self, info: ClassInfo) -> frozenset[str]:
         """Return the optional methods of our bases that the type, or one of its own ancestors, implements.
 
-        A base for drivers implements what it defines; another of our bases, what a further one does not implement.
+        A base for drivers implements all that it defines. Another base implements a method if a further base does not.
         """
         ours = [each for each in self.ancestors(info) if is_framework(each)]
         for_drivers = [each for each in ours if any(self.derives_from(each, name) for name in DRIVER_BASES)]
@@ -195,7 +195,7 @@ class Hierarchy:
         return frozenset(result)
 
     def _fills_in(self, name: str, bases: list[ClassInfo]) -> bool:
-        """Return whether one of our bases does not implement a method, with a body that only raises."""
+        """Return whether one of our bases leaves a method unimplemented: its body only raises an error."""
         declared = (each.function(name) for each in bases)
         return any(
             node is not None and self.is_hook_only(node, each) for node, each in zip(declared, bases, strict=True)

@@ -40,7 +40,7 @@ class InstalledType(Data, frozen=True):
 
 
 def installed_types() -> list[InstalledType]:
-    """Return the object types of all installed distributions by name, for equal names the first one.
+    """Return the object types of all installed distributions by name, for equal names only the first one.
 
     A distribution whose metadata cannot be read is listed as a type with a problem, named after its files.
     """
@@ -49,7 +49,7 @@ def installed_types() -> list[InstalledType]:
     for distribution in distributions():
         folder = Path(str(getattr(distribution, "_path", "")))
         own = folder.name.partition("-")[0]
-        if own.lower() not in seen:  # of two versions in the search path, the first one is imported
+        if own.lower() not in seen:  # Python imports the first of two versions in the search path
             seen.add(own.lower())
             for each in _types_of(distribution, folder, own):
                 found.setdefault(each.name, each)

@@ -193,7 +193,7 @@ class Library:
         return None
 
     def _needed(self, module: Module, lookups: set[str]) -> list[SourceFile]:
-        """Return the files that a module needs, each after those it needs itself.
+        """Return the files that a module needs, each after its own requirements.
 
         Args:
             module: to start from.

@@ -163,7 +163,7 @@ class Module:
 
 
 def _statements(body: Sequence[ast.stmt], sure: bool = True) -> Iterator[tuple[ast.stmt, bool]]:
-    """Yield the statements that run when the module is imported, each with whether it certainly does.
+    """Yield the statements that run when the module is imported, each with whether it certainly runs.
 
     Of alternatives the first one counts: the bindings in `try`, not those in its handlers.
     """

@@ -67,7 +67,7 @@ def _robot_type(info: ClassInfo, hierarchy: Hierarchy) -> RobotType:
 
 
 def _has(info: ClassInfo, method: str, hierarchy: Hierarchy) -> bool:
-    """Return whether a method is implemented, by the type or by some of our bases."""
+    """Return whether a method is implemented, by the type or by one of our bases."""
     found = hierarchy.method(info, method)
     if found is None:
         return False

@@ -48,7 +48,7 @@ class Interlock(Data, frozen=True):
     object_id: the object, or the collision body that is the zone. A zone belongs to one robot at a time. actions: names
     of actions of the object; none for all its actions and motions. during: whether the conditions are needed as long as
     the action runs, or a robot moves in the zone. within: longest time for which an action waits, s. retract: path on
-    which a robot leaves the zone, points in the frame of the body, the last one outside; none for the shortest way.
+    which a robot leaves the zone, points in the frame of the body, the last one outside; none for the shortest path.
     """
 
     name: str

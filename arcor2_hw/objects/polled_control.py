@@ -266,7 +266,7 @@ class PolledControl(Connected, typing.Generic[T]):
         self.drop_control(Phrase.of("control ended when the connection was lost"))
 
     def check_control(self, snapshot: Snapshot[T]) -> None:
-        """End control if a state requested after taking control shows that the device no longer executes our commands."""
+        """End control if a state requested after taking control shows that the device has another owner."""
         if self.in_control and snapshot.asked > self._control_since and (why := self.why_control_ended(snapshot.value)):
             self.drop_control(why)
 

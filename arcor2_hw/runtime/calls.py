@@ -25,7 +25,7 @@ from arcor2_hw.runtime.teaching import SET_MODE, Teaching
 Post = Callable[[m.ToServer], None]
 _Guard = Callable[[Mapping[str, Any]], contextlib.AbstractContextManager[None]]
 _ONLY_CONTROL: Final = frozenset({"check_if_ready_to_move"})
-"""Methods that the server calls to take control, and that move nothing."""
+"""Methods that the server calls to take control. They move nothing."""
 
 
 def error_data(error: BaseException, object_id: str = "") -> m.ErrorData:
@@ -102,7 +102,7 @@ class Calls:
             self._clock.after(within, lambda: lane.expire(job, within))
 
     def _guard(self, device: Device, method: str, control: bool) -> tuple[_Guard | None, float]:
-        """Return the context of a call that acts on its device, and how long it may wait in it, s."""
+        """Return the context of a call that acts on its device, and the maximum waiting time in this context, s."""
         interlocks = self._interlocks
         if interlocks is None or not control or method in _ONLY_CONTROL:
             return None, 0.0

@@ -134,7 +134,7 @@ def scene_recipes(
 
 
 def own_objects(message: OpenScene | RunPackage, scene: Scene) -> list[SceneObject]:
-    """Return the objects that a host creates: all in the main host, which has stubs of those of the others."""
+    """Return the objects that a host creates. The main host creates all, with stubs for those of other hosts."""
     return [one for one in scene.objects if message.main or one.id not in message.remote]
 
 
@@ -273,7 +273,7 @@ class Cell:
         return device
 
     def _identification(self, how: Recipe) -> Identification | None:
-        """Return what recognises a device, None if its type has no identity.
+        """Return the identification of a device, None if its type has no identity.
 
         Commands of a type that continues without its connection, such as a service with an outbox, are not delayed.
         """
@@ -323,7 +323,7 @@ class Cell:
         if former is not None and former.failure is None:
             former.fail(NotConnected("{name} is being connected again", name=former.name))
         if former is not None and former.closed_by is not None:
-            former.closed_by.wait(CLOSE_DEADLINE)  # two instances would use the same port
+            former.closed_by.wait(CLOSE_DEADLINE)  # a second instance would use the same port
         device = self._make(how)
         self._absent.pop(object_id, None)
         job, deadline = device.open(lambda _: None)
@@ -390,7 +390,7 @@ class Cell:
         return True
 
     def take_control(self) -> list[tuple[Device, BaseException]]:
-        """Take control of every device that supports it, concurrently. Return the devices that refuse, and why."""
+        """Take control of every device that supports it, concurrently. Return the devices that refuse, with reasons."""
         jobs = []
         for device in self:
             if overrides(device.recipe.cls, "take_control"):

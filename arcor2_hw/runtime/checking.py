@@ -92,7 +92,7 @@ def _read(device: Device, found: Checked) -> Checked:
         found,
         identity=identity,
         alarms=alarms,
-        control_owner=None if owner is None else str(owner),  # it may be a Phrase, which cannot be encoded
+        control_owner=None if owner is None else str(owner),  # the text may be a Phrase, which cannot be encoded
         health=health,
         connection=connection,
         problem=problem,

@@ -22,7 +22,7 @@ _decode = msgspec.msgpack.Decoder(PartInventory).decode
 
 
 class Checkpoints(Protocol):
-    """The checkpoints of a scene, of which the newest is stored."""
+    """Storage for the newest checkpoint of a scene."""
 
     def write(self, inventory: PartInventory) -> None:
         """Store a checkpoint. It is on disk when this returns. Raises StorageError."""

@@ -48,7 +48,7 @@ class CheckpointsAtServer:
                 answer = self._answers.get(timeout=max(0.0, limit - time.monotonic()))
             except Empty:
                 raise StorageError("The state of the run cannot be stored: the server does not answer.") from None
-            if answer is not None and answer.number == self._number:  # others are answers that were late
+            if answer is not None and answer.number == self._number:  # other answers are late ones
                 if answer.problem is not None:
                     raise StorageError(answer.problem)
                 return answer
@@ -60,6 +60,6 @@ class CheckpointsAtServer:
         self._answers.put(answer)
 
     def abandon(self) -> None:
-        """Handle the end of the connection to the server: whoever waits, and each later call, fails."""
+        """Handle the end of the connection to the server: waiting and later calls fail."""
         self._lost = True
         self._answers.put(None)

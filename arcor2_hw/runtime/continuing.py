@@ -17,8 +17,8 @@ from arcor2_hw.runtime.recovery import decode_results
 class Continuation:
     """The actions of the interrupted cycle. The script runs from its start; they return their stored results.
 
-    The first action that has not been done, the first one that is repeated in a branch, and each that was running holds
-    the program, so that a person decides.
+    The program is held, so that a person decides, at the first action that was not completed, at the first repeated
+    action of a branch, and at each action that was running.
 
     Args:
         run: the interrupted run. Its results are complete.
@@ -36,7 +36,7 @@ class Continuation:
         self._first = True
 
     def take(self, branch: Branch, action: str | None, name: str) -> DoneAction | None:
-        """Return the outcome of the next action of a branch; None if it has not been done.
+        """Return the outcome of the next action of a branch; None if it was not completed.
 
         Raises:
             Conflict: the interrupted program has done another action here.
@@ -61,7 +61,7 @@ class Continuation:
             return list(self._unfinished.values())
 
     def interruption(self, branch: Branch, action: Action, name: str) -> ProgramInterrupted | None:
-        """Return why a person has to decide about an action that was not done; None if that is not necessary."""
+        """Return why a person has to decide about an action that was not completed; None if that is not necessary."""
         key = branch.id, action.id or ""
         with self._lock:
             first, self._first = self._first, False

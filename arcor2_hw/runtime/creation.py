@@ -64,7 +64,7 @@ def _import(module: str, type_name: str) -> ModuleType:
         return importlib.import_module(module)
     except Arcor2Error:
         raise
-    except BaseException as error:  # importing an object type may raise anything
+    except BaseException as error:  # importing an object type may raise any exception
         if isinstance(error, KeyboardInterrupt):
             raise
         detail = f"{type(error).__name__}: {error}"
@@ -74,14 +74,14 @@ def _import(module: str, type_name: str) -> ModuleType:
 
 
 def shown_name(cls: type[Generic]) -> str:
-    """Return the name of a type for users: its own display name, else the name of the class."""
+    """Return the name of a type for users: its display name, or without one the name of the class."""
     return cls.__dict__.get("display_name") or cls.__name__
 
 
 def write_sources(types: Iterable[TypeCode]) -> None:
     """Write uploaded sources as package `object_types` into a private directory and add that to the import path.
 
-    The directory stays, for tracebacks of types that are loaded. The server removes it after the end of the host.
+    The directory is kept for tracebacks of loaded types. The server removes it after the end of the host.
     """
     uploaded = [code for code in types if not code.entry_point and code.source]
     if not uploaded:
@@ -274,7 +274,7 @@ class Remotes(typing.Protocol):
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Recipe:
-    """Class and constructor arguments of one instance. remotes: makes a stub, because another host has the object."""
+    """Class and constructor arguments of one instance. remotes: creates a stub if another host has the object."""
 
     scene_object: SceneObject
     cls: type[Generic]

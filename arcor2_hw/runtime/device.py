@@ -60,7 +60,7 @@ class Device:
         find: Returns the instance of another object of the scene by name or id.
         surroundings: Obstacles and other robots, for a robot.
         find_robot: Returns the robot that carries a gripper.
-        identification: Recognises the device; None if another device is not noticed.
+        identification: Identification of the device; None if another device is not detected.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class Device:
         self._process: DeviceProcess | None = None
         """The child process of an object type that requires its own process."""
         self.failure: Arcor2Error | None = None
-        """Why the device could not be connected, in a scene that continues without it."""
+        """Reason why the device could not be connected, in a scene that continues without it."""
 
     # -------------------------------------------------------------------------------- life
     def open(self, notify: Callable[[Job], None]) -> tuple[Job, float]:
@@ -124,7 +124,10 @@ class Device:
         return job if self.lane.submit_or_fail(job) else None
 
     def require_confirmed(self, lane: Lane) -> None:
-        """Raise DifferentDevice or Refused unless the device may be commanded. It reads after a connection loss."""
+        """Raise DifferentDevice or Refused unless the device may be commanded.
+
+        After a connection loss, it reads the identity.
+        """
         if self.identification is not None and not self.identification.confirmed:
             lane.call(_IDENTIFY, self._require_confirmed)
 
@@ -192,7 +195,7 @@ class Device:
         self._changed(self)
 
     def connection_reason(self) -> Message | None:
-        """Return why the connection is lost or has failed; None if it has not, or for an unknown reason."""
+        """Return why the connection is lost or has failed; None without a loss or for an unknown reason."""
         given = "" if self.instance is None else self.instance.connection_reason
         if given:
             return given if isinstance(given, Message) else Message.of(given)

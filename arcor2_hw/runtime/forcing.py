@@ -1,4 +1,4 @@
-"""Forced outputs in the cell host: an output keeps a value as long as a lease is renewed, and is then switched back.
+"""Forced outputs in the cell host: an output is forced while a lease is renewed, and is then switched back.
 
 The clock of this process ends the lease even if the client, the network or the server hangs. If this process ends, the
 device switches the output to the state that its driver declares for a lost connection.
@@ -47,7 +47,7 @@ class _Force:
         self.ending = False
         self.error: Arcor2Error | None = None
         self.end_ids: list[int] = []
-        """Ids of the requests that the end answers."""
+        """Ids of the requests that are answered when the force has ended."""
         self.over = threading.Event()
 
     @property
@@ -167,7 +167,7 @@ class Forces:
             self._end(force, Cancelled("{device}: the force of {point} was not renewed in time", **force.names))
 
     def check_all(self) -> None:
-        """End the forces of devices that are not connected, or not controlled, any more."""
+        """End the forces of devices that are no longer connected or controlled."""
         for force in list(self._forces.values()):
             if not force.started or force.ending or (instance := force.instance) is None:
                 continue
@@ -184,7 +184,7 @@ class Forces:
                 return
             force.ending, force.error = True, error
             started = force.started
-        if started:  # otherwise as soon as the call that forces it has ended
+        if started:  # otherwise the output is switched back when the call that forces it has ended
             self._switch_back(force)
 
     def _switch_back(self, force: _Force) -> None:

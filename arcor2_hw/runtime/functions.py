@@ -42,7 +42,7 @@ def announced(
 
     Args:
         program: the program.
-        name: what is called, for messages.
+        name: name of the called function, for messages.
         an: name of the action.
         shown: values of the parameters.
         body: receives the announced action and returns the result.

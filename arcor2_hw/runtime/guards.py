@@ -34,15 +34,15 @@ class Guard:
         self.device, self.what, self.zones, self.watched = device, what, zones, watched
         self.targets_known, self.stop = targets_known, stop
         self.broken: Interlocked | None = None
-        """Why it was stopped."""
+        """Reason of the stop."""
         self.leaving: ZoneExit | None = None
-        """Set if it may only leave the zones in which the robot is."""
+        """Set if the motion may only leave the zones in which the robot is."""
         self.retracts = False
-        """Whether it follows the retract paths of these zones."""
+        """Whether the motion follows the retract paths of these zones."""
 
 
 class Obstruction(NamedTuple):
-    """Why an action may not start. patience: how long it may wait, s."""
+    """Reason why an action may not start. patience: maximum waiting time, s."""
 
     reason: Message
     patience: float

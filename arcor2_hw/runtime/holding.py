@@ -43,7 +43,7 @@ class _Hold:
         self.guard: Guard | None = None
         self.driver_started = False
         self.lease_ids: list[int] = []
-        """Ids of the leases that the next call of the driver answers."""
+        """Ids of the leases that are answered after the next call of the driver."""
         self.release_ids: list[int] = []
         self.job: Job | None = None
         self.ending = False

@@ -65,7 +65,7 @@ FORCES_END_TIMEOUT: Final = 0.5
 NICENESS: Final = -5
 """Niceness of this process: devices have priority over user interfaces."""
 FLUSH_TIMEOUT: Final = 2.0
-"""Time without progress after which the last messages are given up, s; a busy server may read that late."""
+"""Time without progress after which the last messages are dropped, s. A busy server may be that late."""
 
 
 class _LogHandler(logging.Handler):
@@ -284,7 +284,7 @@ class Host:
         try:
             for message in self.link.messages(self._wake):
                 self._handle(message)
-        except (msgspec.MsgspecError, ValueError) as error:  # the next messages cannot be read either
+        except (msgspec.MsgspecError, ValueError) as error:  # later messages cannot be read either
             self.link.post(m.LogLine("error", f"received an invalid message from the server: {error}"))
         self._shut_down()
 
@@ -349,7 +349,7 @@ class Host:
                 self._confirm_identity(message)
             case m.DecideHeld():
                 self._decide(message)
-            case m.ConfirmParts():  # waits for a disk, which must not delay stops
+            case m.ConfirmParts():  # this waits for a disk, which must not delay stops
                 threading.Thread(target=self._confirm_parts, args=(message,), name="confirm parts", daemon=True).start()
             case m.CheckpointAnswer():
                 self._at_server.answered(message)

@@ -1,4 +1,4 @@
-"""Recognition of a device: another device than the confirmed one is observed, but not commanded."""
+"""Identification of a device. A device that differs from the confirmed one is observed, but not commanded."""
 
 import logging
 import threading
@@ -45,7 +45,7 @@ class Identification:
     Args:
         name: Name of the device.
         known: The confirmed identity, None for a device that was not seen before.
-        report: Called, on any thread, with what was read.
+        report: Called, on any thread, with the result of reading.
         changed: Called, on any thread, when the alarm begins or ends.
     """
 
@@ -82,7 +82,7 @@ class Identification:
         losses = self._losses
         try:
             found = instance.identify()
-        except Arcor2NotImplemented:  # the type declares it, the device does not have it
+        except Arcor2NotImplemented:  # the type declares an identity, but the device has none
             found = Identity()
         except Exception as error:
             message = message_of(error)
@@ -96,7 +96,7 @@ class Identification:
                 reason=message,
             ) from error
         if losses != self._losses:
-            return  # it may be that of the device before the connection loss; the next command reads it again
+            return  # the identity may be that of the device before the connection loss; the next command reads it again
         self._found = found
         self._compare()
         self._report(ReadIdentity(found, counters=_counters(instance)))
@@ -125,7 +125,7 @@ class Identification:
 
     @property
     def difference(self) -> Message | None:
-        """Return how the device differs from the confirmed one, None if it does not or is unknown."""
+        """Return the difference from the confirmed device, None if there is none or the identity is unknown."""
         known, found = self._known, self._found
         if known is None or found is None:
             return None

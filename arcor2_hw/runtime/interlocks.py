@@ -58,7 +58,7 @@ class Interlocks:
         self._closed = threading.Event()
         self._interlocks: dict[str, Interlock] = {}
         self._needed: dict[str, set[Key]] = {}
-        """What is read of each device; nothing but the position of a robot."""
+        """Observations to read from each device; empty if only the position of a robot is read."""
         self._threads: dict[str, threading.Thread] = {}
         self._seen: dict[Key, CachedValue] = {}
         self._tracks: dict[str, Track] = {}
@@ -121,7 +121,7 @@ class Interlocks:
             self._closed.wait(READ_PERIOD)
 
     def _follow(self, device: Device) -> None:
-        """Read the position of a robot: it releases zones that it has left, and enters others only if it may."""
+        """Read the position of a robot. Release zones that it has left, and stop it in zones that it must not enter."""
         before = self._tracks.get(device.id)
         now = time.monotonic()
         tips = tips_of(device)
@@ -133,7 +133,7 @@ class Interlocks:
                 if device.id not in self._guards and not any(device.id in ids for ids in self._waiting.values()):
                     self._tokens.release(device.id, keep=inside)
                     if inside and self._tokens.take(device.id, inside):
-                        self._tokens.release(device.id, keep=inside)  # it is stopped there, and does not wait
+                        self._tokens.release(device.id, keep=inside)  # the robot is stopped there, and does not wait
             return
         entered = set(inside)
         if guard.leaving is not None:
@@ -228,7 +228,7 @@ class Interlocks:
         return max(min(waits, default=0.0), self._started + FIRST_READING - time.monotonic())
 
     def _check_guards(self) -> None:
-        """Stop what runs although a condition that it needs is not met any more."""
+        """Stop actions and motions whose conditions are no longer met."""
         broken: list[tuple[Guard, Interlocked]] = []
         with self._lock:
             for guard in self._guards.values():
@@ -277,7 +277,7 @@ class Interlocks:
             self.leave(guard)
 
     def longest_wait(self, device: Device, method: str) -> float:
-        """Return how long an action may wait before it starts, s."""
+        """Return the maximum time that an action may wait before it starts, s."""
         found = [one for one in self._interlocks.values() if one.zone or one in self._concerned(device.id, method, ())]
         return FIRST_READING + sum(one.within for one in found if one.otherwise is Unmet.WAIT) if found else 0.0
 
@@ -320,7 +320,7 @@ class Interlocks:
     def _admit_leaving(
         self, device: Device, motion: str, stop: Callable[[Interlocked], None], refused: Interlocked | None
     ) -> Guard:
-        """Admit a motion that only leaves zones: those that the robot may not have, or all without `refused`."""
+        """Admit a motion that only leaves zones: the refused ones, or without `refused` all."""
         robot = device.require()
         tips = tips_of(device) if self._zones and not isinstance(robot, MultiArmRobot) else []
         bodies = dict(self._bodies.present())
@@ -447,9 +447,9 @@ class Interlocks:
 
     # -------------------------------------------------------------------------------- states
     def publish(self) -> None:
-        """Publish the states of the interlocks if they have changed, and stop what must not run in these states.
+        """Publish the states of the interlocks if they have changed, and stop actions that they do not permit.
 
-        A device that does not answer keeps the thread that reads it, which would stop this otherwise.
+        This also runs while a device that does not answer blocks its reading thread, which would otherwise stop them.
         """
         self._check_guards()
         with self._lock:

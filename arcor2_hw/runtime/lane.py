@@ -1,4 +1,4 @@
-"""A lane: one thread on which the calls of one device run one after the other, each with a deadline."""
+"""A lane: one thread that runs the calls of one device one after the other, each with a deadline."""
 
 import threading
 import time
@@ -22,7 +22,7 @@ def on_any_lane() -> bool:
 
 
 class Job:
-    """One call. It ends exactly once: when it returns, at its deadline, or when its caller gives it up."""
+    """One call. It ends exactly once: when it returns, at its deadline, or when its caller abandons it."""
 
     __slots__ = (
         "_claim",
@@ -214,7 +214,7 @@ class Lane:
             )
 
     def check_wanted(self) -> None:
-        """Raise Cancelled if the running call was stopped or given up. A call uses it before it commands the device.
+        """Raise Cancelled if the running call was stopped or abandoned. A call uses it before it commands the device.
 
         This also restarts the time in which a command may reach the device after a stop.
         """
@@ -239,7 +239,7 @@ class Lane:
 
     @property
     def hung(self) -> bool:
-        """Return whether a call that was given up has not returned."""
+        """Return whether an abandoned call has not returned yet."""
         current = self._current
         return current is not None and current.given_up
 

@@ -1,4 +1,4 @@
-"""The inventory of parts in a cell: where each part is, and how many came in and left."""
+"""The inventory of parts in a cell: the place of each part, and the numbers of parts that entered and left."""
 
 from collections import deque
 from collections.abc import Iterable, Sequence
@@ -35,7 +35,7 @@ class Ledger:
         self._left = {PlaceKind.GOOD: counts.good, PlaceKind.BAD: counts.bad, PlaceKind.REJECTED: counts.rejected}
         self._fed = counts.fed
         self._gone: dict[int, str] = {}
-        """Where parts have left the cell, by number: the id of a box; empty: taken out by hand."""
+        """Ids of the boxes in which parts have left the cell, by number of the part; empty: taken out by hand."""
         self.tests = False
         """Whether the program tests parts, so that only those that have passed may go into a good box."""
 
@@ -72,13 +72,13 @@ class Ledger:
         """Start to move a part from one place to another, and return its number.
 
         A part at a feeder that is not in the inventory is new. The move ends by `complete` or `fail`. A part whose
-        place is not confirmed may only be moved as before: a person has decided to repeat the action.
+        place is not confirmed may only repeat its last movement, by the decision of a person.
 
         Raises:
             PlaceOccupied: the target is occupied.
             PlaceEmpty: there is no part at the source.
             WrongPart: the result of the test does not agree with the box.
-            PartUnconfirmed: it is not known where the part is.
+            PartUnconfirmed: the place of the part is unknown.
         """
         start, end = self._places[source], self._places[target]
         if start.kind.is_box:
@@ -155,7 +155,7 @@ class Ledger:
                 return
 
     def require_arrived(self, number: int, target: str) -> None:
-        """Check that no person has confirmed a part elsewhere than at the target of its movement. Raises WrongPart."""
+        """Raise WrongPart if a person has confirmed a part at a place other than the target of its movement."""
         part = self._parts.get(number)
         if part is not None and isinstance(part.moving_to, Unset) and part.place != target:
             raise WrongPart(
@@ -168,7 +168,7 @@ class Ledger:
             raise PartGone("The part is not at {target}: it has left the cell.", target=self.name_of(target))
 
     def has_part(self, place_id: str) -> bool:
-        """Return whether a part is at a place, or may be."""
+        """Return whether a part is at a place, or may be there."""
         return any(place_id in (part.place, part.moving_to) for part in self._parts.values())
 
     def part_at(self, place_id: str) -> int:
@@ -191,7 +191,7 @@ class Ledger:
         Raises:
             NotFound: there is no such part or place.
             PlaceOccupied: too many parts would be at a place.
-            Conflict: a serial number is given to two parts, or a part that was read is said not to exist.
+            Conflict: a serial number is given to two parts, or a part with a serial number is reported as missing.
         """
         parts = dict(self._parts)
         fed = self._fed
@@ -288,5 +288,5 @@ class Ledger:
 
 
 def _next_number(fed: int, parts: Iterable[int]) -> int:
-    """Return the number of a new part: usually how many were fed, but unique if some of them did not exist."""
+    """Return the number of a new part: usually the number of fed parts, but unique if some of them did not exist."""
     return max(fed, 1 + max(parts, default=0))

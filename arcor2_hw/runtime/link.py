@@ -94,8 +94,8 @@ class Link:
     def messages(self, wake: socket.socket) -> Iterator[HostBound]:
         """Yield the messages of the server until it closes the connection or SIGTERM arrives on `wake`.
 
-        They also end when nothing was received for the time of the last `Alive`. A message that waits in the socket,
-        because this process was late, counts as received.
+        They also end when nothing was received for the time of the last `Alive`. A message that waits in the socket
+        because this process was delayed counts as received.
         """
         buffer = bytearray()
         silence: float | None = None

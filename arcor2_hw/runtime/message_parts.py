@@ -64,7 +64,7 @@ class ErrorData(Struct, frozen=True):
 
 
 class TypeCode(Struct, frozen=True):
-    """Where the host finds an object type: entry point ("module:Class") if installed, else module and source code.
+    """Location of an object type: entry point ("module:Class") if installed, otherwise module and source code.
 
     modules: sources of the modules that belong to this type only, by name.
     """

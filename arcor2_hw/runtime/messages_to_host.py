@@ -221,7 +221,7 @@ class RenewForces(ToHost, frozen=True):
 
 
 class EndForce(ToHost, frozen=True):
-    """End a force. Answer: CallDone or CallFailed with this id when the output has its value from before."""
+    """End a force. Answer: CallDone or CallFailed with this id when the output has its previous value again."""
 
     id: int
     force: int

@@ -14,7 +14,7 @@ from arcor2_hw.runtime.message_parts import ErrorData, HeldPart
 
 
 class RemoteKind(StrEnum):
-    """What a RemoteCall does."""
+    """Kind of a RemoteCall."""
 
     CALL = auto()
     CANCEL = auto()
@@ -107,7 +107,7 @@ class HoldEnded(ToServer, frozen=True):
 
 
 class ForceEnded(ToServer, frozen=True):
-    """A force has ended without EndForce, or as it requested. `error`: why, or why the output was not switched back."""
+    """A force has ended, with or without EndForce. `error`: the reason, or why the output was not switched back."""
 
     force: int
     error: ErrorData | None = None
@@ -223,7 +223,7 @@ class DeviceChanged(ToServer, frozen=True):
     """The connection, health, alarms, control owner or shown values of a device have changed.
 
     reason: of a lost connection. in_the_way: false for a disabled collision object. held: the parts that a robot holds.
-    values: what the device reports of what one can see (`Generic.shown_values`). stamp: when the connection changed, on
+    values: visible state that the device reports (`Generic.shown_values`). stamp: when the connection changed, on
     the monotonic clock, s. raised: when each alarm became active, by code, on the same clock.
     """
 

@@ -18,14 +18,14 @@ from arcor2_hw.messages import Message
 from arcor2_hw.runtime.device import Device
 
 MAX_VALUE_AGE: Final = 1.0
-"""Age up to which a value counts, s. Drivers poll their devices about ten times per second."""
+"""Maximum age of a valid value, s. Drivers poll their devices about ten times per second."""
 
 Key = tuple[str, str, str]
 """Object, observation and point."""
 
 
 class CachedValue(NamedTuple):
-    """The last known value of an observation, its time (monotonic, s), and why no newer one is known."""
+    """The last known value of an observation, its time (monotonic, s), and the reason why no newer value is known."""
 
     value: Any = None
     at: float = 0.0
@@ -45,7 +45,7 @@ def key_of(need: Need) -> Key:
 
 
 def read(device: Device, observation: str, point: str, before: CachedValue) -> CachedValue:
-    """Read an observation. If that fails, return the one before with the reason."""
+    """Read an observation. On failure, return the previous value with the reason."""
     asked = time.monotonic()
     try:
         if not is_observation(getattr(device.recipe.cls, observation, None)):

@@ -36,7 +36,7 @@ Probe = Callable[[str, int], Awaitable[Found | None]]
 
 
 def addresses_of(text: str) -> list[str]:
-    """Return the addresses in a text of addresses and networks, separated by commas or spaces, each once.
+    """Return the addresses in a text of addresses and networks, separated by commas or spaces, without duplicates.
 
     Raises:
         InvalidData: There is none, one is not valid or not private, or there are more than MAX_ADDRESSES.

@@ -1,4 +1,4 @@
-"""The gate that every action of a program passes: pause, resume, step, breakpoints, stop."""
+"""The gate, through which each action of a program passes: pause, resume, step, breakpoints, stop."""
 
 import enum
 import sys
@@ -52,7 +52,7 @@ class Gate:
         self._parallel: set[Branch] = set()
         """The branches of the present parallel work."""
         self._deepest = sys.maxsize
-        """After a step: the largest number of calls around an action before which the program pauses."""
+        """After a step: maximum call depth of an action before which the program pauses."""
         if start_paused:  # the same state as after a single step
             self._mode = _Mode.STEP
         self._reported = False

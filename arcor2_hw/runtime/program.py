@@ -55,7 +55,7 @@ STANDSTILL_TIMEOUT: Final = 2.0
 ATTEMPT: Final = contextvars.ContextVar("attempt", default=1)
 """Number of the attempt of an action that is retried, from 1."""
 RETRIES: Final = contextvars.ContextVar("retries", default=0)
-"""How often an action is repeated automatically if it fails."""
+"""Maximum number of automatic repetitions of a failed action."""
 
 _encode = msgspec.json.Encoder().encode
 
@@ -92,7 +92,7 @@ class Program:
     ) -> None:
         self.channel = channel
         self.record = record
-        """Keeps the part inventory and stores checkpoints; None if nothing is stored."""
+        """Manages the part inventory and stores checkpoints; None if nothing is stored."""
         self.cell_file = cell_file
         """Settings of devices in this cell, which override those of the package."""
         self.secrets = secrets
@@ -118,7 +118,7 @@ class Program:
         self.ended = False
         """Whether the script has ended. The devices are being closed then, which a stop must not interrupt."""
         self.inside = False
-        """Whether the main thread runs our code, which an asynchronous exception would leave in an undefined state."""
+        """Whether the main thread runs code of this library, in which an asynchronous exception must not be raised."""
         self.error: BaseException | None = None
         self.branches = Branches()
         self._reporting = threading.Lock()
@@ -151,7 +151,7 @@ class Program:
             )
 
     def take_control(self) -> None:
-        """Take control of all devices. If one refuses, the program is held before its first action.
+        """Take control of all devices. If a device refuses, the program is held before its first action.
 
         Raises:
             SceneFault: a device refuses, and the program is not held after failures.
@@ -398,7 +398,7 @@ class Program:
         self.branches.current.failure.device = error, device
 
     def caught(self, error: Arcor2Error) -> ActionError:
-        """Return what happened, for the error exit of an action.
+        """Return a description of the error, for the error exit of an action.
 
         Raises:
             Arcor2Error: The same error, if it always ends the program: a lost device, lost control, a safety stop or a

@@ -115,7 +115,7 @@ def _action_call(device: Device, program: Program, name: str, bound: Callable[..
                 if decision.choice is HoldChoice.RETRY:
                     action = program.action_repeats(action, device.id, what, an, shown)
                     continue
-                if record is not None and step is not None:  # the action counts as done
+                if record is not None and step is not None:  # the action counts as completed
                     record.end(step, value)
                 elif record is not None:
                     record.decided(action, an or what, program.branches.current, device, bound, value)

@@ -26,9 +26,9 @@ from arcor2_hw.runtime.part_tracking import PartTracking, Step
 from arcor2_hw.runtime.values import results
 
 MAX_RESULT: Final = 10_000
-"""Length of results that are stored in checkpoints, characters. Longer ones are not stored."""
+"""Maximum length of results that are stored in checkpoints, characters."""
 MAX_STORED_ACTIONS: Final = 300
-"""Number of actions of a cycle that are stored. A program whose cycle has more cannot continue."""
+"""Maximum number of stored actions of a cycle. A program with a longer cycle cannot continue."""
 _STORED: Final = (bool, int, float, str, enum.Enum, Pose, Position, Orientation)
 """Types of results that are stored in checkpoints."""
 
@@ -80,13 +80,13 @@ class RunRecord:
         """Actions that have failed, about which a person has to decide, by branch and id."""
         self._interrupted = False
         self._done: list[DoneAction] = []
-        """What the present cycle has done; at most MAX_STORED_ACTIONS actions."""
+        """Completed actions of the present cycle; at most MAX_STORED_ACTIONS."""
         self._cycle_call = 0
         """Number of the call with which the present cycle has started; 0 if it started with an action."""
         self.continues, self._continue_at = continues, continue_at
         """Whether the program continues where it was interrupted."""
         self.continuation: Continuation | None = None
-        """What the interrupted cycle has done already; None if the program starts from its beginning."""
+        """Completed actions of the interrupted cycle; None if the program starts from its beginning."""
 
     @classmethod
     def of(cls, run: m.RunPackage, post: Callable[[m.ToServer], None], at_server: Checkpoints) -> "RunRecord | None":
@@ -188,7 +188,7 @@ class RunRecord:
         return step
 
     def _starts_cycle(self, action: Action, branch: Branch) -> bool:
-        """Return whether an action is the first one of a cycle: that after START, or the first inside a call there."""
+        """Return whether an action is the first one of a cycle: after START, or the first one inside a call there."""
         outer = branch.calls[0] if branch.calls else action
         if not outer.id or outer.id != self._first:
             return False
@@ -205,7 +205,7 @@ class RunRecord:
         """
         done = None if self.continuation is None else self.continuation.take(branch, action_id, name)
         if done is not None and branch.calls:
-            self._cycle_call = branch.calls[0].number  # the call around it belongs to the interrupted cycle
+            self._cycle_call = branch.calls[0].number  # the enclosing call belongs to the interrupted cycle
         return done
 
     def end(self, step: Step, value: Any) -> None:

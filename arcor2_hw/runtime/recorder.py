@@ -29,13 +29,13 @@ from arcor2_hw.runtime.ring_records import (
 )
 
 SEGMENT_TIME: Final = 10.0
-"""Time after which a new segment starts, s. All but the present one contain 70 s."""
+"""Time after which a new segment starts, s. The older segments contain 70 s."""
 READ_PERIOD: Final = 0.05
-"""Least time between two conversions of the state of a device to points, s."""
+"""Minimum time between two conversions of the state of a device to points, s."""
 JOINT_DIGITS: Final = 4
 """Decimal places of recorded joints, rad or m: noise of a robot at standstill is not recorded."""
 MAX_EVENT: Final = 4096
-"""Length of the events whose results are recorded, bytes."""
+"""Maximum length of events whose results are recorded, bytes."""
 SHOWN_BINARY: Final = frozenset({"gripped", "red", "amber", "green", "blue", "white"})
 """Names of shown values (`Generic.shown_values`) that are on or off."""
 

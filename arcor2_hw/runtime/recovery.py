@@ -43,7 +43,7 @@ Post = Callable[[HeldData, Device, BaseException], None]
 
 
 class Decision(NamedTuple):
-    """A decision: `value` is the result of the action, `error` what is raised."""
+    """A decision: `value` is the result of the action, `error` the error to raise."""
 
     choice: HoldChoice
     value: Any = None
@@ -53,8 +53,8 @@ class Decision(NamedTuple):
 class _Hold(NamedTuple):
     """The present hold.
 
-    hints: types of the results. check_done: raises an error if the action cannot count as done. choices: all that the
-    action allows.
+    hints: types of the results. check_done: raises an error if the action cannot count as done. choices: all
+    choices that the action allows.
     """
 
     data: HeldData
@@ -86,13 +86,13 @@ def is_decided(error: BaseException) -> bool:
 class Recovery:
     """Decides whether the failure of an action holds the program, and waits for the decision.
 
-    Without logic in the project nothing is known about the errors that the script handles, so it is never held.
+    Without logic in the project, the handled errors are unknown, so the program is never held.
 
     Args:
         gate: holds the threads of the script.
         cell: the devices.
         settle: waits until no device moves.
-        post: sends what clients are to know of a hold, with its device and error; called while the gate is locked.
+        post: sends the data of a hold for clients, with its device and error; called while the gate is locked.
     """
 
     def __init__(self, gate: Gate, cell: Cell, settle: Callable[[], object], post: Post) -> None:
@@ -108,7 +108,7 @@ class Recovery:
         """Decisions that have not taken effect, by the number of the action: the next hold may begin before."""
 
     def load(self, project: Project) -> None:
-        """Read the error exits of the project, and which results it uses."""
+        """Read the error exits of the project, and the results that it uses."""
         self._actions = {action.id: action for action in project.all_actions()}
         self.active = project.has_logic and bool(self._actions)
         items = [*project.logic, *(item for each in project.functions for item in each.logic)]
@@ -224,7 +224,7 @@ class Recovery:
             hold.check_done()
         except PartGone:
             choices = [choice for choice in choices if choice not in (HoldChoice.SKIP, HoldChoice.RESULT)]
-        except WrongPart:  # it can be brought to its place
+        except WrongPart:  # the part can still be brought to its place
             return None
         if not hold.choices or choices == hold.data.choices:
             return None
@@ -238,7 +238,7 @@ class Recovery:
             Conflict: the program is not held at this action.
             InvalidData: this is not one of the choices, or the results are not valid.
             NotConnected: the connection of the device is lost.
-            WrongPart: the part is not where the action would have put it.
+            WrongPart: the part is not at the target of the action.
         """
         hold, choice = self._present, message.choice
         if hold is None or hold.data.number != message.number:

@@ -1,7 +1,7 @@
 """Objects of the scene that another host has. The main host calls them through the server, by stubs of the same type.
 
-What passes between the computers is what the server and its hosts exchange anyway: arguments and results in JSON by
-the type hints of the methods, errors with their codes, and the reports of devices.
+The computers exchange the same data as the server and its hosts: arguments and results in JSON by the type hints of
+the methods, errors with their codes, and the reports of devices.
 """
 
 import functools
@@ -43,7 +43,7 @@ _CONNECTED: Final = (Connection.ONLINE, Connection.BACK)
 
 
 class _Waiting:
-    """A call without an answer. sent: when it was sent, s."""
+    """A call without an answer. sent: time of sending, s."""
 
     def __init__(self) -> None:
         self.sent = time.monotonic()
@@ -74,7 +74,7 @@ class RemoteObjects:
 
     # -------------------------------------------------------------------------------- the scene
     def expect(self, computers: Mapping[str, Message]) -> None:
-        """Set which objects other hosts have: the computers by id of the object."""
+        """Set the objects of other hosts: their computers by id of the object."""
         self._computers = {**self._computers, **computers}
 
     def follow(self, object_id: str, changed: Callable[[], None]) -> None:
@@ -113,7 +113,7 @@ class RemoteObjects:
             waiting.end(message if isinstance(message, m.RemoteDone) else error_of(message.error))
 
     def stopped(self) -> None:
-        """Note that a stop of the server was passed to the devices. It does not concern calls from now on."""
+        """Record that a stop of the server was passed to the devices. It does not affect later calls."""
         self._stops += 1
 
     def end(self) -> None:
@@ -136,7 +136,7 @@ class RemoteObjects:
         """Call a method of an object of another host; return the answer, and when the call was sent, s.
 
         Raises:
-            Arcor2Error: what the call raised, with its code.
+            Arcor2Error: the error of the call, with its code.
             OutcomeUnknown: the connection to the other host was lost before the answer.
             DeviceTimeout: there is no answer.
         """
@@ -225,7 +225,7 @@ class RemoteObject:
         self.on_change()
 
     def wake(self) -> None:
-        """Let who waits for the connection look again."""
+        """Wake the threads that wait for the connection."""
         with self._news:
             self._news.notify_all()
 
@@ -246,7 +246,7 @@ class RemoteObject:
 
         Raises:
             InvalidData: an argument or the result is of a kind that does not pass between computers.
-            Arcor2Error: what the call raised.
+            Arcor2Error: the error of the call.
         """
         function = getattr(self._cls, name)
         if name == stop_name(self._cls):
@@ -265,7 +265,7 @@ class RemoteObject:
         return self._result(name, *self._remotes.call(self._id, name, {}, m.RemoteKind.CALL, deadline))
 
     def write(self, target: int, name: str, value: Any) -> None:  # noqa: ARG002
-        """Refuse it: attributes are set only in the process of the object."""
+        """Raise an error, because attributes are set only in the process of the object."""
         raise Refused("{name}: {attribute} cannot be set from another computer", name=self._name, attribute=name)
 
     def _encoded(
@@ -303,7 +303,9 @@ class RemoteObject:
         if not answer.value:
             return None
         value = decode_result(self._cls, name, answer.value, self._name)
-        if isinstance(value, Reading):  # its time is of the other computer's clock; it arrives older, never younger
+        if isinstance(
+            value, Reading
+        ):  # its time is from the other computer's clock; the converted age is never too small
             return replace(value, monotonic=sent - max(0.0, answer.stamp - value.monotonic))
         return value
 
@@ -316,7 +318,7 @@ def error_of(data: m.ErrorData) -> Arcor2Error:
     kinds = _kinds(Arcor2Error)
     kind = next((each for each in kinds if each.__name__ == data.type and each.code == data.code), None)
     kind = kind or next((each for each in kinds if each.code == data.code), Arcor2Error)
-    error = kind.__new__(kind)  # its constructor may want other arguments
+    error = kind.__new__(kind)  # its constructor may require other arguments
     error.args = (data.message.text,)
     vars(error).update({"message": data.message, "detail": data.detail, "code": data.code})
     if data.fault:

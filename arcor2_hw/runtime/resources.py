@@ -28,7 +28,7 @@ B = TypeVar("B")
 C = TypeVar("C")
 D = TypeVar("D")
 
-# A script that is run by hand imports this module first, then its object types, and only then calls something here.
+# A script that is run by hand imports this module first and then its object types, before it uses this module.
 prepare_for_sources()
 
 
@@ -131,7 +131,7 @@ class Resources:
         an: str | None = None,
     ) -> tuple[A, B, C, D]: ...
     def parallel(self, *calls: Callable[[], Any], an: str | None = None) -> tuple[Any, ...]:
-        """Run two to four calls of functions at once, wait until all have ended, and return their results.
+        """Run two to four calls of functions concurrently, wait until all have ended, and return their results.
 
         If one fails, the devices of the others are stopped, and the others end at their next action. Then the error
         that came first is raised.
@@ -141,7 +141,7 @@ class Resources:
             an: name of the action.
 
         Raises:
-            InvalidData: the number of calls is wrong, or this is one of calls that run at once.
+            InvalidData: the number of calls is wrong, or this call is a branch of parallel work.
         """
         return run_parallel(self._program, calls, an)
 

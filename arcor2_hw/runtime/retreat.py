@@ -1,4 +1,4 @@
-"""How a robot leaves a zone: along the retract path of the zone, otherwise by the shortest path.
+"""Motion of a robot out of a zone: along the retract path of the zone, or without one by the shortest path.
 
 None of this is a safety function.
 """
@@ -25,7 +25,7 @@ TOLERANCE: Final = 0.003
 PROBE_LENGTH: Final = 0.01
 """Length of the motion for which the progress of a velocity is computed, m."""
 MIN_PROGRESS: Final = 0.3
-"""Smallest part of a motion that has to lead out of each zone."""
+"""Minimum fraction of a motion that has to lead out of each zone."""
 REACHED_DISTANCE: Final = 0.005
 """Distance to a point of the path at which it counts as reached, m."""
 
@@ -35,7 +35,7 @@ class Retreat:
 
     Args:
         body: the zone, a primitive shape.
-        path: points in the frame of the body, the last one outside; none for the shortest way.
+        path: points in the frame of the body, the last one outside; none for the shortest path.
         tips: indices of the end effectors that are in the zone.
     """
 
@@ -89,7 +89,7 @@ class ZoneExit:
 
     Args:
         device: name of the robot.
-        ways: the way out of each zone, by the name of the zone.
+        ways: the path out of each zone, by the name of the zone.
         tips: positions of the end effectors in the world.
     """
 
@@ -98,7 +98,7 @@ class ZoneExit:
         self._remaining = {zone: way.remaining(tips) for zone, way in ways.items()}
 
     def check(self, tips: Sequence[Position]) -> Message | None:
-        """Return why the robot has to stop: it has moved back. None while it moves out."""
+        """Return the reason if the robot has moved back and has to stop. Return None while it moves out."""
         for zone, way in self._ways.items():
             now = way.remaining(tips)
             if now > self._remaining[zone] + TOLERANCE:
@@ -115,7 +115,7 @@ class ZoneExit:
 
         Raises:
             Interlocked: the velocity does not lead out of the zones, or its direction in the world is unknown.
-            Cancelled: the robot is at the end of its way.
+            Cancelled: the robot is at the end of its path.
         """
         if lease.retract:
             way = next(iter(self._ways.values()))

@@ -16,7 +16,7 @@ import msgspec
 
 SEGMENTS: Final = 8
 SEGMENT_SIZE: Final = 512 * 1024
-"""Size of a segment, bytes. If values need more space, the ring contains a shorter time."""
+"""Size of a segment, bytes. If the values need more space, the ring covers a shorter time."""
 SIZE: Final = SEGMENTS * SEGMENT_SIZE
 
 INTERRUPTED: Final = "run-{run}{other}.ring"
@@ -40,7 +40,7 @@ class Ring:
     """The memory of a ring. One thread at a time writes it; another process may read it at any time.
 
     Args:
-        descriptor: of its memory; None for memory of this process only. It is closed.
+        descriptor: file descriptor of its memory, which is closed; None for memory of this process only.
     """
 
     def __init__(self, descriptor: int | None = None) -> None:
@@ -88,11 +88,11 @@ class Ring:
         return [found[generation] for generation in sorted(found)]
 
     def appended(self, generation: int, length: int) -> Iterator[tuple[int, bytes]]:
-        """Yield what was appended after a position: the generations of segments, oldest first, and their new records.
+        """Yield the data appended after a position: generations of segments, oldest first, and their new records.
 
         Args:
-            generation: of the segment of the position; 0 for the start.
-            length: of the records of this segment before the position, bytes.
+            generation: generation of the segment of the position; 0 for the start.
+            length: length of the records of this segment before the position, bytes.
         """
         heads = [(*_HEAD.unpack_from(self._memory, number * SEGMENT_SIZE), number) for number in range(SEGMENTS)]
         for found, used, number in sorted(heads):

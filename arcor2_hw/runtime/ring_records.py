@@ -99,7 +99,7 @@ class _Column:
         self.values.append(value)
 
     def cut(self, begin: int, end: int) -> None:
-        """Remove values after the end, and those before the begin except the last of them."""
+        """Remove values after the end, and all but the last value before the begin."""
         while self.times and self.times[-1] > end:
             self.times.pop()
             self.values.pop()
@@ -114,7 +114,7 @@ class _Action:
 
 
 def converted(rings: Sequence[Iterable[bytes]], event: float, begin: float, end: float) -> tuple[RecordedValues, int]:
-    """Return the content of a recording, and when it begins, ms after the event.
+    """Return the content of a recording, and its start time, ms after the event.
 
     Args:
         rings: the segments of the ring of each host, oldest first. Each host records its own objects.

@@ -90,7 +90,7 @@ def can_nodes(named: str) -> list[Found]:
         raise NotFound("python-can and canopen are not installed. Install arcor2-hw[can].") from error
     logging.getLogger("canopen").setLevel(
         logging.CRITICAL
-    )  # it logs errors when a node lacks an object, which is normal here
+    )  # canopen logs an error if a node lacks an object, which is normal here
     network: Any = canopen.Network()  # the library has no type hints
     try:
         network.connect(**options)
@@ -161,7 +161,7 @@ def main() -> None:
     parser.add_argument("--port", type=int, default=502, help="port of Modbus TCP")
     options = parser.parse_args()
     results = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # so that output of vendor libraries does not mix with the result
+    os.dup2(2, 1)  # keeps the output of vendor libraries separate from the result
     kinds: dict[str, Callable[[], list[Found]]] = {
         Search.SERIAL: serial_ports,
         Search.OAK: oak_cameras,

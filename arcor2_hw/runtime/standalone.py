@@ -35,7 +35,7 @@ class _StdoutChannel:
             sys.stdout.flush()
 
     def action_over(self, number: int, duration: float, error: Message | None, waited: float) -> None:
-        pass  # the protocol has no event for it
+        pass  # the protocol has no event for this
 
     def changed(self, state: str) -> None:
         self.event("PackageState", _encode(Event("PackageState", data=PackageStateData(PackageStateEnum(state)))))

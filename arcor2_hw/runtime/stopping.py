@@ -72,7 +72,7 @@ def _call_error(stop: SentStop, deadline: float, within: float) -> Arcor2Error |
 
 
 def _reason(stop: SentStop, deadline: float, within: float) -> Message | None:
-    """Return why a device was not stopped; None if it was."""
+    """Return why a device was not stopped; None if it was stopped."""
     error = stop.problem or _call_error(stop, deadline, within)
     if error is not None:
         return error.message

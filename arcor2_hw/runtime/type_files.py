@@ -29,7 +29,7 @@ def shared_modules(source: str, modules: Mapping[str, str]) -> set[str]:
 
 
 def forwarding_source(module: str) -> str:
-    """Return the source of a module that stands for a shared module among the modules of a type."""
+    """Return the source of a module that forwards to a shared module."""
     return (
         f'"""The module {module}, which does not belong to this object type only."""\n\n'
         "import importlib\nimport sys\n\n"

@@ -120,7 +120,8 @@ def _positions(cls: type, name: str, given: Iterable[str]) -> list[str]:
     """Return the names by which the server calls a method, in the order of its parameters.
 
     For a method of a base class that is the order of its declaration there. For a method that returns the values of a
-    dynamic parameter it is the order of `given`. For any other method the result is empty: only names count.
+    dynamic parameter it is the order of `given`. For any other method the result is empty, because it is called by
+    name.
     """
     for base in cls.__mro__:
         declared = base.__dict__.get(name)

@@ -118,7 +118,7 @@ class Watch:
             why = _value_or(device.connection_reason, None) if connection in _WITH_REASON else None
             was = Connection.OFFLINE if before is None else before.connection
             if before is not None and connection is was:
-                why = before.reason  # keep the reason of the loss; later attempts to connect may fail for others
+                why = before.reason  # keep the reason of the loss; later attempts to connect may fail for other reasons
             in_the_way = _value_or(lambda: not isinstance(instance, CollisionObject) or instance.enabled, True)
             held = _value_or(lambda: _held_parts(instance), [])
             values = _value_or(lambda: dict(instance.shown_values), {}) if connection in _OBSERVED else {}
@@ -140,7 +140,7 @@ def _with_identification(alarms: list[Alarm], device: Device) -> list[Alarm]:
 
 
 def _plain(owner: str | None) -> str | None:
-    return None if owner is None else str(owner)  # it may be a Phrase, which cannot be encoded
+    return None if owner is None else str(owner)  # the text may be a Phrase, which cannot be encoded
 
 
 def _with_first_times(alarms: list[Alarm], before: list[Alarm]) -> list[Alarm]:
@@ -150,7 +150,7 @@ def _with_first_times(alarms: list[Alarm], before: list[Alarm]) -> list[Alarm]:
 
 
 def _raised(instance: Generic, alarms: list[Alarm], before: dict[str, float]) -> dict[str, float]:
-    """Return when each alarm became active: as the driver reported it, else when it was first seen."""
+    """Return the time at which each alarm became active: as reported by the driver, or when it was first observed."""
     found = {}
     for code in (alarm.code for alarm in alarms):
         found[code] = conditions_of(instance).raised(code) or before.get(code) or time.monotonic()

@@ -1,4 +1,4 @@
-"""Motions of robots as interlocks see them: positions of end effectors, lines to targets, and the zones on them."""
+"""Motions of robots for interlocks: positions of end effectors, lines to targets, and the zones on these lines."""
 
 import contextlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -63,7 +63,7 @@ def tips_of(device: Device) -> list[Position]:
 
 
 def extrapolated(before: Position, now: Position, share: float) -> Position:
-    """Return the position after a share of the time between two positions."""
+    """Return the position after a fraction of the time between two positions."""
     return now + Position(*(share * each for each in now - before))
 
 

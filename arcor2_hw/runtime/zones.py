@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class Busy(NamedTuple):
-    """A zone that another robot has. deadlock: whether that robot waits, directly or not, for the one that asks."""
+    """A zone that another robot has. deadlock: whether that robot waits, directly or indirectly, for the requesting robot."""
 
     zone: str
     owner: str
@@ -17,7 +17,7 @@ class ZoneTokens:
     """The owner of each zone. Any thread may call it; nothing waits.
 
     Each robot takes its zones in the order of their ids, and keeps those that it has while it waits for the next one.
-    So robots that are in no zone cannot block each other. A robot that is in a zone already may, which is detected.
+    So robots that are in no zone cannot block each other. A robot inside of a zone can, which is detected.
     """
 
     def __init__(self) -> None:
@@ -27,7 +27,9 @@ class ZoneTokens:
         """The zone for which each waiting robot waits."""
 
     def take(self, robot: str, zones: Iterable[str]) -> Busy | None:
-        """Take zones in their order, up to the first one that another robot has. Return that one, None if it has all.
+        """Take zones in their order, up to the first one that another robot has.
+
+        Return that zone, or None after taking all.
 
         Repeat it while it returns a zone. Call `release` to give up.
         """
@@ -52,7 +54,7 @@ class ZoneTokens:
         return False
 
     def release(self, robot: str, keep: Iterable[str] = ()) -> None:
-        """Release the zones of a robot, except those in which it is. It does not wait any more."""
+        """Release the zones of a robot, except those in which it is. The robot no longer waits."""
         kept = set(keep)
         with self._lock:
             self._wanted.pop(robot, None)

@@ -30,7 +30,7 @@ def missing(name: str) -> NotImplementedError:
 class Check(NamedTuple):
     """A value that the driver returned, the value of the device itself, and their maximum difference, in SI units.
 
-    Values are numbers, sequences of them, or something that is compared for equality.
+    Values are numbers, sequences of numbers, or objects that are compared for equality.
     """
 
     what: str
@@ -78,7 +78,7 @@ class Bench(abc.ABC):
         stops_within: Time from `stop` to standstill, s.
         loss_watched: Time for which a device that holds or continues is observed after its driver has died, s: longer
             than any watchdog of the device.
-        progress_within: Longest time between two changes of `progress` while the action goes on, s.
+        progress_within: Longest time between two changes of `progress` during the action, s.
     """
 
     object_type: ClassVar[type[Generic]]
@@ -102,7 +102,7 @@ class Bench(abc.ABC):
     frames: Frames | None = None
     """Reader of the driver's frames on the wire."""
     hanging: CallHangs | None = None
-    """The call that did not return. While it runs, no other case does."""
+    """The call that did not return. While it runs, no other case runs."""
 
     def __init__(self) -> None:
         self._made: list[Generic] = []
@@ -193,16 +193,20 @@ class Bench(abc.ABC):
     def orphan(self) -> list[str]:
         """Return the command line of a process that connects, takes control and acts until it is killed.
 
-        It runs an action like that of `run_long`. A device declared to hold is brought to hold something.
+        It runs an action like that of `run_long`. If the type declares that it holds, the process makes the device hold
+        something.
         """
         raise missing("orphan")
 
     def holding(self) -> object:
-        """Return what the device holds, read without the driver: the grip, the outputs. Falsy if it holds nothing."""
+        """Return the held state of the device, such as grip or outputs, read without the driver.
+
+        Falsy if it holds nothing.
+        """
         raise missing("holding")
 
     def progress(self) -> float:
-        """Return how much of the action of `orphan` is done, 0 to 1, read from the device without the driver."""
+        """Return the completed fraction of the action of `orphan`, 0 to 1, read from the device without the driver."""
         raise missing("progress")
 
     # -------------------------------------------------------------------------------- hooks for level silver
@@ -213,7 +217,7 @@ class Bench(abc.ABC):
     def results(self, device: Generic) -> Iterable[Check]:
         """Call each action that returns a value at least twice, and change the device in between.
 
-        Yield what each call returned, by the name of the action, with the value of the device. The device is
+        Yield the result of each call, by the name of the action, with the value of the device. The device is
         controlled. For a type without such an action, use a reading.
         """
         raise missing("results")
@@ -281,7 +285,7 @@ class Bench(abc.ABC):
         return device
 
     def polled(self, what: str, read: Callable[[], object], real: object, within: float = 0.0) -> Check:
-        """Return the check of a reading that the driver polls, when it agrees, or after `fresh_within` s."""
+        """Return the check of a polled reading as soon as it agrees, or after `fresh_within` s."""
         began = own_time()
         while not (check := Check(what, read(), real, within)).agrees and not began.is_past(self.fresh_within):
             time.sleep(POLL)
@@ -344,7 +348,7 @@ def needs(
 
 
 def obstacle(bench: Bench, case: Callable[..., None], name: str) -> tuple[Kind, str] | None:
-    """Return why a case is not run on a bench: its hooks are missing, or quality.yaml excludes it. Else return None.
+    """Return why a case is not run on a bench, or None: its hooks are missing, or quality.yaml excludes it.
 
     FAILED: a hook is missing without a reason, or a reason is given although the bench can run the case.
     """
@@ -356,7 +360,7 @@ def obstacle(bench: Bench, case: Callable[..., None], name: str) -> tuple[Kind, 
         if reason is None and lacking and (like := getattr(case, "like", "")):
             reason = claims.reason(bench.type_name(), like)
     except Arcor2Error as error:
-        if not bench.guessed:  # otherwise the case `described` reports it
+        if not bench.guessed:  # otherwise the case `described` reports the fault
             return Kind.FAILED, str(error)
     if reason is not None and (lacking or bench.guessed):
         return Kind.NOT_RUN, reason

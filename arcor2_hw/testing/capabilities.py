@@ -43,7 +43,7 @@ def declared(kind: type[Generic]) -> frozenset[str]:
 
 
 def hooks(kind: type[Generic]) -> dict[str, Any]:
-    """Return the optional methods of our bases that are not implemented there."""
+    """Return the optional methods of our bases that the bases do not implement."""
     found: dict[str, Any] = {}
     for base in kind.__mro__:
         if not base.__module__.startswith(OURS):
@@ -73,7 +73,7 @@ def _required(function: Any) -> int:
 def to_be_shown(kind: type[Generic]) -> frozenset[str]:
     """Return the declared optional methods that act, so that the bench has to show that they work."""
     said = declared(kind)
-    return (said & set(hooks(kind))) - set(readable(kind, said)) - {"parameters_restore"}  # MaintenanceCases show it
+    return (said & set(hooks(kind))) - set(readable(kind, said)) - {"parameters_restore"}  # MaintenanceCases test them
 
 
 @lru_cache(maxsize=64)

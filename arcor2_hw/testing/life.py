@@ -12,7 +12,7 @@ from arcor2_hw.testing.own_time import own_time
 
 POLL: Final = 0.01
 TIME_TOLERANCE: Final = 0.5
-"""Time that a busy machine may add to any time limit, s."""
+"""Tolerance added to each time limit for busy machines, s."""
 CLEAN_UP_TIMEOUT: Final = 2.0
 """Time in which threads and sockets have to end, s."""
 
@@ -40,7 +40,7 @@ def leaked_resources(before: set[str]) -> set[str]:
 
 
 def wait_until(holds: Callable[[], bool], within: float, what: str) -> float:
-    """Wait until a condition holds and return the time it took in s. Fail after `within` s."""
+    """Wait until a condition holds, and return the elapsed time, s. Fail after `within` s."""
     began = own_time()
     while not holds():
         assert not began.is_past(within), f"{what}: not within {within:g} s"
@@ -57,7 +57,7 @@ def require_throughout(holds: Callable[[], bool], seconds: float, what: str) -> 
 
 
 def require_in_time(call: Callable[[], Any], within: float, what: str) -> Any:
-    """Call and return the result. Fail when it took longer than `within` s plus the slack."""
+    """Call and return the result. Fail if the call took longer than `within` s plus TIME_TOLERANCE."""
     began = own_time()
     try:
         return call()
@@ -67,7 +67,7 @@ def require_in_time(call: Callable[[], Any], within: float, what: str) -> Any:
 
 
 def require_error(call: Callable[[], Any], *kinds: type[DeviceError], within: float, what: str) -> DeviceError:
-    """Call and return the typed error it has to raise in time. Fail when it returns, or raises another."""
+    """Call, and return the typed error that it raises. Fail if it returns, is late, or raises another error."""
     given: object = None
     error: Exception | None = None
     try:

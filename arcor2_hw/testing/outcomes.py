@@ -1,4 +1,4 @@
-"""Results of each case on each bench, and the level they show."""
+"""Results of each case on each bench, and the resulting level."""
 
 import enum
 from collections.abc import Mapping, Sequence
@@ -84,8 +84,8 @@ class Verdict:
     """The level of one bench.
 
     Attributes:
-        not_judged: Why it could not be judged.
-        missing: What the next level requires.
+        not_judged: Reason why the level could not be determined.
+        missing: Requirements for the next level.
     """
 
     claimed: Level = Level.NONE
@@ -97,7 +97,7 @@ class Verdict:
 def judge(
     outcomes: Mapping[str, tuple[Kind, str]], tests_missing: Sequence[str], report_missing: Sequence[str]
 ) -> tuple[Level, list[str]]:
-    """Return the level reached, and what the next one requires, from the results of all cases of the suite."""
+    """Return the level that all cases of the suite show, and the requirements for the next level."""
     if lacks := [f"{case} failed" for case, (kind, _) in sorted(outcomes.items()) if kind is Kind.FAILED]:
         return Level.NONE, lacks
     lacks = [f"{case}: {why}" for case, (kind, why) in sorted(outcomes.items()) if kind is Kind.LACKING]

@@ -1,7 +1,7 @@
 """A clock for time limits that stops while this process or its children wait for a processor.
 
-A test that a call returns within 1 s would otherwise fail next to processes that take the processor away, from the
-driver or from its fake. On an idle machine it is the ordinary clock; on the busiest it runs at a tenth of the speed.
+Otherwise, a test that a call returns within 1 s would fail if other processes delay the driver or its fake. On an idle
+machine it is the ordinary clock; on the busiest it runs at a tenth of the speed.
 """
 
 import contextlib
@@ -17,7 +17,7 @@ SLOWEST: Final = 0.1
 
 
 class Instant(NamedTuple):
-    """A moment; the difference of two is the time between them, s, without the time spent waiting for a processor.
+    """A moment. The difference of two moments is the time between them, s, without the time of waiting for a processor.
 
     Attributes:
         clock: Monotonic time, s.
@@ -44,7 +44,7 @@ def own_time() -> Instant:
 
 
 def _waited(process: str) -> Iterator[tuple[str, float]]:
-    """Yield the threads of a process and its children, and for how many seconds each waited for a processor."""
+    """Yield the threads of a process and its children, each with its time of waiting for a processor, s."""
     with contextlib.suppress(OSError):  # the process has ended, or the kernel has no such statistics
         for thread in (PROC / process / "task").iterdir():
             with contextlib.suppress(OSError):

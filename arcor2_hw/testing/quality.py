@@ -34,7 +34,7 @@ class Level(enum.IntEnum):
 
 
 class OutputsOnLoss(enum.StrEnum):
-    """What the outputs of the device do when it loses the connection."""
+    """Reaction of the outputs of the device to a connection loss."""
 
     HOLD = "hold"
     OFF = "off"
@@ -64,7 +64,7 @@ class Quality(Data, frozen=True, forbid_unknown_fields=True):
         level: The claimed level; the suite checks it.
         tests: Folder of the tests in `rules`, from the project's root; default: all test folders.
         report: File in this folder, written by a run on the real device.
-        not_on_hardware: By case, why it did not pass on the real device of the report, although it does on the fake.
+        not_on_hardware: By case, why it did not pass on the real device of the report although it passes on the fake.
         frames: How the driver's frames are read, by kind (`arcor2_hw.testing.frames`), with the first words of lines
             that act, or the objects that may be written for observation.
     """

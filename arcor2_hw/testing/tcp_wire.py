@@ -175,7 +175,7 @@ class TcpWire(Wire):
                 self._write(link, "driver")
                 self._write(link, "device")
         except OSError:
-            if self._cut:  # while the cable is cut, an end is not affected by the other
+            if self._cut:  # while the cable is cut, the ends do not affect each other
                 link.ended |= {side}
                 link.torn = True
             else:

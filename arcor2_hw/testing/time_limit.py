@@ -79,7 +79,7 @@ def _frames(frame: FrameType | None) -> list[FrameType]:
 
 
 def _call_of(frames: list[FrameType]) -> str:
-    """Return the outermost call of a driver on a stack, else the outermost call outside the suite."""
+    """Return the outermost call of a driver on a stack, or without one the outermost call outside of the suite."""
     outside = ""
     for frame in frames:
         code = frame.f_code

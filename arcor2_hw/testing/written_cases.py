@@ -55,7 +55,7 @@ class WrittenCases:
             try:
                 getattr(device, name)()
             except (Refused, InvalidData, NotFound):
-                continue  # it needs another state or arguments
+                continue  # the method needs another state or arguments
             except Exception as error:
                 raise AssertionError(f"{name}() raised {type(error).__name__}: {error}") from error
 

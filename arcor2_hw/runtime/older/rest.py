@@ -64,7 +64,7 @@ class _Session:
     def client(self) -> httpx.Client:
         with self._lock:
             if self._client is None:
-                # Services run in the local network, so proxies of the environment do not apply.
+                # Services run in the local network, so proxies of the environment are not used.
                 self._client = httpx.Client(trust_env=False, follow_redirects=True)
             return self._client
 

@@ -69,7 +69,7 @@ class DeviceServer(Peer):
     """Serve the calls of one instance."""
 
     def __init__(self, sock: socket.socket) -> None:
-        super().__init__(sock, idle=None)  # a driver may require all calls of a lane on one thread
+        super().__init__(sock, idle=None)  # a driver may require that all calls of a lane run on one thread
         self._instance: Generic | None = None
         self._names: list[str] = []
         self._connected = False

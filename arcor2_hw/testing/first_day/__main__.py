@@ -1,7 +1,7 @@
 """Lead a person through the first day with a real device, in a process of its own.
 
 `python -m arcor2_hw.testing.first_day cell.yaml NAME FOLDER [--plan]` speaks the messages of
-`arcor2_hw.data.first_day` on standard input and output. Without its terminal, it stops the device and ends.
+`arcor2_hw.data.first_day` on standard input and output. When its terminal ends, it stops the device and ends.
 """
 
 import argparse

@@ -40,13 +40,13 @@ STANDSTILL: Final = frozenset(
 )
 """States of a machine in which nothing moves."""
 FREE_WITHIN: Final = 10.0
-"""Time in which a device ends the control of a lost owner, s."""
+"""Time limit for a device to end the control of a lost owner, s."""
 LAG: Final = 0.15
-"""Age of the state that a second connection may show, s: a device that moves is observed twice."""
+"""Maximum age of the state over a second connection, s: a moving device is observed over two connections."""
 PULLED_WITHIN: Final = 120.0
-"""Time in which the person pulls the cable, s."""
+"""Time limit for the person to pull the cable, s."""
 ORPHANS: Final = 2
-"""Number of processes that are started to be killed in one case."""
+"""Number of processes that one case starts and kills."""
 STOP_TIMEOUT: Final = 5.0
 """Time limit of the stop after Ctrl-C, s."""
 AT_STANDSTILL: Final = 1e-3
@@ -181,7 +181,7 @@ class RealBench(CellBench):
         joints = device.robot_joints()
         joint = joints[motion.joint - 1]
         start = self.starts.setdefault(which, joint.value)
-        if abs(joint.value - start) > 1.5 * abs(motion.by):  # the other motion has moved it
+        if abs(joint.value - start) > 1.5 * abs(motion.by):  # the other motion has moved the joint
             start = self.starts[which] = joint.value
         joint.value = start if abs(joint.value - start) > abs(motion.by) / 2 else start + motion.by
         device.move_to_joints(joints, motion.speed)
@@ -279,7 +279,7 @@ class RealBench(CellBench):
 
     @contextlib.contextmanager
     def foreign(self) -> Iterator[None]:
-        """Ask the person to give control to something else."""
+        """Ask the person to give control to another client."""
         assert not isinstance(self.day.elsewhere, Unset)
         self.person.done(f"{self.day.elsewhere.take} Then press Enter.")
         try:

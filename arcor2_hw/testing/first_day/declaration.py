@@ -54,7 +54,7 @@ class Motion(Data, frozen=True, forbid_unknown_fields=True):
 
 
 class Elsewhere(Data, frozen=True, forbid_unknown_fields=True):
-    """How the person gives control to something else, such as the pendant, and takes it back."""
+    """Instructions for giving control to another client, such as the pendant, and taking it back."""
 
     take: str
     give_back: str
@@ -70,7 +70,7 @@ class FirstDay(Data, frozen=True, forbid_unknown_fields=True):
         ready: What to do before control is taken.
         small: A motion of some millimetres or degrees, or a short output.
         full: A motion of at least 5 s.
-        elsewhere: How control is given to something else.
+        elsewhere: Instructions for giving control to another client.
         ask: Method without arguments that communicates with the device; "small" for the small motion.
         display: Where the device itself shows its readings.
         wire: Settings and fixed ports of the connection, as in cell.yaml.

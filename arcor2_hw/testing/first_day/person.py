@@ -1,4 +1,4 @@
-"""The person at the device, whom the session asks."""
+"""The person at the device, who answers the questions of the session."""
 
 from typing import Any, Protocol
 

@@ -18,7 +18,7 @@ FILE: Final = "wire.jsonl.gz"
 PER_SIDE: Final = 32 << 10
 """Maximum amount of recorded data of one case and one side, bytes: its beginning and its end."""
 _SHORTEST: Final = 4
-"""Length of a secret below which its bytes would be found everywhere."""
+"""Minimum length of a secret that is masked; the bytes of a shorter one occur too often by chance."""
 
 
 def forms(secrets: Collection[str], users: Collection[str] = ()) -> list[bytes]:
@@ -63,7 +63,7 @@ def masked(pieces: Sequence[Piece], secrets: Iterable[bytes]) -> list[Piece]:
 
 
 def shortened(pieces: Sequence[Piece]) -> tuple[list[Piece], Mapping[Side, int]]:
-    """Return the first and last pieces of each side, and how many bytes were left off."""
+    """Return the first and last pieces of each side, and the number of omitted bytes."""
     whole: dict[Side, int] = {"driver": 0, "device": 0}
     for piece in pieces:
         whole[piece.by] += len(piece.data)

@@ -91,7 +91,7 @@ class Session:
         except Ended as error:
             self.person.say(str(error), "warning")
         except Exception as error:
-            # A driver may also raise what it should not; the device is stopped in any case.
+            # A driver may raise unexpected errors; the device is stopped in any case.
             self.person.say(self._clean(f"{_reason(error)} {getattr(error, 'detail', '')}".strip()), "bad")
             self._interrupt()
             raise

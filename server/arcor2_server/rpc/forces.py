@@ -28,5 +28,5 @@ class ForceRequests:
 
     @rpc("EndForce")
     async def end_force(self, context: Context, args: EndForceArgs) -> None:
-        """End a force of any client. The answer comes when the output has its value from before."""
+        """End a force of any client. The answer comes when the output has its previous value again."""
         await self._online.forces.end(args.id)
