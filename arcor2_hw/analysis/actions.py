@@ -37,7 +37,7 @@ class ActionReader:
 
     # -------------------------------------------------------------------------------- detection of actions
     def mark(self, owner: ClassInfo, name: str, node: FunctionNode) -> ActionMetadata | None:
-        """Return the metadata of a method that is marked as an action by the decorator or `method.__action__ = ActionMetadata()`."""
+        """Return the metadata of an action, which the decorator or `method.__action__ = ActionMetadata()` marks."""
         expression = owner.marks.get((name, "__action__"))
         if expression is not None:
             if not isinstance(expression, ast.Call):

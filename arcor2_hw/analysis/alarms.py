@@ -59,7 +59,7 @@ def _picture(folder: Path, name: str) -> Path:
 
 
 def kind_of(code: str, *declared: Iterable[AlarmKind]) -> AlarmKind | None:
-    """Return the declaration of a code: exact matches before patterns, earlier lists first, then longer patterns first."""
+    """Return the declaration of a code: exact matches before patterns, then earlier lists, then longer patterns."""
     found = [
         (kind.code == code, -rank, len(kind.code.replace("*", "")), kind)
         for rank, kinds in enumerate(declared)

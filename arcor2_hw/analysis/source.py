@@ -82,7 +82,7 @@ class Problem(Data, frozen=True):
 
 
 class AnalysisStopped(Exception):
-    """Reading cannot continue. It is caught inside the analysis.
+    """Reading cannot continue. The analysis catches this error.
 
     Args:
         message: The message; with values its template.

@@ -54,7 +54,7 @@ _DEPTH: Final = 40
 
 
 def our_spelling(module: str, name: str) -> tuple[str, str]:
-    """Return our module and name for what older object types import (protocol, section 9.6)."""
+    """Return our module and name for an import of older object types (protocol, section 9.6)."""
     return OLDER_NAMES.get(module, {}).get(name, (module, name))
 
 

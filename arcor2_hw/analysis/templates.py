@@ -145,7 +145,7 @@ def _is_phrase(node: ast.expr) -> bool:
 
 
 class _Scan(NamedTuple):
-    """What is needed of a syntax tree.
+    """Required content of a syntax tree.
 
     Attributes:
         classes: All classes.

@@ -18,7 +18,7 @@ FOLDER: Final = "translations"
 MAX_SIZE: Final = 4 * 1024 * 1024
 """Maximum size of a file, bytes."""
 GROUPED: Final = 3
-"""Number of settings with a common first word from which the editor shows them as a group with this title."""
+"""Minimum number of settings with a common first word that the editor shows as a group with this title."""
 _LANGUAGE: Final = re.compile(r"[a-z]{2,3}(-[A-Z]{2})?")
 
 
@@ -90,7 +90,7 @@ def faults(folder: Path, keys: Iterable[str]) -> list[str]:
 
 
 def _problem(key: str, text: str) -> str:
-    """Return what is wrong with a translation; empty if nothing is."""
+    """Return the problem of a translation; empty if there is none."""
     if not text.strip():
         return "the translation is empty"
     try:

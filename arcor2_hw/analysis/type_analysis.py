@@ -20,7 +20,7 @@ class TypeAnalysis(Data, frozen=True):
         mixins: Classes before its base.
         enumerations: The enumerations of its actions, by action and parameter.
         keyword_only: Keyword-only parameters, as (action, parameter).
-        modules: The other files it needs, each after those that it needs itself; without ours, and without packages
+        modules: The other required files, each after its own requirements; without our files, and without packages
             that only contain them.
         lookups: Full names of the modules that were looked for, except ours and those of distributions without an
             object type. The analysis is outdated when a module of such a name, or below it, is added or removed.

@@ -105,7 +105,7 @@ def measured_board(
 
     Returns:
         The outermost corners between squares and their positions in the frame of the board, (4, 3), m. None when too
-        few of its markers are detected, or its edges are not where they should be.
+        few of its markers are detected, or its edges are not at the expected places.
     """
     last = board.first_id + board.columns * board.rows // 2 - 1
     own = [(number, corners) for number, corners in found if board.first_id <= number <= last]

@@ -59,7 +59,7 @@ def find_camera_pose(
     try:
         found = find(lens, detection.seen, hints, options)
     except CalibrationRefused as error:
-        if error.reason == Reason.IMPLAUSIBLE:  # in a mirror image, some markers are mistaken for others
+        if error.reason == Reason.IMPLAUSIBLE:  # in a mirrored image, some markers are mistaken for others
             check_not_mirrored(grey_of(pictures[0]), wanted_markers(layout))
         raise
     checked = check_of_lens(lens, found, hints, options)
@@ -133,7 +133,7 @@ def _check_still(seen: list[DetectedTarget]) -> None:
     """Require that markers are at the same pixels in all images.
 
     Raises:
-        CalibrationRefused: Something moved.
+        CalibrationRefused: A marker moved.
     """
     first: dict[tuple[str, int], DetectedTarget] = {}
     for each in seen:
@@ -209,7 +209,7 @@ def _check_known(found: PoseCandidate, lens: LensCheck, position: float, options
     """Require that the pose is certain enough and agrees with the hints.
 
     Raises:
-        CalibrationRefused: It does not.
+        CalibrationRefused: The pose is uncertain or contradicts the hints.
     """
     if math.isfinite(position) and position <= options.largest_deviation:
         return
@@ -248,7 +248,7 @@ def _verdict(
     checked: CheckedPose,
     options: PoseOptions,
 ) -> tuple[Grade, Message]:
-    """Return how good a pose is, and what a technician should check."""
+    """Return the grade of a pose, and instructions for checks by a technician."""
     markers = sum(kind == "marker" for kind, _ in places)
     boards = len(places) - markers
     seen = Message.of("markers: {markers}, boards: {boards}", markers=markers, boards=boards)

@@ -16,7 +16,7 @@ PoseMethod = Literal["joint", "averaged"]
 
 
 class PoseOptions(Data, frozen=True):
-    """How the pose of a camera is computed, and when the result is refused.
+    """Options for computing the pose of a camera, and limits for refusing the result.
 
     Attributes:
         method: `joint` solves the corners of all markers in all images as one problem; `averaged` averages one pose per
@@ -27,7 +27,7 @@ class PoseOptions(Data, frozen=True):
         min_distance: Distance up to which a marker has full weight, m.
         max_distance: Distance above which a marker has no weight, m.
         largest_deviation: Maximum standard deviation of the position (largest axis), m.
-        largest_residual: Residual of a marker above which it is not where it should be, px.
+        largest_residual: Residual of a marker above which it is not at its configured place, px.
         focal_deviation: Standard deviation of fx and fy as a fraction.
         centre_deviation: Standard deviation of cx and cy, px.
         distortion_deviation: Standard deviation of each distortion coefficient as a fraction.
@@ -59,7 +59,7 @@ class PoseOptions(Data, frozen=True):
 
 
 class MarkerError(Data, frozen=True):
-    """How well one marker or board fits the pose.
+    """Error of one marker or board with respect to the pose.
 
     Attributes:
         name: `marker 3` or `board 1`.
@@ -69,7 +69,7 @@ class MarkerError(Data, frozen=True):
         largest: Largest such distance, px.
         distance: Distance from the camera, m.
         angle: Angle between the marker's normal and the line to the camera, rad.
-        used: Whether it was used; false when it is not where it should be.
+        used: Whether it was used; false when it is not at its configured place.
     """
 
     name: str
@@ -115,7 +115,7 @@ class LensCheck(TranslatableData, frozen=True):
 
 
 class CameraPose(TranslatableData, frozen=True):
-    """The pose of a camera, and how certain it is.
+    """The pose of a camera with its uncertainty.
 
     Attributes:
         pose: Pose of the camera in the frame of the origin.
@@ -147,7 +147,7 @@ class CameraPose(TranslatableData, frozen=True):
     lens: LensCheck | Unset = UNSET
 
     def estimated(self, *, inverse: bool = False) -> EstimatedPose:
-        """Return the result as the protocol has it; with `inverse`, the pose of the origin in the camera's frame."""
+        """Return the result in the form of the protocol; with `inverse`, the pose of the origin in the camera's frame."""
         return EstimatedPose(self.pose.inverted() if inverse else self.pose, self.quality)
 
 
@@ -163,7 +163,7 @@ class HandEyeSample(Data, frozen=True):
 
 
 class HandEyeOptions(Data, frozen=True):
-    """When a hand-eye calibration is refused. See PoseOptions for options not listed here.
+    """Limits for refusing a hand-eye calibration. See PoseOptions for options not listed here.
 
     Attributes:
         smallest_turn: Minimum rotation between two stations that counts, rad.
@@ -194,7 +194,7 @@ class HandEyeMethod(Data, frozen=True):
 
 
 class HandEyeError(TranslatableData, frozen=True):
-    """How well one sample fits.
+    """Error of one sample.
 
     Attributes:
         residual: Root mean square error of the corners, px.
@@ -239,7 +239,7 @@ class HandEye(TranslatableData, frozen=True):
 
 # ------------------------------------------------------------------------------------------------ intrinsics
 class IntrinsicsOptions(Data, frozen=True):
-    """How intrinsics are computed, and when they are refused.
+    """Options for computing intrinsics, and limits for refusing them.
 
     Attributes:
         coefficients: Number of distortion coefficients: 4 (k1, k2, p1, p2), 5 (and k3), 8 (rational), 12 (and thin
@@ -259,7 +259,7 @@ class IntrinsicsOptions(Data, frozen=True):
 
 
 class ViewError(TranslatableData, frozen=True):
-    """How well one image fits.
+    """Error of one image.
 
     Attributes:
         residual: Root mean square error of the corners, px.

@@ -82,7 +82,7 @@ def mean_depth(pictures: DepthPictures) -> Floats:
         return np.asarray(pictures.reshape(pictures.shape[-2:]), dtype=np.float64) * 1e-3
     total = np.zeros(pictures.shape[1:])
     squares, count = np.zeros_like(total), np.zeros_like(total)
-    for picture in pictures:  # one at a time, so that a thousand images need no more memory than two
+    for picture in pictures:  # one at a time, so that memory does not grow with the number of images
         z = picture * 1e-3
         total += z
         squares += z * z
@@ -98,7 +98,7 @@ class DepthView:
 
     Attributes:
         depth: (rows, columns), m, 0 where not usable.
-        seen: The same before edges were removed.
+        seen: The depth before edges were removed.
         rays: (rows, columns, 3) in the camera's optical frame with z = 1, so that ray times depth is the point.
     """
 

@@ -1,4 +1,4 @@
-"""Detection of a layout in images: from files to corners of known place, or a refusal that says what is missing."""
+"""Detection of a layout in images: from files to corners of known position, or a refusal with the reason."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -198,7 +198,7 @@ def _seen_marker(marker: Measured, origin_from_marker: Array, size: float, pictu
 
 
 def _missing(greys: Sequence[Grey], layout: Layout, contents: Sequence[_ImageContent]) -> CalibrationRefused:
-    """Return the refusal that says why no target could be used, and what was visible instead.
+    """Return the refusal, with the reason why no target could be used, and the visible content.
 
     Raises:
         CalibrationRefused: The image is mirrored.

@@ -35,7 +35,7 @@ FARTHEST: Final = (0.005, math.radians(0.7))
 
 
 class JointState(NamedTuple):
-    """The robot's surface at the joint values of a state, and the depth images of it."""
+    """The robot's surface at the joint values of a state, and the depth images of this state."""
 
     surface: RobotSurface
     depth: DepthPictures
@@ -50,8 +50,8 @@ def find_robot_pose_of_states(
 ) -> RobotPose:
     """Find the pose of a robot's base in the world, and check its joints and its model.
 
-    The poses of all states are averaged, weighted by their covariances, and compared by a chi-square test. What they
-    differ by is added to the covariance. With one state, the result is that of `find_robot_pose`.
+    The poses of all states are averaged, weighted by their covariances, and compared by a chi-square test. Their
+    differences are added to the covariance. With one state, the result is that of `find_robot_pose`.
 
     Args:
         states: Joint states that differ in all joints, better three or more, with the same base and camera.

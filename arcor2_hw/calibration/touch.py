@@ -27,7 +27,7 @@ ORIENTATION_SPREAD: Final = 0.12
 """Minimum singular value, per square root of the count, of the equations of the tip: some 15° about every axis."""
 TIP_FITS: Final = 0.0005
 TIP_MISFIT: Final = 0.01
-"""Root mean square residual above which the tip was not at one point, m."""
+"""Root mean square residual above which the touches of the tip do not agree, m."""
 ANGLE_GOOD: Final = math.radians(0.25)
 """Standard deviation of a frame's orientation up to which it is good, rad: less than 1° in 4 standard deviations."""
 TOUCH_DEVIATION: Final = 0.0005
@@ -284,7 +284,7 @@ def orientation_by_points(flange: Orientation, tip: Position, along_z: Position,
     return TouchedOrientation(found, Grade.USABLE, verdict.text, [off], off, 0, False, **verdict.translation())
 
 
-# ---------------------------------------------------------------------------------------------------- what they share
+# ---------------------------------------------------------------------------------------------------- common
 def _points(name: str, points: Sequence[Position], least: int) -> Floats:
     if not least <= len(points) <= _MOST:
         raise InvalidData(

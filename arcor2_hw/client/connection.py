@@ -293,7 +293,7 @@ class Client(Requests):
                     raise AnswerLost(name, self._url) from None
             except AnswerTimeout:
                 raise AnswerTimeout(name, limit) from None
-            await asyncio.sleep(0)  # so that the reconnecting task runs
+            await asyncio.sleep(0)  # lets the reconnecting task run
         data = self._data(name, message)
         if not message.result:
             raise refusal(name, message.messages, data, message.code)
@@ -316,7 +316,7 @@ class Client(Requests):
                 ) from None
             if self._end is not None:
                 raise self._end.with_traceback(None)
-            await asyncio.sleep(0.001)  # just lost: the reconnecting task will notice
+            await asyncio.sleep(0.001)  # the connection was just lost; the reconnecting task detects it
         return self._wire
 
     def _data(self, name: str, message: Message) -> Any:
@@ -330,7 +330,7 @@ class Client(Requests):
             raise InvalidData("The server's answer to {name} is invalid.", str(e), name=name) from e
 
     def _remember(self, args: Any, dry_run: bool) -> None:
-        """Remember what has to be sent again after a connection loss."""
+        """Store requests that have to be sent again after a connection loss."""
         if dry_run:
             return
         match args:

@@ -43,7 +43,7 @@ async def dry_run(
         on_progress: Receives the progress, 0 to 1.
 
     Raises:
-        DryRunFailed: It could not be computed; the message says why.
+        DryRunFailed: It could not be computed; the message states the reason.
         Cancelled: A client cancelled it.
         RequestFailed: The server refused it.
     """

@@ -108,12 +108,12 @@ class AnswerTimeout(DeviceTimeout):
 
 
 class EventsMissed(Arcor2Error):
-    """Events are missing at this place of a stream. The stream can be read further.
+    """Events are missing at this place of a stream. The stream remains usable.
 
     Attributes:
         dropped: Number of events dropped because they were not read in time, or were invalid.
-        rejoined: Whether the connection was lost and restored. Events of that time are missing; the initial events of
-            the server, with what is open and running, follow.
+        rejoined: Whether the connection was lost and restored. Events of that time are missing; the initial events
+            of the server follow, which describe the open document and the running program.
         seconds: Duration of the connection loss, s.
         not_resumed: Streams of robots that the server refused to resume.
     """

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class Busy(NamedTuple):
-    """A zone that another robot has. deadlock: whether that robot waits, directly or indirectly, for the requesting robot."""
+    """A zone of another robot. deadlock: whether that robot waits, directly or indirectly, for the requesting robot."""
 
     zone: str
     owner: str

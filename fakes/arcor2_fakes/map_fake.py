@@ -61,7 +61,7 @@ class MapFake(MappedDevice):
             vars(self.registers).update(end)
 
     def _command(self, command: dict[str, Any]) -> tuple[str, dict[str, Any], dict[str, Any], dict[str, Any]]:
-        """Return for a command the last written point, all writes, and the values at its start and at its end."""
+        """Return the last written point of a command, all its writes, and the values at its start and end."""
         busy, start = self._content.get("busy", {}), command.get("write", {})
         last = [*command.get("parameters", []), *start][-1]
         done = command.get("done", {}).get("when", {})
@@ -93,7 +93,7 @@ class MapFake(MappedDevice):
         self.__init__(self._content)  # type: ignore[misc]
 
     def advance(self, now: float) -> None:
-        """End the command when its time is over."""
+        """End the command when its duration has elapsed."""
         if now - self.began >= self.seconds:
             self.let_go()
 
@@ -131,7 +131,7 @@ class MapFake(MappedDevice):
             self.let_go()
 
     def truth(self) -> dict[str, Any]:
-        """Return the real state, for tests; `done` is the part of the command that is done, 0 to 1."""
+        """Return the real state, for tests; `done` is the completed fraction of the command, 0 to 1."""
         done = (time.monotonic() - self.began) / self.seconds if self.busy else 1.0
         return super().truth() | {"done": done}
 

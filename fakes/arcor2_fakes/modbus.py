@@ -34,7 +34,7 @@ _TABLES: Final = {1: "coils", 2: "discrete_inputs", 3: "holding_registers", 4: "
     23: "holding_registers",
     43: "identity",
 }
-"""Attribute of a device without which it does not have a function."""
+"""Attribute of a device that a function requires."""
 _REQUESTS: Final = (
     dict.fromkeys(range(1, 7), (8, 0))
     | dict.fromkeys((15, 16), (9, 6))
@@ -73,7 +73,7 @@ class ModbusTables:
 
     Class Attributes:
         unit: Unit id of the device.
-        functions: Functions that it has, if it has their tables.
+        functions: Functions of the device, if it has their tables.
         identity: Vendor, product code, revision and product name (function 43/14); empty without this function.
         coils, discrete_inputs, holding_registers, input_registers: Sizes of the tables; 0 without its functions.
     """
@@ -99,11 +99,11 @@ class ModbusTables:
         raise NotImplementedError
 
     def read_input_registers(self) -> Sequence[int]:
-        """Return all input registers; of a longer number the lower 16 bits count."""
+        """Return all input registers. The lower 16 bits of longer numbers are used."""
         raise NotImplementedError
 
     def read_holding_register(self, address: int) -> int:  # noqa: ARG002 - they cannot be read
-        """Return a holding register; of a longer number the lower 16 bits count."""
+        """Return a holding register. The lower 16 bits of a longer number are used."""
         return 0
 
     def read_registers(self, function: int, address: int, count: int) -> Sequence[int]:

@@ -195,7 +195,7 @@ class Arm:
         return Motion([self._straight_part(here, over), across, self._straight_part(above, goal)])
 
     def _joint_part(self, start: Four, end: Four) -> Part:
-        """Return the part in which all joints arrive together; the slowest determines the time."""
+        """Return the part in which all joints arrive together. The slowest joint determines its duration."""
         fast, quick = self.settings.speed_ratio / 100.0, self.settings.acceleration_ratio / 100.0
         shares = [
             Trapezoid(abs(b - a), speed * fast, acceleration * quick)

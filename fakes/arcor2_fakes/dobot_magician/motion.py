@@ -10,7 +10,7 @@ from arcor2_fakes.trapezoid import Trapezoid
 
 
 def between(a: Four, b: Four, share: float) -> Four:
-    """Return the point at a fraction of the way from `a` to `b`."""
+    """Return the point at a fraction of the distance from `a` to `b`."""
     return (
         a[0] + (b[0] - a[0]) * share,
         a[1] + (b[1] - a[1]) * share,

@@ -111,11 +111,11 @@ class Station:
     # ------------------------------------------------------------------------------------------------ time
 
     def advance(self) -> None:
-        """Apply in order all changes that are due since the last call."""
+        """Apply all changes since the last call, in order."""
         now = self._clock()
         while (event := self._next_event()) is not None and event[0] <= now:
             due, happen = event
-            self._now = max(due, self._now)  # a fault that was armed late may be due in the past
+            self._now = max(due, self._now)  # the time of a fault that was armed late may be in the past
             happen()
         self._now = now
 
@@ -159,7 +159,7 @@ class Station:
         verdict = "pass" if self.measured.within_limits() else "fail"
         self.results.append(Result(number, self._board.code, verdict, self._program, self.measured))
 
-    # ------------------------------------------------------------------------------------------------ the host's side
+    # ------------------------------------------------------------------------------------------------ host
 
     def request_arrived(self) -> None:
         """Reset the host watchdog; call it for every request."""

@@ -62,7 +62,7 @@ class Stream:
         return found
 
     def _step(self) -> str | Format | None:
-        """Check whether the last byte completes a command. A ~ command counts everywhere, also inside a format."""
+        """Check whether the last byte completes a command. A ~ command is valid everywhere, also inside a format."""
         rest = self._rest
         if len(rest) >= 3 and rest[-3] == 0x7E:
             command = bytes(rest[-3:]).decode("latin-1")
