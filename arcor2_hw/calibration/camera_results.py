@@ -147,7 +147,7 @@ class CameraPose(TranslatableData, frozen=True):
     lens: LensCheck | Unset = UNSET
 
     def estimated(self, *, inverse: bool = False) -> EstimatedPose:
-        """Return the result in the form of the protocol; with `inverse`, the pose of the origin in the camera's frame."""
+        """Return the result in the form of the protocol. `inverse`: pose of the origin in the camera's frame."""
         return EstimatedPose(self.pose.inverted() if inverse else self.pose, self.quality)
 
 

@@ -220,7 +220,7 @@ def _verdict(name: str, found: Agreement, deviations: tuple[float, ...], moved: 
     parts = [
         Message.of(
             "{name} is {moved:.0f} mm and {turned:.1f}° from its assumed pose, known to {position:.1f} mm and"
-            " {orientation:.2f}°. The picture confirms {confirmed:.0%} of what should be seen.",
+            " {orientation:.2f}°. The picture confirms {confirmed:.0%} of the visible surface.",
             name=name,
             moved=moved * 1e3,
             turned=math.degrees(turned),

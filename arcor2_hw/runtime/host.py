@@ -394,7 +394,7 @@ class Host:
         try:
             record = None if self.program is None else self.program.record
             if self.program is None or record is None:
-                raise Conflict("The program keeps no part inventory.")
+                raise Conflict("The program has no part inventory.")
             record.confirm(message.parts)
         except Arcor2Error as error:
             self.link.post(m.CallFailed(message.id, error_data(error)))

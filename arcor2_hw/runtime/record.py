@@ -313,7 +313,7 @@ class RunRecord:
         """
         with self._lock:
             if self._parts is None:  # the program is still starting
-                raise Conflict("The program keeps no part inventory.")
+                raise Conflict("The program has no part inventory.")
             if self._running:
                 names = ", ".join(action.action_name for action in self._running.values())
                 raise Conflict("Parts cannot be confirmed while an action runs: {names}.", names=names)

@@ -122,7 +122,7 @@ async def test_registering_is_repeated_until_the_name_is_free() -> None:
 async def test_a_revoked_token_closes_the_client() -> None:
     async with scripted() as server, Client(server.url, token="old") as client:
         server.admits = False
-        await server.sockets[-1].close(4401, "the token is not valid any more")
+        await server.sockets[-1].close(4401, "the token is no longer valid")
         await client.next_event("ShowMainScreen")
         for _ in range(2):
             with pytest.raises(NotAdmitted, match="not valid any more"):

@@ -192,7 +192,7 @@ class ImportFunctionArgs(Data, frozen=True):
     """Arguments of ImportFunction.
 
     points: the action points of the open project, by the id or name of the exported ones. Other items are found by
-    their id, else by their name.
+    their id, otherwise by their name.
     """
 
     function: FunctionExport

@@ -293,7 +293,9 @@ class RealBench(CellBench):
         values = readings_of(device, self._read)
         self.person.show(["reading", "by the driver"], [[name, text] for name, text, _ in values])
         agrees = self.person.confirm(f"Does the device show the same values ({self.day.display})?")
-        return [Check(name, value, value if agrees else "another value, says the person") for name, _, value in values]
+        return [
+            Check(name, value, value if agrees else "the person reports another value") for name, _, value in values
+        ]
 
     def beyond_limits(self, device: Generic) -> Mapping[str, Callable[[], object]]:
         """Return calls that move nothing even if they are not refused: moves to the present joints."""
@@ -327,7 +329,7 @@ class RealBench(CellBench):
         if hook == "orphan" and self._single:
             return "it accepts one connection only, so it cannot be observed while another process uses it"
         if hook == "foreign" and isinstance(day.elsewhere, Unset):
-            return "first_day.yaml does not say how to give control to something else"
+            return "first_day.yaml does not state how to give control to another client"
         if hook == "readings" and (isinstance(day.display, Unset) or not self._read):
             return "first_day.yaml does not say where the device shows its readings"
         single_arm = issubclass(self.object_type, Robot) and not issubclass(self.object_type, MultiArmRobot)

@@ -36,7 +36,7 @@ BEFORE: Final = (
     "This program and its stops are not safety functions. They do not replace a risk assessment, guards or an enabling "
     "switch.",
     "The emergency stop of the device is within your reach, and you have tried it.",
-    "Nobody and nothing is in the space that the device can reach, and nobody else uses it.",
+    "No person or object is in the space that the device can reach, and no other client uses the device.",
 )
 MAX_SHOWN: Final = 240
 """Maximum length of a reading that is shown."""
@@ -170,7 +170,7 @@ class Session:
         """Connect, show everything that can be read, and disconnect. Nothing may act on the device."""
         bench, person = self.bench, self.person
         self._current = "reading"
-        person.say("What the device says", "heading")
+        person.say("Readings of the device", "heading")
         began = time.monotonic()
         device = within(bench.case_within, bench.connected, "connecting")
         connected = time.monotonic() - began

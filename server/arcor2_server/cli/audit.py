@@ -12,7 +12,7 @@ from arcor2_server.audit.export import csv_chunks
 from arcor2_server.cli.exit_status import ExitStatus, fail
 from arcor2_server.settings import ServerSettings, default_data_dir
 
-app = App(name="audit", help="Check and export who changed or commanded what.")
+app = App(name="audit", help="Check and export the audit trail of changes and commands.")
 
 DataDir = Annotated[Path | None, Parameter(help="Data directory of the server ($XDG_DATA_HOME/arcor2-hw).")]
 

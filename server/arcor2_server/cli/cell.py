@@ -27,7 +27,7 @@ def show(*, server: Server = HERE) -> int:
 
 @app.command
 def mode(
-    mode: Annotated[CellMode, Parameter(help="What the cell is used for.")],
+    mode: Annotated[CellMode, Parameter(help="Mode of the cell.")],
     /,
     *,
     user: User = None,
@@ -39,7 +39,7 @@ def mode(
 
 @app.command
 def authority(
-    authority: Annotated[CellAuthority, Parameter(help="Who may start programs.")],
+    authority: Annotated[CellAuthority, Parameter(help="The client that may start programs.")],
     /,
     *,
     user: User = None,

@@ -266,7 +266,10 @@ def _overlaps(points: Mapping[str, Point]) -> Iterator[tuple[Keys, str]]:
 
 def _of_a_command(path: Keys, command: Command, device: DeviceMap) -> Iterator[tuple[Keys, str]]:
     if command.acknowledge is UNSET and command.done is UNSET:
-        yield path, "acknowledge or done is missing: without one of them, nobody knows whether the device obeyed"
+        yield (
+            path,
+            "acknowledge or done is missing: one of them is required to detect the end of a command",
+        )
     for key, wait in (("acknowledge", command.acknowledge), ("done", command.done)):
         if isinstance(wait, Unset):
             continue

@@ -48,7 +48,9 @@ app.command("arcor2_server.cli.metrics:app", name="metrics", help="Manage the to
 app.command("arcor2_server.cli.person:app", name="person", help="Manage the persons who log on at shared devices.")
 app.command("arcor2_server.cli.alarms:app", name="alarms", help="List, acknowledge and shelve alarms; statistics.")
 app.command("arcor2_server.cli.cell:app", name="cell", help="Mode and authority of the cell, and jobs of its PLC.")
-app.command("arcor2_server.cli.audit:app", name="audit", help="Check and export who changed or commanded what.")
+app.command(
+    "arcor2_server.cli.audit:app", name="audit", help="Check and export the audit trail of changes and commands."
+)
 app.command(
     "arcor2_server.cli.database:app", name="database", help="Move the documents of a data directory to PostgreSQL."
 )

@@ -125,7 +125,7 @@ def _owned(document: Document, change: Change, types: Types) -> None:  # noqa: A
     kinds = (Kind.POINT, Kind.FUNCTION) if change.kind is Kind.ACTION else (Kind.POINT,)
     if all(document.find(kind, change.parent) is None for kind in kinds):
         raise Inconsistent(
-            "The action point or function of {change} does not exist any more.", [change.parent], change=title(change)
+            "The action point or function of {change} no longer exists.", [change.parent], change=title(change)
         )
 
 
@@ -192,9 +192,9 @@ def _check_function(document: Document, key: str, types: Types) -> None:
 def _logic(document: Document, change: Change, types: Types) -> None:
     project = next((item for item in document.of_kind(Kind.PROJECT)), None)
     if change.parent and document.find(Kind.FUNCTION, change.parent) is None:
-        raise Inconsistent("The function of {change} does not exist any more.", [change.parent], change=title(change))
+        raise Inconsistent("The function of {change} no longer exists.", [change.parent], change=title(change))
     if project is not None and not project.value.has_logic and not change.parent:
-        raise Inconsistent("The project {name} has no logic any more.", [project.id], name=project.value.name)
+        raise Inconsistent("The project {name} no longer has logic.", [project.id], name=project.value.name)
     _check_step(document, change.after, types)
 
 

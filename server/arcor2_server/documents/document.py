@@ -135,7 +135,7 @@ class Document:
 
     def _check_open(self) -> None:
         if self._retired:
-            raise InvalidData("The scene or project was closed meanwhile: nothing was changed.")
+            raise InvalidData("The scene or project was closed in the meantime. Nothing was changed.")
 
     def apply(self, changes: Iterable[Change]) -> None:
         """Apply changes in order."""

@@ -56,7 +56,7 @@ class Exporter:
             scene = await rest.scene(project.scene_id)
         except ResourceNotFound:
             raise NotFound(
-                "the scene {scene_id} of the project {name} does not exist any more",
+                "the scene {scene_id} of the project {name} no longer exists",
                 scene_id=project.scene_id,
                 name=project.name,
             ) from None

@@ -131,7 +131,7 @@ class HostGroup:
         except TimeoutError as error:
             raise DeviceTimeout("{computer} does not open the scene", computer=shown(host.node)) from error
         if self.reason is not None or self._main.leaving or self.has(host.node):
-            raise ConnectionLost("The scene went offline meanwhile.")
+            raise ConnectionLost("The scene went offline in the meantime.")
         self._members[host.node] = member
         self.rings.append(host.ring)
         host.user = self

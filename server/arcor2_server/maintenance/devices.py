@@ -173,7 +173,7 @@ class Devices:
             raise RequestRefused("{name} is the confirmed device already.", name=card.name)
         if card.found != identity:
             raise RequestRefused(
-                "Meanwhile another device is connected as {name}. Check its identity again.", name=card.name
+                "A different device is now connected as {name}. Check its identity again.", name=card.name
             )
         before, at = card.identity, now()
         if set(card.differing) - {"firmware"}:

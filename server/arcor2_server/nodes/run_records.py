@@ -120,11 +120,11 @@ class RunRecords:
     def _checkpoint(self, request: m.ReadCheckpoint | m.StoreCheckpoint) -> PartInventory | None:
         """Read or store a checkpoint. A node can change only that of the scene that it runs."""
         if self._file is None:
-            raise Conflict("The program keeps no part inventory.")
+            raise Conflict("The program has no part inventory.")
         if isinstance(request, m.ReadCheckpoint):
             return self._file.read()
         if request.inventory.scene_id != self._scene_id:
-            raise Conflict("The program keeps no part inventory.")
+            raise Conflict("The program has no part inventory.")
         self._file.write(request.inventory)
         return None
 

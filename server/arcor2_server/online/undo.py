@@ -94,7 +94,7 @@ class Undo:
                 if change.kind is Kind.OBJECT and self._online.online and _moves(change):
                     await self._online.object_pose_changed(change.id, change.after.pose)
         if session.document is not document:
-            raise RequestRefused("The scene or project was closed meanwhile: nothing was changed.")
+            raise RequestRefused("The scene or project was closed in the meantime. Nothing was changed.")
         # Other users may have edited the document while this waited.
         require_applicable(document, changes, self._types, session.history, after, user)
         if dry_run:

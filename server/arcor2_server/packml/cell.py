@@ -104,7 +104,7 @@ class PackmlCell:
 
     @property
     def authority(self) -> CellAuthority:
-        """Who may start programs."""
+        """The client that may start programs."""
         return self._file.record.authority
 
     @property

@@ -336,7 +336,7 @@ class Plc:
             known = [each for each in self._file.record.plant_requests if each.id == request]
             if request and known:
                 return known[0].result, Message.of(known[0].text) if known[0].text else None
-            await self._store_plant_request(request, command, R.INTERRUPTED, "The server ended meanwhile.")
+            await self._store_plant_request(request, command, R.INTERRUPTED, "The server ended during the request.")
             try:
                 result, text = await self._execute(command, job, by)
             except Arcor2Error as error:

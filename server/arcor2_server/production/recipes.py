@@ -324,7 +324,7 @@ class Recipes:
         try:
             digest = await asyncio.to_thread(self._packages.digest, recipe.package_id)
         except NotFound:
-            return Message.of("The package of {recipe} does not exist any more.", recipe=recipe.shown)
+            return Message.of("The package of {recipe} no longer exists.", recipe=recipe.shown)
         if digest != recipe.package_hash:
             return Message.of(
                 "The package of {recipe} was changed. Build it again and add a new revision.", recipe=recipe.shown

@@ -60,7 +60,7 @@ def _create_or_migrate(connection: Connection, place: str) -> None:
         _create(connection)
     elif found not in KNOWN_REVISIONS | {REVISION}:
         raise StorageError(
-            "The database {place} has the schema {found!r}, which this version does not know. Update arcor2-hw.",
+            "The database {place} has the schema {found!r}, which this version does not support. Update arcor2-hw.",
             place=place,
             found=found,
         )

@@ -135,7 +135,7 @@ class Endpoint:
                     log.error("tokens cannot be read", error=str(error))
                     break
                 if not valid:
-                    client.close(CloseCode.NOT_ADMITTED, "the token is not valid any more")
+                    client.close(CloseCode.NOT_ADMITTED, "the token is no longer valid")
             try:
                 await self._log_ons.refresh()
             except StorageError as error:

@@ -136,7 +136,7 @@ class DisplayModels:
         replace_file(self._directory / f"{name_on_disk}.glb", made.content, durable=False, temporary=temporary)
         found = self._find(name_on_disk)
         if found is None:
-            raise FileNotFoundError(2, "the file was deleted meanwhile")
+            raise FileNotFoundError(2, "the file was deleted in the meantime")
         return found
 
     def _make_room(self, needed: int) -> None:

@@ -21,7 +21,7 @@ export const STATES: Record<CellStateName, MessageDescriptor> = {
 interface Option<Id> {
   id: Id;
   name: MessageDescriptor;
-  /** Who may start programs. */
+  /** The client that may start programs. */
   detail: MessageDescriptor;
 }
 
