@@ -44,7 +44,7 @@ def teardown_module():
 """
 
 
-def test_what_is_tidied_up_or_of_wider_scope_passes(pytester: pytest.Pytester) -> None:
+def test_cleaned_up_resources_and_those_of_wider_scope_pass(pytester: pytest.Pytester) -> None:
     pytester.makeconftest(CONFTEST)
     pytester.makepyfile(
         """

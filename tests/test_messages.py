@@ -40,7 +40,7 @@ def test_an_error_or_message_as_value_stays_translatable() -> None:
     assert Message.of("{reason!r}", reason=inner).values == {"reason": repr(inner)}
 
 
-def test_translation_contains_what_is_sent_next_to_the_text() -> None:
+def test_translation_contains_the_fields_sent_with_the_text() -> None:
     made = Message.of("{name} is unknown.", name="x")
     assert made.translation() == {"key": "{name} is unknown.", "values": {"name": "x"}}
     assert Message.of("It is unknown.").translation() == {}

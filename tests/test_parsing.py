@@ -33,12 +33,12 @@ def nested() -> Iterator[list[str]]:
     gc.callbacks.remove(finalize)
 
 
-def test_a_source_is_parsed_while_something_else_parses(nested: list[str]) -> None:
+def test_a_source_is_parsed_during_another_parse(nested: list[str]) -> None:
     assert len(parse(SOURCE).body) == 2000
     assert nested, "nothing else has parsed meanwhile"
 
 
-def test_an_expression_is_parsed_while_something_else_parses(nested: list[str]) -> None:
+def test_an_expression_is_parsed_during_another_parse(nested: list[str]) -> None:
     expression = parse_expression("[" + "{}, " * 2000 + "]")
     assert isinstance(expression, ast.List)
     assert nested, "nothing else has parsed meanwhile"

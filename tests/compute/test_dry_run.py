@@ -85,7 +85,7 @@ def test_the_maximum_velocity_of_a_joint_slows_down_a_line() -> None:
     assert found.trace.spans[1].duration > 1.5 * (trapezoid_time(0.5, 3.0, 25.0) + SETTLING)
 
 
-def test_a_collision_on_the_way_is_reported_with_action_obstacle_and_place() -> None:
+def test_a_collision_on_the_path_is_reported_with_action_obstacle_and_place() -> None:
     post = WorldBody("post", Box(0.04, 0.04, 1.0), Pose(Position(0.4, 0.0, 0.5)))
     found = predict(program({"a": line(0.4, 0.25), "b": line(0.4, -0.25)}, "stop"), post)
     problem = problem_of(found)

@@ -19,14 +19,14 @@ from arcor2_hw.exceptions import InvalidData, TextTooLong
         ({"k" * (OTHER + 1): 1}, "A text", OTHER),
     ],
 )
-def test_what_is_too_long_is_refused_by_field_and_limit(args: object, field: str, limit: int) -> None:
+def test_too_long_values_are_refused_by_field_and_limit(args: object, field: str, limit: int) -> None:
     with pytest.raises(TextTooLong, match=rf"^{field} has \d+ characters; at most {limit} are allowed") as raised:
         check_texts(args)
     assert isinstance(raised.value, InvalidData)
     assert raised.value.code == "text_too_long"
 
 
-def test_what_fits_passes() -> None:
+def test_texts_within_the_limits_pass() -> None:
     check_texts(RegisterUserArgs("é" * NAME))
     check_texts([Parameter("n" * NAME, "string", "v" * VALUE)])
     check_texts(UploadPackageArgs("pkg_1", "x" * 2_000_000))

@@ -93,7 +93,7 @@ def test_a_force_ends_unless_it_is_renewed(host: HostProcess, block: FakeProcess
     assert outputs(block)["lock"] is True
 
 
-def test_what_cannot_be_forced(host: HostProcess, block: FakeProcess) -> None:
+def test_points_that_cannot_be_forced(host: HostProcess, block: FakeProcess) -> None:
     refused(host, "part is not an output", "part", True, 1)
     refused(host, "clamp cannot be forced, because the device would keep the value", "clamp", True, 2)
     refused(host, "has no point 'missing'", "missing", True, 3)

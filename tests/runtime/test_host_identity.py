@@ -158,6 +158,6 @@ def test_a_program_does_not_start_with_another_firmware(host: HostProcess, packa
     assert log(tmp_path) == []
 
 
-def test_differences_ignore_what_one_side_does_not_report() -> None:
+def test_differences_ignore_fields_missing_on_one_side() -> None:
     assert KNOWN.differences(Identity("", "Unit 5", "", "1.0")) == []
     assert KNOWN.differences(msgspec.structs.replace(KNOWN, serial="B2", firmware="2.0")) == ["serial", "firmware"]

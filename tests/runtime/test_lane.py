@@ -183,7 +183,7 @@ def test_a_driver_can_check_whether_its_call_is_still_wanted(lane: Lane) -> None
         stopped.outcome()
 
 
-def test_a_call_that_was_given_up_is_not_wanted_either(lane: Lane) -> None:
+def test_an_abandoned_call_counts_as_cancelled(lane: Lane) -> None:
     gate = threading.Event()
     reactions: list[BaseException] = []
 

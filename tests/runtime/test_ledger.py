@@ -141,7 +141,7 @@ def test_a_part_that_a_sensor_has_invented_does_not_count(ledger: Ledger) -> Non
         ledger.confirm([ConfirmedPart(3, "", exists=False)])
 
 
-def test_what_ended_with_the_program_is_repeated() -> None:
+def test_effects_that_ended_with_the_program_are_repeated() -> None:
     def done(branch: str, name: str, device: str, **more: bool) -> DoneAction:
         return DoneAction(branch, f"act_{name}", name, device, **more)
 

@@ -131,6 +131,6 @@ async def test_a_modbus_device_without_identification_is_found_too() -> None:
     assert found.description == "Modbus TCP"
 
 
-async def test_a_silent_server_is_given_up() -> None:
+async def test_a_silent_server_is_not_found() -> None:
     async with answering(None) as port, asyncio.timeout(20 * ANSWER_TIME):
         assert await search(modbus_device, ["127.0.0.1"], port) == []

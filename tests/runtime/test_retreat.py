@@ -32,7 +32,7 @@ def near(found: Position | None, *expected: float) -> bool:
         (Cylinder("zone", 0.5, 2.0), Position(1.2, 2.0, 0.1), (1.0, 0.0, 0.0), 0.3),
     ],
 )
-def test_the_shortest_way_leads_to_the_nearest_surface(
+def test_the_shortest_path_leads_to_the_nearest_surface(
     model: Models, tip: Position, direction: tuple[float, float, float], depth: float
 ) -> None:
     way = Retreat(Obstacle("zone", model, AT), [])

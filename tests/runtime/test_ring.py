@@ -62,7 +62,7 @@ def test_a_record_that_does_not_fit_leaves_the_segment_unchanged() -> None:
     assert [len(record) for record in content(ring)] == [ring_module.ROOM - 8, 0]
 
 
-def test_another_mapping_of_the_memory_reads_what_was_written_also_while_it_is_written() -> None:
+def test_a_second_mapping_of_the_memory_reads_records_during_writing() -> None:
     descriptor = create()
     reader = Ring(os.dup(descriptor))
     writer = Ring(descriptor)

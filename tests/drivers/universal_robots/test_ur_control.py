@@ -83,7 +83,7 @@ def test_the_pose_is_that_of_our_tool_before_control_is_taken(fake: FakeUr) -> N
     assert before.orientation.angle_to(after.orientation) < 1e-3
 
 
-def test_control_is_taken_from_a_program_that_ends_meanwhile(
+def test_control_is_taken_after_a_program_that_is_ending(
     robot: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fake.do("foreign_program", on=True)
@@ -186,7 +186,7 @@ def test_control_is_refused_without_a_payload(fake: FakeUr) -> None:
         robot.disconnect()
 
 
-def test_control_is_taken_although_this_computer_was_busy_meanwhile(
+def test_control_is_taken_although_this_computer_was_busy(
     robot: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The control process does not run from arming the watchdog until its first commands wait."""

@@ -187,7 +187,9 @@ def test_the_set_point_handshake(fake: FakeProcess, adapter: Adapter) -> None:
 @pytest.mark.parametrize(
     ("option", "state"), [(0, "operation_enabled"), (1, "fault"), (2, "switch_on_disabled"), (3, "switch_on_disabled")]
 )
-def test_heartbeat_loss_does_what_6007h_says(fake: FakeProcess, adapter: Adapter, option: int, state: str) -> None:
+def test_heartbeat_loss_causes_the_reaction_of_6007h(
+    fake: FakeProcess, adapter: Adapter, option: int, state: str
+) -> None:
     adapter.sdo("2316100196007F00")  # 150 ms of node 127
     adapter.sdo(f"2B076000{option:02X}000000")
     adapter.send("t00020105")

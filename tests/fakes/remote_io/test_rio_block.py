@@ -38,7 +38,7 @@ def after(block: Block, clock: Clock, seconds: float) -> list[bool]:
     return block.outputs[:4]
 
 
-def test_watchdog_expires_and_locks_what_it_guards(block: Block, clock: Clock) -> None:
+def test_watchdog_expires_and_locks_its_outputs(block: Block, clock: Clock) -> None:
     dog = block.watchdogs[0]
     assert after(block, clock, 60.0) == [True, False, True, True]  # off until it is triggered
     for _ in range(5):

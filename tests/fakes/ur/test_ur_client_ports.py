@@ -133,7 +133,7 @@ def test_the_primary_port_reports_errors_of_programs(ur):
         assert {secondary.message()[4] for _ in range(3)} == {16}
 
 
-def test_a_client_that_does_not_read_delays_nobody(ur):
+def test_a_client_that_does_not_read_does_not_delay_others(ur):
     with Client(ur, "script"), Client(ur, "script") as reading:
         times = [struct.unpack_from(">d", reading.message(), 4)[0] for _ in range(1000)]
     assert [round(b - a, 6) for a, b in pairwise(times)] == [0.002] * 999

@@ -117,7 +117,7 @@ def test_a_revoked_token_does_not_come_back_from_the_copy(tmp_path: Path) -> Non
     assert TokenFile(tmp_path).find(secret) is None
 
 
-def test_unreadable_tokens_admit_nobody(tmp_path: Path) -> None:
+def test_unreadable_tokens_admit_no_client(tmp_path: Path) -> None:
     for name in (FILE, COPY):
         (tmp_path / name).write_text("{")
     access = Access(ServerSettings(data_dir=tmp_path))

@@ -106,7 +106,7 @@ async def listening(server: ServerProcess) -> AsyncIterator[list[str]]:
                 received.append(str(await asyncio.wait_for(socket.recv(), 0.2)))
 
 
-async def test_a_secret_reaches_the_device_and_nobody_else(tmp_path: Path) -> None:
+async def test_a_secret_is_sent_only_to_the_device(tmp_path: Path) -> None:
     data = tmp_path / "data"
     async with (
         running(data) as server,

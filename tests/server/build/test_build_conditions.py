@@ -11,7 +11,7 @@ from arcor2_server.documents.comparisons import Comparison, Comparisons, Referen
 CASES = json.loads(Path(__file__).with_name("conditions.json").read_text())
 
 
-def test_server_and_editor_agree_on_what_conditions_cover() -> None:
+def test_server_and_editor_agree_on_the_coverage_of_conditions() -> None:
     places = {name: Reference(-1, 0, name) for name in CASES["types"]}
     for case in CASES["cases"]:
         tests = []

@@ -104,7 +104,7 @@ else:
     )
 
 
-def test_an_early_end_needs_no_else() -> None:
+def test_an_early_end_is_written_without_else() -> None:
     draft = Draft().edge(START, "a").branch("a", "b", "c").chain("b", END).branch("c", "d", END).chain("d", END)
     assert (
         loop(draft.script())

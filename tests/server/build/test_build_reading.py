@@ -409,7 +409,7 @@ def test_consecutive_conditions_become_one_branch() -> None:
     assert steps_of(project) == steps_of(workplace.project())
 
 
-def test_numbers_and_texts_with_an_else() -> None:
+def test_conditions_on_numbers_and_texts_with_else() -> None:
     pack = '            robot.place(aps.good.poses.default, an="pack")\n'
     counted = PICK + '        n = flow.count(an="count")\n'
     before = workplace.project()

@@ -63,7 +63,7 @@ async def test_devices_at_entered_addresses_are_offered_as_values_of_the_setting
 
 
 @serving()
-async def test_a_search_that_cannot_work_says_why(server: Server) -> None:
+async def test_a_search_that_cannot_work_states_the_reason(server: Server) -> None:
     server.types.settings["Belt"] = SETTINGS
     with pytest.raises(InvalidData, match="No search finds the setting bitrate of Belt"):
         await server.ask("FindDevices", {"type": "Belt", "setting": "bitrate"})

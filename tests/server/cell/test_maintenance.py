@@ -196,7 +196,7 @@ async def test_hours_and_cycles_belong_to_the_serial_number(tmp_path: Path) -> N
         assert swapped.counted_since > card.counted_since
 
 
-async def test_what_is_known_survives_a_restart_of_the_server(tmp_path: Path) -> None:
+async def test_device_cards_survive_a_restart_of_the_server(tmp_path: Path) -> None:
     async with workplace(tmp_path) as place:
         await place.restart()
         info = await place.ask("BackUpParameters", object_id="obj_unit")
@@ -291,7 +291,7 @@ async def test_files_of_backups_are_checked(tmp_path: Path) -> None:
             await place.ask("GetParameterBackup", object_id="obj_unit", backup_id=info.id)
 
 
-async def test_the_card_shows_what_the_confirmed_device_counts(tmp_path: Path) -> None:
+async def test_the_card_shows_the_counters_of_the_confirmed_device(tmp_path: Path) -> None:
     async with workplace(tmp_path) as place:
         await place.restart()
         assert (await place.card()).counters == {"gain adjusted": 5}

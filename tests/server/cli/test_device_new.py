@@ -73,7 +73,7 @@ def test_a_generated_modbus_driver_also_works_over_rtu(tmp_path: Path) -> None:
     pass_tests(root, "amount or half_a_frame or loss_reaction or reset_and_back", 4)
 
 
-def test_lines_of_text_may_end_in_another_way(tmp_path: Path) -> None:
+def test_lines_of_text_may_have_other_line_ends(tmp_path: Path) -> None:
     root = generate(tmp_path, Base.GENERIC, Bus.TCP, "press")
     link, fake = root / "press" / "link.py", root / "press" / "press_fake.py"
     link.write_text(link.read_text().replace('END = b"\\r"', 'END = b"\\r\\n"'))

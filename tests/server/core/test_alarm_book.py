@@ -117,7 +117,7 @@ def test_shelved_alarm_is_hidden_and_returns() -> None:
     assert [record.number for record in book.records(AlarmFilter.RETAINED)] == [1]
 
 
-def test_restart_ends_conditions_but_keeps_what_is_not_acknowledged() -> None:
+def test_restart_ends_conditions_but_keeps_unacknowledged_alarms() -> None:
     before = AlarmBook()
     before.raised(occurrence("a", "x", latching=True))
     before.raised(occurrence("b", "y"))
@@ -128,7 +128,7 @@ def test_restart_ends_conditions_but_keeps_what_is_not_acknowledged() -> None:
     assert record.number == 3
 
 
-def test_history_is_bounded_and_keeps_what_needs_attention() -> None:
+def test_history_is_bounded_and_keeps_alarms_that_need_attention() -> None:
     book = AlarmBook()
     book.raised(occurrence("keep", "x"))
     for number in range(MAX_RECORDS + 5):

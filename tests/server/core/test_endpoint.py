@@ -254,7 +254,7 @@ async def test_an_oversized_name_is_refused_without_events(services: Server) -> 
         assert len(bob.protocol.sent) == 1
 
 
-async def test_a_refusal_contains_what_is_needed_to_translate_it_if_codes_are_requested(services: Server) -> None:
+async def test_a_refusal_contains_its_translation_data_if_codes_are_requested(services: Server) -> None:
     async def handler(context: object, args: object) -> None:
         raise RequestRefused("The scene {name!r} is open.", name="s1")
 

@@ -233,7 +233,7 @@ async def test_requests_overtake_a_waiting_request(server: ServerProcess) -> Non
 
 
 # ------------------------------------------------------------------------------------------------ slow clients
-async def test_a_client_that_does_not_read_delays_nobody_and_is_closed(tmp_path: Path) -> None:
+async def test_a_client_that_does_not_read_is_closed_without_delaying_others(tmp_path: Path) -> None:
     limit = {"ARCOR2_HW_OUTGOING_BYTES": "1000000", "ARCOR2_HW_OUTGOING_AGE": "60"}
     loop = asyncio.get_running_loop()
     async with running(tmp_path / "data", **limit) as server, talking(server.url, "quick") as quick:

@@ -19,7 +19,7 @@ def rounds(directory: Path) -> int:
     return notes.read_text().count("round") if notes.exists() else 0
 
 
-async def test_a_program_goes_on_after_an_automatic_log_off(tmp_path: Path) -> None:
+async def test_a_program_continues_after_an_automatic_log_off(tmp_path: Path) -> None:
     data = tmp_path / "data"
     tokens = TokenFile(data)
     tablet = tokens.add("tablet", Role.OPERATOR, shared=True)[1]

@@ -62,7 +62,7 @@ async def plant_metrics() -> dict[str, tuple[str, frozenset[str], dict[str, floa
     return found
 
 
-async def test_metrics_of_what_connects_the_cell_to_the_plant() -> None:
+async def test_metrics_of_plant_connections() -> None:
     found = await plant_metrics()
     for name, (kind, labels, _) in found.items():
         assert DOCUMENTED[name] == (kind, labels)

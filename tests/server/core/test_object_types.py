@@ -470,7 +470,7 @@ class Unreadable(Generic):
 """
 
 
-async def test_problems_contain_what_is_needed_to_translate_them_if_codes_are_requested(server: ServerProcess) -> None:
+async def test_problems_contain_translation_data_if_codes_are_requested(server: ServerProcess) -> None:
     async with talking(server.url, "ann") as ann, Client(server.url) as client:
         await client.rest.put_object_type("Unreadable", UNREADABLE)
         # Events contain the key and values for all clients.

@@ -239,7 +239,7 @@ async def test_limits_of_number_are_met_while_storing(bench: Bench, monkeypatch:
         await bench.recordings.get(1)
 
 
-async def test_csv_repeats_values_and_states_what_happened(bench: Bench) -> None:
+async def test_csv_repeats_values_and_lists_events(bench: Bench) -> None:
     await bench.recordings.open(lambda _: None)
     stored = info(1, alarms=[RecordedAlarm(5, 0, "=It jams.", object_name="io")])
     RecordingFiles(bench.folder).put(stored, VALUES)

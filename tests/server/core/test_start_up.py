@@ -47,7 +47,7 @@ asyncio.run(start())
 """
 
 
-async def test_a_start_imports_only_what_it_needs(tmp_path: Path) -> None:
+async def test_a_start_imports_only_needed_modules(tmp_path: Path) -> None:
     async with running_server(ServerSettings(data_dir=tmp_path)):
         pass  # creates the database, which takes more imports than opening it
     started = subprocess.run(

@@ -223,7 +223,7 @@ asyncio.run(main())
 
 
 @pytest.mark.sqlite
-async def test_what_was_acknowledged_survives_a_kill(settings: ServerSettings) -> None:
+async def test_acknowledged_edits_survive_a_kill(settings: ServerSettings) -> None:
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-c", WRITER, str(settings.data_dir), stdout=asyncio.subprocess.PIPE
     )

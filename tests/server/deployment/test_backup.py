@@ -135,7 +135,7 @@ def test_the_state_is_that_of_one_moment(data: Path, tmp_path: Path) -> None:
     assert _number(data / "documents.sqlite") > 10, "the server writes during backups"
 
 
-def test_a_file_that_is_deleted_meanwhile_is_left_out(
+def test_a_file_deleted_during_the_backup_is_left_out(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     original = backups._add
@@ -148,7 +148,7 @@ def test_a_file_that_is_deleted_meanwhile_is_left_out(
     assert "secrets.json" not in write_backup(data, tmp_path / "backup.zip", "0.1.0").files
 
 
-def test_a_file_that_a_database_lists_meanwhile_is_included(
+def test_a_file_listed_during_the_backup_is_included(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     original = backups._snapshot
@@ -310,7 +310,7 @@ def test_data_in_use_is_not_replaced(data: Path, tmp_path: Path, capsys: pytest.
     assert "4 files" in capsys.readouterr().out
 
 
-def test_what_cannot_be_read_is_named(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_unreadable_files_are_named(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert backup(tmp_path / "backup.zip", data_dir=tmp_path / "missing") == ExitStatus.DATA_UNUSABLE
     assert restore(tmp_path / "missing.zip", data_dir=data) == ExitStatus.NOT_FOUND
     (tmp_path / "text.zip").write_text("text")

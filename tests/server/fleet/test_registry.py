@@ -72,7 +72,7 @@ def test_two_servers_with_one_name_are_a_conflict_until_one_is_removed() -> None
         registry.remove(f"press:{A}")
 
 
-def test_two_servers_with_the_same_data_are_a_conflict_but_a_restart_is_none() -> None:
+def test_two_servers_with_the_same_data_conflict_but_a_restart_does_not() -> None:
     registry = Registry()
     registry.accept("press", state_of(boot="1", number=900), now(), 1.0)
     registry.accept("press", state_of(boot="2", number=1), now(), 2.0)
@@ -112,7 +112,7 @@ def test_known_cells_have_no_signal_after_a_restart_of_the_fleet() -> None:
         (msgspec.json.encode(state_of(good=-1)), ">= 0"),
     ],
 )
-def test_what_is_not_a_state_is_refused(data: bytes, reason: str) -> None:
+def test_an_invalid_state_is_refused(data: bytes, reason: str) -> None:
     with pytest.raises(InvalidData, match=reason):
         records.decode_state(data)
     assert records.decode_state(msgspec.json.encode(state_of())) == state_of()

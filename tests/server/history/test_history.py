@@ -358,7 +358,7 @@ async def test_the_service_records_moves_merges_and_deletes(tmp_path: Path) -> N
     await history.close()
 
 
-async def test_a_full_disk_is_stated_and_what_waits_is_stored_later(
+async def test_a_full_disk_is_reported_and_waiting_values_are_stored_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     history = History(ServerSettings(data_dir=tmp_path, point_history=True), Worker())  # type: ignore[arg-type]

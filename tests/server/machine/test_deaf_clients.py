@@ -44,7 +44,7 @@ async def _descriptions(talker: RawConnection) -> list[str]:
     return found
 
 
-async def test_clients_that_never_read_delay_nobody_and_are_closed(tmp_path: Path) -> None:
+async def test_clients_that_never_read_are_closed_without_delaying_others(tmp_path: Path) -> None:
     async with (
         running(tmp_path / "data", ARCOR2_HW_OUTGOING_BYTES=str(BOUND), ARCOR2_HW_OUTGOING_AGE="60") as server,
         contextlib.AsyncExitStack() as stack,

@@ -176,7 +176,7 @@ async def test_motion_stops_when_the_service_of_the_node_hangs(
     await online(again)
 
 
-async def test_a_node_announces_itself_and_what_runs_on_it(
+async def test_a_node_announces_itself_and_its_sessions(
     broker: Broker, node: Node, start_host: Callable[..., Any]
 ) -> None:
     async with followed(os.environ | {"ARCOR2_HW_NATS_URL": broker.url}) as until:

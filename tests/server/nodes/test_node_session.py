@@ -233,7 +233,7 @@ def test_meshes_are_sent_once_and_keep_their_names(tmp_path: Path) -> None:
     assert delivered(added, store, folder) == (added, [])
 
 
-def test_a_package_is_sent_without_what_only_the_server_stores(tmp_path: Path) -> None:
+def test_a_package_is_sent_without_data_stored_only_at_the_server(tmp_path: Path) -> None:
     package, folder = tmp_path / "package", tmp_path / "session"
     (package / "data").mkdir(parents=True)
     folder.mkdir()

@@ -144,7 +144,7 @@ def modbus_write(transaction: int, registers: list[int]) -> bytes:
     return struct.pack(">HHHB", transaction, 0, len(pdu) + 1, 1) + pdu
 
 
-async def test_a_plc_starts_jobs_once_and_a_technician_decides_who_may(tmp_path: Path) -> None:
+async def test_a_plc_starts_jobs_once_and_a_technician_sets_the_authority(tmp_path: Path) -> None:
     data = tmp_path / "data"
     async with cell(data) as client, plc_of(client) as plc:
         # Without the authority, it starts nothing.

@@ -77,7 +77,7 @@ def new_cell(tmp_path: Path) -> tuple[PackmlCell, Parts]:
         *[(A.NOBODY, mode, []) for mode in M],
     ],
 )
-async def test_mode_and_authority_decide_who_starts(
+async def test_mode_and_authority_determine_who_may_start(
     tmp_path: Path, authority: CellAuthority, mode: CellMode, allowed: list[RunStart]
 ) -> None:
     cell, parts = new_cell(tmp_path)

@@ -77,7 +77,7 @@ async def test_points_and_runs_are_read_before_and_after_they_are_moved(tmp_path
 
 
 @pytest.mark.asyncio(loop_scope="module")
-async def test_a_server_without_history_says_so(http: httpx.AsyncClient) -> None:
+async def test_a_server_without_history_refuses_queries(http: httpx.AsyncClient) -> None:
     assert granted(await http.get("/api/history"))["recording"] is False
     answer = await http.get("/api/history/points")
     assert (answer.status_code, "--history" in answer.text) == (409, True)

@@ -43,7 +43,7 @@ def test_error_types_are_kept_across_processes() -> None:
     assert (error.code, error.detail) == ("out_of_reach", "at 3 m")
 
 
-def test_the_answer_contains_what_is_needed_to_translate_it() -> None:
+def test_the_answer_contains_its_translation_data() -> None:
     inner = KinematicsError("{x:.1f} m is too far.", x=3)
     body = msgspec.json.decode(
         refusal("Calibration", Arcor2Error("{name}: {reason}", name="arm", reason=inner)).content

@@ -82,7 +82,7 @@ async def test_jobs_that_wait_are_stored_in_one_commit(journal: Journal, disk: D
     assert [len(jobs) for jobs in disk.commits] == [1, 1, 3]
 
 
-async def test_closing_stores_what_waits(journal: Journal, path: Path, disk: Disk) -> None:
+async def test_closing_stores_waiting_values(journal: Journal, path: Path, disk: Disk) -> None:
     disk.ready.clear()
     waiting = [journal.rebase(scene()), journal.append(edit(1))]
     closing = asyncio.create_task(journal.close())

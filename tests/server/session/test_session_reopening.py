@@ -153,7 +153,7 @@ async def test_an_edit_right_after_opening_follows_the_stored_history(tmp_path: 
             assert points(server) == left
 
 
-async def test_undo_is_refused_for_what_was_changed_meanwhile(server: SessionServer, alice: Person, work: Work) -> None:
+async def test_undo_is_refused_for_items_changed_by_others(server: SessionServer, alice: Person, work: Work) -> None:
     project = await work.project("moved", "gone", "same")
     await alice.ask("SaveProject")
     await alice.ask("CloseProject")

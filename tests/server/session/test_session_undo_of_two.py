@@ -37,7 +37,7 @@ async def test_undo_reverts_only_own_edits(server: SessionServer, alice: Person,
         await alice.ask("Undo", number=server.session.revision - 3)
 
 
-async def test_undo_is_refused_naming_the_user_who_changed_it_since(alice: Person, bob: Person, work: Work) -> None:
+async def test_undo_is_refused_with_the_name_of_the_later_author(alice: Person, bob: Person, work: Work) -> None:
     await work.project("p")
     p = work.point("p")
     await make(alice, ("RenameActionPoint", {"action_point_id": p, "new_name": "q"}, p, False), {})

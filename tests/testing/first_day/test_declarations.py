@@ -76,7 +76,7 @@ def test_a_secret_setting_is_found() -> None:
     assert bench.secrets() == ["hidden word"]
 
 
-def test_the_page_shows_what_the_command_shows() -> None:
+def test_the_page_shows_the_same_as_the_command() -> None:
     page = (DOCS / "how-to" / "first-hardware-day.md").read_text()
     flat = " ".join(page.split())
     for line in BEFORE:
