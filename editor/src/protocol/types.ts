@@ -50,7 +50,7 @@ export interface ActionExecutionData {
 }
 
 /**
- * How long a program was held at an action, and who decided.
+ * Duration of a hold at an action, and the author of the decision.
  *
  * duration: s; omitted while the program is held. choice, by: the decision, and the name of a user or token; omitted
  * while the program is held, and if it was stopped.
@@ -63,7 +63,7 @@ export interface ActionHold {
 }
 
 /**
- * How an action is executed. `composite` actions may call others; `hidden` ones are not offered to users.
+ * Properties of an action. `composite` actions may call others; `hidden` actions are not offered to users.
  *
  * verdict (not in ARCOR2): whether the returned boolean says that a part is good. again (not in ARCOR2): whether the
  * action may be repeated after it has failed; ask if it is omitted.
@@ -266,7 +266,7 @@ export interface AddVirtualCollisionObjectToSceneArgs {
   model: ObjectModel;
 }
 
-/** Whether an action may be repeated after it has failed: always, if a person agrees, or never. */
+/** Whether an action may be repeated after a failure: always, after confirmation by a person, or never. */
 export type Again = "safe" | "ask" | "never";
 
 /**
@@ -365,7 +365,7 @@ export interface AlarmSummary {
   translations: Record<string, Record<string, string>>;
 }
 
-/** An assumption of a dry run, as a sentence. action_id: the action that it concerns. */
+/** An assumption of a dry run, as a sentence. action_id: the action to which it applies. */
 export interface Assumption {
   text: string;
   action_id?: string;
@@ -846,18 +846,18 @@ export interface DeviceArgs {
 }
 
 /**
- * What is known about a device of the workplace.
+ * Identity and state of a device of the workplace.
  *
  * Attributes:
  *     object_id: Id of the scene object.
  *     name: Its name.
  *     object_type: Its object type.
- *     identity: The confirmed identity; the one that was seen first needs no confirmation.
+ *     identity: The confirmed identity; the first one needs no confirmation.
  *     found: The identity of the connected device, if it is not the confirmed one. Then it is not commanded.
  *     differing: The fields of `found` that differ.
- *     first_seen: When the device was connected first.
- *     seen: When its identity was last read.
- *     confirmed_at: When a technician confirmed the identity; omitted if it was seen first.
+ *     first_seen: Time of the first connection of the device.
+ *     seen: Time at which its identity was last read.
+ *     confirmed_at: Time at which a technician confirmed the identity; omitted if it was seen first.
  *     confirmed_by: Who confirmed it.
  *     parameters: Whether the driver can read the parameters.
  *     restores: Whether it can write them.
@@ -985,7 +985,7 @@ export interface DryRunHead {
   values?: Record<string, string | Message>;
 }
 
-/** The first action that would fail. reason: why, as a sentence. pose: where, in the world. */
+/** The first action that would fail. reason: a sentence. pose: pose in the world at which it fails. */
 export interface DryRunProblem {
   action_id: string;
   name: string;
@@ -1002,7 +1002,7 @@ export type DryRunState = "running" | "finished" | "failed" | "cancelled";
  * Source of the duration of an action.
  *
  * planned: the timing of its planned motion. action: the median of this action in earlier runs. method: the median of
- * other actions of the same object type that call the same method. unknown: there is none, and 0 s are counted.
+ * other actions of the same object type that call the same method. unknown: no duration is known, and 0 s are counted.
  */
 export type DurationSource = "planned" | "action" | "method" | "unknown";
 
@@ -1486,7 +1486,7 @@ export interface HistoryItem {
 }
 
 /**
- * The edit that Undo or Redo of a user would revert.
+ * The edit that the next undo or redo of a user reverts.
  *
  * request: request that made the edit. text: label of the button, without `Undo` or `Redo`.
  */
@@ -1499,7 +1499,7 @@ export interface HistoryStep {
 }
 
 /**
- * How a held program continues.
+ * The continuation of a held program.
  *
  * RETRY repeats the action, or starts it if the program is held before it. RESULT continues with results that a person
  * supplies. SKIP continues as if an action without results had succeeded. ERROR_EXIT takes an error exit although it
@@ -1507,7 +1507,7 @@ export interface HistoryStep {
  */
 export type HoldChoice = "retry" | "result" | "skip" | "error_exit" | "end";
 
-/** Data of the event HoldDecided: who decided about the action with this number, and how. */
+/** Data of the event HoldDecided: the decision about the action with this number, and its author. */
 export interface HoldDecidedData {
   run: number;
   number: number;
@@ -1557,7 +1557,7 @@ export interface Identity {
  * Arguments of ImportFunction.
  *
  * points: the action points of the open project, by the id or name of the exported ones. Other items are found by
- * their id, else by their name.
+ * their id, otherwise by their name.
  */
 export interface ImportFunctionArgs {
   function: FunctionExport;
@@ -1581,7 +1581,7 @@ export interface ImportScriptData {
  * object_id: the object, or the collision body that is the zone. A zone belongs to one robot at a time. actions: names
  * of actions of the object; none for all its actions and motions. during: whether the conditions are needed as long as
  * the action runs, or a robot moves in the zone. within: longest time for which an action waits, s. retract: path on
- * which a robot leaves the zone, points in the frame of the body, the last one outside; none for the shortest way.
+ * which a robot leaves the zone, points in the frame of the body, the last one outside; none for the shortest path.
  */
 export interface Interlock {
   name: string;
@@ -1621,7 +1621,7 @@ export interface InterlockStates {
   interlocks: InterlockState[];
 }
 
-/** What an interlock applies to: actions of an object, or a zone. */
+/** Target of an interlock: actions of an object, or a zone. */
 export type InterlockTarget = "action" | "zone";
 
 /** Arguments of InverseKinematics. */
@@ -1975,7 +1975,7 @@ export interface Mesh {
 }
 
 /**
- * A text for users, with what is needed to translate it. `str(message)` is the text.
+ * A text for users with the data for its translation. `str(message)` is the text.
  *
  * Attributes:
  *     text: The English text.
@@ -2102,7 +2102,7 @@ export interface NewSceneArgs {
   description?: string;
 }
 
-/** The last error of a node: its text, and when it happened. `key` and `values` translate the text. */
+/** The last error of a node: its text and time. `key` and `values` translate the text. */
 export interface NodeError {
   text: string;
   at: string;
@@ -2126,7 +2126,7 @@ export interface NodeSession {
 export type NodeState = "connected" | "silent" | "other_version";
 
 /**
- * A node, as it was announced last.
+ * A node according to its last announcement.
  *
  * Attributes:
  *     name: Its name.
@@ -2357,7 +2357,7 @@ export interface ObservationMeta {
   of_point?: boolean;
 }
 
-/** What a program does when an action fails and no error exit applies: end, or hold until a person decides. */
+/** Reaction of a program if an action fails and no error exit applies: end, or hold until a person decides. */
 export type OnError = "end" | "hold";
 
 /** Data of the event OpenProject. */
@@ -2430,7 +2430,7 @@ export interface Parameter {
   value: string;
 }
 
-/** The parameters of a device, as they are stored and written to a file. Fields as in BackupInfo. */
+/** The parameters of a device in the form of the file. Fields as in BackupInfo. */
 export interface ParameterBackup {
   object_type: string;
   identity: Identity;
@@ -2439,7 +2439,7 @@ export interface ParameterBackup {
   digest: string;
 }
 
-/** A parameter with different values in a backup and in the device; omitted where there is none. */
+/** A parameter with different values in a backup and in the device. A missing value is omitted. */
 export interface ParameterDifference {
   name: string;
   backup?: boolean | number | string;
@@ -2447,7 +2447,7 @@ export interface ParameterDifference {
   unit: string;
 }
 
-/** A parameter that could not be written, and why. */
+/** A parameter that could not be written, and the reason. */
 export interface ParameterFailure {
   name: string;
   reason: string;
@@ -2678,7 +2678,7 @@ export interface Project {
   script?: string;
 }
 
-/** The shared breakpoints of a project: ids of its action points and actions, and who changed them last. */
+/** The shared breakpoints of a project: ids of its action points and actions, and the user of the last change. */
 export interface ProjectBreakpoints {
   project_id: string;
   ids: string[];
@@ -2800,11 +2800,11 @@ export interface Range {
   max: number;
 }
 
-/** How an end effector reaches a pose. */
+/** Reachability of a pose by an end effector. */
 export type Reach = "reachable" | "near_limit" | "in_collision" | "out_of_reach" | "unknown";
 
 /**
- * How an end effector reaches an orientation or joints; `reason` is a sentence when it does not.
+ * Reachability of an orientation or joints by an end effector. `reason` is a sentence if they are not reachable.
  *
  * `key` and `values` are those of the reason.
  */
@@ -2831,7 +2831,7 @@ export interface ReachabilityArgs {
 /**
  * Answer to Reachability for each end effector, and data of the event ReachabilityChanged.
  *
- * revision: revision of the document for which it holds. items: orientations and joints of the open project; in the
+ * revision: revision of the document to which it applies. items: orientations and joints of the open project; in the
  * event, those that changed.
  */
 export interface ReachabilityData {
@@ -3307,14 +3307,14 @@ export interface RunCheckpoint {
   restarts: Restart[];
 }
 
-/** How a run ended: completed, stopped by a user, by an error, or with the server or its host. */
+/** Outcome of a run: completed, stopped by a user, failed, or ended with the server or its host. */
 export type RunEnd = "running" | "finished" | "stopped" | "failed" | "lost";
 
 /**
  * Arguments of RunPackage.
  *
  * shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
- * on_error: what the program does when an action fails and no error exit applies. checkpoints: whether the state is
+ * on_error: reaction of the program if an action fails and no error exit applies. checkpoints: whether the state is
  * stored before and after each action; default: true. continues: whether the program continues where it was
  * interrupted, which requires that it is held on errors. continue_at: position in the cycle of another action at which
  * it continues (see Restart). recipe_id: the recipe, whose package this must be.
@@ -3336,7 +3336,7 @@ export interface RunPackageArgs {
 }
 
 /**
- * What a run has produced so far.
+ * Statistics of a run up to now.
  *
  * cycles: completed passes of the program from its start to its end. last_cycle, mean_cycle: durations of the last
  * cycle and of all cycles, s, without cycles during which the program was paused; omitted before the first one. good,
@@ -3729,7 +3729,7 @@ export interface TaskStateData {
  * Arguments of TemporaryPackage.
  *
  * shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
- * on_error: what the program does when an action fails and no error exit applies. checkpoints: as in RunPackage.
+ * on_error: reaction of the program if an action fails and no error exit applies. checkpoints: as in RunPackage.
  */
 export interface TemporaryPackageArgs {
   start_paused?: boolean;
@@ -3921,7 +3921,7 @@ export interface UnitSummary {
   translations: Record<string, Record<string, string>>;
 }
 
-/** What an action does while a condition is not met: wait, then hold the program; or hold it at once. */
+/** Reaction of an action to a condition that is not met: wait, then hold the program; or hold it at once. */
 export type Unmet = "wait" | "hold";
 
 /** Arguments of UpdateAction. */
