@@ -63,7 +63,7 @@ class Options:
 
 
 def measurements(options: Options) -> dict[str, Callable[[Report, Path], Awaitable[None]]]:
-    """Return what measures each group."""
+    """Return the measuring function of each group."""
     return {
         "requests": requests.run,
         "documents": documents.run,

@@ -1,4 +1,4 @@
-"""Backups of a server that is saving: how long saves take meanwhile, and how fast a backup is written."""
+"""Backups of a server that is saving: duration of saves during a backup, and speed of the backup."""
 
 import asyncio
 import random

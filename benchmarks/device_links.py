@@ -161,7 +161,7 @@ class Links:
         return fake
 
     def _linked(self, module: str, *arguments: str) -> FakeProcess:
-        """Start a fake on a pty that keeps its path when it is plugged in again."""
+        """Start a fake on a pseudo terminal whose path stays the same after it is plugged in again."""
         return self._start(module, "--link", str(self._folder / f"tty_{module}"), *arguments)
 
     def _tester(self) -> Link:

@@ -50,7 +50,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Deselect the tests of the matrix unless it is wanted, and sort the others.
+    """Deselect the tests of the matrix unless they are requested, and sort the others.
 
     The tests of a parallel run are sorted for a queue that is read from both ends, so that short tests run last.
 

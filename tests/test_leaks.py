@@ -7,7 +7,7 @@ CONFTEST = 'pytest_plugins = ["tests.leaks"]\nimport tests.leaks\ntests.leaks.GR
 
 @pytest.fixture(autouse=True)
 def no_other_plugins(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those that happen to be installed take seconds to load."""
+    """Do not load other installed plugins, which takes seconds."""
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
 
 

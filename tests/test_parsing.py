@@ -1,4 +1,4 @@
-"""Parsing of Python source while something else parses."""
+"""Python source is parsed while another thread parses."""
 
 import ast
 import gc

@@ -1,4 +1,4 @@
-"""What was found for a seed: the inventory, the results and the motion compared with the truth."""
+"""Findings for a seed: the inventory, the results and the motion compared with the truth."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from benchmarks.parts.cell import Cell
 
 @dataclass
 class Result:
-    """What was found for a seed. Each entry of the lists is a sentence."""
+    """Findings for a seed. Each entry of the lists is a sentence."""
 
     boards: int = 0
     faults: Counter[str] = field(default_factory=Counter)

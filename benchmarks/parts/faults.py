@@ -141,6 +141,6 @@ class Faults:
         await asyncio.gather(*self._injecting)
 
     def cancel(self) -> None:
-        """Inject nothing any more."""
+        """Stop injecting faults."""
         for task in self._injecting:
             task.cancel()

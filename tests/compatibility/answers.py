@@ -1,4 +1,4 @@
-"""What a server answers about object types, without the texts that later versions may word differently."""
+"""Answers of a server about object types, without texts that later versions may word differently."""
 
 import json
 from typing import Any

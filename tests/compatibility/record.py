@@ -30,7 +30,7 @@ SOURCES = ("drivers/arcor2_drivers", "arcor2_hw/objects/stock", "docs/examples")
 
 
 def imported_names(root: Path) -> dict[str, list[str]]:
-    """Return what drivers, stock object types and examples import from the library, by module."""
+    """Return the names that drivers, stock object types and examples import from the library, by module."""
     found: dict[str, set[str]] = {}
     for folder in SOURCES:
         for file in sorted((root / folder).rglob("*.py")):

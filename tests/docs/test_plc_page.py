@@ -12,7 +12,7 @@ PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "plc.md").read_text()
 
 
 def rows(heading: str) -> dict[int, str]:
-    """Return the rows of the table with a heading: the number in the first column, and the rest."""
+    """Return the rows of the table with a heading: the number in the first column, and the other cells."""
     table = PAGE.partition(heading)[2].partition("\n|")[2].partition("\n\n")[0]
     return {int(number): rest for number, rest in re.findall(r"^\| (\d+) \| (.*)$", table, re.M)}
 

@@ -51,7 +51,7 @@ class NoStore:
 
 
 def report(device: Generic) -> m.DeviceChanged:
-    """Return what the host reports of a device."""
+    """Return the state of a device as reported by the host."""
     alarms = []
     with contextlib.suppress(DeviceError):
         alarms = device.alarms()

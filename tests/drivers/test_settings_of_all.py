@@ -46,7 +46,7 @@ WRONG = {
 
 
 def kind_of(field: "dataclasses.Field[Any]") -> str | None:
-    """Return what a setting names (port, URL or file), judged by its name; None for other settings."""
+    """Return the kind of a setting (port, URL or file), judged by its name; None for other settings."""
     if field.type not in ("str", str):
         return None
     for kind, names in (

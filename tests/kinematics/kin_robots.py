@@ -1,4 +1,4 @@
-"""Models for the tests: those of the drivers, and small ones written here."""
+"""Models for the tests: the models of the drivers, and small models defined here."""
 
 import functools
 from pathlib import Path

@@ -73,7 +73,7 @@ def test_configurations_match_an_independent_solver(values: tuple[float, ...]) -
 
 
 def test_solutions_are_sorted_by_their_distance_from_the_seed() -> None:
-    """Compared with those of an independent solver, each with the turn nearest to the seed within the limits."""
+    """The solutions equal those of an independent solver, each at the turns nearest to the seed."""
     arm, chain, chance = ur().arm("tcp"), Chain("ur5e"), np.random.default_rng(4)
     arm.lower[2], arm.upper[2] = -4.0, 1.0
     inverse = InverseKinematics(arm)

@@ -63,7 +63,7 @@ TARGETS = (
 
 @dataclass(frozen=True)
 class Result:
-    """Number of mutants, and those that survived as differences of the source."""
+    """Number of mutants, and the surviving mutants as differences of the source."""
 
     total: int
     survived: list[str]

@@ -24,7 +24,7 @@ STATES: dict[str, dict[str, str]] = _read("states.json")
 
 @cache
 def openapi(service: str) -> dict[str, Any]:
-    """Return the OpenAPI document of a REST service of the protocol: storage, scene, build, ..."""
+    """Return the OpenAPI document of a REST service of the protocol, such as storage, scene or build."""
     document: dict[str, Any] = _read(f"openapi/{service}.json")
     return document
 

@@ -1,4 +1,4 @@
-"""Forced outputs in the cell host, on a fake I/O block: leases, refusals, and what happens when processes die."""
+"""Forced outputs in the cell host, on a fake I/O block: leases, refusals, and the end of processes."""
 
 import time
 from collections.abc import Iterator

@@ -104,7 +104,7 @@ class Holder:
     def hold_once(self, valid: float) -> float:
         """Send one lease of a new hold. Return when, by the monotonic clock, after the host has accepted it.
 
-        A lease that expires on its way, on a busy computer, is repeated by another hold.
+        If the lease expires before it arrives, as on a busy computer, another hold is started.
         """
         while True:
             began = time.monotonic()

@@ -1,4 +1,4 @@
-"""The cell host with parallel work: two devices that work at the same time, and what stops, pauses and ends them."""
+"""The cell host with parallel work: two devices that work at the same time; stopping, pausing and ending them."""
 
 import textwrap
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the cell host records, and what remains of it when the host or the server is killed."""
+"""Recordings of the cell host, and their state after the host or the server was killed."""
 
 import time
 from pathlib import Path
@@ -87,7 +87,7 @@ def running(host: HostProcess, package: Package, recordings: Path) -> None:
 
 
 def check(found: RecordedValues) -> None:
-    """Check what was recorded until the last action."""
+    """Check the recording up to the last action."""
     signals = {each.name: each for each in found.signals if each.object_id == "obj_lift"}
     assert set(signals) == {"count", "height", "connected", "gripped"}
     counted = [value for value in signals["count"].values if value is not None]

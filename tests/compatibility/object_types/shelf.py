@@ -29,7 +29,7 @@ class Side(StrEnum):
 
 @dataclass
 class ShelfSettings(Settings):
-    """What a person says about the shelf."""
+    """The settings that a person enters for the shelf."""
 
     rows: int
     distance: float = 0.3

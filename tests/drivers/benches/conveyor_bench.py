@@ -77,7 +77,7 @@ class ConveyorBench(WiredBench):
         return device.position()
 
     def ask(self, device: Generic) -> object:
-        """Read by SDO: a PDO that was on its way before the cut would answer what is reported by PDO."""
+        """Read by SDO, because a PDO sent before the cut might still arrive."""
         assert isinstance(device, Conveyor)
         return device.identify()
 

@@ -1,4 +1,4 @@
-"""The functional tester on its fake: a test takes 4 s, all else is fast. The wire in between is cut and recorded."""
+"""The functional tester on its fake, with tests of 4 s. The connection between both is cut and recorded."""
 
 import sys
 from collections.abc import Callable, Iterator

@@ -13,7 +13,7 @@ from tests.fakes.conftest import FakeProcess
 
 
 def handshake(fake: FakeProcess) -> list[tuple[str, Any]]:
-    """Return what the host wrote of the handshake, without its life sign."""
+    """Return the values of the handshake that the host wrote, without its life sign."""
     written = [tuple(each) for each in fake.truth()["written"]]
     return [(name.removeprefix("Handshake."), value) for name, value in written if "HostLife" not in name]
 

@@ -371,7 +371,7 @@ def test_a_second_client_is_refused(
 def test_reconnecting_to_a_controller_that_still_serves_the_broken_connection(
     start_fake: Callable[..., FakeProcess], make: Callable[..., OpenProtocolScrewdriver], wait_for: Callable[..., Any]
 ) -> None:
-    """It refuses the driver with error 96 until its keep-alive timeout has ended the old session."""
+    """The controller refuses the driver with error 96 until its keep-alive timeout has ended the old session."""
     fake = start_fake("screwdriver", "--clients", "1", "--keep-alive-timeout", "1.5")
     host, _, port = fake.ready["open_protocol"].rpartition(":")
     with socket.create_connection((host, int(port))) as dead:  # like the remains of a connection without a cable

@@ -102,7 +102,7 @@ def control_program(frequency: float, **commands: Callable[[], bool]) -> Control
 
 
 def test_a_command_that_outlasts_the_watchdog_reports_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The watchdog stops the control program meanwhile, and the library rejects the command without a reason."""
+    """The watchdog stops the control program, and the library rejects the command without a reason."""
     program = control_program(10.0, setPayload=lambda: bool(time.sleep(0.2)))
     monkeypatch.setattr(os, "_exit", sys.exit)
     with pytest.raises(SystemExit) as exit_:

@@ -103,7 +103,7 @@ def test_control_is_taken_after_a_program_that_is_ending(
 def test_disconnecting_waits_for_the_last_stop_of_an_ended_session(
     ready: UR5e, fake: FakeUr, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Otherwise it would stop the program of whoever takes control next."""
+    """Otherwise this stop would end the program of the next client that takes control."""
     stop = ControlSession._last_stop
 
     def late(session: ControlSession) -> None:

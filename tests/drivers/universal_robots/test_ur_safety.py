@@ -173,7 +173,7 @@ def _acknowledged(robot: UR5e) -> bool:
 
 # ------------------------------------------------------------------------------------------------ jogging
 def test_a_late_jog_is_dropped(ready: UR5e, fake: FakeUr) -> None:
-    """A jog that waited longer than it is valid moves nothing, nor does one that was stopped meanwhile."""
+    """A jog that waited longer than its validity moves nothing, nor does a jog that was stopped while it waited."""
     session = ready._control.session
     assert session is not None
     taken = len(fake.do("commands_taken"))

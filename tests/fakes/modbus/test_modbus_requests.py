@@ -37,7 +37,7 @@ class Tcp:
         return (head + self._exactly(head[5])).hex()
 
     def ask(self, request: str, unit: int = 1) -> str:
-        """Send function and data, and return those of the answer."""
+        """Send a function code and data, and return the function code and data of the answer."""
         pdu = bytes.fromhex(request)
         self.socket.sendall(struct.pack(">HHHB", 0x1234, 0, len(pdu) + 1, unit) + pdu)
         answer = bytes.fromhex(self.receive())

@@ -245,7 +245,7 @@ report(kicked=kicked["moving"], trips_before=kicked["watchdog_trips"])
 
 
 def test_a_killed_client_leaves_the_arm_at_standstill(ur):
-    """kill -9 during a move: nothing is sent any more, and the watchdog stops the arm."""
+    """After kill -9 during a move, no more commands are sent, and the watchdog stops the arm."""
     with pytest.raises(AssertionError, match="status -9"):
         ur.library("""
 control = Control(host, 500.0)

@@ -1,4 +1,4 @@
-"""Tokens, roles and ports: who is admitted with which role, and how access is revoked."""
+"""Tokens, roles and ports: admission, roles, and how access is revoked."""
 
 import asyncio
 import contextlib

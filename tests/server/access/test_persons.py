@@ -1,4 +1,4 @@
-"""Persons log on at shared devices with a PIN or a card: their right, lock-out, log-off, and what is never stored."""
+"""Persons log on at shared devices with a PIN or a card: rights, lock-out, log-off, and data never stored."""
 
 import asyncio
 import contextlib

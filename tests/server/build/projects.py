@@ -555,7 +555,7 @@ def with_comparisons(draft: Draft, rng: random.Random) -> Draft:
 
 
 def with_variables(draft: Draft, rng: random.Random) -> Draft:
-    """Store results that nothing else uses in variables, and use these as parameters."""
+    """Store otherwise unused results in variables, and use these as parameters."""
     used = {source for source, _ in draft.links.values()}
     used |= {condition[0] for _, _, condition in draft.edges if condition is not None}
     for when in draft.whens.values():

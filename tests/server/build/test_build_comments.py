@@ -157,7 +157,7 @@ def edited(project: Project, rng: random.Random) -> tuple[Project, set[str]]:
 
 
 def comments_of(source: str) -> dict[str, tuple[list[str], str]]:
-    """Return the comments directly above each action, and the one behind it."""
+    """Return the comments directly above each action, and the comment behind it."""
     lines = source.splitlines()
     found = {}
     [main] = [node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)]

@@ -73,7 +73,7 @@ def files_in(packed: bytes) -> dict[str, bytes]:
 
 
 def changed(packed: bytes, **contents: bytes | None) -> bytes:
-    """Return the package with other files; None leaves one out. `__` in a name stands for a slash."""
+    """Return the package with replaced files; None removes a file. `__` in a name stands for a slash."""
     files: dict[str, bytes] = files_in(packed)
     for name, content in contents.items():
         path = name.replace("__", "/").replace("_py", ".py").replace("_json", ".json")

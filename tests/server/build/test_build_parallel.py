@@ -1,4 +1,4 @@
-"""Parallel work in scripts: its form, what Build refuses, and what the import refuses at its line."""
+"""Parallel work in scripts: its form, refusals of Build, and refusals of the import with their line."""
 
 import itertools
 import json

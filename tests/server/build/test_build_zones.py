@@ -1,4 +1,4 @@
-"""Build names zones that overlap, and robots that may wait for each other's zone for ever."""
+"""Build reports overlapping zones, and robots that may wait for each other's zone for ever."""
 
 import json
 from typing import Any

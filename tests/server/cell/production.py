@@ -45,7 +45,7 @@ PARAMETERS = [ProjectParameter("serial", "string", '"A-1"', id="prm_serial")]
 
 
 class ProductionServer:
-    """The server, and ids of a technician and an operator, who have the same PIN."""
+    """The server, and the ids of a technician and an operator who have the same PIN."""
 
     def __init__(self, server: Server, directory: Path, packages: Path) -> None:
         self.server, self.directory, self.packages = server, directory, packages

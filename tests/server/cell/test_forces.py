@@ -1,4 +1,4 @@
-"""Forced outputs as clients see them: leases, ends, refusals, the audit trail, and no program meanwhile."""
+"""Forced outputs as clients see them: leases, ends, refusals, the audit trail, and no program during forcing."""
 
 from typing import Any
 

@@ -23,7 +23,7 @@ USER = cast("HostUser", None)
 
 @pytest.fixture
 def killed(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
-    """Kill started hosts before they are ready: those whose flag is true, which is removed; later ones run."""
+    """Kill each started host before it is ready if its flag, which is then removed, is true; later hosts run."""
     kills: list[bool] = []
 
     class Host(CellHost):

@@ -1,4 +1,4 @@
-"""StopAll stops everything with one request and names at once what cannot be stopped."""
+"""StopAll stops all devices with one request and immediately names those that cannot be stopped."""
 
 import os
 import signal

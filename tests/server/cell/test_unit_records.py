@@ -1,4 +1,4 @@
-"""Records of units: steps, results, where each part went, what survives a crash, and the time of the cell."""
+"""Records of units: steps, results, destination of each part, state after a crash, and the time of the cell."""
 
 import csv
 import io

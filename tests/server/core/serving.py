@@ -181,7 +181,7 @@ class RawConnection:
         return message
 
     async def nothing_more(self) -> None:
-        """Assert that no event is on its way: everything sent earlier arrives before this answer."""
+        """Assert that no event is pending: all events sent earlier arrive before the answer of this request."""
         await self.request("SystemInfo")
         assert self.events == []
 

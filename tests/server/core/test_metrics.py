@@ -1,4 +1,4 @@
-"""Metrics over HTTP: the token, the documented names, values that follow what happens, and the dashboard."""
+"""Metrics over HTTP: the token, the documented names, values after changes, and the dashboard."""
 
 import asyncio
 import json
@@ -29,7 +29,7 @@ CLASSES = ("_bucket", "_count", "_sum")
 
 
 class Parts:
-    """Nodes, fleet, history, OPC UA and MQTT, all of them used, with what the metrics read."""
+    """Nodes, fleet, history, OPC UA and MQTT, all in use, with the members that the metrics read."""
 
     configured = connected = running = True
     ends, clients, dropped = 2, 3, 4

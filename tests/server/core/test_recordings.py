@@ -1,4 +1,4 @@
-"""Recordings of alarms and failed runs: their files, what is stored when, and what is deleted."""
+"""Recordings of alarms and failed runs: their files, content, times of storing, and deletion."""
 
 import asyncio
 import csv

@@ -1,4 +1,4 @@
-"""What the server avoids at its start: unneeded imports, and parsing known sources."""
+"""The server neither imports unneeded modules at its start nor parses known sources."""
 
 import ast
 import json

@@ -1,4 +1,4 @@
-"""Saved documents: what is stored, what survives a kill, errors of unusable databases."""
+"""Saved documents: their content, their state after a kill, and errors of unusable databases."""
 
 import asyncio
 import contextlib

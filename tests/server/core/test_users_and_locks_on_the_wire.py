@@ -1,4 +1,4 @@
-"""Two users on one server: names, locks, and what happens when one leaves."""
+"""Two users on one server: names, locks, and the departure of one user."""
 
 from tests.server.core.serving import ServerProcess, talking
 

@@ -48,7 +48,7 @@ def data(tmp_path: Path) -> Path:
 
 
 def _content(directory: Path) -> dict[str, bytes]:
-    """Return the files of a directory except those that say what was replaced, with SQLite files as dumps."""
+    """Return the files of a directory, with SQLite files as dumps, except lists of replaced files."""
     found = {}
     for path in sorted(directory.rglob("*")):
         name = str(path.relative_to(directory))

@@ -1,4 +1,4 @@
-"""The history: what is recorded, that moved rows are seen exactly once, and that nothing stored is lost."""
+"""The history: recorded points, moved rows (which are seen exactly once), and that no stored row is lost."""
 
 import asyncio
 import signal

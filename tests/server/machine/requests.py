@@ -1,4 +1,4 @@
-"""Edits to draw from: each builds a request for the open documents from a few numbers, and states what to lock."""
+"""Edits to draw from. Each builds a request for the open documents from a few numbers, and states the ids to lock."""
 
 import json
 from collections.abc import Callable

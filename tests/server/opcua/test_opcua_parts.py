@@ -241,7 +241,7 @@ LEFT = Unit(1, "S1", "scn", 1, UnitState.GOOD, "2026-01-02T03:04:05+00:00")
 
 
 class Cell:
-    """The parts that the feed reads: a cell with one known device, and a board with what a scene reports."""
+    """The parts that the feed reads: a cell with one known device, and a board with the values that a scene reports."""
 
     def __init__(self) -> None:
         self.board = SimpleNamespace(

@@ -23,7 +23,7 @@ A, M = CellAuthority, CellMode
 
 
 class Parts:
-    """The parts next to the cell, with what it uses of them."""
+    """The parts of the server next to the cell, with the members that the cell uses."""
 
     def __init__(self) -> None:
         self.state, self.before_start, self.before_resume, self.on_state = PackageStateEnum.STOPPED, [], [], []

@@ -76,7 +76,7 @@ def test_fit_refuses_lists_of_different_length() -> None:
 
 # ------------------------------------------------------------------------------------------------ the requests
 async def put_tip(stage: Stage, actor: Actor, position: Position) -> None:
-    """Move the arm there. The move needs another lock than the one that the user holds."""
+    """Move the arm there. The move needs a different lock from the one that the user holds."""
     pose = msgspec.to_builtins(Pose(position, Orientation(1, 0, 0, 0)))
     raw: dict[str, Any] = {"end_effector_id": "tip", "target_pose": pose, "speed": 1.0}
     await stage.services.online.call(stage.ids["arm"], "move_to_pose", raw)

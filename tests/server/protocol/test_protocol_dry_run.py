@@ -1,4 +1,4 @@
-"""Dry runs of the open project: requests, events, and what an edit does to a result."""
+"""Dry runs of the open project: requests, events, and the effect of an edit on a result."""
 
 import itertools
 from pathlib import Path

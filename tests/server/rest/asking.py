@@ -1,4 +1,4 @@
-"""Common helpers of the REST tests."""
+"""Shared helpers of the REST tests."""
 
 import contextlib
 from collections.abc import AsyncIterator

@@ -1,4 +1,4 @@
-"""Display meshes over REST: converted once, cached, announced, refused by name."""
+"""Display meshes over REST: they are converted once, cached and announced; invalid names are refused."""
 
 import asyncio
 import contextlib

@@ -1,4 +1,4 @@
-"""Records of units over REST: found by serial number, exported as CSV, and with their steps and calibrations."""
+"""Records of units over REST: search by serial number, export as CSV, steps and calibrations."""
 
 import csv
 import io

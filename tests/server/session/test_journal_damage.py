@@ -1,4 +1,4 @@
-"""A damaged journal: every acknowledged change is restored, or the loss is reported and the file kept."""
+"""A damaged journal: either every acknowledged change is restored, or the loss is reported and the file is kept."""
 
 import random
 import shutil

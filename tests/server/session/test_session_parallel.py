@@ -1,4 +1,4 @@
-"""Parallel work of the open project: made from calls, changed, dissolved, undone, and kept for older clients."""
+"""Parallel work of the open project: creation, changes, dissolving, undo, and older clients."""
 
 from typing import Any
 

@@ -13,7 +13,7 @@ PATIENCE = 40.0
 
 
 async def expect(person: Person, name: str, where: Callable[[Any], bool] = lambda _: True) -> Any:
-    """Wait for an event and return its data. Drop earlier messages, keep later ones."""
+    """Wait for an event and return its data. Earlier messages are dropped, later messages are kept."""
     async with asyncio.timeout(PATIENCE):
         while True:
             seen = person.take()

@@ -1,4 +1,4 @@
-"""Locks and open documents of users who left: events, takeover, and programs that may start."""
+"""Locks and open documents of users who left: events, takeover, and the start of programs."""
 
 import asyncio
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""View states: owners, events, refusals, and what survives a restart."""
+"""View states: owners, events, refusals, and their state after a restart."""
 
 from pathlib import Path
 from typing import Any
