@@ -200,7 +200,7 @@ class HandEyeError(TranslatableData, frozen=True):
         residual: Root mean square error of the corners, px.
         largest: Largest error of a corner, px.
         used: Whether it was used.
-        problem: Why it was not used. `key` and `values` translate it.
+        problem: Reason why it was not used. `key` and `values` translate it.
     """
 
     sample: int
@@ -265,7 +265,7 @@ class ViewError(TranslatableData, frozen=True):
         residual: Root mean square error of the corners, px.
         largest: Largest error of a corner, px.
         used: Whether it was used.
-        problem: Why it was not used. `key` and `values` translate it.
+        problem: Reason why it was not used. `key` and `values` translate it.
     """
 
     view: int

@@ -1,4 +1,4 @@
-"""The reason why an image has no usable marker: nothing to see, blur, mirroring, glare, or markers that are hidden."""
+"""The reason why an image has no usable marker: empty image, blur, mirroring, glare, or hidden markers."""
 
 import math
 from collections.abc import Mapping

@@ -55,7 +55,7 @@ class CheckedCalibration:
 
     @property
     def verdict(self) -> Message:
-        """Return what confirms or contradicts the result, and what to do."""
+        """Return the facts that confirm or contradict the result, and the recommended action."""
         parts = [self._contradiction() if self.contradicted else self._confirmation()]
         if self.misfit:
             misfit = "The corners fit neither target nor lens: check that the target is flat, and the intrinsics."

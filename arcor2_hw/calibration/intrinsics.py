@@ -271,7 +271,7 @@ def _result(
 def _verdict(
     used: int, pictures: int, residual: float, focal_px: float, focal: float, centre: float, covered: float
 ) -> tuple[Grade, Message]:
-    """Return how good intrinsics are, and what would improve them."""
+    """Return the quality of intrinsics, and advice to improve them."""
     parts = [
         Message.of(
             "The focal length is known to {focal:.1f} px and the principal point to {centre:.1f} px (standard "

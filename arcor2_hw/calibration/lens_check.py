@@ -120,7 +120,7 @@ def _between(a: Solution, b: Solution) -> Array:
 
 
 def _verdict(state: LensState, factor: float, deviation: float, distance: float) -> Message:
-    """Return what the markers say about the focal length, and what to do."""
+    """Return the conclusion from the markers about the focal length, and the recommended action."""
     match state:
         case LensState.CONFIRMED:
             return Message.of("The markers confirm the focal length to {deviation:.1%}.", deviation=deviation)

@@ -125,7 +125,7 @@ class _Group:
 
 
 class PoseProblem:
-    """Everything that one camera sees from one place, with intrinsics known to some degree.
+    """All targets that one camera sees from one place, with intrinsics of limited accuracy.
 
     `lens_changes` has one column for each way in which the intrinsics (as Lens.numbers) may differ, of one standard
     deviation. The intrinsics are unknowns with prior knowledge. Their errors that the image shows do not affect the
@@ -151,7 +151,7 @@ class PoseProblem:
         self._groups = [_Group(members, self.seen, firsts) for members in alike]
 
     def starts(self) -> list[Array]:
-        """Return initial poses: both that each marker allows, and those of all corners together."""
+        """Return initial poses: both poses that each marker allows, and the poses from all corners together."""
         found: list[Array] = []
         if len(self.seen) > 1:
             rays = self.lens.rays(self._pixels)

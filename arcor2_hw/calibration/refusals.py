@@ -1,4 +1,4 @@
-"""The error of a calibration without a reliable result. Imports no numerics, so that the server can use it."""
+"""The error raised if a calibration has no reliable result. Imports no numerics, so that the server can use it."""
 
 import enum
 

@@ -10,7 +10,7 @@ from arcor2_hw.data.geometry import Orientation, Pose, Position
 
 
 class Grade(enum.StrEnum):
-    """How reliable a result is. An unreliable one is refused (CalibrationRefused), never graded."""
+    """Reliability of a result. An unreliable result is refused (CalibrationRefused), never graded."""
 
     GOOD = "good"
     """As good as the method gets."""

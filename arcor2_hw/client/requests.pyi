@@ -368,7 +368,7 @@ class Requests(ABC):
         unlock: bool = False,
         timeout: float | None = None,
     ) -> Person:
-        """ChangePerson: what changes. An empty `pin` or `card` is removed; `unlock` ends all lock-outs.
+        """ChangePerson: the changes. An empty `pin` or `card` is removed; `unlock` ends all lock-outs.
 
         Needs the role programmer.
         """
@@ -419,12 +419,15 @@ class Requests(ABC):
         """CompareRecipes: ids of two recipes. Needs the role operator."""
 
     async def confirm_device(self, *, object_id: str, identity: Identity, timeout: float | None = None) -> DeviceCard:
-        """ConfirmDevice: the device, and its new identity as the technician has seen it. Needs the role technician."""
+        """ConfirmDevice: the device, and the new identity that was shown to the technician.
+
+        Needs the role technician.
+        """
 
     async def confirm_parts(
         self, *, scene_id: str, parts: list[ConfirmedPart], dismiss: bool = False, timeout: float | None = None
     ) -> None:
-        """ConfirmParts: where a person has found parts. No parts: only that a program was interrupted.
+        """ConfirmParts: places where a person has found parts. No parts: only confirms the interruption.
 
         Needs the role operator.
         """
@@ -724,7 +727,7 @@ class Requests(ABC):
         run: int | Unset = UNSET,
         timeout: float | None = None,
     ) -> ListAlarmsData:
-        """ListAlarms: which records, maximum number, number before which they are listed, object, run.
+        """ListAlarms: selection of records, maximum number, upper limit of the record number, object, run.
 
         Needs the role operator.
         """
@@ -797,7 +800,7 @@ class Requests(ABC):
         limit: int = 100,
         timeout: float | None = None,
     ) -> ListUnitsData:
-        """ListUnits: which units, newest first. Needs the role operator."""
+        """ListUnits: selection of units, newest first. Needs the role operator."""
 
     async def log_off(self, *, timeout: float | None = None) -> None:
         """LogOff. Needs the role operator."""

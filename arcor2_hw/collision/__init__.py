@@ -1,4 +1,4 @@
-"""The collision world: bodies, robots and attached parts, and the questions asked about them.
+"""The collision world: bodies, robots and attached parts, and queries about them.
 
 Vocabulary:
 

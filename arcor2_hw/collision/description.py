@@ -105,7 +105,7 @@ class WorldBody(Struct, frozen=True, tag="body"):
 
 
 class RobotSource(Struct, frozen=True):
-    """What a robot model is loaded from, and where its root link is.
+    """The file of a robot model and the pose of its root link.
 
     Attributes:
         urdf: URDF file, or archive with a URDF and its meshes.

@@ -68,7 +68,7 @@ class CollisionRobot:
         manager: coal's manager of the parts that move with the joints.
         obstacle: coal's manager of all parts.
         margin: Distance to the bodies of the world below which a configuration is in collision, m.
-        revision: Grows whenever the same joint values may be judged differently: the base was moved, a body was
+        revision: Grows whenever the result for the same joint values may change: the base was moved, a body was
             attached or detached, an allowed contact changed.
     """
 

@@ -30,7 +30,7 @@ class Hit(NamedTuple):
 
     Attributes:
         share: Position along the motion, 0 to 1.
-        what: The two things in contact, as text.
+        what: The two objects in contact, as text.
     """
 
     share: float

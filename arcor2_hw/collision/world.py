@@ -24,7 +24,7 @@ from arcor2_hw.messages import Message
 
 
 class Contact(Data, frozen=True):
-    """Two things in contact, by name, and the penetration depth in m as far as it is known."""
+    """Two objects in contact, by name, and the penetration depth in m if it is known."""
 
     first: str
     second: str
@@ -40,7 +40,7 @@ class Contact(Data, frozen=True):
 
 
 class Clearance(Data, frozen=True):
-    """The nearest two things and their distance in m, negative when in contact, with the nearest points."""
+    """The two nearest objects and their distance in m, negative when in contact, with the nearest points."""
 
     distance: float
     first: str
@@ -50,7 +50,7 @@ class Clearance(Data, frozen=True):
 
 
 class RayHit(Data, frozen=True):
-    """The first thing that a line meets: its name, the position along the line (0 to 1), and the point."""
+    """The first object that a line meets: its name, the position along the line (0 to 1), and the point."""
 
     name: str
     share: float
@@ -58,7 +58,7 @@ class RayHit(Data, frozen=True):
 
 
 class CollisionWorld(WorldState):
-    """Bodies and robots by id (see `WorldState`), and the questions asked about them."""
+    """Bodies and robots by id (see `WorldState`), with queries about contacts, clearances and rays."""
 
     # -------------------------------------------------------------------------------- collisions
     def is_free(self, robot: str, q: Array) -> bool:
@@ -219,7 +219,7 @@ class CollisionWorld(WorldState):
                         yield _gap(part, their), part, their.object, _name(other, their)
 
     def ray(self, start: Position, end: Position, ignore: Iterable[str] = (), inflation: float = 0.0) -> RayHit | None:
-        """Return the first thing that a straight line meets, or None if the line is free.
+        """Return the first object that a straight line meets, or None if the line is free.
 
         Robots are at their present joint values.
 

@@ -1,4 +1,4 @@
-"""The compute worker: a process of its own for what needs SciPy, OpenCV, Open3D or Pinocchio.
+"""The compute worker: a separate process for computations with SciPy, OpenCV, Open3D or Pinocchio.
 
-`tasks` says what can be asked and imports none of those: the server knows it. `worker` is the process.
+`tasks` defines the tasks without importing these libraries, so that the server can use it. `worker` is the process.
 """

@@ -1,4 +1,4 @@
-"""Functions of the calibration worker, one for each task. Each imports the libraries it needs."""
+"""Functions of the calibration worker, one for each task. Each function imports the libraries it needs."""
 
 from collections.abc import Callable
 

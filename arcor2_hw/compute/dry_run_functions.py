@@ -66,7 +66,7 @@ class _Robot:
         self.moved = False
 
     def timer(self, end_effector: str) -> MotionTimer:
-        """Return the timer of an arm, whose other joints are as they are now."""
+        """Return the timer of an arm. The other joints of the robot keep their present values."""
         links = self.standing.model.end_effectors
         fitting = [link for link in links if end_effector in (link, link.partition("_")[0])]
         link = fitting[0] if fitting else next(iter(links))
@@ -83,7 +83,7 @@ class _Robot:
 
 
 class _Cycle:
-    """The simulation of one cycle. `run` simulates it from where the robots are."""
+    """The simulation of one cycle. `run` starts at the present joint values of the robots."""
 
     def __init__(self, task: DryRunTask, state: WorkerState, visits: list[Visit]) -> None:
         self._task, self._state, self._visits = task, state, visits
@@ -123,7 +123,7 @@ class _Cycle:
             self._state.progress(self._done / (2 * len(self._visits)), "")
 
     def _moves(self, step: Step, robot: _Robot, moves: ActionMoves) -> tuple[float | None, Message | None]:
-        """Return the duration of the motions of an action, and why the first one fails."""
+        """Return the duration of the motions of an action, and the reason if one fails."""
         whole: float | None = 0.0
         first: Message | None = None
         for move in moves.moves:
@@ -152,7 +152,7 @@ class _Cycle:
         return found[0]
 
     def _start(self, robot: _Robot, timer: MotionTimer, move: Move) -> "Array":
-        """Return where a robot starts: the configuration at its first target from which most of its next moves succeed.
+        """Return the start of a robot: the configuration at its first target from which most of its next moves succeed.
 
         The configuration of a real robot is known only while it is online.
         """
@@ -186,7 +186,7 @@ class _Cycle:
         calls = {visit.call for visit in self._visits}
         seconds = [0.0] * len(self._records)
         for number, (visit, planned, _) in enumerate(self._records):
-            if number not in calls:  # a call takes as long as what it executes
+            if number not in calls:  # a call takes as long as the steps that it executes
                 step = self._task.graph.steps[visit.step]
                 seconds[number], source = self._duration(step, planned, known)
                 durations.append(source)
@@ -245,7 +245,7 @@ class _Cycle:
         return 0.0, ActionDuration(step.action_id, DurationSource.UNKNOWN)
 
     def _measured_additions(self) -> dict[str, float]:
-        """Return by how much the motions of each method took longer in runs of the same program than planned, s.
+        """Return the additional time of the motions of each method compared with the plan, in runs of this program, s.
 
         This is the time for commands, settling and gripping.
         """

@@ -65,7 +65,7 @@ class KnownDuration(Data, frozen=True):
 
 
 class DryRunAnswer(Data, frozen=True):
-    """The prediction, and by how much the motions of each measured method take longer than planned, s."""
+    """The prediction, and the additional time of the motions of each measured method, compared with the plan, s."""
 
     prediction: Prediction
     additions: dict[str, float] = field(default_factory=dict)
@@ -82,7 +82,7 @@ class DryRunTask(Task[DryRunAnswer], frozen=True):
         moves: The motions of actions, by id of the action.
         durations: The durations of earlier runs, by id of the action.
         measured: The durations of moving actions in runs of exactly this program, s, by id of the action.
-        additions: By how much the motions of a method took longer than planned before, s, by method.
+        additions: Additional time of earlier motions of a method, compared with the plan, s, by method.
         assumptions: Assumptions about motions that cannot be planned.
     """
 

@@ -1,9 +1,9 @@
 """Reads the history and moves it to Parquet files, with DuckDB, in the worker process.
 
 Rows are in an SQLite file first, which also lists the Parquet files. Both are read in one transaction of SQLite, so
-each row is seen exactly once, also while rows are moved: what the list does not contain does not count.
+each row is seen exactly once, also while rows are moved: files that are not listed are ignored.
 """
-# ruff: noqa: S608 - statements contain only names of ours, and file names in quotation marks
+# ruff: noqa: S608 - statements contain only fixed names, and file names in quotation marks
 
 import sqlite3
 from collections.abc import Iterator, Sequence
@@ -177,13 +177,13 @@ def read_runs(task: ReadRuns, _state: WorkerState) -> list[PastRun]:
 def _read(
     directory: Path, kind: str, condition: str, arguments: Sequence[Any], period: tuple[int, int], read: Any
 ) -> list[tuple[Any, ...]]:
-    """Return what `read` selects of the rows that meet a condition, from the database and the files of a period."""
+    """Return the values that `read` selects from rows that meet a condition, in database and files of a period."""
     attempt = 1
     while True:
         try:
             with _engine(directory, THREADS) as engine:
                 with _snapshot(directory) as recent:
-                    # Rows that are in a file already are deleted in small steps. Until then they do not count.
+                    # Rows that are already in a file are ignored here and deleted later in small steps.
                     covered = recent.execute(
                         "select last_id, before from cold where kind = ? and clearing", (kind,)
                     ).fetchone() or (0, 0)
@@ -202,7 +202,7 @@ def _read(
 
 
 def _with(condition: str, arguments: Sequence[Any]) -> str:
-    """Return a condition of ours with its arguments: integers, and texts in quotation marks."""
+    """Return a condition with its arguments inserted: integers, and texts in quotation marks."""
     values = iter(arguments)
     parts = condition.split("?")
     texts = [str(int(each)) if isinstance(each, int) else f"'{_quoted(each)}'" for each in values]

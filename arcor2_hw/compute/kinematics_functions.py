@@ -1,4 +1,4 @@
-"""Functions of the kinematics worker, one for each task. Each imports Pinocchio and coal where it needs them."""
+"""Functions of the kinematics worker, one for each task. Each function imports Pinocchio and coal if it needs them."""
 
 import math
 from typing import TYPE_CHECKING
@@ -111,7 +111,7 @@ def _near(model: "RobotModel", end_effector: str, q: "Array") -> list[str]:
 
 # ------------------------------------------------------------------------------------------------ the world
 def check_lines(task: t.CheckLines, state: WorkerState) -> list[t.LineHit | None]:
-    """Find the first thing that each line meets."""
+    """Find the first object that each line meets."""
     collisions = state.world().collisions
     hits = [collisions.ray(line.start, line.end, task.ignore, task.inflation) for line in task.lines]
     return [None if hit is None else t.LineHit(hit.name, hit.share) for hit in hits]

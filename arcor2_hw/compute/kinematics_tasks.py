@@ -73,7 +73,7 @@ class SolveForward(Task[Pose], frozen=True):
 
 
 class SolveInverse(Task[list[Joint]], frozen=True):
-    """Compute joint values for a pose, nearest to `start`, free of collision if wanted."""
+    """Compute joint values for a pose, nearest to `start`, free of collision if requested."""
 
     result_type: ClassVar = list[Joint]
     function: ClassVar = f"{_FUNCTIONS}:inverse"
@@ -96,7 +96,7 @@ class ReachResult(Data, frozen=True):
 
 
 class JudgePoses(Task[list[ReachResult]], frozen=True):
-    """Judge how an end effector reaches poses. Results are cached in the world of the task."""
+    """Judge the reachability of poses by an end effector. Results are cached in the world of the task."""
 
     result_type: ClassVar = list[ReachResult]
     function: ClassVar = f"{_FUNCTIONS}:judge_poses"
@@ -131,14 +131,14 @@ class Line(Data, frozen=True):
 
 
 class LineHit(Data, frozen=True):
-    """The first thing that a line meets: its id, or "robot/link", and the position along the line (0 to 1)."""
+    """The first object that a line meets: its id, or "robot/link", and the position along the line (0 to 1)."""
 
     id: str
     share: float
 
 
 class CheckLines(Task[list[LineHit | None]], frozen=True):
-    """Find the first thing that each line meets.
+    """Find the first object that each line meets.
 
     Attributes:
         lines: The lines.

@@ -36,7 +36,7 @@ class ChangeWorld(Struct, frozen=True, tag=True):
     """Change a world: remove items, and add items, replacing those of the same id.
 
     An item that cannot be used fails every task in this world until it is removed. Caches belong to a world, so
-    questions about different sets of items use worlds of their own.
+    tasks about different sets of items use separate worlds.
 
     Attributes:
         place: Name of the world.

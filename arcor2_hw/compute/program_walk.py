@@ -1,4 +1,4 @@
-"""The walk through the logic of a program for a dry run: which actions one cycle executes, in which order.
+"""The walk through the logic of a program for a dry run: the actions that one cycle executes, in their order.
 
 Imports no numerics.
 """

@@ -15,7 +15,7 @@ MAX_PICTURE: Final = 64 * 1024 * 1024
 
 
 class WorkerKind(enum.StrEnum):
-    """Kinds of compute worker. Each has a process of its own, so that slow calibrations do not delay kinematics."""
+    """Kinds of compute worker. Each kind has its own process, so that slow calibrations do not delay kinematics."""
 
     KINEMATICS = "kinematics"
     CALIBRATION = "calibration"
@@ -25,7 +25,7 @@ class WorkerKind(enum.StrEnum):
 
 
 class Task(Struct, Generic[R], frozen=True, tag=True):
-    """A question to a compute worker. Its answer has the type R.
+    """A task for a compute worker. Its result has the type R.
 
     Class Attributes:
         result_type: R, for decoding.

@@ -33,7 +33,7 @@ class WorkerState:
         self.place = ""
 
     def change(self, place: str, put: Sequence[WorldItem], remove: Sequence[str]) -> None:
-        """Record a change of a world. It is applied when a task needs the world."""
+        """Record a change of a world. The change is applied when a task needs the world."""
         self._changes.setdefault(place, []).append((put, remove))
 
     def forget(self, place: str) -> None:

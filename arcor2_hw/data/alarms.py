@@ -11,7 +11,7 @@ from arcor2_hw.messages import Message
 
 
 class Priority(enum.StrEnum):
-    """How soon an alarm needs a person (ISA-18.2), least first."""
+    """Urgency of an alarm (ISA-18.2), lowest first."""
 
     LOW = "low"
     MEDIUM = "medium"
@@ -55,7 +55,7 @@ class AlarmKind(Data, frozen=True, forbid_unknown_fields=True):
 
     number: unique in the file. code: of the condition or error that raises it; `*` stands for any characters, `?` for
     one.
-    text: what happened; empty: the text that the device reports. cause: why it usually happens. remedy: what to do;
+    text: the event; empty: the text that the device reports. cause: the usual cause. remedy: what to do;
     empty: the one that the device reports. latching: whether it stays until it is acknowledged, after its condition has
     ended. picture: an SVG file next to `alarms.toml`. group: name under which lists show it; by default the folder.
     """
@@ -85,8 +85,9 @@ class AlarmRecord(Data, frozen=True):
     object_name: omitted for alarms of the program and the system. remedy_message, text_message: for translation, if the
     text or the remedy has values. active: whether its condition persists. cleared: when the condition ended. retain:
     whether it still needs attention: it is active, or it latches and is not acknowledged. first_up: number of the
-    record that came first of those with the same cause; its own number for the first one. count: how often the
-    condition occurred while the record was open. run: number of the run. action: name of the action that failed.
+    record that came first of those with the same cause; its own number for the first one. count: number of
+    occurrences of the condition while the record was open. run: number of the run. action: name of the action that
+    failed.
     """
 
     number: int
@@ -123,7 +124,7 @@ class AlarmRecord(Data, frozen=True):
 
 
 class AlarmFrequency(Data, frozen=True):
-    """How often, and how long in s, an alarm of an object was active in a period."""
+    """Number and duration in s of the activations of an alarm of an object in a period."""
 
     kind: str
     code: str
@@ -136,7 +137,7 @@ class AlarmFrequency(Data, frozen=True):
 
 
 class AlarmFilter(enum.StrEnum):
-    """Which alarms are listed: those that need attention, the shelved ones, or the whole history."""
+    """Selection of alarms: those that need attention, the shelved ones, or the whole history."""
 
     RETAINED = "retained"
     SHELVED = "shelved"

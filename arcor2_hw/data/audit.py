@@ -9,7 +9,7 @@ from arcor2_hw.data.base import Data, Timestamp
 
 
 class AuditOutcome(enum.StrEnum):
-    """What became of a request."""
+    """Outcome of a request."""
 
     DONE = "done"
     REFUSED = "refused"
@@ -40,7 +40,7 @@ class AuditEntry(Data, frozen=True):
     Args:
         number: counts the entries from 1.
         time: time of the end of the request.
-        outcome: what became of the request.
+        outcome: outcome of the request.
         request: name of the request, or method and path of a REST operation.
         target: id or name of the affected item; empty if unknown.
         user: name of the user or of the token; empty if unknown.

@@ -15,7 +15,7 @@ __all__ = ["UNSET", "Data", "MutableData", "Timestamp", "TranslatableData", "Uns
 
 
 class Data(Struct, frozen=True):
-    """Base of all protocol data: immutable; an unset optional field is omitted, null is rejected."""
+    """Base of all protocol data: immutable; unset optional fields are omitted, null is rejected."""
 
 
 class TranslatableData(Data, frozen=True, kw_only=True):

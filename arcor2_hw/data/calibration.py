@@ -43,8 +43,8 @@ class CalibrationInput(Data, frozen=True):
 class CalibrationRecord(TranslatableData, frozen=True):
     """One calibration.
 
-    person: name of the user who did it. object_id and object_name: scene object whose pose, lens or tool it is; parent:
-    name of the frame of the poses ("world", a robot's base or flange). inputs: images and tables it was computed from;
+    person: name of the user who did it. object_id and object_name: the scene object that was calibrated; parent:
+    name of the frame of the poses ("world", a robot's base or flange). inputs: images and tables for the computation;
     parameters: other inputs (joints, markers, options), as JSON values. residual: in residual_unit ("m", "rad" or
     "px"); result: the complete result, as JSON values. before and after: pose of the object before and after, where the
     result is a pose; applied: whether the object's pose was set. key and values translate the verdict.

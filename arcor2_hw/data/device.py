@@ -107,7 +107,7 @@ class Severity(enum.StrEnum):
 class Alarm(Data, frozen=True):
     """A condition that needs attention; `remedy` says what to do.
 
-    text_message, remedy_message: the text and the remedy with what is needed to translate them, if they have values.
+    text_message, remedy_message: the text and the remedy with the data for their translation, if they have values.
     """
 
     code: str
@@ -126,7 +126,7 @@ class Alarm(Data, frozen=True):
 
 
 class LossKind(enum.StrEnum):
-    """What a device does when it loses the connection."""
+    """Reaction of a device to a connection loss."""
 
     STOPS_WITHIN = "stops_within"
     HOLDS = "holds"
@@ -134,14 +134,14 @@ class LossKind(enum.StrEnum):
 
 
 class LossReaction(Data, frozen=True):
-    """The declared reaction of a device to a connection loss; `within` in s for one that stops."""
+    """The declared reaction of a device to a connection loss; `within` in s if the device stops."""
 
     kind: LossKind
     within: float = 0.0
 
     @classmethod
     def stops_within(cls, seconds: float) -> "LossReaction":
-        """Declare that motion ends within that time after the connection loss, s."""
+        """Declare that motion ends within a time after the connection loss, s."""
         return cls(LossKind.STOPS_WITHIN, seconds)
 
     @classmethod

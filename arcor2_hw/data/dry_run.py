@@ -74,8 +74,8 @@ class DryRunHead(TranslatableData, frozen=True):
     """A dry run without its result, and data of the event DryRunChanged.
 
     number: grows by one with each dry run since the start of the server. revision: revision of the project (see
-    History) that was checked. from_action: the first action, omitted for START. error: why it failed, with `key` and
-    `values`. cycle: the predicted cycle time, s.
+    History) that was checked. from_action: the first action, omitted for START. error: reason of a failure, with
+    `key` and `values`. cycle: the predicted cycle time, s.
     """
 
     number: int

@@ -49,7 +49,7 @@ class ProjectBreakpoints(Data, frozen=True):
 
 # ---------------------------------------------------------------------------------------------- presence
 class Presence(Data, frozen=True):
-    """What a user views and edits, as reported by the client.
+    """The items that a user views and edits, as reported by the client.
 
     document: id of the viewed scene, project or package. selected, aimed, editing: ids in it. view: name of the screen
     or view. camera: camera pose in the world, as a camera frame.
@@ -64,7 +64,7 @@ class Presence(Data, frozen=True):
 
 
 class UserPresenceData(Data, frozen=True):
-    """Data of the event UserPresence; without `presence` the client of the user has not reported any yet."""
+    """Data of the event UserPresence; `presence` is omitted before the first report of the client."""
 
     user: str
     online: bool
@@ -117,7 +117,7 @@ class TaskProgress(enum.StrEnum):
 class TaskStateData(TranslatableData, frozen=True):
     """Data of the event TaskState.
 
-    title: sentence for users; title_message: what is needed to translate it. started_by: name of a user or token,
+    title: sentence for users; title_message: the data for its translation. started_by: name of a user or token,
     omitted when it was started automatically. progress: 0 to 1, omitted when unknown. message: present activity, or
     reason of the failure.
     """
@@ -250,10 +250,10 @@ class TraceEntry(TranslatableData, frozen=True):
 
     number: number of the action in the run from 1, in the order of their start. started: time of the start. duration:
     s, without a pause before it; omitted while it runs. parameters, results: as in ActionStateBefore and
-    ActionStateAfter. error: why it failed, with `key` and `values`. thread_id: omitted in the main thread of the
+    ActionStateAfter. error: reason of a failure, with `key` and `values`. thread_id: omitted in the main thread of the
     script. call: number of the call of the function that contains the action; omitted in the program itself. attempt:
-    number of the attempt of a retried action; omitted for the first one. hold: how long the program was held at it, and
-    who decided.
+    number of the attempt of a retried action; omitted for the first one. hold: the hold of the program at the
+    action.
     """
 
     run: int

@@ -221,7 +221,7 @@ class SceneStateData(TranslatableData, frozen=True):
 
 
 class RobotEefData(Data, frozen=True):
-    """Data of the event RobotEef; `time_ms` (steady clock of the cell) is set when StreamRobot asked for it."""
+    """Data of the event RobotEef; `time_ms` (steady clock of the cell) is set if StreamRobot requested it."""
 
     robot_id: str
     end_effectors: list[EefPose] = field(default_factory=list)
@@ -296,7 +296,8 @@ class ProjectExceptionData(TranslatableData, frozen=True):
 class ObjectStateData(TranslatableData, frozen=True):
     """Data of the event ObjectState: the connection of an object of the online scene or the running program.
 
-    reason: why it is lost or failed, or why all connections ended. overlaid: settings from the server's cell file.
+    reason: why the connection is lost or failed, or why all connections ended. overlaid: settings from the server's
+        cell file.
     answering: false while the process that controls the devices does not answer; `state` is then the last known one.
     """
 

@@ -1,4 +1,4 @@
-"""A program that is held at an action that failed, until a person decides how it continues."""
+"""A program that is held at a failed action until a person decides how to continue."""
 
 import enum
 
@@ -49,7 +49,7 @@ class HoldExit(Data, frozen=True):
 
 
 class HeldData(TranslatableData, frozen=True):
-    """Data of the event Held: the action at which the program is held, its error, and how it may continue.
+    """Data of the event Held: the action at which the program is held, its error, and the possible decisions.
 
     run: number of the run. number: of the action in the run. device: id of the object. kind: code of the error. text:
     the error, with `key` and `values`. again: whether the action is safe to retry, or the person has to be asked;

@@ -118,7 +118,7 @@ class HistoryState(Data, frozen=True):
 
     recording: false if the server was started without `--history`. hot_bytes, cold_bytes: sizes of the database and of
     the Parquet files. rows: number of values and runs in these files. dropped: values that could not be stored since
-    the start of the server. problem: why nothing is stored now; empty if there is none.
+    the start of the server. problem: reason why no data is stored at present; empty if there is none.
     """
 
     recording: bool

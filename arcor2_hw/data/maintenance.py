@@ -45,8 +45,8 @@ class ParameterDifference(Data, frozen=True):
 class BackupInfo(Data, frozen=True):
     """A backup of the parameters of a device, without the parameters.
 
-    identity: of the device that was read. at, by: when, and who requested it. count: number of parameters. digest:
-    SHA-256 of identity, type and parameters. uploaded: whether it was uploaded as a file.
+    identity: of the device that was read. at, by: time, and the user who requested it. count: number of parameters.
+        digest: SHA-256 of identity, type and parameters. uploaded: whether it was uploaded as a file.
     """
 
     id: str
@@ -88,14 +88,14 @@ class DeviceCard(TranslatableData, frozen=True):
         first_seen: Time of the first connection of the device.
         seen: Time at which its identity was last read.
         confirmed_at: Time at which a technician confirmed the identity; omitted if it was seen first.
-        confirmed_by: Who confirmed it.
+        confirmed_by: The technician who confirmed it.
         parameters: Whether the driver can read the parameters.
         restores: Whether it can write them.
         hours: Hours for which the device was connected since `counted_since`.
         cycles: Number of actions that it executed since then.
-        counters: What the device itself counts, by name, when its identity was last read.
-        counted_since: When this device, by its serial number, was put into operation here.
-        problem: Why the identity could not be read at the last connection; `key` and `values` translate it.
+        counters: Counters of the device itself by name, read together with its identity.
+        counted_since: Time at which this device, by its serial number, was put into operation here.
+        problem: Reason why the identity could not be read at the last connection; `key` and `values` translate it.
         backups: The backups of its parameters, newest first.
     """
 

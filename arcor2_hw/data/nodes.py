@@ -25,10 +25,10 @@ class NodeState(StrEnum):
 
 
 class NodeSession(Data, frozen=True):
-    """What runs on a node.
+    """The scene or program that runs on a node.
 
     kind: `scene` or `program`; empty while it is being opened. name: of the scene; of a program, the id of its package.
-    since: when it was started.
+    since: time of its start.
     """
 
     kind: str
@@ -51,11 +51,11 @@ class NodeStatus(Data, frozen=True):
         state: Whether it can be used.
         version: Version of its installation; empty if it has never announced itself.
         computer: Name of the computer.
-        since: When its service started. Omitted, as all that follows, if it has never announced itself.
+        since: Start of its service. This and all following fields are omitted if it has never announced itself.
         seen: Time of its last announcement, for a silent node.
         load: Average load of the last minute, per processor core: 1 for as many running tasks as cores.
         free: Free space of its disk, bytes.
-        sessions: What runs on it.
+        sessions: The scene or program that runs on it.
         error: Its last error since its start.
         objects: Names of the objects of the open scene that run on it.
     """
@@ -80,8 +80,8 @@ class NodesData(TranslatableData, frozen=True):
         configured: Whether the server uses nodes: it has a broker, or its cell file or the open scene names a node.
         nodes: The nodes by name: those that announced themselves, and those that the open scene or the cell file names.
         assigned: The nodes that the cell file of the server sets, by name of the object. They override those of scenes.
-        problem: Why the state of the nodes is unknown; `key` and `values` translate it.
-        apart: Why the objects of the open scene cannot work together where they run (`several_nodes`).
+        problem: Reason why the state of the nodes is unknown; `key` and `values` translate it.
+        apart: Reason why the objects of the open scene cannot work together across their nodes (`several_nodes`).
     """
 
     configured: bool

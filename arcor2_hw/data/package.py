@@ -1,4 +1,4 @@
-"""Execution packages: their metadata, and what they announce when they run."""
+"""Execution packages: their metadata, and the data that they announce while they run."""
 
 import enum
 

@@ -1,4 +1,4 @@
-"""Parts in the cell: where each of them is, what was counted, and which program was interrupted."""
+"""Parts in the cell: their places, the counts, and the interrupted program."""
 
 import enum
 
@@ -75,7 +75,7 @@ class PartCounts(Data, frozen=True):
 
 
 class RunningAction(Data, frozen=True):
-    """An action that has started and not ended.
+    """An action that has started but not ended.
 
     number: in the run. branch, frames: its position, as in ProgramPosition.
     """
@@ -92,7 +92,8 @@ class DoneAction(Data, frozen=True, omit_defaults=True):
 
     branch: of the program. action_id, name, device: the action and its object. results: in JSON. stored: whether the
     results are stored. error, code, text: kind, code and message of an error that the program has handled. lasts:
-    whether its effect ends with the program. moved: whether it has moved a part; source, target: from where to where.
+    whether its effect ends with the program. moved: whether it has moved a part; source, target: its places before and
+    after.
     """
 
     branch: str
@@ -113,7 +114,7 @@ class DoneAction(Data, frozen=True, omit_defaults=True):
 class Restart(TranslatableData, frozen=True):
     """An action of the interrupted cycle at which the program can continue instead, so that it is repeated.
 
-    at: its position in the cycle. text: why it cannot continue there; empty if it can.
+    at: its position in the cycle. text: reason why it cannot continue there; empty if it can.
     """
 
     at: int
@@ -127,10 +128,10 @@ class RunCheckpoint(Data, frozen=True):
 
     package_hash: SHA-256 of script and project. cycle: number of the present cycle, from 1. actions: those that have
     started and not ended; empty between two actions. last: the action that ended last. results: the newest results of
-    each action by its id, in JSON. ended: whether the program has ended in an orderly way. done: what the present
-    cycle has done. variables: the values of the program's variables at its start, by name, in JSON. complete: whether
-    `done` is complete. interrupted: whether the server has noticed that the run was interrupted. confirmed: whether a
-    person has confirmed since where all parts are.
+    each action by its id, in JSON. ended: whether the program has ended in an orderly way. done: the completed
+    actions of the present cycle. variables: the values of the program's variables at its start, by name, in JSON.
+    complete: whether `done` is complete. interrupted: whether the server has noticed that the run was interrupted.
+    confirmed: whether a person has since confirmed the places of all parts.
     restarts: the actions before the interruption at which it can continue instead.
     continues, continues_at: whether the program can continue, and at which actions (empty: after `last`). missing: name
     of the action because of which it cannot.
@@ -156,13 +157,14 @@ class RunCheckpoint(Data, frozen=True):
     restarts: list[Restart] = field(default_factory=list)
 
     def until(self, at: int) -> "RunCheckpoint":
-        """Return the run as if it had been interrupted before an action that it has done."""
+        """Return the run as if it had been interrupted before one of its completed actions."""
         return replace(self, done=self.done[:at], actions=[])
 
     def split_done(self) -> tuple[list[DoneAction], list[DoneAction]]:
         """Return the actions whose results are used when the program continues, and those that are repeated.
 
-        An action is repeated if its effect has ended with the program, and with it what its branch has done since.
+        An action is repeated if its effect has ended with the program. The later actions of its branch are repeated
+        too.
         """
         newest = {each.device: index for index, each in enumerate(self.done)}
         first: dict[str, int] = {}

@@ -41,12 +41,12 @@ class Person(Data, frozen=True):
 
 
 class LogOnChangedData(TranslatableData, frozen=True):
-    """Data of LogOnChanged: who is logged on at the connection, and why somebody was logged off.
+    """Data of LogOnChanged: the person who is logged on at the connection, and the reason of a log-off.
 
     Args:
         role: the role of the connection.
         person: the person; unset if nobody is logged on.
-        reason: why the server logged the person off; empty otherwise.
+        reason: reason why the server logged the person off; empty otherwise.
     """
 
     role: RoleName

@@ -16,7 +16,7 @@ PointValue = bool | float | str | None
 
 
 class PointUse(enum.StrEnum):
-    """What a point is: an input or output of the device, one of its registers, or another value that it reports."""
+    """Kind of a point: an input or output of the device, one of its registers, or another reported value."""
 
     INPUT = "input"
     OUTPUT = "output"
@@ -25,7 +25,7 @@ class PointUse(enum.StrEnum):
 
 
 class PointQuality(enum.StrEnum):
-    """How far the value of a point can be trusted."""
+    """Reliability of the value of a point."""
 
     GOOD = "good"
     UNCERTAIN = "uncertain"
@@ -73,8 +73,8 @@ class ObjectPointsData(TranslatableData, frozen=True):
 class ForcedPoint(Data, frozen=True):
     """An output that a person forces.
 
-    object, point: names of the device and of its output. unit: of the value. user: who forces it. since: start of the
-    force.
+    object, point: names of the device and of its output. unit: of the value. user: the user who forces it. since: start
+    of the force.
     """
 
     id: str

@@ -12,7 +12,7 @@ MAIN_BRANCH: Final = "main"
 
 
 class ProgramStep(enum.StrEnum):
-    """Where a step ends: before the next action of the same function or a caller, of any function, or of a caller."""
+    """End of a step: before the next action of the same function or a caller, of any function, or of a caller."""
 
     OVER = "over"
     INTO = "into"

@@ -79,7 +79,7 @@ class BareAction(Data, frozen=True):
 
 
 class Retry(Data, frozen=True):
-    """How often an action is repeated at most after it has failed, and the pause before each repetition, s."""
+    """Maximum number of repetitions of a failed action, and the pause before each repetition, s."""
 
     count: int
     pause: float = 0.0
@@ -248,7 +248,7 @@ class LogicItem(Data, frozen=True):
 
 
 class ProjectParameter(Parameter, frozen=True):
-    """A constant of the project, or a variable, whose value at the start of a run it is.
+    """A constant of the project, or a variable with its value at the start of a run.
 
     Actions store results in a variable by giving the result its name.
     """

@@ -1,4 +1,4 @@
-"""Recipes: which package makes a product with which values, and the signatures by which it is released."""
+"""Recipes: the package and the values for a product, and the signatures by which it is released."""
 
 import enum
 import hashlib
@@ -46,8 +46,8 @@ class RecipeValue(Data, frozen=True):
 class Signature(Data, frozen=True):
     """A signature of a person.
 
-    state: the state that it sets. person, name, role: who signed. at: when. meaning: what the signature means. note: a
-    remark of the person. digest: SHA-256 of the recipe, the signature before, and all other fields.
+    state: the state that it sets. person, name, role: the person who signed. at: time. meaning: meaning of the
+    signature. note: remark of the person. digest: SHA-256 of the recipe, the signature before, and all other fields.
     """
 
     state: RecipeState
@@ -109,7 +109,7 @@ class Recipe(Data, frozen=True):
         return hashlib.sha256(msgspec.json.encode(signed, order="sorted")).hexdigest()
 
     def is_intact(self) -> bool:
-        """Return whether the recipe, its state and its signatures are as they were signed."""
+        """Return whether the recipe, its state and its signatures are unchanged since they were signed."""
         before = ""
         for signature in self.signatures:
             if signature.digest != self.digest_of(signature, before):
@@ -134,9 +134,9 @@ class UsedRecipe(Data, frozen=True):
 
 
 class Changeover(Data, frozen=True):
-    """What the cell produces: the recipe, and the one before, to which it can be rolled back.
+    """The production of the cell: the recipe, and the previous one, to which it can be rolled back.
 
-    released_only: whether operators may run only released recipes. by, at: who changed over, and when.
+    released_only: whether operators may run only released recipes. by, at: the user and the time of the changeover.
     """
 
     released_only: bool
@@ -172,7 +172,7 @@ class ChangedValue(Data, frozen=True):
 class RecipeComparison(Data, frozen=True):
     """The differences of two recipes.
 
-    script: unified diff of the scripts. problems: why a recipe cannot be used, such as a changed package.
+    script: unified diff of the scripts. problems: reasons why a recipe cannot be used, such as a changed package.
     """
 
     before: Recipe

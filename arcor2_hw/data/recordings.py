@@ -22,7 +22,7 @@ class SignalKind(enum.StrEnum):
 class RecordedAlarm(Data, frozen=True):
     """An alarm in a recording.
 
-    number: of its record. time: when it was raised, ms after the event of the recording.
+    number: of its record. time: time at which it was raised, ms after the event of the recording.
     """
 
     number: int
@@ -38,8 +38,9 @@ class RecordingInfo(Data, frozen=True):
 
     number: of the recording, from 1. at: time of the event, to which all times are relative. stamp: the same on the
     monotonic clock of the computer, s. begin, end: the recorded time, ms after the event. size: of its file, bytes.
-    complete: false while the recording continues, and for one that the end of the server cut off. run: number of the
-    run; omitted in an online scene. run_failed: whether the run ended with an error or was interrupted. error: why.
+    complete: false while the recording continues, and for a recording that was cut off by the end of the server.
+        run: number of the run; omitted in an online scene. run_failed: whether the run ended with an error or was
+        interrupted. error: its reason.
     alarms: the recorded ones, the event first.
     """
 

@@ -104,7 +104,7 @@ class Safety(enum.StrEnum):
 
 
 class ProgramState(enum.StrEnum):
-    """State of the controller's program; foreign: a program that is not ours."""
+    """State of the controller's program; foreign: a program of another source."""
 
     STOPPED = "stopped"
     PLAYING = "playing"
@@ -157,7 +157,7 @@ class MoveEnd(enum.StrEnum):
 
 
 class MoveResult(Data, frozen=True):
-    """Result of a move: pose reached (world), fraction of the speed used, duration in s, how it ended."""
+    """Result of a move: reached pose (world), used fraction of the speed, duration in s, outcome."""
 
     pose: Pose
     speed: float

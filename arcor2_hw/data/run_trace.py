@@ -1,4 +1,4 @@
-"""The trace of a run: when each device executed which action, also as a Chrome trace."""
+"""The trace of a run: the actions of each device with their times, also as a Chrome trace."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
@@ -14,11 +14,11 @@ class Span(Data, frozen=True):
 
     number: number of the action in the run from 1, in the order of their start. device: id of the object. start: since
     the first action of the run, s. duration: s. branch: value of the condition after which the action followed the one
-    before it, as JSON; omitted without a condition. error: why the action failed. thread_id: omitted in the main thread
-    of the script. call: number of the call of the function that contains the action; omitted in the program itself. The
-    span of a call has no device. attempt: number of the attempt of a retried action; omitted for the first one. lane:
-    id of the branch that executed the action at the same time as others; omitted in the program itself. hold: how long
-    the program was held at the action, which is not part of its duration, and who decided.
+    before it, as JSON; omitted without a condition. error: reason why the action failed. thread_id: omitted in the main
+    thread of the script. call: number of the call of the function that contains the action; omitted in the program
+    itself. The span of a call has no device. attempt: number of the attempt of a retried action; omitted for the first
+    one. lane: id of the branch that executed the action at the same time as others; omitted in the program itself.
+    hold: the hold of the program at the action, which is not part of its duration.
     """
 
     number: int

@@ -79,7 +79,7 @@ class ActionDifference(Data, frozen=True):
 
     @property
     def difference(self) -> float | None:
-        """Return by how much the action took longer in the second run, s; None if one run did not execute it."""
+        """Return the additional time of the action in the second run, s; None if one run did not execute it."""
         return None if isinstance(self.first, Unset) or isinstance(self.second, Unset) else self.second - self.first
 
 
@@ -143,7 +143,7 @@ def _device_waits(devices: Sequence[DeviceTimes], spans: Sequence[Span]) -> list
 
 
 def _key(action: Span | ActionTimes) -> tuple[str, str]:
-    """Return what identifies an action: its id, or its device and name in a script without declared actions."""
+    """Return the key of an action: its id, or its device and name in a script without declared actions."""
     return (action.action_id, "") if action.action_id else (action.device, action.name)
 
 

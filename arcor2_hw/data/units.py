@@ -1,4 +1,4 @@
-"""Records of produced units, and what the cell has produced."""
+"""Records of produced units, and the production of the cell."""
 
 import enum
 
@@ -9,7 +9,7 @@ from arcor2_hw.data.recipes import UsedRecipe
 
 
 class UnitState(enum.StrEnum):
-    """Where a unit is: in the cell, in a box for good, bad or rejected parts, or unknown.
+    """Location of a unit: in the cell, in a box for good, bad or rejected parts, or unknown.
 
     REJECTED includes parts that a person has taken out of the cell. UNKNOWN: it left while the server was off, and the
     inventory no longer contains its serial number.
@@ -26,7 +26,7 @@ class UnitStep(TranslatableData, frozen=True):
     """An action that concerned a unit.
 
     run, number: run, and number of the action in it. duration: s. parameters, results: each as JSON in a string. error:
-    why it failed, with `key` and `values`. attempt: number of the attempt, if not the first one.
+    reason of a failure, with `key` and `values`. attempt: number of the attempt, if not the first one.
     """
 
     run: int
@@ -55,7 +55,8 @@ class Unit(Data, frozen=True):
     """A unit that the cell has worked on, without its steps.
 
     number: of the record. serial: serial number; empty if it was never read. scene_id, part: the scene, and the number
-    of the part in the inventory. order: id of the order. entered, left: when it came into the cell and left it.
+    of the part in the inventory. order: id of the order. entered, left: times at which it came into the cell and left
+    it.
     verdict: result of its last test. runs: numbers of the runs that worked on it.
     """
 
@@ -88,7 +89,7 @@ class UnitRecord(Unit, frozen=True, kw_only=True):
 
 
 class CellActivity(enum.StrEnum):
-    """What the cell does. OFF: the server did not run."""
+    """The activity of the cell. OFF: the server did not run."""
 
     RUNNING = "running"
     HELD = "held"
@@ -123,7 +124,7 @@ class Effectiveness(Data, frozen=True):
 
 
 class Production(Data, frozen=True):
-    """What the cell has produced in a period, and the time per activity, s."""
+    """The production of the cell in a period, and the time per activity, s."""
 
     since: Timestamp
     until: Timestamp

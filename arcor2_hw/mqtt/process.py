@@ -52,7 +52,7 @@ async def run(descriptor: int) -> None:
             each.changed(changes)
 
     async def watch() -> None:
-        """Mark values as stale that are not renewed, also because the server does not answer."""
+        """Mark values as stale if they are not renewed, also if the server does not answer."""
         while True:
             await asyncio.sleep(BEAT_PERIOD)
             changes = cell.expire(silent=time.monotonic() - heard > STALE_AFTER)

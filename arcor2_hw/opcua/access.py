@@ -68,7 +68,7 @@ class Services:
 
 
 class Users:
-    """Returns the user whom the processor of the connection has checked."""
+    """Returns the user who was checked by the processor of the connection."""
 
     def get_user(self, _server: Any, username: Any = None, password: Any = None, certificate: Any = None) -> Any:  # noqa: ARG002
         """Return the checked user, None if the log-on is refused."""

@@ -42,9 +42,9 @@ def own_certificate(folder: Path, machine: str, hosts: list[str], issuer: Issuer
         folder: contains the files.
         machine: name of the machine.
         hosts: names and addresses of the server.
-        issuer: signs a new certificate. None: its own key does. A certificate that an issuer has signed is replaced
-            if it was another one, or if the names have changed; one that is signed by its own key stays valid, because
-            clients trust it by itself.
+        issuer: signs a new certificate. None: the certificate is self-signed. A certificate that an issuer has
+            signed is replaced if it was another one, or if the names have changed; one that is signed by its own key
+            stays valid, because clients trust it by itself.
     """
     certificate, key = folder / CERTIFICATE, folder / KEY
     names: list[x509.GeneralName] = [x509.UniformResourceIdentifier(application_uri(machine)), *map(_name, hosts)]
@@ -154,7 +154,7 @@ class TrustedClients:
             each.mkdir(mode=0o700, exist_ok=True)
 
     def admits(self, certificate: bytes) -> bool:
-        """Return whether a DER certificate is valid now and trusted. Another one is stored in the rejected folder."""
+        """Return whether a DER certificate is valid now and trusted; otherwise store it in the rejected folder."""
         try:
             client = x509.load_der_x509_certificate(certificate)
         except ValueError:

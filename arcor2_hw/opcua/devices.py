@@ -41,7 +41,7 @@ async def add_identification(space: Space, item: ua.NodeId, blocks: ua.NodeId, k
         item: the machine or component.
         blocks: its folder MachineryBuildingBlocks.
         kind: number of the type in OPC 40001-1.
-        info: what is known about it.
+        info: its identification.
     """
     node = await space.add_object(
         blocks, space.name("di", "Identification"), space.standard("machinery", kind), ua.ObjectIds.HasAddIn

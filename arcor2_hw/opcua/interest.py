@@ -1,4 +1,4 @@
-"""Which devices clients want values of: only those are read."""
+"""The devices whose values clients monitor or read; other devices are not read."""
 
 import asyncio
 import contextlib
@@ -33,7 +33,7 @@ class MonitoredDevices:
         self._wanted: set[str] | None = None
 
     def update(self) -> None:
-        """Request the values of the devices that are wanted now."""
+        """Request the values of the devices that clients need now."""
         at = time.monotonic()
         self._leases = {key: end for key, end in self._leases.items() if end > at and key in self._devices}
         wanted = {key for key, device in self._devices.items() if key in self._leases or device.monitored}
@@ -48,7 +48,7 @@ class MonitoredDevices:
         self._watch(sorted(wanted))
 
     def arrived(self, node: ua.NodeId) -> None:
-        """Let clients read that wait for the values below a node of a device."""
+        """Release clients that wait for the values below a node of a device."""
         if (first := self._first.get(str(node.Identifier))) is not None:
             first[0].set()
 

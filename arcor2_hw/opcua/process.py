@@ -62,7 +62,7 @@ class Process:
         """
         await self._link.open()
         setup = await self._link.read()
-        gc.disable()  # it would visit the 700,000 objects of the address space repeatedly while they are created
+        gc.disable()  # the collector would visit 700,000 objects repeatedly during their creation
         await self._start(setup)
         gc.freeze()
         gc.enable()
@@ -167,7 +167,7 @@ class Process:
             self._interest.arrived(device.node)
 
     async def _watch(self) -> None:
-        """Mark values as stale that are not renewed, also because the server does not answer."""
+        """Mark values as stale if they are not renewed, also if the server does not answer."""
         clients = 0
         while True:
             self._interest.update()

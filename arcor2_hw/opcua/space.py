@@ -152,7 +152,7 @@ class Space:
             parent: the node to which it belongs.
             name: its browse name.
             kind: its type.
-            reference: how it belongs to the parent.
+            reference: type of the reference from the parent.
             node: its identifier; None: that of the parent with the name.
         """
         attributes = ua.ObjectAttributes()
@@ -230,7 +230,7 @@ class Space:
         inputs: Sequence[ua.Argument] = (),
         outputs: Sequence[ua.Argument] = (),
     ) -> None:
-        """Add a method. Without a function clients see it, and that it cannot be executed."""
+        """Add a method. Without a function, clients see that it cannot be executed."""
 
         async def refuse(_parent: ua.NodeId, *_arguments: ua.Variant) -> ua.StatusCode:
             return status_code(ua.StatusCodes.BadNotExecutable)

@@ -52,7 +52,7 @@ class Outcome(NamedTuple):
     Attributes:
         q: Joint values at the end; those at the start if the target is out of reach.
         seconds: Duration, None if there is no path.
-        reason: Why the motion would fail, None if it succeeds.
+        reason: Reason why the motion would fail, None if it succeeds.
         place: Pose of the end effector in the world where it would fail.
     """
 

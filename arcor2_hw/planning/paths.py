@@ -67,7 +67,7 @@ def straight_line(
 
 
 class _Line:
-    """Poses are matrices: a line has many, and `Pose` is ten times slower."""
+    """Poses are matrices, because a line has many, and `Pose` is ten times slower."""
 
     def __init__(self, inverse: InverseKinematics, start: Array, target: Array, name: str, coarse: float) -> None:
         arm = inverse.arm

@@ -56,7 +56,7 @@ class Planner:
     def to_pose(
         self, start: Array, target: Array, *, within: float = TIME_LIMIT, seed: int = 0, stopped: Stopped | None = None
     ) -> list[Array]:
-        """Plan a path to a pose, to whichever joint values give a short one.
+        """Plan a path to a pose. The joint values at the end are chosen for a short path.
 
         Args:
             start: Joint values at the start.

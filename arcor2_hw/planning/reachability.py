@@ -37,9 +37,9 @@ class Judgement(Data, frozen=True):
     """The result for one pose.
 
     Attributes:
-        reach: How the arm reaches the pose.
+        reach: Reachability of the pose by the arm.
         joints: Joint values of the arm, empty when it is out of reach.
-        reason: Why it is not reachable, or only with reservation; None if it is reachable.
+        reason: Reason why it is not reachable, or only with reservation; None if it is reachable.
     """
 
     reach: Reach
@@ -54,7 +54,7 @@ class _Candidate:
     Attributes:
         q: Joint values of the arm.
         whole: Joint values of the model.
-        reservation: Why other joint values would be better; unset before that is known, None if they are good.
+        reservation: Reason why other joint values would be better; unset before this is known, None if they are good.
         box: Bounding box of the arm, (2, 3).
         state: State of the robot for which the box holds.
     """
@@ -112,7 +112,7 @@ class Reachability:
         self.checked = 0
 
     def judge(self, poses: Iterable[Pose]) -> list[Judgement]:
-        """Return for each pose in the world how the arm reaches it."""
+        """Return the reachability of each pose in the world by the arm."""
         if not np.array_equal(self._base, self._standing.base):
             self._cache.clear()
             self._update_base()
@@ -211,7 +211,7 @@ class Reachability:
 
 
 def why_out_of_reach(arm: Arm, target: Array) -> Message:
-    """Return why an arm does not reach a pose (4, 4) in the frame of the model's root link."""
+    """Return the reason why an arm does not reach a pose (4, 4) in the frame of the model's root link."""
     distance = float(np.linalg.norm(target[:3, 3] - arm.centre))
     if distance > arm.reach:
         return Message.of(

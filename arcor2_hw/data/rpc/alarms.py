@@ -15,7 +15,7 @@ Note = Annotated[str, Meta(max_length=500)]
 
 
 class ListAlarmsArgs(Data, frozen=True):
-    """Arguments of ListAlarms: which records, maximum number, number before which they are listed, object, run."""
+    """Arguments of ListAlarms: selection of records, maximum number, upper limit of the record number, object, run."""
 
     show: AlarmFilter = AlarmFilter.RETAINED
     limit: Annotated[int, Meta(ge=1, le=1000)] = 100

@@ -27,7 +27,7 @@ class Rpc(Struct, frozen=True):
 class Request(Data, frozen=True):
     """The envelope of a request; `args` is decoded when the request is known.
 
-    `codes`: whether a refusal contains its reason, and every answer what is needed to translate its messages.
+    `codes`: whether refusals contain their reason, and answers the data for the translation of their messages.
     `step`: edits of a user with the same name of a step are undone together.
     """
 

@@ -44,9 +44,9 @@ class RunPackageArgs(IdArgs, frozen=True):
 
     shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
     on_error: reaction of the program if an action fails and no error exit applies. checkpoints: whether the state is
-    stored before and after each action; default: true. continues: whether the program continues where it was
-    interrupted, which requires that it is held on errors. continue_at: position in the cycle of another action at which
-    it continues (see Restart). recipe_id: the recipe, whose package this must be.
+    stored before and after each action; default: true. continues: whether the program continues at the
+    interruption, which requires that it is held on errors. continue_at: position in the cycle of another action at
+    which it continues (see Restart). recipe_id: the recipe, whose package this must be.
     recipe_values: values of this run by name, JSON in a string, within the limits of the recipe. order: id of the order
     that is stored with the produced units.
     """
@@ -106,7 +106,7 @@ class GetHeldData(Data, frozen=True):
 
 
 class ConfirmPartsArgs(Data, frozen=True):
-    """Arguments of ConfirmParts: where a person has found parts. No parts: only that a program was interrupted.
+    """Arguments of ConfirmParts: places where a person has found parts. No parts: only confirms the interruption.
 
     dismiss: the interrupted program does not continue; it starts from its beginning.
     """

@@ -28,7 +28,7 @@ class ListDeviceCardsData(Data, frozen=True):
 
 
 class ConfirmDeviceArgs(Data, frozen=True):
-    """Arguments of ConfirmDevice: the device, and its new identity as the technician has seen it."""
+    """Arguments of ConfirmDevice: the device, and the new identity that was shown to the technician."""
 
     object_id: str
     identity: Identity

@@ -108,7 +108,7 @@ class StopOutcome(TranslatableData, frozen=True):
 
 
 class StopAllData(Data, frozen=True):
-    """Answer to StopAll: the result for everything that was stopped, or cannot be stopped."""
+    """Answer to StopAll: the result for each device, action or program that was stopped, or cannot be stopped."""
 
     outcomes: list[StopOutcome]
 

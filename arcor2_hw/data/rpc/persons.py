@@ -31,7 +31,7 @@ class LogOnData(Data, frozen=True):
     """Answer to LogOn.
 
     Args:
-        person: who is logged on.
+        person: the person who is logged on.
         role: the role of this connection, the lower one of the person and of the token.
         session: a secret by which this device logs the person on again after a lost connection, and for REST.
         log_off_after: time without activity after which the person is logged off, s; 0: never.
@@ -84,7 +84,7 @@ class AddPersonArgs(Data, frozen=True):
 
 
 class ChangePersonArgs(Data, frozen=True):
-    """Arguments of ChangePerson: what changes. An empty `pin` or `card` is removed; `unlock` ends all lock-outs."""
+    """Arguments of ChangePerson: the changes. An empty `pin` or `card` is removed; `unlock` ends all lock-outs."""
 
     id: str
     name: PersonName | Unset = UNSET

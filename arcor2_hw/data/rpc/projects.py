@@ -116,7 +116,7 @@ class UpdateActionArgs(Data, frozen=True):
 
 
 class UpdateLogicItemArgs(Data, frozen=True):
-    """Arguments of UpdateLogicItem; without `error_kinds` or `when` these stay as they are, and empty ones remove them.
+    """Arguments of UpdateLogicItem; omitted `error_kinds` or `when` are unchanged, empty ones are removed.
 
     A `condition` removes `when`.
     """

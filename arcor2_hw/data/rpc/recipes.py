@@ -23,7 +23,7 @@ class ListRecipesArgs(Data, frozen=True):
 
 
 class ListRecipesData(Data, frozen=True):
-    """Answer to ListRecipes: recipes by product, newest revision first, and what the cell produces."""
+    """Answer to ListRecipes: recipes by product, newest revision first, and the present production of the cell."""
 
     recipes: list[Recipe]
     changeover: Changeover

@@ -74,7 +74,7 @@ class CheckConnectionArgs(Data, frozen=True):
 
 
 class CheckConnectionData(Data, frozen=True):
-    """Answer to CheckConnection: what the connected device reports, and the time to connect, s."""
+    """Answer to CheckConnection: the data reported by the connected device, and the time to connect, s."""
 
     identity: Identity
     health: Health
@@ -108,7 +108,7 @@ class FindDevicesArgs(Data, frozen=True):
 
 
 class FoundDevice(Data, frozen=True):
-    """Answer to FindDevices: JSON of the setting's value that selects a device, and what is known about the device."""
+    """Answer to FindDevices: JSON of the setting's value that selects a device, and a description of the device."""
 
     value: str
     address: str

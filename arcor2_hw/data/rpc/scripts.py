@@ -38,7 +38,7 @@ class ScriptArgs(Data, frozen=True):
 
 
 class ScriptProblem(TranslatableData, frozen=True):
-    """Why a script cannot be imported. `line` and `column` count from 1; without them it concerns the whole script."""
+    """The reason why a script cannot be imported. `line` and `column` from 1 are omitted for the whole script."""
 
     message: str
     line: int | Unset = UNSET

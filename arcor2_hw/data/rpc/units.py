@@ -11,9 +11,9 @@ from arcor2_hw.data.units import Production, Unit, UnitRecord, UnitState
 
 
 class ListUnitsArgs(Data, frozen=True):
-    """Arguments of ListUnits: which units, newest first.
+    """Arguments of ListUnits: selection of units, newest first.
 
-    serial: the beginning of the serial number, in upper or lower case. order, product, run, state: all must match.
+    serial: the beginning of the serial number; case is ignored. order, product, run, state: all must match.
     since, until: of entering the cell. before: number of a record.
     """
 

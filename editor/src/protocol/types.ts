@@ -272,7 +272,7 @@ export type Again = "safe" | "ask" | "never";
 /**
  * A condition that needs attention; `remedy` says what to do.
  *
- * text_message, remedy_message: the text and the remedy with what is needed to translate them, if they have values.
+ * text_message, remedy_message: the text and the remedy with the data for their translation, if they have values.
  */
 export interface Alarm {
   code: string;
@@ -287,10 +287,10 @@ export interface Alarm {
 /** What an alarm is about. */
 export type AlarmCategory = "connection" | "control" | "safety" | "device" | "supply" | "process" | "program" | "system";
 
-/** Which alarms are listed: those that need attention, the shelved ones, or the whole history. */
+/** Selection of alarms: those that need attention, the shelved ones, or the whole history. */
 export type AlarmFilter = "retained" | "shelved" | "all";
 
-/** How often, and how long in s, an alarm of an object was active in a period. */
+/** Number and duration in s of the activations of an alarm of an object in a period. */
 export interface AlarmFrequency {
   kind: string;
   code: string;
@@ -309,8 +309,9 @@ export interface AlarmFrequency {
  * object_name: omitted for alarms of the program and the system. remedy_message, text_message: for translation, if the
  * text or the remedy has values. active: whether its condition persists. cleared: when the condition ended. retain:
  * whether it still needs attention: it is active, or it latches and is not acknowledged. first_up: number of the
- * record that came first of those with the same cause; its own number for the first one. count: how often the
- * condition occurred while the record was open. run: number of the run. action: name of the action that failed.
+ * record that came first of those with the same cause; its own number for the first one. count: number of
+ * occurrences of the condition while the record was open. run: number of the run. action: name of the action that
+ * failed.
  */
 export interface AlarmRecord {
   number: number;
@@ -394,8 +395,8 @@ export interface BackupArgs {
 /**
  * A backup of the parameters of a device, without the parameters.
  *
- * identity: of the device that was read. at, by: when, and who requested it. count: number of parameters. digest:
- * SHA-256 of identity, type and parameters. uploaded: whether it was uploaded as a file.
+ * identity: of the device that was read. at, by: time, and the user who requested it. count: number of parameters.
+ *     digest: SHA-256 of identity, type and parameters. uploaded: whether it was uploaded as a file.
  */
 export interface BackupInfo {
   id: string;
@@ -517,8 +518,8 @@ export type CalibrationKind = "camera_pose" | "robot_pose" | "hand_eye" | "intri
 /**
  * One calibration.
  *
- * person: name of the user who did it. object_id and object_name: scene object whose pose, lens or tool it is; parent:
- * name of the frame of the poses ("world", a robot's base or flange). inputs: images and tables it was computed from;
+ * person: name of the user who did it. object_id and object_name: the scene object that was calibrated; parent:
+ * name of the frame of the poses ("world", a robot's base or flange). inputs: images and tables for the computation;
  * parameters: other inputs (joints, markers, options), as JSON values. residual: in residual_unit ("m", "rad" or
  * "px"); result: the complete result, as JSON values. before and after: pose of the object before and after, where the
  * result is a pose; applied: whether the object's pose was set. key and values translate the verdict.
@@ -625,7 +626,7 @@ export interface ChangeOwnPinArgs {
   new_pin: string;
 }
 
-/** Arguments of ChangePerson: what changes. An empty `pin` or `card` is removed; `unlock` ends all lock-outs. */
+/** Arguments of ChangePerson: the changes. An empty `pin` or `card` is removed; `unlock` ends all lock-outs. */
 export interface ChangePersonArgs {
   id: string;
   name?: string;
@@ -652,9 +653,9 @@ export interface ChangedValue {
 }
 
 /**
- * What the cell produces: the recipe, and the one before, to which it can be rolled back.
+ * The production of the cell: the recipe, and the previous one, to which it can be rolled back.
  *
- * released_only: whether operators may run only released recipes. by, at: who changed over, and when.
+ * released_only: whether operators may run only released recipes. by, at: the user and the time of the changeover.
  */
 export interface Changeover {
   released_only: boolean;
@@ -689,7 +690,7 @@ export interface CheckConnectionArgs {
   node?: string;
 }
 
-/** Answer to CheckConnection: what the connected device reports, and the time to connect, s. */
+/** Answer to CheckConnection: the data reported by the connected device, and the time to connect, s. */
 export interface CheckConnectionData {
   identity: Identity;
   health: Health;
@@ -734,14 +735,14 @@ export interface CompareRecipesArgs {
   after: string;
 }
 
-/** Arguments of ConfirmDevice: the device, and its new identity as the technician has seen it. */
+/** Arguments of ConfirmDevice: the device, and the new identity that was shown to the technician. */
 export interface ConfirmDeviceArgs {
   object_id: string;
   identity: Identity;
 }
 
 /**
- * Arguments of ConfirmParts: where a person has found parts. No parts: only that a program was interrupted.
+ * Arguments of ConfirmParts: places where a person has found parts. No parts: only confirms the interruption.
  *
  * dismiss: the interrupted program does not continue; it starts from its beginning.
  */
@@ -858,14 +859,14 @@ export interface DeviceArgs {
  *     first_seen: Time of the first connection of the device.
  *     seen: Time at which its identity was last read.
  *     confirmed_at: Time at which a technician confirmed the identity; omitted if it was seen first.
- *     confirmed_by: Who confirmed it.
+ *     confirmed_by: The technician who confirmed it.
  *     parameters: Whether the driver can read the parameters.
  *     restores: Whether it can write them.
  *     hours: Hours for which the device was connected since `counted_since`.
  *     cycles: Number of actions that it executed since then.
- *     counters: What the device itself counts, by name, when its identity was last read.
- *     counted_since: When this device, by its serial number, was put into operation here.
- *     problem: Why the identity could not be read at the last connection; `key` and `values` translate it.
+ *     counters: Counters of the device itself by name, read together with its identity.
+ *     counted_since: Time at which this device, by its serial number, was put into operation here.
+ *     problem: Reason why the identity could not be read at the last connection; `key` and `values` translate it.
  *     backups: The backups of its parameters, newest first.
  */
 export interface DeviceCard {
@@ -945,7 +946,8 @@ export interface DissolveParallelArgs {
  *
  * branch: of the program. action_id, name, device: the action and its object. results: in JSON. stored: whether the
  * results are stored. error, code, text: kind, code and message of an error that the program has handled. lasts:
- * whether its effect ends with the program. moved: whether it has moved a part; source, target: from where to where.
+ * whether its effect ends with the program. moved: whether it has moved a part; source, target: its places before and
+ * after.
  */
 export interface DoneAction {
   branch: string;
@@ -967,8 +969,8 @@ export interface DoneAction {
  * A dry run without its result, and data of the event DryRunChanged.
  *
  * number: grows by one with each dry run since the start of the server. revision: revision of the project (see
- * History) that was checked. from_action: the first action, omitted for START. error: why it failed, with `key` and
- * `values`. cycle: the predicted cycle time, s.
+ * History) that was checked. from_action: the first action, omitted for START. error: reason of a failure, with
+ * `key` and `values`. cycle: the predicted cycle time, s.
  */
 export interface DryRunHead {
   number: number;
@@ -1221,8 +1223,8 @@ export interface ForcePointData {
 /**
  * An output that a person forces.
  *
- * object, point: names of the device and of its output. unit: of the value. user: who forces it. since: start of the
- * force.
+ * object, point: names of the device and of its output. unit: of the value. user: the user who forces it. since: start
+ * of the force.
  */
 export interface ForcedPoint {
   id: string;
@@ -1248,7 +1250,7 @@ export interface ForwardKinematicsArgs {
   arm_id?: string;
 }
 
-/** Answer to FindDevices: JSON of the setting's value that selects a device, and what is known about the device. */
+/** Answer to FindDevices: JSON of the setting's value that selects a device, and a description of the device. */
 export interface FoundDevice {
   value: string;
   address: string;
@@ -1404,7 +1406,7 @@ export interface HandTeachingModeData {
 export type Health = "normal" | "check_function" | "off_spec" | "maintenance_required" | "failure";
 
 /**
- * Data of the event Held: the action at which the program is held, its error, and how it may continue.
+ * Data of the event Held: the action at which the program is held, its error, and the possible decisions.
  *
  * run: number of the run. number: of the action in the run. device: id of the object. kind: code of the error. text:
  * the error, with `key` and `values`. again: whether the action is safe to retry, or the person has to be asked;
@@ -1672,7 +1674,7 @@ export interface Joint {
   value: number;
 }
 
-/** Arguments of ListAlarms: which records, maximum number, number before which they are listed, object, run. */
+/** Arguments of ListAlarms: selection of records, maximum number, upper limit of the record number, object, run. */
 export interface ListAlarmsArgs {
   show?: AlarmFilter;
   limit?: number;
@@ -1746,7 +1748,7 @@ export interface ListRecipesArgs {
   state?: RecipeState;
 }
 
-/** Answer to ListRecipes: recipes by product, newest revision first, and what the cell produces. */
+/** Answer to ListRecipes: recipes by product, newest revision first, and the present production of the cell. */
 export interface ListRecipesData {
   recipes: Recipe[];
   changeover: Changeover;
@@ -1777,9 +1779,9 @@ export interface ListScenesData {
 }
 
 /**
- * Arguments of ListUnits: which units, newest first.
+ * Arguments of ListUnits: selection of units, newest first.
  *
- * serial: the beginning of the serial number, in upper or lower case. order, product, run, state: all must match.
+ * serial: the beginning of the serial number; case is ignored. order, product, run, state: all must match.
  * since, until: of entering the cell. before: number of a record.
  */
 export interface ListUnitsArgs {
@@ -1855,12 +1857,12 @@ export interface LogOnArgs {
 }
 
 /**
- * Data of LogOnChanged: who is logged on at the connection, and why somebody was logged off.
+ * Data of LogOnChanged: the person who is logged on at the connection, and the reason of a log-off.
  *
  * Args:
  *     role: the role of the connection.
  *     person: the person; unset if nobody is logged on.
- *     reason: why the server logged the person off; empty otherwise.
+ *     reason: reason why the server logged the person off; empty otherwise.
  */
 export interface LogOnChangedData {
   role: "operator" | "standard_user" | "advanced_user" | "technician" | "programmer";
@@ -1874,7 +1876,7 @@ export interface LogOnChangedData {
  * Answer to LogOn.
  *
  * Args:
- *     person: who is logged on.
+ *     person: the person who is logged on.
  *     role: the role of this connection, the lower one of the person and of the token.
  *     session: a secret by which this device logs the person on again after a lost connection, and for REST.
  *     log_off_after: time without activity after which the person is logged off, s; 0: never.
@@ -2111,10 +2113,10 @@ export interface NodeError {
 }
 
 /**
- * What runs on a node.
+ * The scene or program that runs on a node.
  *
  * kind: `scene` or `program`; empty while it is being opened. name: of the scene; of a program, the id of its package.
- * since: when it was started.
+ * since: time of its start.
  */
 export interface NodeSession {
   kind: string;
@@ -2133,11 +2135,11 @@ export type NodeState = "connected" | "silent" | "other_version";
  *     state: Whether it can be used.
  *     version: Version of its installation; empty if it has never announced itself.
  *     computer: Name of the computer.
- *     since: When its service started. Omitted, as all that follows, if it has never announced itself.
+ *     since: Start of its service. This and all following fields are omitted if it has never announced itself.
  *     seen: Time of its last announcement, for a silent node.
  *     load: Average load of the last minute, per processor core: 1 for as many running tasks as cores.
  *     free: Free space of its disk, bytes.
- *     sessions: What runs on it.
+ *     sessions: The scene or program that runs on it.
  *     error: Its last error since its start.
  *     objects: Names of the objects of the open scene that run on it.
  */
@@ -2162,8 +2164,8 @@ export interface NodeStatus {
  *     configured: Whether the server uses nodes: it has a broker, or its cell file or the open scene names a node.
  *     nodes: The nodes by name: those that announced themselves, and those that the open scene or the cell file names.
  *     assigned: The nodes that the cell file of the server sets, by name of the object. They override those of scenes.
- *     problem: Why the state of the nodes is unknown; `key` and `values` translate it.
- *     apart: Why the objects of the open scene cannot work together where they run (`several_nodes`).
+ *     problem: Reason why the state of the nodes is unknown; `key` and `values` translate it.
+ *     apart: Reason why the objects of the open scene cannot work together across their nodes (`several_nodes`).
  */
 export interface NodesData {
   configured: boolean;
@@ -2275,7 +2277,8 @@ export interface ObjectPointsData {
 /**
  * Data of the event ObjectState: the connection of an object of the online scene or the running program.
  *
- * reason: why it is lost or failed, or why all connections ended. overlaid: settings from the server's cell file.
+ * reason: why the connection is lost or failed, or why all connections ended. overlaid: settings from the server's
+ *     cell file.
  * answering: false while the process that controls the devices does not answer; `state` is then the last known one.
  */
 export interface ObjectStateData {
@@ -2570,10 +2573,10 @@ export interface PlcLink {
   peer?: string;
 }
 
-/** How far the value of a point can be trusted. */
+/** Reliability of the value of a point. */
 export type PointQuality = "good" | "uncertain" | "stale" | "bad" | "not_connected";
 
-/** What a point is: an input or output of the device, one of its registers, or another value that it reports. */
+/** Kind of a point: an input or output of the device, one of its registers, or another reported value. */
 export type PointUse = "input" | "output" | "register" | "signal";
 
 /** Position and orientation of a frame in its parent frame. */
@@ -2604,7 +2607,7 @@ export interface Prediction {
 }
 
 /**
- * What a user views and edits, as reported by the client.
+ * The items that a user views and edits, as reported by the client.
  *
  * document: id of the viewed scene, project or package. selected, aimed, editing: ids in it. view: name of the screen
  * or view. camera: camera pose in the world, as a camera frame.
@@ -2618,7 +2621,7 @@ export interface Presence {
   camera?: Pose;
 }
 
-/** How soon an alarm needs a person (ISA-18.2), least first. */
+/** Urgency of an alarm (ISA-18.2), lowest first. */
 export type Priority = "low" | "medium" | "high" | "urgent";
 
 /** Data of the event ProcessState. */
@@ -2633,7 +2636,7 @@ export interface ProcessStateData {
 /** Values of StateEnum in ProcessState. */
 export type ProcessStateEnum = "started" | "finished" | "failed";
 
-/** What the cell has produced in a period, and the time per activity, s. */
+/** The production of the cell in a period, and the time per activity, s. */
 export interface Production {
   since: string;
   until: string;
@@ -2652,7 +2655,7 @@ export interface ProgramPosition {
   branches: Branch[];
 }
 
-/** Where a step ends: before the next action of the same function or a caller, of any function, or of a caller. */
+/** End of a step: before the next action of the same function or a caller, of any function, or of a caller. */
 export type ProgramStep = "over" | "into" | "out";
 
 /**
@@ -2724,7 +2727,7 @@ export interface ProjectMeta {
 }
 
 /**
- * A constant of the project, or a variable, whose value at the start of a run it is.
+ * A constant of the project, or a variable with its value at the start of a run.
  *
  * Actions store results in a variable by giving the result its name.
  */
@@ -2877,7 +2880,7 @@ export interface Recipe {
 /**
  * The differences of two recipes.
  *
- * script: unified diff of the scripts. problems: why a recipe cannot be used, such as a changed package.
+ * script: unified diff of the scripts. problems: reasons why a recipe cannot be used, such as a changed package.
  */
 export interface RecipeComparison {
   before: Recipe;
@@ -2906,7 +2909,7 @@ export interface RecipeValue {
 /**
  * An alarm in a recording.
  *
- * number: of its record. time: when it was raised, ms after the event of the recording.
+ * number: of its record. time: time at which it was raised, ms after the event of the recording.
  */
 export interface RecordedAlarm {
   number: number;
@@ -2932,8 +2935,9 @@ export interface RecordingChangedData {
  *
  * number: of the recording, from 1. at: time of the event, to which all times are relative. stamp: the same on the
  * monotonic clock of the computer, s. begin, end: the recorded time, ms after the event. size: of its file, bytes.
- * complete: false while the recording continues, and for one that the end of the server cut off. run: number of the
- * run; omitted in an online scene. run_failed: whether the run ended with an error or was interrupted. error: why.
+ * complete: false while the recording continues, and for a recording that was cut off by the end of the server.
+ *     run: number of the run; omitted in an online scene. run_failed: whether the run ended with an error or was
+ *     interrupted. error: its reason.
  * alarms: the recorded ones, the event first.
  */
 export interface RecordingInfo {
@@ -3074,7 +3078,7 @@ export interface RenewForcesArgs {
 /**
  * An action of the interrupted cycle at which the program can continue instead, so that it is repeated.
  *
- * at: its position in the cycle. text: why it cannot continue there; empty if it can.
+ * at: its position in the cycle. text: reason why it cannot continue there; empty if it can.
  */
 export interface Restart {
   at: number;
@@ -3111,7 +3115,7 @@ export interface ResultType {
   members: string[];
 }
 
-/** How often an action is repeated at most after it has failed, and the pause before each repetition, s. */
+/** Maximum number of repetitions of a failed action, and the pause before each repetition, s. */
 export interface Retry {
   count: number;
   pause: number;
@@ -3129,7 +3133,7 @@ export interface RobotArg {
   arm_id?: string;
 }
 
-/** Data of the event RobotEef; `time_ms` (steady clock of the cell) is set when StreamRobot asked for it. */
+/** Data of the event RobotEef; `time_ms` (steady clock of the cell) is set if StreamRobot requested it. */
 export interface RobotEefData {
   robot_id: string;
   end_effectors: EefPose[];
@@ -3278,10 +3282,10 @@ export interface Run {
  *
  * package_hash: SHA-256 of script and project. cycle: number of the present cycle, from 1. actions: those that have
  * started and not ended; empty between two actions. last: the action that ended last. results: the newest results of
- * each action by its id, in JSON. ended: whether the program has ended in an orderly way. done: what the present
- * cycle has done. variables: the values of the program's variables at its start, by name, in JSON. complete: whether
- * `done` is complete. interrupted: whether the server has noticed that the run was interrupted. confirmed: whether a
- * person has confirmed since where all parts are.
+ * each action by its id, in JSON. ended: whether the program has ended in an orderly way. done: the completed
+ * actions of the present cycle. variables: the values of the program's variables at its start, by name, in JSON.
+ * complete: whether `done` is complete. interrupted: whether the server has noticed that the run was interrupted.
+ * confirmed: whether a person has since confirmed the places of all parts.
  * restarts: the actions before the interruption at which it can continue instead.
  * continues, continues_at: whether the program can continue, and at which actions (empty: after `last`). missing: name
  * of the action because of which it cannot.
@@ -3315,9 +3319,9 @@ export type RunEnd = "running" | "finished" | "stopped" | "failed" | "lost";
  *
  * shared_breakpoints: whether the breakpoints of the project (SetBreakpoints) are used in addition to `breakpoints`.
  * on_error: reaction of the program if an action fails and no error exit applies. checkpoints: whether the state is
- * stored before and after each action; default: true. continues: whether the program continues where it was
- * interrupted, which requires that it is held on errors. continue_at: position in the cycle of another action at which
- * it continues (see Restart). recipe_id: the recipe, whose package this must be.
+ * stored before and after each action; default: true. continues: whether the program continues at the
+ * interruption, which requires that it is held on errors. continue_at: position in the cycle of another action at
+ * which it continues (see Restart). recipe_id: the recipe, whose package this must be.
  * recipe_values: values of this run by name, JSON in a string, within the limits of the recipe. order: id of the order
  * that is stored with the produced units.
  */
@@ -3382,7 +3386,7 @@ export interface RunTrace {
 }
 
 /**
- * An action that has started and not ended.
+ * An action that has started but not ended.
  *
  * number: in the run. branch, frames: its position, as in ProgramPosition.
  */
@@ -3443,7 +3447,7 @@ export interface ScriptArgs {
   revision: number;
 }
 
-/** Why a script cannot be imported. `line` and `column` count from 1; without them it concerns the whole script. */
+/** The reason why a script cannot be imported. `line` and `column` from 1 are omitted for the whole script. */
 export interface ScriptProblem {
   message: string;
   line?: number;
@@ -3530,8 +3534,8 @@ export interface SignRecipeArgs {
 /**
  * A signature of a person.
  *
- * state: the state that it sets. person, name, role: who signed. at: when. meaning: what the signature means. note: a
- * remark of the person. digest: SHA-256 of the recipe, the signature before, and all other fields.
+ * state: the state that it sets. person, name, role: the person who signed. at: time. meaning: meaning of the
+ * signature. note: remark of the person. digest: SHA-256 of the recipe, the signature before, and all other fields.
  */
 export interface Signature {
   state: RecipeState;
@@ -3549,11 +3553,11 @@ export interface Signature {
  *
  * number: number of the action in the run from 1, in the order of their start. device: id of the object. start: since
  * the first action of the run, s. duration: s. branch: value of the condition after which the action followed the one
- * before it, as JSON; omitted without a condition. error: why the action failed. thread_id: omitted in the main thread
- * of the script. call: number of the call of the function that contains the action; omitted in the program itself. The
- * span of a call has no device. attempt: number of the attempt of a retried action; omitted for the first one. lane:
- * id of the branch that executed the action at the same time as others; omitted in the program itself. hold: how long
- * the program was held at the action, which is not part of its duration, and who decided.
+ * before it, as JSON; omitted without a condition. error: reason why the action failed. thread_id: omitted in the main
+ * thread of the script. call: number of the call of the function that contains the action; omitted in the program
+ * itself. The span of a call has no device. attempt: number of the attempt of a retried action; omitted for the first
+ * one. lane: id of the branch that executed the action at the same time as others; omitted in the program itself.
+ * hold: the hold of the program at the action, which is not part of its duration.
  */
 export interface Span {
   number: number;
@@ -3618,7 +3622,7 @@ export interface StepRobotEefArgs {
 /** Values of What in StepRobotEef. */
 export type StepWhat = "position" | "orientation";
 
-/** Answer to StopAll: the result for everything that was stopped, or cannot be stopped. */
+/** Answer to StopAll: the result for each device, action or program that was stopped, or cannot be stopped. */
 export interface StopAllData {
   outcomes: StopOutcome[];
 }
@@ -3707,7 +3711,7 @@ export type TaskProgress = "running" | "finished" | "failed" | "cancelled";
 /**
  * Data of the event TaskState.
  *
- * title: sentence for users; title_message: what is needed to translate it. started_by: name of a user or token,
+ * title: sentence for users; title_message: the data for its translation. started_by: name of a user or token,
  * omitted when it was started automatically. progress: 0 to 1, omitted when unknown. message: present activity, or
  * reason of the failure.
  */
@@ -3744,10 +3748,10 @@ export interface TemporaryPackageArgs {
  *
  * number: number of the action in the run from 1, in the order of their start. started: time of the start. duration:
  * s, without a pause before it; omitted while it runs. parameters, results: as in ActionStateBefore and
- * ActionStateAfter. error: why it failed, with `key` and `values`. thread_id: omitted in the main thread of the
+ * ActionStateAfter. error: reason of a failure, with `key` and `values`. thread_id: omitted in the main thread of the
  * script. call: number of the call of the function that contains the action; omitted in the program itself. attempt:
- * number of the attempt of a retried action; omitted for the first one. hold: how long the program was held at it, and
- * who decided.
+ * number of the attempt of a retried action; omitted for the first one. hold: the hold of the program at the
+ * action.
  */
 export interface TraceEntry {
   run: number;
@@ -3813,7 +3817,8 @@ export interface UndoData {
  * A unit that the cell has worked on, without its steps.
  *
  * number: of the record. serial: serial number; empty if it was never read. scene_id, part: the scene, and the number
- * of the part in the inventory. order: id of the order. entered, left: when it came into the cell and left it.
+ * of the part in the inventory. order: id of the order. entered, left: times at which it came into the cell and left
+ * it.
  * verdict: result of its last test. runs: numbers of the runs that worked on it.
  */
 export interface Unit {
@@ -3870,7 +3875,7 @@ export interface UnitRecord {
 }
 
 /**
- * Where a unit is: in the cell, in a box for good, bad or rejected parts, or unknown.
+ * Location of a unit: in the cell, in a box for good, bad or rejected parts, or unknown.
  *
  * REJECTED includes parts that a person has taken out of the cell. UNKNOWN: it left while the server was off, and the
  * inventory no longer contains its serial number.
@@ -3881,7 +3886,7 @@ export type UnitState = "in_cell" | "good" | "bad" | "rejected" | "unknown";
  * An action that concerned a unit.
  *
  * run, number: run, and number of the action in it. duration: s. parameters, results: each as JSON in a string. error:
- * why it failed, with `key` and `values`. attempt: number of the attempt, if not the first one.
+ * reason of a failure, with `key` and `values`. attempt: number of the attempt, if not the first one.
  */
 export interface UnitStep {
   run: number;
@@ -3997,7 +4002,7 @@ export interface UpdateLockArgs {
 }
 
 /**
- * Arguments of UpdateLogicItem; without `error_kinds` or `when` these stay as they are, and empty ones remove them.
+ * Arguments of UpdateLogicItem; omitted `error_kinds` or `when` are unchanged, empty ones are removed.
  *
  * A `condition` removes `when`.
  */
@@ -4102,7 +4107,7 @@ export interface UsedRecipe {
   planned_rate?: number;
 }
 
-/** Data of the event UserPresence; without `presence` the client of the user has not reported any yet. */
+/** Data of the event UserPresence; `presence` is omitted before the first report of the client. */
 export interface UserPresenceData {
   user: string;
   online: boolean;
