@@ -50,7 +50,7 @@ def register_commands(fake: Fake, controller: Controller, wire: TcpWire) -> None
         tool.pull(within("times", times, 0, 1000))
 
     def tighten() -> None:
-        """Tighten at once, enabled or not, as with a test function of the controller."""
+        """Tighten immediately, whether enabled or not, as by a test function of the controller."""
         tool.tighten_once()
 
     def alarm(
@@ -124,7 +124,7 @@ async def main(
         port: port to serve Open Protocol on (4545 on real controllers); 0 takes a free one.
         duration: duration of a tightening, s.
         evaluation: time from its end to its result, s.
-        time_scale: how many times faster than real time the tool turns.
+        time_scale: speed of the tool as a multiple of real time.
         automatic: hold the trigger, so that an enabled tool tightens again and again.
         programs: number of programs.
         jobs: number of jobs.

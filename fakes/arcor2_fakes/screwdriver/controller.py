@@ -61,7 +61,7 @@ class Client(Protocol):
         """Send an alarm that was active before the subscription."""
 
     def report_cleared(self, alarm: Alarm) -> None:
-        """Send that an alarm was acknowledged at the controller."""
+        """Report that an alarm was acknowledged at the controller."""
 
 
 class Controller:

@@ -113,7 +113,7 @@ class Session:
             self._resend.cancel()
 
     def report(self, event: Event) -> None:
-        """Send an event after those before it were acknowledged."""
+        """Send an event after the acknowledgement of the previous events."""
         if event.no_ack:
             self._send(event.telegram)
             return
@@ -162,7 +162,7 @@ class Session:
         self.report(Event(build(76, data, revision), 77))
 
     def report_cleared(self, alarm: Alarm) -> None:
-        """Send that an alarm was acknowledged at the controller."""
+        """Report that an alarm was acknowledged at the controller."""
         if self.alarms is not None:
             self.report(Event(build(74, _code(alarm, self.alarms), self.alarms), 75))
 

@@ -117,12 +117,12 @@ class Tool:
     # ------------------------------------------------------------------------------------------------ the operator
 
     def pull(self, times: int) -> None:
-        """Pull the trigger. It stays pulled until the tool has tightened so often."""
+        """Pull the trigger. It stays pulled until the tool has tightened `times` times."""
         self.pulls += times
         self._start()
 
     def tighten_once(self) -> None:
-        """Tighten at once, enabled or not, as with a test function of the controller."""
+        """Tighten immediately, whether enabled or not, as by a test function of the controller."""
         if self._motor is None:
             self._shut_off()
 

@@ -17,7 +17,7 @@ SYNC_WRITE: Final = 0x83
 
 
 class Bus:
-    """Servos on one bus; `send` sends a status packet."""
+    """The servos on one bus. `send` is called with each status packet."""
 
     def __init__(self, servos: list[Servo], send: Callable[[bytes], None]) -> None:
         self.servos = {servo.number: servo for servo in servos}

@@ -70,7 +70,7 @@ OVERHEATED: Final = 0x04  # of hardware_error
 class Servo:
     """A servo with id `number`; `clock` returns monotonic seconds, `position` is that of the shaft, in ticks.
 
-    The clock runs `time_scale` times faster than real time; the bus watchdog, which concerns the host, does not.
+    The clock runs `time_scale` times faster than real time; the bus watchdog runs in real time.
     """
 
     def __init__(
@@ -117,7 +117,7 @@ class Servo:
 
     @property
     def position(self) -> float:
-        """Return the position of the horn as the servo counts it, ticks."""
+        """Return the position of the horn as counted by the servo, ticks."""
         return self._shaft + self._values["homing_offset"]
 
     @property
@@ -176,7 +176,7 @@ class Servo:
     def _step(self, step: float, acceleration: float, fastest: float) -> None:
         left = self._target - self._shaft
         change = acceleration * step
-        # Highest speed from which it can still stop there, at the middle of this step.
+        # Highest speed from which the servo can still stop at the goal, at the middle of this step.
         allowed = math.sqrt(2.0 * acceleration * abs(left) + change * change / 4.0) - change / 2.0
         wanted = math.copysign(min(fastest, max(allowed, 0.0)), left)
         self._speed += max(-change, min(change, wanted - self._speed))
@@ -247,7 +247,7 @@ class Servo:
         was, self._values[name] = self._values[name], value
         if name == "goal" or (name == "torque" and value and not was):
             goal = self._values["goal"]
-            # The encoder resolves whole ticks: a shaft that is at the goal as far as the servo knows does not move.
+            # The encoder resolves whole ticks: a shaft that is at the goal within this resolution does not move.
             self._target = self._shaft if goal == round(self.position) else goal - self._values["homing_offset"]
         elif name == "torque" and not value:
             self._speed = 0.0

@@ -79,7 +79,7 @@ class _Cycles:
         return still and not any(wire.connections for wire in self._wires)
 
     def _catch_up(self) -> None:
-        """Run some cycles; data received meanwhile, such as a watchdog signal, is read before the next ones."""
+        """Run some cycles. Data received during these, such as a watchdog signal, is read before the next cycles."""
         cycles = min(self._owed, _CHUNK)
         for left in range(self._owed, self._owed - cycles, -1):
             self._controller.tick(late=left > _CHUNK)

@@ -1,6 +1,6 @@
 """Model of the program that ur_rtde uploads: a command loop over registers, with threads.
 
-The command codes are those of the program's text. So are its stops: a stopL or stopJ is run as stopj until the first
+The command codes are those of the program's text. Its stops too: a stopL or stopJ is run as stopj until the first
 asynchronous stop, and as stopl from then on.
 """
 
@@ -120,7 +120,7 @@ class ControlScript(Program):
         self._handler(command)()
 
     def _handler(self, command: int) -> Callable[[], Steps | None]:
-        """Return the function for a command; one that does nothing if the program lacks the command."""
+        """Return the function for a command; a function without effect if the program lacks the command."""
         if command in _NOT_MODELLED:
             raise ValueError(f"command {command} is not modelled")
         return self._handlers.get(command, lambda: None)
@@ -328,7 +328,7 @@ def _finite(values: Sequence[float]) -> None:
 
 
 class _WithProgress(Interpreter):
-    """Runs the path that a client has written into its control script; that reports its progress."""
+    """Runs the path that a client has written into its control script, and reports the progress."""
 
     def __init__(self, script: ControlScript) -> None:
         super().__init__(script._c)

@@ -40,14 +40,14 @@ class Program(abc.ABC):
 
     @abc.abstractmethod
     def run(self) -> Steps:
-        """Return the program's main thread; it ends when this does."""
+        """Return the main thread of the program. The program ends with this thread."""
 
     def ended(self) -> None:  # noqa: B027
         """Handle the end of the program, for any reason."""
 
 
 class Controller:
-    """State shared by the ports. For the event loop's thread; `tick` is one control cycle."""
+    """State shared by the ports, for use in the thread of the event loop only. `tick` is one control cycle."""
 
     def __init__(self, model: str, version: tuple[int, ...], frequency: float, time_scale: float = 1.0) -> None:
         self.model, self.version, self.frequency = model, version, frequency
@@ -305,7 +305,7 @@ class Controller:
         self.changed()
 
     def _mode_from(self, expected: RobotMode, mode: RobotMode) -> None:
-        if self.robot_mode is expected:  # else the state has changed meanwhile
+        if self.robot_mode is expected:  # otherwise the state has changed in the meantime
             self._mode(mode)
 
     # ------------------------------------------------------------------------------------------------------- program
@@ -376,7 +376,7 @@ class Controller:
         self._written[index] = self.watched
 
     def set_watchdog(self, register: int, minimum_frequency: float) -> None:
-        """Set the watchdog: stop the program when the register is written less often, Hz; 0 disarms it."""
+        """Set the watchdog: stop the program if the register is written at a lower rate, Hz; 0 disarms it."""
         self._watchdog = (register, 1.0 / minimum_frequency) if minimum_frequency > 0.0 else None
         self._written[register] = self.watched
 

@@ -218,7 +218,7 @@ class Chain:
             bend = math.acos(min(1.0, max(-1.0, cosine)))
             for q5 in (bend, -bend):
                 c5, s5 = math.cos(q5), math.sin(q5)
-                free = abs(s5) < _SINGULAR  # joints 4 and 6 are parallel: one of them is free
+                free = abs(s5) < _SINGULAR  # joints 4 and 6 are parallel, so one of them is free
                 q6 = q6_if_free if free else math.atan2(-dot(y6, n) / s5, dot(x6, n) / s5)
                 c6, s6 = math.cos(q6), math.sin(q6)
                 x5 = _combine(c6, x6, -s6, y6)
@@ -247,10 +247,10 @@ class Chain:
                 best, least = q, far
         if best is None:
             raise NoSolution("the pose is out of reach")
-        return self.follow(target, best) or best  # singular ones are exact only after a step of Newton's
+        return self.follow(target, best) or best  # near singularities, solutions are inexact without a Newton step
 
     def follow(self, target: Transform, q: Sequence[float], steps: int = 5) -> tuple[float, ...] | None:
-        """Return a configuration next to `q` (Newton, damped near singularities); None if it does not converge."""
+        """Return a configuration next to `q` (Newton's method, damped); None if it does not converge."""
         for _ in range(steps):
             tip, jacobian = self._tip_and_jacobian(q)
             shift, turn = difference(tip, target)

@@ -36,7 +36,7 @@ _BLOCK = re.compile(r"(def|thread)\s+(\w+)\s*\(\s*\)\s*:|(while|if|elif)\b(.+):|
 _ASSIGNMENT = re.compile(r"(?:(?:global|local)\s+)?(\w+)\s*=(?!=)\s*(.+)")
 _RUN = re.compile(r"run\s+(\w+)\s*\(\s*\)")
 _HANDLING = re.compile(r"(kill|join)\s+(\w+)")
-_MAX_AT_ONCE = 10_000  # statements in one control cycle; more are an infinite loop
+_MAX_AT_ONCE = 10_000  # statements in one control cycle; a larger number is treated as an infinite loop
 
 
 @dataclass

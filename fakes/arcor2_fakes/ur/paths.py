@@ -1,4 +1,4 @@
-"""Motions along a path: movej and movel with trapezoidal speed, and the blends between two of a kind."""
+"""Motions along a path: movej and movel with trapezoidal speed, and blends between two motions of the same kind."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ Joints = Sequence[float]
 
 
 class MovingArm(Protocol):
-    """What a path needs to know of the arm."""
+    """The properties of the arm that a path uses."""
 
     q: tuple[float, ...]
     """Joint positions, rad."""

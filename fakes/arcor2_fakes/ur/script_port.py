@@ -1,4 +1,4 @@
-"""Programs of clients, received as text on the ports 30001, 30002 and 30003; one replaces the playing one."""
+"""Programs of clients, received as text on the ports 30001, 30002 and 30003. A new program replaces the playing one."""
 
 import logging
 

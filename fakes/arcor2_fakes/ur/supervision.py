@@ -1,6 +1,6 @@
 """The control channel of the fake: the true state, and events from outside the controller.
 
-To read and subscribe: `truth` (everything), `pose` (what a simulated world follows at a high rate). To read: `stops`
+To read and subscribe: `truth` (everything), `pose` (the state for a simulated world, at a high rate). To read: `stops`
 (frames that request a stop, stamped at arrival), `commands_taken` (executed motions), `popup`. To do, with `on` true or
 false: `safeguard_stop` (`reports_paused`), `emergency_stop` (`system`), `reduced`, `remote_control`,
 `foreign_program`, `power`, `contact`, `fieldbus` (owns registers 0 to 23). To do: `protective_stop`, `violation`,
@@ -64,7 +64,7 @@ def truth(c: Controller, rtde: RtdeServer, script: ScriptPort) -> dict[str, Any]
 
 
 def pose_truth(c: Controller) -> dict[str, Any]:
-    """Return the state that a simulated world follows at a high rate."""
+    """Return the state for a simulated world that polls it at a high rate."""
     return {
         "t": c.cycles * c.period,
         "q": c.arm.q,

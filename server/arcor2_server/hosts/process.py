@@ -306,7 +306,7 @@ class CellHost:
         await self._request(m.DecideHeld, number, choice, list(results), exit_id, limit=ANSWER_TIMEOUT)
 
     async def confirm_parts(self, parts: Sequence[ConfirmedPart]) -> None:
-        """Record where a person has found parts.
+        """Record the places where a person has found parts.
 
         Raises:
             CellError: an action is running, or the parts contradict each other.

@@ -18,7 +18,7 @@ class AlarmOperations:
 
     @operation("GET", "/api/alarms/{number}/picture", SERVER, Role.OPERATOR, media_type="image/svg+xml")
     async def alarm_picture(self, number: str) -> Binary:
-        """Return the picture that explains what to do about an alarm (SVG)."""
+        """Return the picture that explains the remedy of an alarm (SVG)."""
         if not (number.isascii() and number.isdecimal() and len(number) < 10):
             raise NotFound("Alarm {number} does not exist.", number=number[:20])
         file = self._alarms.picture(int(number))

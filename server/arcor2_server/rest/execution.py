@@ -61,7 +61,7 @@ class ExecutionState(enum.StrEnum):
 
 
 class ExecutionInfo(Data, frozen=True):
-    """State of the program. action_point_ids: those that the running action, or the next action if paused, uses."""
+    """State of the program. action_point_ids: the action points of the running action, or of the next one if paused."""
 
     state: ExecutionState
     active_package_id: str | Unset = UNSET
@@ -76,7 +76,7 @@ class BreakpointsQuery(Data, frozen=True):
 
 
 class StartQuery(Data, frozen=True, rename="camel"):
-    """What the program does when an action fails and no error exit applies, the recipe, and the order."""
+    """The reaction of the program to a failed action without an error exit, the recipe, and the order."""
 
     on_error: OnError = OnError.END
     recipe_id: str = ""
@@ -84,7 +84,7 @@ class StartQuery(Data, frozen=True, rename="camel"):
 
 
 class DebugQuery(StartQuery, frozen=True, rename="camel"):
-    """Whether the program pauses before its first action, and what it does when an action fails."""
+    """Whether the program pauses before its first action, and its reaction to a failed action."""
 
     break_on_first_action: bool = False
 

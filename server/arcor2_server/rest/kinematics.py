@@ -17,8 +17,8 @@ from arcor2_server.workspace.robots import SceneRobots
 class RobotKinematics(TranslatableData, frozen=True):
     """Kinematic calibration with which the server computes the kinematics of a robot, also offline.
 
-    read, checksum: time and checksum of the calibration read from the controller. refused: why it is not used; its
-    translation is in `key` and `values`.
+    read, checksum: time and checksum of the calibration read from the controller. refused: reason why it is not
+    used, with `key` and `values`.
     """
 
     object_id: str

@@ -23,7 +23,7 @@ class ProductionOperations:
 
     @operation("GET", "/api/recipes", SERVER, Role.OPERATOR, plain=True)
     async def recipes(self, query: ListRecipesArgs) -> ListRecipesData:
-        """Return recipes with their signatures, and what the cell produces."""
+        """Return recipes with their signatures, and the present production of the cell."""
         return ListRecipesData(self._recipes.find(query), self._recipes.changeover)
 
     @operation("GET", "/api/units", SERVER, Role.OPERATOR, plain=True)

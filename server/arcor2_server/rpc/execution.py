@@ -194,7 +194,7 @@ class ExecutionRequests:
 
     @rpc("GetHeld")
     async def get_held(self, context: Context, args: None) -> GetHeldData:
-        """Return the action at which the program is held, if it is."""
+        """Return the action at which the program is held, if any."""
         held = self._execution.hold.present
         return GetHeldData() if held is None else GetHeldData(context.translatable([held])[0])
 
@@ -210,7 +210,7 @@ class ExecutionRequests:
 
     @rpc("ConfirmParts")
     async def confirm_parts(self, context: Context, args: ConfirmPartsArgs) -> None:
-        """Record where a person has found parts. PartsChanged publishes it."""
+        """Record the places where a person has found parts. PartsChanged publishes it."""
         await self._execution.confirm_parts(args, context.client.name)
 
     @rpc("GetProgramPosition")

@@ -57,7 +57,7 @@ from arcor2_server.rpc.registry import Context, rpc
 class FunctionRequests:
     """Requests about the functions of the open project (docs/protocol/programs.md).
 
-    Each is one edit. Its result is checked with the rules that also apply to an undo.
+    Each request is one edit. Its result is checked by the rules that also apply to an undo.
     """
 
     _types: ObjectTypes
@@ -66,7 +66,7 @@ class FunctionRequests:
     _editing: Editing
 
     async def _edit(self, context: Context, changes: Sequence[Change]) -> None:
-        """Make changes of the present document as one edit, with the locks of the ordinary requests, and publish it.
+        """Commit changes of the present document as one edit, with the locks of the ordinary requests, and publish it.
 
         Raises:
             RequestRefused: the project would not be consistent, or others have edited it meanwhile.
@@ -116,7 +116,7 @@ class FunctionRequests:
 
     @rpc("UpdateParallel")
     async def update_parallel(self, context: Context, args: UpdateParallelArgs) -> None:
-        """Change the calls that a parallel action runs at once. Refuse to leave out one whose results are used."""
+        """Change the calls that a parallel action runs at once. A call whose results are used cannot be left out."""
         document = self._session.require_project_open()
         action = document.action(args.action_id)
         for left_out in set(action.branches or ()).difference(args.branches):
@@ -189,7 +189,7 @@ class FunctionRequests:
 
     @rpc("UpdateFunctionResult")
     async def update_result(self, context: Context, args: UpdateFunctionResultArgs) -> None:
-        """Let a result of a function be another result of its actions."""
+        """Replace a result of a function by another result of its actions."""
         document = self._session.require_project_open()
         await self._edit(context, update_result(document, self._types, args.function_id, args.index, args.link))
 
@@ -202,7 +202,7 @@ class FunctionRequests:
     # ---------------------------------------------------------------------------------------------- exchange
     @rpc("ExportFunction")
     async def export_function(self, context: Context, args: IdArgs) -> FunctionExport:
-        """Return a function with what its actions refer to."""
+        """Return a function with the items to which its actions refer."""
         return export_function(self._session.require_project_open(), args.id)
 
     @rpc("ImportFunction")

@@ -33,7 +33,7 @@ class NodeRequests:
 
     @rpc("SetObjectNode")
     async def set_object_node(self, context: Context, args: SetObjectNodeArgs) -> None:
-        """Set on which node an object of the scene runs, also while a project is open."""
+        """Set the node on which an object of the scene runs, also while a project is open."""
         async with self._locks.auto_skip_held(context.user, args.id):
             document = self._session.require_scene_open()
             self._online.require_offline()

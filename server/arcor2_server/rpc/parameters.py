@@ -87,7 +87,7 @@ class ParameterRequests:
         if not isinstance(args.value, Unset):
             updated = replace(updated, value=args.value)
         check_project_parameter(updated)
-        # The actions that store results in a variable name it.
+        # Actions that store results in a variable contain its name.
         storing = document.storing(parameter) if updated.name != parameter.name else []
         async with self._locks.auto_skip_held(context.user, *(action.id for action in storing)):
             renamed: list[Action] = []
@@ -161,7 +161,7 @@ class ParameterRequests:
             context.emit("OverrideUpdated", given, change_type, object_id)
 
     async def _without_secret(self, context: Context, object_id: str, given: Parameter) -> Parameter:
-        """Return an override. Of a secret setting the value is stored and replaced by a reference.
+        """Return an override. The value of a secret setting is stored and replaced by a reference.
 
         Raises:
             InvalidData: a secret setting has no value.

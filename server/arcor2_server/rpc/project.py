@@ -147,7 +147,7 @@ class ProjectRequests:
             self._notify_older_clients(project)
 
     def _notify_older_clients(self, project: Project) -> None:
-        """Notify the users of clients that do not know functions of what they cannot show or edit."""
+        """Notify users whose clients do not know functions of the items that these clients cannot show or edit."""
         if not (parts := extensions_of(project)):
             return
         text = Message.of(

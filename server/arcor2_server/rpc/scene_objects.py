@@ -155,7 +155,7 @@ class SceneObjectRequests:
 
     @rpc("CheckConnection")
     async def check_connection(self, context: Context, args: CheckConnectionArgs) -> CheckConnectionData:
-        """Connect a device that is not online, and return what it reports."""
+        """Connect a device that is not online, and return the data that it reports."""
         if args.id and self._online.state is not SceneStateEnum.STOPPED:
             raise RequestRefused("The scene is online. Its devices are connected already.")
         pose = Pose() if self._types.meta(args.type).has_pose else UNSET

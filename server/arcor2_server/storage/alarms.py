@@ -29,7 +29,7 @@ TAKEN_OVER: Final = 1
 _BUSY_TIMEOUT: Final = 5.0
 _SCHEMA: Final = (
     "create table if not exists alarm (number integer primary key, document blob not null) strict",
-    # What has to be sent to the fleet: the alarm, and the number of this sending.
+    # Alarms that have to be sent to the fleet, each with the number of the transmission.
     "create table if not exists outbox (alarm integer primary key, number integer not null unique) strict",
 )
 
@@ -56,7 +56,7 @@ class AlarmStore:
         """Open or create the file, and take over the records of the database once.
 
         Returns:
-            What happened to a damaged file, which is renamed; otherwise None.
+            A message about a damaged file, which was renamed; otherwise None.
         """
         problem = await self._in_thread(self._open)
         async with self._storage.reading() as session:
@@ -96,7 +96,7 @@ class AlarmStore:
         try:
             self._connect()
             return None
-        except sqlite3.OperationalError:  # it cannot be written; that is no damage
+        except sqlite3.OperationalError:  # the file cannot be written, but it is not damaged
             raise
         except sqlite3.DatabaseError as error:
             self._close()
@@ -104,7 +104,7 @@ class AlarmStore:
             for ending in ("", "-wal", "-shm"):
                 if (part := self._path.with_name(self._path.name + ending)).exists():
                     part.rename(stored.with_name(stored.name + ending))
-            self._connect(user_version=TAKEN_OVER)  # what the database contains is older
+            self._connect(user_version=TAKEN_OVER)  # the records in the database are older
             return Message.of(
                 "The records of alarms were damaged: {reason}. They are stored as {file}.",
                 reason=error,

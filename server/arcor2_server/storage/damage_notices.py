@@ -71,7 +71,7 @@ class DataDamage:
         Args:
             path: The file.
             kind: The type of its content.
-            loss: Sentences about what is lost if it is damaged, and what to do.
+            loss: Sentences about the loss if it is damaged, and the remedy.
 
         Raises:
             StorageError: The file cannot be read.
@@ -91,7 +91,7 @@ class DataDamage:
 
         Args:
             path: The file.
-            loss: Sentences about what is lost, and what to do.
+            loss: Sentences about the loss and the remedy.
             reason: The damage.
         """
         target: Path | None = None

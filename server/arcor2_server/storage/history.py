@@ -1,9 +1,9 @@
 """The newest rows of the history in an SQLite file, and the list of the Parquet files with older rows.
 
 All methods block and belong to one thread. A Parquet file counts as soon as it is listed; the same transaction states
-which rows of the database it contains. They are deleted afterwards in small steps, and no longer count until then.
+which rows of the database it contains. These rows are then ignored, and deleted later in small steps.
 """
-# ruff: noqa: S608 - statements contain only names of ours, and file names in quotation marks
+# ruff: noqa: S608 - statements contain only fixed names, and file names in quotation marks
 
 import contextlib
 import shutil
@@ -93,7 +93,7 @@ class HistoryFile:
         self._connection = connection = sqlite3.connect(
             path, timeout=_BUSY_TIMEOUT, isolation_level=None, check_same_thread=False
         )
-        # The end of the process loses nothing that was committed; a power cut may lose the last minutes.
+        # The end of the process loses no committed row; a power cut may lose the rows of the last minutes.
         for pragma in ("journal_mode=wal", "synchronous=normal"):
             connection.execute(f"pragma {pragma}")
         if (verdict := connection.execute("pragma quick_check(1)").fetchone()[0]) != "ok":

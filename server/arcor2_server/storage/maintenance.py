@@ -1,4 +1,4 @@
-"""Stores what is known about devices, and backups of their parameters."""
+"""Stores the cards of devices, and backups of their parameters."""
 
 from collections.abc import Iterable
 from typing import Final

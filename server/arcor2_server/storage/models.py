@@ -280,7 +280,7 @@ class PersonLockOutRow(Base):
 
 
 class DeviceRow(Base):
-    """What is known about a device of the workplace, as JSON."""
+    """The card of a device of the workplace, as JSON."""
 
     __tablename__ = "device"
 

@@ -1,4 +1,4 @@
-"""Stores persons, and how often each entered a wrong PIN at a device."""
+"""Stores persons, and the number of wrong PINs of each person at each device."""
 
 from typing import Final
 

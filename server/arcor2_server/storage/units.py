@@ -113,7 +113,7 @@ class UnitStore:
         return found
 
     async def left_between(self, since: Timestamp, until: Timestamp) -> list[tuple[UnitState, float | None, int]]:
-        """Return how many units left the cell in a period, by state and planned rate."""
+        """Return the number of units that left the cell in a period, by state and planned rate."""
         chosen = (
             select(UnitRow.state, UnitRow.planned_rate, func.count())
             .where(UnitRow.left >= since, UnitRow.left < until)

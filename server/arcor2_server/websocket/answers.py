@@ -43,7 +43,7 @@ def refusal(request: "Request | Head", message: Message, code: str = "", data: A
     """Return the answer to a refused request.
 
     Args:
-        request: The request, or what is readable of it.
+        request: The request, or its readable part.
         message: The reason.
         code: The code of the error, for clients that asked for codes.
         data: Results of a request that was done in part.

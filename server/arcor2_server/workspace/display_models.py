@@ -103,7 +103,7 @@ class DisplayModels:
             with _ShownTask(self._tasks, name) as on_progress:
                 made = await self._compute.run(task, on_progress=on_progress)
         except InvalidData as error:
-            if await asyncio.to_thread(Path(task.file.path).is_file):  # else the asset was deleted meanwhile
+            if await asyncio.to_thread(Path(task.file.path).is_file):  # otherwise the asset was deleted in the meantime
                 self._refusals[name_on_disk, name] = error
             while len(self._refusals) > MAX_REFUSALS:
                 del self._refusals[next(iter(self._refusals))]

@@ -1,4 +1,4 @@
-"""Object aiming: which user touches the focus points of an object with a robot (protocol, 7.3)."""
+"""Object aiming: users touch the focus points of an object with a robot (protocol, 7.3)."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING

@@ -136,7 +136,7 @@ class ReachabilityBoard:
         return {robot.id}
 
     def _items_of(self, row: _Row, wanted: set[str]) -> list[ReachOfItem]:
-        """Return the results of a row for the wanted ids, without joints of other robots."""
+        """Return the results of a row for the requested ids, without joints of other robots."""
         project = self._session.require_project()
         own = {orientation.id for point in project.action_points for orientation in point.orientations}
         own |= {each.id for point in project.action_points for each in point.robot_joints if _is_of(each, row)}
@@ -244,7 +244,7 @@ class ReachabilityBoard:
                 return  # the next computation uses the new state
 
     async def _describe(self, robot: SceneObject) -> Message | None:
-        """Update the rows of a robot; return why its model cannot be used, None if it can."""
+        """Update the rows of a robot; return the reason if its model cannot be used, otherwise None."""
         model = self._robot_models.find(robot)
         if model is None:
             return None

@@ -48,9 +48,9 @@ class RobotCalibration(Data, frozen=True):
         object_id: The id of the robot.
         name: The name of the robot.
         device: Identifies the device by the settings of the robot.
-        read: When the calibration was read.
+        read: Time at which the calibration was read.
         calibration: The calibration.
-        refused: Why the calibration is not used, empty if it is used. Older versions stored the English text.
+        refused: Reason why the calibration is not used, empty if it is used. Older versions stored the English text.
     """
 
     object_id: str
@@ -200,7 +200,7 @@ class RobotCalibrations:
             self._publish(Message.of(used, robot=robot.name), bad=False)
 
     async def _refused(self, robot: SceneObject, calibration: KinematicCalibration) -> Message | None:
-        """Return why a calibration cannot be used, None if it can."""
+        """Return the reason why a calibration cannot be used, None if it can."""
         file = self._robots.model_of_type(robot.type)
         if file is None:
             return Message.of("{name} has no model (URDF).", name=robot.name)
@@ -214,7 +214,7 @@ class RobotCalibrations:
         return None
 
     def _publish(self, message: Message, *, bad: bool = True) -> None:
-        """Notify all clients which kinematics of a robot are used, and why."""
+        """Notify all clients of the kinematics used for a robot, and the reason."""
         level = NotificationLevel.WARN if bad else NotificationLevel.INFO
         data = NotificationData(message.text, level, **message.translation())
         self._hub.broadcast(make_event("Notification", data))
