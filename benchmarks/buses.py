@@ -33,7 +33,7 @@ def seconds_each(call: Callable[[], object], n: int) -> float:
 
 
 def modbus_reads(address: str, rounds: int = 150, n: int = 100) -> Metric:
-    """Measure reading one point through the driver and the same registers through the bare library.
+    """Measure reads of one point through the driver, and of the same registers through the library alone.
 
     Both use one simulated block with separate connections, in alternation; the driver also observes the block, as it
     always does. The order within a round is random, so that a machine that is getting slower favours neither.
@@ -61,12 +61,12 @@ def modbus_reads(address: str, rounds: int = 150, n: int = 100) -> Metric:
 
 
 def dynamixel_reads(port: str, n: int = 1000) -> Metric:
-    """Measure reading the positions of six servos at once through the driver's bus; a pty has no bit rate."""
+    """Measure reads of the positions of six servos at once through the driver's bus; a pty has no bit rate."""
     bus = Bus("servos", port, 1_000_000)
     unanswered = 0
 
     def read(register: Register) -> None:
-        """Read as the driver does: retry once if a servo does not answer within the library's time limit."""
+        """Read like the driver: retry once if a servo does not answer within the library's time limit."""
         nonlocal unanswered
         try:
             bus.again(lambda: bus.sync_read(SERVOS, register))

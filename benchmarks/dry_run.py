@@ -90,7 +90,7 @@ async def _demo(report: Report, directory: Path) -> None:
 
 
 def _cycles(trace: RunTrace) -> Iterator[tuple[str, float, dict[str, float]]]:
-    """Return for each cycle of a run of the demo what happened to the board, its duration and those of its actions, s.
+    """Return the result for the board, the duration and the durations of the actions of each cycle of a demo run, s.
 
     The first cycle is left out, because the robot starts elsewhere, and so is the last one, which ends the order.
     """
@@ -103,7 +103,7 @@ def _cycles(trace: RunTrace) -> Iterator[tuple[str, float, dict[str, float]]]:
 
 
 def real_cycles(trace: RunTrace) -> dict[str, list[float]]:
-    """Return the durations of the cycles of a run of the demo, s, by what happened to the board."""
+    """Return the durations of the cycles of a demo run, s, by the result for the board."""
     found: dict[str, list[float]] = {name: [] for name in BRANCHES}
     for name, cycle, _ in _cycles(trace):
         found[name].append(cycle)
@@ -111,9 +111,9 @@ def real_cycles(trace: RunTrace) -> dict[str, list[float]]:
 
 
 def shortened_by(trace: RunTrace) -> dict[str, list[float]]:
-    """Return by how much parallel work shortens each of these cycles, %.
+    """Return the reduction of each of these cycles by parallel work, %.
 
-    Without it, its branches would follow each other.
+    Without parallel work, the branches would be executed one after the other.
     """
     found: dict[str, list[float]] = {name: [] for name in BRANCHES}
     for name, cycle, durations in _cycles(trace):

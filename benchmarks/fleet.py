@@ -94,7 +94,7 @@ async def _page(report: Report, fleet: FleetProcess, broker: Broker, cells: Cell
         drawn = (await _task_duration(session) - tasks) / OBSERVED * 100
         report.add(Metric("fleet_page_core_percent", drawn, 1, "main thread of the page"))
 
-        # Numbers that the benchmark changes; those of the others change by themselves.
+        # Cells whose states the benchmark changes; the states of the other cells change by themselves.
         ready = [44, *range(40, 44)]
         durations = []
         for number in range(CHANGES):

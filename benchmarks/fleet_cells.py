@@ -1,4 +1,4 @@
-"""Light cells for the benchmark of the fleet and its pictures: each has a connection of its own, as a real one.
+"""Light cells for the benchmark of the fleet and its pictures: each cell has its own connection, like a real cell.
 
 `python -m benchmarks.fleet_cells URL COUNT [ADDRESS]` publishes the states of COUNT cells. Commands are lines on
 standard input: `change N` counts one more good unit at cell N, `die N` ends its connection without a farewell.

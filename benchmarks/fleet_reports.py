@@ -146,7 +146,7 @@ def run(report: Report, directory: Path) -> None:
 
 
 def _first_search(path: Path, cell: str) -> float:
-    """Return how long a search takes if nothing of the file is in memory, ms."""
+    """Return the duration of a search if no part of the file is in memory, ms."""
     with path.open("rb+") as file:
         os.fsync(file.fileno())
         os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)

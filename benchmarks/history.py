@@ -3,8 +3,8 @@
 The rows are those that the recorder would store of 7 points of a cell in 30 days: 4 digital ones that change twice in
 each cycle of 24 s (standard deviation 0.9 s), and 3 inputs of a 12-bit converter that drift through 600 steps each
 day, with noise of 1.2 steps (standard deviation) and a dead band of 2 steps. The driver polls every 100 ms, with a
-jitter of 2 ms. All is random but repeatable. Changes that are spread over the day without any pattern need 3.9 instead
-of 2.2 bytes for a row.
+jitter of 2 ms. All values are random but repeatable. Changes that are spread over the day without any pattern need 3.9
+instead of 2.2 bytes for a row.
 """
 
 import asyncio

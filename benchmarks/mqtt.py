@@ -30,7 +30,7 @@ def mosquitto(directory: Path) -> Iterator[int]:
         port = probe.getsockname()[1]
     file = directory / "mosquitto.conf"
     file.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\n")
-    command = shutil.which("mosquitto") or "/usr/sbin/mosquitto"  # where users other than root do not look
+    command = shutil.which("mosquitto") or "/usr/sbin/mosquitto"  # not on the PATH of users other than root
     broker = subprocess.Popen([command, "-c", str(file)], stderr=subprocess.DEVNULL)
     try:
         while not _accepts(port):

@@ -1,4 +1,4 @@
-"""A process that answers messages, over NATS, a TLS socket, or Zenoh.
+"""A process that echoes messages over NATS, a TLS socket or Zenoh.
 
 `python -m benchmarks.node_echo FOLDER nats|socket|zenoh PORT`
 """

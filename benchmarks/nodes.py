@@ -171,7 +171,7 @@ with open(FILE, "w") as file:
 
 
 class _Group:
-    """The hosts of a scene or program on this computer and on nodes, and what they report."""
+    """The hosts of a scene or program on this computer and on nodes, and their reports."""
 
     def __init__(self) -> None:
         self.messages: asyncio.Queue[m.ServerBound] = asyncio.Queue()
@@ -263,7 +263,7 @@ def certificates(folder: Path) -> None:
 
 @contextlib.asynccontextmanager
 async def echo(folder: Path, kind: str, port: int = 0) -> AsyncIterator[str]:
-    """Run an echo process in this context; return what it prints when it is ready."""
+    """Run an echo process in this context; return its output after it is ready."""
     command = (sys.executable, "-m", "benchmarks.node_echo", str(folder), kind, str(port))
     process = await asyncio.create_subprocess_exec(*command, stdout=subprocess.PIPE)
     try:

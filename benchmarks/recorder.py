@@ -35,7 +35,7 @@ async def run(report: Report, folder: Path) -> None:
             await process.wait()
     if process.returncode:
         raise RuntimeError("The demo failed.")
-    # The host of the program has recorded most; the others opened the scene or waited.
+    # The host of the program has recorded the most values; the other hosts opened the scene or waited.
     hosts = [[tuple(map(float, line.split())) for line in file.read_text().splitlines()] for file in times.iterdir()]
     if not hosts:
         raise RuntimeError("No host has recorded anything.")

@@ -25,7 +25,7 @@ WHITE, BLACK, TABLE = 0.85, 0.06, 0.32  # reflectance
 
 @dataclass(frozen=True)
 class Lens:
-    """Lens: fx, fy, cx, cy in px; the first of the coefficients k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4."""
+    """Lens: fx, fy, cx, cy in px, and the first coefficients of k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4."""
 
     fx: float
     fy: float

@@ -1,7 +1,7 @@
 """Measure how long it takes to select an item: with the crosshair, by a tap in the view, and in the list of objects.
 
-A script acts as soon as the editor has answered, so its times compare the ways; the time in which a person aims or
-reads is not in them.
+A script acts as soon as the editor has answered. The times are therefore comparable, but do not include the time
+for aiming and reading.
 """
 
 import re

@@ -1,4 +1,4 @@
-"""Server process for measurements, and the echo server it is compared with."""
+"""Server process for measurements, and the echo server for comparison."""
 
 import asyncio
 import contextlib

@@ -48,7 +48,7 @@ class ProcessResources:
         return cls({t.ident or 0: t.name for t in threading.enumerate()}, dict(_children), sockets)
 
     def beyond(self, other: "ProcessResources") -> list[str]:
-        """Name the resources that are here and not in `other`."""
+        """Return the names of the resources that are missing in `other`."""
         found = [f"thread {name}" for ident, name in self.threads.items() if ident not in other.threads]
         started = {pid for pid, _ in other.children} - forking
         for key, cmd in self.children.items():
@@ -160,7 +160,10 @@ def pytest_runtest_teardown(item: pytest.Item) -> Generator[None, None, None]:
 
 @pytest.fixture
 async def no_leaked_tasks() -> AsyncIterator[None]:
-    """Set up before and torn down after every other fixture of an asynchronous test."""
+    """Fail a test with remaining tasks.
+
+    Set up before and torn down after all other fixtures of an asynchronous test.
+    """
     before = asyncio.all_tasks()
     yield
     mine = before | {asyncio.current_task()}

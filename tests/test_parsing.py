@@ -13,7 +13,7 @@ SOURCE = "\n".join(f"x{number} = [{number}, {{}}]" for number in range(2000))
 
 @pytest.fixture
 def nested() -> Iterator[list[str]]:
-    """A finalizer that parses once, in the middle of parsing, as another thread may. Yields its result."""
+    """Provide a finalizer that parses once during another parse, like another thread. Yields its result."""
     parsed: list[str] = []
 
     def finalize(phase: str, _: dict[str, int]) -> None:
@@ -25,7 +25,7 @@ def nested() -> Iterator[list[str]]:
     gc.collect()
     gc.callbacks.append(finalize)
     gc.set_threshold(500)
-    gc.enable()  # a test of a start that fails may have left it disabled
+    gc.enable()  # a test of a failed start may have left it disabled
     yield parsed
     if not enabled:
         gc.disable()

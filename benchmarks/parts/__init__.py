@@ -26,7 +26,7 @@ FAULTS: Final = 50
 
 @dataclass(frozen=True)
 class Size:
-    """How many seeds are run, and how long each of them takes."""
+    """Number of seeds, and size of the run of each seed."""
 
     seeds: int = SEEDS
     boards: int = BOARDS

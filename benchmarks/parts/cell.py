@@ -89,7 +89,7 @@ class Cell:
         return await ask(self.at[fake], command, within=15.0, **arguments)
 
     async def apply(self, commands: tuple[FakeCommand, ...]) -> None:
-        """Send commands to fakes. One that is impossible now, such as dropping nothing, has no effect."""
+        """Send commands to fakes. A command that is impossible now, such as dropping a missing part, has no effect."""
         for fake, command, arguments in commands:
             with contextlib.suppress(Arcor2Error):
                 await self.command(fake, command, **arguments)

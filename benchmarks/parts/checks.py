@@ -30,13 +30,13 @@ class Result:
 
 
 class Checks:
-    """Compares what the server states with the simulated world and the simulated planning service."""
+    """Compares the data of the server with the simulated world and the simulated planning service."""
 
     def __init__(self, cell: Cell, result: Result, say: Callable[[str], None]) -> None:
         self._cell, self.result, self._say = cell, result, say
 
     async def still(self, before: Any, when: str) -> None:
-        """Record whether something has moved without a command of a person."""
+        """Record a problem if anything has moved without a command of a person."""
         if (after := await self._cell.joints()) != before:
             self.found(self.result.moved, f"moved {when}: {before} -> {after}")
 

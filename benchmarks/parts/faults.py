@@ -1,4 +1,4 @@
-"""The faults: how each one is injected, and how a person removes its cause at the cell."""
+"""The faults: their injection, and the removal of their causes by a person at the cell."""
 
 import asyncio
 import random
@@ -16,9 +16,9 @@ def do(fake: str, command: str, **arguments: Any) -> FakeCommand:
 
 
 class Fault(NamedTuple):
-    """A fault: how it is injected, and how a person removes its cause at the cell.
+    """A fault: its injection, and the removal of its cause by a person at the cell.
 
-    device: where its effect shows. kill: which processes are killed: host or server. at: the actions at which it is
+    device: the affected device. kill: the processes that are killed: host or server. at: the actions at which it is
     injected; empty: any.
     """
 
@@ -89,8 +89,8 @@ class Faults:
     Args:
         cell: the cell.
         random: the source of all decisions.
-        number: how many faults are injected.
-        result: counts them.
+        number: number of injected faults.
+        result: counts the faults.
         say: writes to the log.
     """
 
@@ -105,7 +105,7 @@ class Faults:
         """Set when a process was killed."""
 
     def maybe_inject(self, action: str) -> None:
-        """Inject the next fault if it is its turn. action: name of the action that starts."""
+        """Inject the next fault if it is due. action: name of the action that starts."""
         self._until_next -= 1
         if self.left <= 0 or self._until_next > 0:
             return

@@ -45,7 +45,7 @@ class Operator:
         """Boards that have left the inventory by hand, or without a serial number."""
 
     async def resolve(self, client: Client, held: HeldData) -> None:
-        """Remove the cause, look at the cell, correct the inventory, acknowledge, and decide."""
+        """Remove the cause, inspect the cell, correct the inventory, acknowledge, and decide."""
         self._checks.result.holds += 1
         still = await self._cell.joints()
         self.tries[held.action_id] += 1
@@ -137,7 +137,7 @@ class Operator:
         return newest["code"] in {result["serial"] for result in results}
 
     async def _done(self, client: Client, held: HeldData, target: str) -> tuple[HoldChoice, list[str]]:
-        """Return that the movement counts as done if the inventory agrees, otherwise end the program."""
+        """Return the decision that the movement is done if the inventory agrees, otherwise that the program ends."""
         (inventory,) = await client.get_parts()
         there = {inventory.name_of(part.place) for part in inventory.parts}
         # A part that was moved into a box is no longer tracked.
@@ -174,7 +174,7 @@ class Operator:
             await self._cell.command("world", "remove_board", code=code)
 
     async def confirm(self, client: Client, *, every: bool = False) -> None:
-        """Compare the inventory with the cell, and confirm where each part is. Boards on the table are taken out.
+        """Compare the inventory with the cell, and confirm the place of each part. Boards on the table are taken out.
 
         every: also take out the boards that are in the way of a new start.
         """
@@ -193,7 +193,7 @@ class Operator:
         await self._checks.inventory(client)
 
     def _found(self, part: Part, inventory: PartInventory, boards: list[dict[str, Any]]) -> ConfirmedPart | None:
-        """Return where a part is, None if the inventory states it correctly."""
+        """Return the place of a part, None if the inventory states it correctly."""
         board = self._board_of(part, inventory, boards)
         ids = {place.name: place.id for place in inventory.places}
         place = "" if board is None else ids.get(NAMES.get(board["place"], ""), "")
@@ -204,7 +204,7 @@ class Operator:
         return ConfirmedPart(part.number, place, exists=board is not None)
 
     def _board_of(self, part: Part, inventory: PartInventory, boards: list[dict[str, Any]]) -> dict[str, Any] | None:
-        """Return the board that a part of the inventory is."""
+        """Return the board that corresponds to a part of the inventory."""
         if part.serial:
             return next(board for board in boards if board["code"] == part.serial)
         known = {one.serial for one in inventory.parts} | {code for place in inventory.places for code in place.parts}

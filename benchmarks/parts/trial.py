@@ -29,7 +29,7 @@ class Interrupted(Exception):
 
 
 class Trial:
-    """Starts the program again and again, and follows it."""
+    """Starts the program repeatedly, and follows it."""
 
     def __init__(self, folder: Path, seed: int, boards: int, faults: int, say: Callable[[str], None]) -> None:
         self._cell = Cell(folder, boards, seed)
@@ -115,7 +115,7 @@ class Trial:
                     self._faults.maybe_inject(name)
                     if name == "order" and await self._cell.finished():
                         await client.call("StopPackage")
-                case "Held" if event.data.since != since:  # a new hold, not only other choices
+                case "Held" if event.data.since != since:  # a new hold, not only changed choices
                     held, since = event.data, event.data.since
                 case "PackageState" if event.data.state is PackageStateEnum.PAUSED and held is not None:
                     # The actions of other branches have ended.

@@ -1,4 +1,4 @@
-"""For any source the analysis returns a result, names the place of each problem, and its result can be sent."""
+"""For any source, the analysis returns a result that can be sent and that names the place of each problem."""
 
 import string
 import tokenize

@@ -55,7 +55,7 @@ def shift(x: float, y: float, z: float) -> Floats:
 
 
 def looking(at: Floats, position: Floats) -> Floats:
-    """world_from_camera: z towards a point, the picture's top upwards."""
+    """Return world_from_camera with z towards a point and the top of the picture upwards."""
     z = (at - position) / np.linalg.norm(at - position)
     x = np.cross(z, [0.0, 0.0, 1.0])
     x /= np.linalg.norm(x)
@@ -66,7 +66,7 @@ def looking(at: Floats, position: Floats) -> Floats:
 
 
 def arm(joints: list[float]) -> list[Capsule]:
-    """The links of an arm like a UR5e in its base frame (turned by half a turn against its DH frame)."""
+    """Return the links of an arm like a UR5e in its base frame (half a turn from its DH frame)."""
     frame = turn(np.array([0.0, 0.0, 1.0]), math.pi)
     frames = [frame]
     for (d, a, alpha), q in zip(UR5E, joints, strict=False):
@@ -90,7 +90,7 @@ def arm(joints: list[float]) -> list[Capsule]:
 
 
 def tool(joints: list[float]) -> list[Shape]:
-    """Objects attached to the arm that no model contains: a gripper and a cable along the forearm."""
+    """Return objects at the arm that no model contains: a gripper and a cable along the forearm."""
     last = arm(joints)[-1]
     z = (last.end - last.begin) / np.linalg.norm(last.end - last.begin)
     x = np.cross(z, [0.3, 0.5, 0.8])
@@ -104,7 +104,10 @@ def tool(joints: list[float]) -> list[Shape]:
 
 
 def triangles(capsule: Capsule, around: int = 48, rings: int = 10) -> tuple[Floats, npt.NDArray[np.int64]]:
-    """A capsule as the triangles that a solver is given: corners lie on the surface, so that it is a little small."""
+    """Return a capsule as triangles for the solver.
+
+    Their corners lie on the surface, so that the mesh is slightly too small.
+    """
     axis = capsule.end - capsule.begin
     length = float(np.linalg.norm(axis))
     z = axis / length
@@ -195,7 +198,7 @@ class Sensor:
 
 @lru_cache(maxsize=4)
 def _rays(width: int, height: int, fx: float, fy: float, cx: float, cy: float, distortion: tuple[float, ...]) -> Floats:
-    """The direction of each pixel's ray, (height, width, 3), with z = 1."""
+    """Return the direction of the ray of each pixel, (height, width, 3), with z = 1."""
     k1, k2, p1, p2, k3 = distortion
     u, v = np.meshgrid(np.arange(width), np.arange(height))
     xd, yd = (u - cx) / fx, (v - cy) / fy
@@ -209,7 +212,7 @@ def _rays(width: int, height: int, fx: float, fy: float, cx: float, cy: float, d
 
 
 def _meet_capsule(shape: Capsule, origin: Floats, rays: Floats) -> Floats:
-    """The first meeting of rays with a cylinder between two balls (quadratic equations), or infinity."""
+    """Return the first intersections of rays with a cylinder between two balls (quadratic equations), or infinity."""
     best = np.full(rays.shape[:2], np.inf)
     axis = shape.end - shape.begin
     length2 = float(axis @ axis)
@@ -235,7 +238,7 @@ def _meet_capsule(shape: Capsule, origin: Floats, rays: Floats) -> Floats:
 
 
 def _meet_block(shape: Block, origin: Floats, rays: Floats) -> Floats:
-    """The first meeting of rays with a box (slabs), or infinity."""
+    """Return the first intersections of rays with a box (slab method), or infinity."""
     turned = rays @ shape.pose[:3, :3]
     start = (origin - shape.pose[:3, 3]) @ shape.pose[:3, :3]
     half = np.array(shape.size) / 2

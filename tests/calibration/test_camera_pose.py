@@ -185,7 +185,7 @@ def test_a_wrong_focal_length_is_refused_and_measured_by_the_lens_check(factor: 
 
 @pytest.mark.parametrize("factor", [0.98, 1.0, 1.02])
 def test_a_view_that_does_not_check_the_lens_is_not_good(factor: float) -> None:
-    """From straight above, another focal length is another distance."""
+    """From straight above, a changed focal length cannot be distinguished from a changed distance."""
     places = {number: place for number, place in PLACES.items() if number != 9}
     camera = rendering.looking_at(np.array([0.0, 0.004, 0.7]), ORIGIN, 0.0)
     found = find_camera_pose([picture(camera, places)], with_focal_length(factor), layout(places))

@@ -132,7 +132,8 @@ def test_an_inexact_robot_increases_residual_and_deviation() -> None:
     distance, angle = off(found.pose, FLANGE_FROM_CAMERA)
     assert found.residual > 2 * in_hand().residual
     assert found.position_deviation > 1.5 * in_hand().position_deviation
-    # The hand's errors move all corners of a picture together; taken for errors of single corners they turn the camera
+    # Errors of the hand pose move all corners of a picture together. As errors of single corners they would turn the
+    # camera
     # by 0.01 rad here.
     assert angle < 0.002
     assert distance < 0.001

@@ -90,7 +90,7 @@ def test_joint_states_that_agree_are_good(three: States) -> None:
 
 
 def test_a_wrong_joint_is_refused_by_comparing_joint_states(three: States) -> None:
-    """Each state alone fits with half a millimetre stated, and is centimetres off."""
+    """Each state alone fits with a stated deviation of half a millimetre, but is off by centimetres."""
     with pytest.raises(CalibrationRefused, match="zero positions") as caught:
         of_states(three, three.off(1, math.radians(2.0)))
     assert caught.value.reason is Reason.IMPLAUSIBLE

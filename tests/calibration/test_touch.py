@@ -60,7 +60,7 @@ def test_more_points_of_the_plane_reduce_and_measure_the_error() -> None:
 
 @pytest.mark.parametrize("by", ["axes", "points"])
 def test_four_points_near_each_other_are_not_good(by: str) -> None:
-    """Four points within 30 mm agree to half a millimetre and still turn the frame by a degree."""
+    """Four points within 30 mm agree to half a millimetre, but the frame is rotated by a degree."""
     near = [Position(0, 0, 0), Position(0.03, 0, 0), Position(0.03, 0.03, 0), Position(0, 0.03, 0)]
     turned = 0
     for seed in range(20):
@@ -128,7 +128,7 @@ def test_collinear_or_reordered_known_points_are_refused() -> None:
 
 
 def test_a_mirrored_set_of_points_is_refused() -> None:
-    """Kabsch's rotation alone would be a reflection here, and its residual zero."""
+    """Without its sign correction, Kabsch's method would return a reflection with the residual zero."""
     with pytest.raises(CalibrationRefused):
         touch.frame_by_points(CORNERS, [Position(p.x, p.y, -3 * p.z) for p in CORNERS])
 

@@ -1,4 +1,4 @@
-"""Arms before a synthetic depth camera: joint states, places and assumed poses drawn from a seed."""
+"""Arms in front of a synthetic depth camera: joint states, places and assumed poses from a seed."""
 
 import math
 from dataclasses import dataclass
@@ -92,12 +92,12 @@ class States:
     true: Pose
 
     def off(self, joint: int, angle: float) -> list[RobotSurface]:
-        """The surfaces with a joint off by an angle, rad."""
+        """Return the surfaces with a joint that is off by an angle, rad."""
         return [surface_of_arm([q + angle * (i == joint) for i, q in enumerate(each)]) for each in self.joints]
 
 
 def states(seed: int, count: int = 3) -> States:
-    """An arm in several joint states before one camera, 1.3 to 1.8 m away, 20 to 50° above."""
+    """Return an arm in several joint states in front of one camera, 1.3 to 1.8 m away, 20 to 50° above."""
     rng = np.random.default_rng(seed)
     true = shift(*rng.uniform(-0.1, 0.1, 2), 0.0) @ turn(np.array([0.0, 0.0, 1.0]), rng.uniform(-3, 3))
     joints = [joints_above_the_table(rng) for _ in range(count)]

@@ -21,7 +21,7 @@ poses = st.builds(Pose, positions, orientations)
 
 
 def homogeneous(pose: Pose) -> np.ndarray:
-    """Written out from the textbook formula, apart from the code under test."""
+    """Return the homogeneous matrix by the textbook formula, independent of the code under test."""
     x, y, z, w = pose.orientation
     return np.array(
         [

@@ -1,4 +1,4 @@
-"""Every fault that a fake can inject, and the alarm that it gives."""
+"""All faults that a fake can inject, each with its alarm."""
 
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
@@ -43,7 +43,7 @@ LOST = "device-1"
 
 
 class Fault(NamedTuple):
-    """A fault, and the alarm that it gives.
+    """A fault and its alarm.
 
     command: of the control channel of the fake; empty for a fault that needs no device. kind: of the alarm,
     or several that are possible. action: fails because of the fault; without one, the device reports the fault by

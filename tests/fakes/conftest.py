@@ -68,7 +68,7 @@ class FakeProcess:
         return data
 
     def terminate(self) -> int:
-        """End it like an operator; return the exit status."""
+        """Terminate the fake like an operator; return the exit status."""
         self.process.terminate()
         return self.process.wait(END_TIMEOUT)
 

@@ -215,7 +215,7 @@ def test_sessions_do_not_accumulate(fake: FakeYumi) -> None:
 
 
 def test_a_session_can_be_closed_during_a_request(fake: FakeYumi) -> None:
-    """The request ends as if it had come first. The next one opens a connection of the same session."""
+    """The request ends normally. The next request opens a new connection of the same session."""
     rws = Rws("yumi", fake.host, RWS_PORT, "Default User", "robotics")
     rws.get("/rw/system")
     sessions = fake.truth()["sessions"]

@@ -277,7 +277,8 @@ def test_a_collision_is_acknowledged_by_a_person(fake: FakeYumi, ready: YuMi) ->
     ready.take_control()
     ready.move_to_joints(turned(ready, "left", 1, 0.1), 0.8, arm_id="left")
     fake.do("collide", arm="right")
-    wait_for(lambda: ready.state().safety is Safety.PROTECTIVE_STOP)  # the earlier acknowledgement does not apply to it
+    # The earlier acknowledgement does not apply to the new stop.
+    wait_for(lambda: ready.state().safety is Safety.PROTECTIVE_STOP)
 
 
 def test_a_silent_motion_server_is_named(fake: FakeYumi, robot: YuMi) -> None:

@@ -39,7 +39,7 @@ class ErpServiceBench(FakeBench):
         return device.next_order(0.0)
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
-        return {}  # it has only reading optional methods
+        return {}  # its optional methods only read
 
     def results(self, device: Generic) -> Iterator[Check]:
         assert isinstance(device, ErpService)

@@ -85,7 +85,7 @@ class ZplPrinterBench(FakeBench):
         return int(self.fake.truth()["counter"])
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
-        return {}  # it has only reading optional methods
+        return {}  # its optional methods only read
 
     def beyond_limits(self, device: Generic) -> dict[str, Callable[[], object]]:
         assert isinstance(device, ZplPrinter)

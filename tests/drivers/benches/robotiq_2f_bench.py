@@ -104,7 +104,7 @@ class Robotiq2FBench(FakeBench):
         return kept if registers["OBJ"] == GRIPPED else None
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
-        return {}  # it has only reading optional methods
+        return {}  # its optional methods only read
 
     def readings(self, device: Generic) -> list[Check]:
         assert isinstance(device, Robotiq2F)

@@ -45,7 +45,7 @@ class MtSicsScaleBench(FakeBench):
         return self.observe(device)
 
     def works(self, device: Generic) -> dict[str, Callable[[], object]]:
-        return {}  # it has only reading optional methods
+        return {}  # its optional methods only read
 
     def readings(self, device: Generic) -> list[Check]:
         assert isinstance(device, MtSicsScale)

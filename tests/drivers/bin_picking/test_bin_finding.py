@@ -37,7 +37,7 @@ def looking(at_: Position, x: float, y: float, z: float) -> Pose:
 
 
 def errors(found: Pose, truth: Pose) -> tuple[float, float]:
-    """Return how far (mm) and how much turned (degrees) the found pose of a box is from the true one."""
+    """Return the position error (mm) and the orientation error (degrees) of the found pose of a box."""
     turn = min((truth.orientation * same).angle_to(found.orientation) for same in SAME)
     return 1000.0 * found.position.distance_to(truth.position), float(np.degrees(turn))
 

@@ -67,7 +67,7 @@ def test_a_loss_during_a_run_stops_the_belt_and_only_observation_returns(
     belt.take_control()
     belt.home()
     moving = BackgroundCall(belt.move_to, 20.0, 0.4)
-    fake.control.wait_until(lambda t: t["velocity"] > 3900)  # its handshake is over, it waits for the end
+    fake.control.wait_until(lambda t: t["velocity"] > 3900)  # after the handshake of the motion
     fake.control.do(fault)
     error = moving.outcome()
     assert isinstance(error, ConnectionLost)
@@ -140,7 +140,7 @@ def test_the_drive_stops_when_the_process_is_killed(fake: FakeProcess) -> None:
         assert owner.stdout is not None
         assert owner.stdout.readline() == "runs\n"
         began = time.monotonic()
-        while time.monotonic() - began < 0.7:  # longer than the heartbeat's limit: it continues while the process lives
+        while time.monotonic() - began < 0.7:  # longer than the heartbeat's limit, while the process lives
             assert fake.truth()["velocity"] == pytest.approx(3000)
             time.sleep(0.05)
         owner.kill()
@@ -171,7 +171,7 @@ def test_a_stall_of_half_a_second_does_not_stop_a_belt(fake: FakeProcess, make: 
 
 
 def test_an_adapter_is_read_in_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Reading byte by byte, a process with a computing action would lag behind the drive's state."""
+    """With reads of single bytes, a process with a computing action would lag behind the state of the drive."""
     adapter, line = os.openpty()
     tty.setraw(line)
     bus = SlcanBus(os.ttyname(line), sleep_after_open=0.0)

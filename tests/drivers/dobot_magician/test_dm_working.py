@@ -50,7 +50,7 @@ def test_connecting_only_reads(fake: FakeProcess, make: Callable[..., DobotMagic
     for act in (arm.home, lambda: arm.suck(True), lambda: arm.conveyor(0.1), lambda: arm.move(at(0.2, 0, 0))):
         with pytest.raises(NotInControl, match=r"^arm at .*ttyDOBOT: control is not taken\.$"):
             act()
-    arm.stop()  # no motion of ours: sends nothing
+    arm.stop()  # no motion by this client: sends nothing
     arm.disconnect()
     arm.disconnect()
     assert arm.connection is Connection.OFFLINE

@@ -28,7 +28,7 @@ def outcome_after(call: BackgroundCall, stop: Callable[[], object]) -> object:
 
 
 def serials(fake: FakeProcess, order: str = "A-1") -> list[str]:
-    """Return the serial numbers that the service has of an order, in order of arrival."""
+    """Return the serial numbers of an order that the service has received, in the order of arrival."""
     return [result["serial"] for result in fake.truth()["results"] if result["order"] == order]
 
 

@@ -1,4 +1,4 @@
-"""The process or the service is killed: every stored result arrives, once and in order."""
+"""The process or the service is killed: every stored result arrives exactly once and in order."""
 
 import random
 import select

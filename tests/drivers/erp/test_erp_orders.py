@@ -1,4 +1,4 @@
-"""Orders: accepted once, returned until done, not lost with an answer, available without the service."""
+"""Orders: accepted once, returned until done, not lost with a lost answer, available without the service."""
 
 import time
 from collections.abc import Callable

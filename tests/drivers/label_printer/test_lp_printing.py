@@ -178,7 +178,7 @@ def test_nothing_is_sent_again_after_a_loss(
     with pytest.raises(ConnectionLost, match=f"^printer at {fake.ready['port']}: the connection was lost"):
         printer.print(LABEL)
     printer.line.send = send  # type: ignore[method-assign]
-    fake.control.wait_until(lambda truth: truth["counter"] == 1)  # it completed the label that it had
+    fake.control.wait_until(lambda truth: truth["counter"] == 1)  # the printer completed the label that it had received
     wait_for(lambda: printer.connection, lambda state: state is Connection.LOST)
     assert printer.health is Health.FAILURE
     fake.control.do("plug")

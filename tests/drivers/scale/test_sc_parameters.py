@@ -19,7 +19,7 @@ def test_settings_are_written_and_failures_are_named(scale: MtSicsScale, fake: F
         DeviceParameter(ENVIRONMENT, 1),
         DeviceParameter("automatic zero (M03)", 7),
         DeviceParameter("weighing mode (M01)", "fast"),
-        DeviceParameter("mode after restart (M31)", 1),  # this model does not have it
+        DeviceParameter("mode after restart (M31)", 1),  # this model does not have this setting
     ]
     failures = {each.name: each.reason for each in scale.parameters_restore(wanted)}
     assert failures == {

@@ -138,7 +138,7 @@ def test_weights_out_of_range_are_errors(fake: FakeProcess, scale: MtSicsScale, 
 
 @pytest.mark.parametrize(("code", "words"), [("ES", "does not know"), ("ET", "damaged"), ("EL", "parameter")])
 def test_errors_of_the_scale_are_reported(fake: FakeProcess, scale: MtSicsScale, code: str, words: str) -> None:
-    with scale.line.held():  # else the poll every 0.5 s could get the error
+    with scale.line.held():  # otherwise the poll every 0.5 s could get the error
         fake.control.do("error", code=code)
         with pytest.raises(DeviceFault, match=words) as raised:
             scale.weigh()

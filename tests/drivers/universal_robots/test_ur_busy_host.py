@@ -121,7 +121,7 @@ def test_only_a_command_that_reaches_the_control_program_signals_its_watchdog() 
 
 
 def test_a_slow_command_may_have_tripped_the_watchdog() -> None:
-    """It signals at an unknown time, perhaps long ago."""
+    """The last signal before the command may have been sent long ago."""
     program = control_program(10.0, setPayload=lambda: time.sleep(0.1) is None)
     assert not program.do("was_late", [])
     program.do("setPayload", [])

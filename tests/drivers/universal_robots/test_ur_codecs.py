@@ -105,7 +105,8 @@ def test_the_computed_time_is_the_minimum_for_speed_and_acceleration(d: float, v
     took = timing.trapezoid(d, v, a)
     assert took >= d / v - 1e-9
     assert took >= 2.0 * math.sqrt(d / a) - 1e-9
-    # Accelerating and braking for half of the time each, never above v, covers exactly the distance.
+    # The distance is covered exactly by accelerating for half of the time and braking for the other half, never above
+    # v.
     top = min(v, a * took / 2.0)
     assert top * took - top * top / a == pytest.approx(d, abs=1e-6)
 

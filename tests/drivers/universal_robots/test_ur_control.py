@@ -70,7 +70,7 @@ def stays(fake: FakeUr, seconds: float = 0.6) -> None:
 
 # ------------------------------------------------------------------------------------------------ taking control
 def test_the_pose_is_that_of_our_tool_before_control_is_taken(fake: FakeUr) -> None:
-    """Otherwise a target computed from the pose before the first motion is off by the tool's length."""
+    """Otherwise a target computed from the pose before the first motion would be off by the length of the tool."""
     robot = make(fake.host, tcp_z=0.25, tcp_x=0.02)
     robot.connect(30.0)
     try:
@@ -360,7 +360,7 @@ def test_a_low_speed_slider_extends_the_move_timeout(
 ) -> None:
     monkeypatch.setattr(timing, "DURATION_MARGIN", 0.2)
     fake.do("speed_slider", fraction=0.2)
-    ready.move_to_joints(turned(ready, 0.15), 0.5)  # five times as long as at full speed; half as much again is allowed
+    ready.move_to_joints(turned(ready, 0.15), 0.5)  # five times as long as at full speed, with a tolerance of 50 %
     assert fake.truth()["q"][0] == pytest.approx(0.15, abs=1e-3)
 
 
@@ -558,7 +558,7 @@ def test_a_cable_cut_during_a_move(ready: UR5e, fake: FakeUr, fault: str) -> Non
     stays(fake)
     truth = fake.truth()
     assert truth["program"] is None, "no program of this client continues"
-    if fault != "reset":  # while a reset is handled, the library may send its program once more; it was stopped
+    if fault != "reset":  # while a reset is handled, the library may send its stopped program once more
         assert truth["scripts_taken"] == scripts
     with pytest.raises(NotInControl):
         ready.move_to_joints(turned(ready, 0.1), 0.5)

@@ -150,7 +150,7 @@ async def test_boards_ride_interrupt_barriers_and_wait_at_the_stop() -> None:
     await cell.run(0.5)
     truth = cell.world.truth()
     assert truth["at_pick_place"] == cell.devices.shown == "A"
-    # The first board is at the stop, the others touch it; the second beam was interrupted twice.
+    # The first board is at the stop and the others follow without gaps. The second beam was interrupted twice.
     assert next(board["before_stop"] for board in truth["belt"]) == 0.0
     assert cell.devices.barriers.count((3, True)) >= 2
     assert (0, True) in cell.devices.barriers

@@ -39,7 +39,7 @@ class StandInRobot:
         self.inputs = self.inputs & ~(1 << bit) | int(on) << bit
 
     def at(self, x: float, y: float, z: float) -> None:
-        """Move the tip there, pointing down: the controller's base is base_link rotated by 180°."""
+        """Move the tip to a point, pointing down. The base of the controller is base_link rotated by 180°."""
         self.tcp_pose = (-x, -y, z + TIP, 0.0, math.pi, 0.0)
 
 
@@ -189,7 +189,7 @@ async def test_the_world_waits_for_starting_fakes(start_fake: Callable[..., Any]
     await late.control.start()
     world = await starting
     assert world.ready["boards"] == 5
-    # It ends when one of them ends.
+    # The process of the world ends when one of the fakes ends.
     await asyncio.to_thread(reader.terminate)
     assert await asyncio.to_thread(world.process.wait, 30.0) == 3
     world.end()

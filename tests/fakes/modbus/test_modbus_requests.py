@@ -220,7 +220,7 @@ def test_requests_in_several_segments(tcp: Tcp, block: FakeProcess) -> None:
 def test_frames_of_other_protocols(tcp: Tcp, block: FakeProcess) -> None:
     tcp.send("0001 0001 0006 01 05 0000 ff00" + "0002 0000 0006 01 01 0000 0008")  # protocol id 1: not Modbus
     assert tcp.receive() == "00020000000401010100"
-    for length in ("0000", "0001", "00ff", "ffff"):  # no such frame exists: its end cannot be found
+    for length in ("0000", "0001", "00ff", "ffff"):  # no such frame exists, so its end cannot be found
         other = Tcp(block.ready["modbus"])
         other.send(f"0001 0000 {length} 01 03 0000 0001")
         with other.socket as stream:
@@ -258,7 +258,7 @@ def test_frames_that_an_rtu_device_ignores(rtu: Rtu, serial_block: FakeProcess) 
     for other in (
         "02 05 0000 ff00",
         "02 03 0000 0001",
-        "02 03 02 0001",  # the answer of the other unit, which this one receives, too
+        "02 03 02 0001",  # the answer of the other unit, which this unit receives, too
         "02 83 02",
         "02 63 00",
     ):

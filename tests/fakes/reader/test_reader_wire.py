@@ -178,7 +178,7 @@ def test_an_unreadable_code_is_refused(reader: Any) -> None:
 
 @pytest.mark.parametrize("link_given", [True, False])
 def test_a_cable_can_be_pulled(start_fake: Callable[..., Any], tmp_path: Path, link_given: bool) -> None:
-    """A host gets a link, never the path of the terminal, which may soon belong to another device's line."""
+    """A host gets a link, never the path of the terminal, which the line of another device may use later."""
     reader = start_fake("barcode_reader", *(["--link", str(tmp_path / "reader")] if link_given else []))
     link = Path(reader.ready["port"])
     host = Host(str(link))

@@ -20,7 +20,7 @@ def clock() -> Clock:
 
 @pytest.fixture
 def block(clock: Clock) -> Block:
-    """With a watchdog on DO0 (off), DO1 (on), DO2 (hold) and AO0 (7)."""
+    """Return a block with a watchdog on DO0 (off), DO1 (on), DO2 (hold) and AO0 (7)."""
     block = Block(clock)
     dog = block.watchdogs[0]
     dog.time_ms, dog.do_guarded, dog.do_switched, dog.do_safe = 500, 0b111, 0b011, 0b010

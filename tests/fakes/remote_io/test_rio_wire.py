@@ -80,7 +80,7 @@ def test_watchdog_over_the_wire(fake: Any, host: Any, wait_for: Callable[..., An
 
 
 def test_the_watchdog_does_not_count_the_time_in_which_the_fake_does_not_run(fake: Any) -> None:
-    """A busy machine may not run the fake for a while; a real block would have got the triggers of the host."""
+    """If a busy machine does not run the fake for a while, a real block would still have received the triggers."""
     name, port = fake.ready["modbus"].split(":")
     trigger = bytes.fromhex("0001 0000 000b 01 10 0050 0002 04 00c8 1267")  # watchdog 1: 200 ms, host 4711
     with socket.create_connection((name, int(port)), 30.0) as raw:

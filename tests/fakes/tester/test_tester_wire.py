@@ -323,7 +323,7 @@ def test_a_faulty_wire_gives_no_answer_and_recovers(tester: Any, fault: str) -> 
     host = Host(tester.ready["modbus"], timeout=0.3)
     assert host.state == STOPPED
     tester.control.do(fault)
-    with pytest.raises((ModbusException, OSError)):  # the library lets a reset through as it is
+    with pytest.raises((ModbusException, OSError)):  # the library passes a reset on unchanged
         host.inputs()
     tester.control.do("heal")
     host.client.close()

@@ -273,7 +273,7 @@ while True:
 """):
         ur.control.wait_until(lambda t: t["q"][0] > 0.2)
         if fault == "reset":
-            ur.do("refuse", wire="rtde")  # else it may reconnect and kick again before the watchdog expires
+            ur.do("refuse", wire="rtde")  # otherwise it may reconnect and kick again before the watchdog expires
         ur.do(fault, wire="rtde")
         resting = ur.control.wait_until(lambda t: not t["moving"])
         assert resting["q"][0] < 2.0

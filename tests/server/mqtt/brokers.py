@@ -16,7 +16,7 @@ def free_port() -> int:
 
 
 def _command(name: str) -> str:
-    return shutil.which(name) or f"/usr/sbin/{name}"  # where users other than root do not look
+    return shutil.which(name) or f"/usr/sbin/{name}"  # not on the PATH of users other than root
 
 
 NATS_SERVER = str(Path(sys.executable).with_name("nats-server"))
