@@ -44,7 +44,7 @@ def joint(
 
 
 def six_axes(wrist: float = 0.0, elbow: str = "0 1 0") -> RobotModel:
-    """An industrial arm on an inclined foot; `wrist`: by how much, m, its last axis passes by the two before."""
+    """Return an industrial arm on an inclined foot. `wrist`: offset of its last axis from the previous two axes, m."""
     text = links("base", "l1", "l2", "l3", "l4", "l5", "l6", "tool")
     text += joint("j1", "base", "l1", xyz="0 0 0.2", rpy="0.2 0 0")
     text += joint("j2", "l1", "l2", xyz="0.1 0 0.2", axis="0 1 0", limit='<limit lower="-2" upper="2.2" velocity="1"/>')

@@ -64,7 +64,7 @@ def test_configurations_match_an_independent_solver(values: tuple[float, ...]) -
     assume(not arm.dexterity(q).near_singularity)
     chain = Chain("ur5e")
     expected = [np.array(each) for each in chain.solutions(chain.forward(values))]
-    # Where the other configurations are near singular both lose digits.
+    # Where the other configurations are nearly singular, both lose digits.
     assume(not any(arm.dexterity(each).near_singularity for each in expected))
     found = InverseKinematics(arm).solutions(arm.forward(q))
     assert len(found) == len(expected)

@@ -161,7 +161,7 @@ def test_robots_with_few_joints_and_linkages_are_planned() -> None:
 
 @pytest.mark.parametrize("make", [kin_robots.ur, lambda: RobotModel.load(kin_robots.DOBOT)])
 def test_levers_bound_the_travel_of_points(make: object) -> None:
-    """Compared with the vertices of the links after small random motions."""
+    """The bounds are compared with the vertices of the links after small random motions."""
     model = make()  # type: ignore[operator]
     world = world_of(model)
     robot = world.robot("arm")

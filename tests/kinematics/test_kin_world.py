@@ -159,7 +159,7 @@ def test_the_table_under_a_robot_collides_only_with_its_arm(world: CollisionWorl
 def test_two_robots_are_obstacles_for_each_other(world: CollisionWorld) -> None:
     reaching = np.array((0.0, -0.6, 0.4, 0.2, 0.0, 0.0))
     tip = where("flange", reaching).position
-    foot = at(tip.x, tip.y, tip.z - 0.15)  # where the arm reaches to is the other's shoulder
+    foot = at(tip.x, tip.y, tip.z - 0.15)  # the arm reaches to the shoulder of the other robot
     world.add_robot("other", ur("ur3e"), foot, np.zeros(6))
     assert any(two.startswith("other/") for _, two in pairs(world, reaching))
     assert not world.is_free("arm", reaching)
@@ -245,7 +245,7 @@ def test_fingers_may_touch_the_gripped_part() -> None:
 def test_gripped_parts_can_be_deleted_replaced_and_removed(world: CollisionWorld) -> None:
     world.put("part", Sphere(0.05), where("flange"))
     world.attach("part", "arm", "flange")
-    world.put("part", Sphere(0.01), at(0.0, 0.0, 2.0))  # after another put it is no longer gripped
+    world.put("part", Sphere(0.01), at(0.0, 0.0, 2.0))  # after another `put`, the body is no longer gripped
     assert world.pose("part") == at(0.0, 0.0, 2.0)
     world.move("part", where("flange"))
     world.attach("part", "arm", "flange")
@@ -353,7 +353,7 @@ def test_fast_and_exhaustive_checks_agree_for_a_thousand_bodies() -> None:
     taken = (time.process_time() - began) / len(configurations)
     assert fast == [not world.contacts("arm", q) for q in configurations]
     assert 0 < sum(fast) < len(fast) or sum(fast) == 0
-    assert taken < 0.002, f"{taken * 1e6:.0f} us"  # 20 to 50 us on a quiet machine; pair by pair it is 800
+    assert taken < 0.002, f"{taken * 1e6:.0f} us"  # 20 to 50 us on an idle machine; with a check of each pair, 800 us
     for number in range(0, 1000, 2):
         world.delete(f"body {number}")
     for number in range(1, 1000, 2):

@@ -16,7 +16,7 @@ from arcor2_hw.data.address import host_of, is_address_name
         ("https://[::1]:80", "::1"),
         ("socket://plc1:4001", "plc1"),
         ("http://plc1.evil?x=1", "plc1.evil"),
-        # Not only a host: any other text is another address.
+        # Not only hosts: any other text is another address.
         ("/dev/ttyUSB0", "/dev/ttyUSB0"),
         ("http://plc1@evil/", "http://plc1@evil/"),
         ("http://plc1:80@evil/", "http://plc1:80@evil/"),

@@ -95,7 +95,7 @@ def test_messages_stop_at_once_when_the_parent_dies() -> None:
         assert owner.stdout.read(4) == b"kick"
         owner.kill()
         os.read(owner.stdout.fileno(), 65536)
-        messages = owner.stdout.read()  # to the end: the child has closed the line as well
+        messages = owner.stdout.read()  # reads to the end: the child has closed the line, too
         assert messages.count(b"kick") < FROZEN_AFTER / 2.0 / 0.02, "it considered the owner frozen, not ended"
 
 
@@ -105,7 +105,7 @@ def test_the_time_of_sending_a_pulse_counts() -> None:
         parent = Parent(reading)
         os.write(writing, b'{"n": 1}\n' + pulse() + b"half")
         assert parent.lines(1.0) == [b'{"n": 1}']
-        parent.pulse -= FROZEN_AFTER  # as if this child had not run for so long
+        parent.pulse -= FROZEN_AFTER  # as if this child had not been scheduled during this time
         os.write(writing, b" a line\n" + pulse())
         assert parent.lines(0.0) == [b"half a line"]
         assert (parent.ended, parent.lines(0.0)) == (None, [])

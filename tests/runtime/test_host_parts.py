@@ -96,7 +96,7 @@ ONE = BODY + 'arm.scan("A-1", an="scan")\narm.pick(stop, an="pick")\narm.place(i
 
 
 def write_package(package: Path, directory: Path, body: str, project: Project = PROJECT) -> Path:
-    """Write a package whose arm writes notes to the directory, and finds its faults there."""
+    """Write a package whose arm writes notes to the directory, and reads its faults from there."""
     objects = [
         scene_object("arm", "Arm", directory=str(directory)),
         scene_object("feeder", "PartFeeder", pose=True),

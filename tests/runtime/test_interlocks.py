@@ -387,7 +387,7 @@ def test_jogging_stops_before_a_zone(cell: Cell) -> None:
 
 
 def hold(cell: Cell, number: int, velocity: float = 0.0) -> Any:
-    """Jog the arm, or let it leave its zone, until the hold is refused or ends; return why. number: of the hold."""
+    """Jog the arm, or let it leave its zone, until the hold is refused or ends; return the reason."""
     for lease_id in range(1000 * number, 1000 * number + 200):
         twist = (velocity, 0.0, 0.0, 0.0, 0.0, 0.0) if velocity else None
         lease = m.Lease(lease_id, "obj_arm", number, HoldKind.JOG, time.monotonic() + 0.3, twist, retract=not velocity)

@@ -113,7 +113,7 @@ def test_a_stopped_call_keeps_the_error_of_the_device(lane: Lane) -> None:
 
 
 def test_no_call_from_before_a_stop_runs_after_it(lane: Lane) -> None:
-    """Only the call that was just starting may run, and it ends as cancelled."""
+    """Only a call that was just starting may run, and it ends as cancelled."""
     source = random.Random(7)
     cut = 0
     for _ in range(300):

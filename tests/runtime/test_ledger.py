@@ -75,7 +75,7 @@ def test_after_a_failure_a_person_confirms_the_place(ledger: Ledger) -> None:
     with pytest.raises(NotFound, match="no place shelf"):
         ledger.confirm([ConfirmedPart(1, "shelf")])
     ledger.confirm([ConfirmedPart(1, "robot", "A-2")])
-    ledger.complete(1)  # has no effect: a person has found the part
+    ledger.complete(1)  # no effect, because a person has found the part
     carry(ledger, "robot", "nest")
     with pytest.raises(PlaceOccupied):
         ledger.confirm([ConfirmedPart(0, "nest")])

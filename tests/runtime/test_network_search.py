@@ -83,7 +83,7 @@ async def test_a_universal_robot_is_found_with_model_and_serial_number() -> None
 
 @asynccontextmanager
 async def answering(answer: bytes | None) -> AsyncIterator[int]:
-    """A server that answers every connection with these bytes; with None it accepts and stays silent."""
+    """Run a server that answers every connection with these bytes, or with None accepts it and sends nothing."""
 
     async def serve(_reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if answer is not None:

@@ -217,7 +217,7 @@ def test_a_type_that_blocks_the_interpreter_does_not_delay_other_devices(
     _wait_noted(notes, "w2 moving")
     _wait_noted(notes, "p moving")
     with _kept_interpreter(host, notes, tmp_path) as kept:
-        # Each is answered although w1 cannot run anything: its C call ends only after this block.
+        # Each call is answered although w1 cannot run any code, because its C call ends only after this block.
         host.send(m.StopMotion(98, "obj_w2"))
         host.send(m.StopMotion(99, "obj_p"))
         assert [host.answer(number) for number in (98, 99)] == [None, None]

@@ -139,7 +139,7 @@ async def test_a_person_logs_on_with_pin_or_card(tmp_path: Path) -> None:
         with pytest.raises(Refused, match="programmer"):
             await device.ask("RemovePerson", id=found.ids["Ivo"])
 
-        answer = await device.ask("LogOn", card=CARD)  # the next person needs not log off the one before
+        answer = await device.ask("LogOn", card=CARD)  # the next person does not need to log off the previous one
         assert (answer["person"]["name"], answer["role"]) == ("Ivo", "operator")
         with pytest.raises(Refused, match="technician"):
             await device.ask("SaveScene")
@@ -188,13 +188,13 @@ async def test_wrong_pins_lock_the_person_out_longer_each_time(tmp_path: Path, m
         device = await found.at_tablet()
         assert [await wrong(device, eva) for _ in range(4)] == ["The PIN of Eva is wrong."] * 4
         assert "Try again in 60 s" in await wrong(device, eva)
-        with pytest.raises(Refused, match="60 s"):  # the correct one is not checked either
+        with pytest.raises(Refused, match="60 s"):  # the correct PIN is not checked either
             await device.ask("LogOn", person=eva, pin=PIN)
         await device.ask("LogOn", card=CARD)  # other persons can log on
         clock += 61
         assert "Try again in 120 s" in await wrong(device, eva)
         other = await found.server.person("", found.tokens.add("other tablet", Role.OPERATOR, shared=True)[1])
-        await other.ask("LogOn", person=eva, pin=PIN)  # the lock-out is that of one device
+        await other.ask("LogOn", person=eva, pin=PIN)  # the lock-out applies to one device only
     async with open_server(tmp_path) as server:  # it survives a restart
         found.server = server
         device = await found.at_tablet()
@@ -347,5 +347,5 @@ async def test_secrets_are_stored_and_noted_nowhere(tmp_path: Path, caplog: pyte
 
 @pytest.fixture(autouse=True)
 def cheap_hashes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The cost of a hash is not tested here."""
+    """Use cheap hashes, because their cost is not tested here."""
     monkeypatch.setattr("arcor2_server.collaboration.pins._N", 2**8)

@@ -90,7 +90,7 @@ def leaks(directory: Path, *secrets: str, besides: str = "secrets.json") -> list
 
 
 def open_to_others(directory: Path) -> list[str]:
-    """Return the paths that others than the owner may read, including the directory itself."""
+    """Return the paths that other users than the owner may read, including the directory itself."""
     found = [path for path in (directory, *directory.iterdir()) if path.stat().st_mode & 0o077]
     return [f"{path.name} {stat.S_IMODE(path.stat().st_mode):o}" for path in found]
 
@@ -338,7 +338,7 @@ async def test_a_secret_is_not_sent_to_another_host(tmp_path: Path) -> None:
         assert answer.is_client_error
         assert AGAIN in answer.text
 
-        # Overrides are entered one by one: a mismatch is refused when the scene starts.
+        # Overrides are entered one after the other. A mismatch is refused when the scene starts.
         await call("NewProject", rpc.NewProjectArgs(scene.id, "ringing"))
         await call("WriteLock", rpc.WriteLockArgs(obj.id))
         await call("AddOverride", rpc.AddOverrideArgs(obj.id, setting("host", "evil")))

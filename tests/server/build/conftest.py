@@ -1,4 +1,4 @@
-"""The workplace's object types as code: two uploaded, one of a driver with a folder of its own, one of ours."""
+"""The object types of the workplace as code: two uploaded, one of a driver with its own folder, one of this library."""
 
 from pathlib import Path
 

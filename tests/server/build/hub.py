@@ -27,7 +27,7 @@ async def opened(
     monkeypatch: pytest.MonkeyPatch,
     models: Mapping[str, ObjectModel] | None = None,
 ) -> AsyncIterator[Any]:
-    """Return services on an empty storage but for the uploaded types among `code`; the others are installed."""
+    """Return services on a storage with the uploaded types of `code` only. The other types are installed."""
     settings = ServerSettings(data_dir=directory)
     settings.data_dir.mkdir(parents=True)
     storage = await Storage.open(settings)

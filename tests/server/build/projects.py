@@ -635,9 +635,9 @@ class TypesOfTests:
 
 
 def with_functions(project: Project, rng: random.Random, count: int) -> Project:
-    """Make functions of random actions that follow each other, of the program or of a function, where that is possible.
+    """Create functions from random consecutive actions of the program or of a function, if possible.
 
-    The program does the same afterwards, but for an error that no exit handles.
+    The program then does the same, except for an error that no exit handles.
     """
     document = Document.of(SCENE, project)
     for number in range(count):

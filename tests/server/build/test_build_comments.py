@@ -35,7 +35,7 @@ from tests.server.build.projects import (
 
 
 def reformatted(source: str, rng: random.Random) -> str:
-    """Return a script as a person could have written it: with comments, other quotes, line breaks and names."""
+    """Return a script as a person could have written it: with comments, different quotes, line breaks and names."""
     lines: list[str] = []
     inside = False
     number = 0
@@ -280,7 +280,7 @@ def test_an_edited_parameter_changes_one_statement() -> None:
 def test_comments_move_with_actions_and_vanish_with_them() -> None:
     source = commented()
     project = imported(source)
-    # Both kinds of boards go to the good box: the condition and its `else` are gone.
+    # Both kinds of boards go to the good box, so the condition and its `else` are removed.
     logic = [item for item in project.logic if item.start != "act_known?" and item.start != "act_throw_away"]
     logic.append(LogicItem("act_known?", "act_into_good_box", id="lit_new"))
     found = generated(replace(project, logic=logic))
@@ -296,7 +296,7 @@ def test_comments_move_with_actions_and_vanish_with_them() -> None:
         "Written by the night shift",
     ):
         assert kept in found, found
-    # Undo brings them back, because the stored text did not change.
+    # Undo restores them, because the stored text did not change.
     assert generated(project) == source
 
 

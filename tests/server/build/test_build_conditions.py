@@ -1,4 +1,4 @@
-"""Whether one of several conditions is always true, with the cases of the editor's completeness.test.ts."""
+"""Check whether one of several conditions is always true, with the cases of the editor's completeness.test.ts."""
 
 import json
 from pathlib import Path

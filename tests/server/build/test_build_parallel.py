@@ -48,7 +48,7 @@ def function(name: str, *actions: Action, returns: tuple[str, ...] = ()) -> Proj
 
 
 def project(*functions: ProjectFunction) -> Project:
-    """Fetch and press at once, then use the result of fetch; a refusal leads to the end."""
+    """Return a project that fetches and presses at once, then uses the result of fetch. A refusal leads to the end."""
     link = ActionParameter("flag", "link", json.dumps("act_fetch it/default/0"))
     actions = [
         action("both", PARALLEL, branches=["act_fetch it", "act_press it"], error_output="problem"),

@@ -295,7 +295,7 @@ def test_a_new_action_is_placed_at_its_point() -> None:
     assert point_of(project, "let go") == "acp_feeder"
     assert point_of(project, "once more") == point_of(
         project, "back"
-    )  # it names no point, so it gets that of the action before
+    )  # the action names no point, so it gets the point of the previous action
     new = actions_of(project)["once more"]
     assert (new.type, new.outputs()) == ("obj_reader/scan", ["again"])
     assert new.id.startswith("act_")

@@ -60,7 +60,7 @@ def scene(right: float = 1.0) -> Scene:
 
 
 def move(text: str) -> Action:
-    """Return the action `alpha left`: this robot moves there."""
+    """Return the action `alpha left`: a motion of this robot to this place."""
     robot, place = text.split()
     pose = ActionParameter("pose", "pose", json.dumps(f"ori_{place}"))
     return Action(text, f"obj_{robot}/move", f"act_{robot}_{place}", parameters=[pose])

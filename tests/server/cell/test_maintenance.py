@@ -301,7 +301,7 @@ async def test_the_card_shows_the_counters_of_the_confirmed_device(tmp_path: Pat
         place.device({"gain": 700}, serial="B2")
         await place.restart()
         card = await place.card()
-        assert card.counters == {"gain adjusted": 6}  # those of the other device are not mistaken for them
+        assert card.counters == {"gain adjusted": 6}  # the counters of the other device are not counted
         await place.ask("ConfirmDevice", object_id=card.object_id, identity=card.found)
         assert (await place.card()).counters == {}
         await place.restart()

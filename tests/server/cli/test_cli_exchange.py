@@ -220,7 +220,7 @@ def test_an_exported_project_is_imported_and_builds_on_an_empty_server(cli: Any,
         return built.package_id
 
     assert place.ask(place.second, build).startswith("pkg_")
-    # Once more: there is nothing left to do, and no difference.
+    # The second import changes nothing, and there is no difference.
     once_more = cli("project", "import", "open_it.zip", at=place.second)
     assert {line.partition(": ")[2] for line in once_more.out.splitlines()} == {"same"}
     same = cli("project", "diff", "open_it.zip", "open it", at=place.second)
@@ -348,7 +348,7 @@ def test_a_failed_import_is_reverted(cli: Any, place: Place, tmp_path: Path, mon
     assert "Undone: project copy." in failed.err
     assert picture() == before
 
-    # What cannot be undone is named.
+    # Changes that cannot be undone are named.
     async def gone(rest: Rest, scene: Any) -> None:
         monkeypatch.setattr(Rest, "put_scene", put_again)
         await put_scene(rest, scene)

@@ -90,7 +90,7 @@ class ServerProcess:
                 self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, env=self._environment)
         try:
             self.url = await self._ready()
-        except BaseException:  # nobody will stop a server that has not started
+        except BaseException:  # a server that has not started would not be stopped later
             self._process.kill()
             await self.ended()
             raise

@@ -61,7 +61,7 @@ def test_the_oldest_connection_of_an_address_is_closed_first() -> None:
     assert opened.dropped == []
     third = opened.open()
     assert opened.dropped == [first]
-    second.wait()  # it has been used: now it counts as the latest
+    second.wait()  # it has been used, and now counts as the latest
     opened.open()
     assert opened.dropped == [first, third]
     other.close()
@@ -192,7 +192,7 @@ async def ended(reader: asyncio.StreamReader) -> bool:
 
 
 async def drips(port: int, first: bytes, drip: bytes = b"") -> bool:
-    """Send something, then a byte now and then, until the server ends the connection."""
+    """Send some bytes, then single bytes with pauses, until the server ends the connection."""
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
     ending = asyncio.create_task(ended(reader))
     try:

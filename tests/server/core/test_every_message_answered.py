@@ -77,7 +77,7 @@ async def test_deeply_nested_json(server: ServerProcess) -> None:
 
 
 def meaningless(kind: Any) -> Any:
-    """Return arguments of the right shape that name nothing that exists."""
+    """Return valid arguments that name no existing item."""
     info = msgspec.inspect
     match msgspec.inspect.type_info(kind) if not isinstance(kind, info.Type) else kind:
         case info.StructType() as struct:
@@ -219,7 +219,7 @@ async def test_messages_are_accepted_refused_or_closed_by_size(server: ServerPro
 
 
 async def test_requests_overtake_a_waiting_request(server: ServerProcess) -> None:
-    """Each request is a task of its own: one that waits for a lock does not delay the next."""
+    """Each request is a task of its own: a request that waits for a lock does not delay the next."""
     async with talking(server.url, "holder") as holder, talking(server.url, "waiter") as waiter:
         await holder.granted("WriteLock", {"object_id": "ADDING_OBJECT"})
         waiting = {"type": "Thing", "base": "Generic"}

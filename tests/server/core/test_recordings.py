@@ -206,7 +206,7 @@ async def test_the_ring_of_an_interrupted_run_becomes_a_recording_once(bench: Be
     other = Recorder(Ring())
     other.observed(SimpleNamespace(id="obj_far", name="far"), [Observation("part", False)], time.monotonic())  # type: ignore[arg-type]
     other.save(bench.folder, 12, main=False)
-    other.save(bench.folder, 15, main=False)  # its program has ended, so that the main host stores nothing
+    other.save(bench.folder, 15, main=False)  # its program has ended, so the main host stores nothing
     bench.recorder.save(bench.folder, 12)
     bench.recorder.save(bench.folder, 13)
     (bench.folder / "run-14.ring").write_bytes(b"\xff")

@@ -129,7 +129,7 @@ async def test_object_type_with_and_without_model(storage: Storage) -> None:
     assert [kind.id for kind in await storage.object_types()] == ["Crate", "mixin"]
     assert (await storage.object_types())[1].description == "helper"
     assert (await storage.object_types())[1].model is UNSET
-    # One model per id, of any kind. The type it belongs to counts as changed.
+    # Each id has at most one model, of any kind. The type of the model counts as changed.
     await storage.put_model(Sphere("Crate", 0.5))
     changed = await storage.object_type("Crate")
     assert changed.model == ObjectModel.of(Sphere("Crate", 0.5))
