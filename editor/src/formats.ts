@@ -111,7 +111,7 @@ export function ago(time: string, present = Date.now()): string {
   return new Date(time).toLocaleDateString(i18n.locale, { day: "numeric", month: "short", year: "numeric" });
 }
 
-/** Return how long something took, with the symbols of SI units. `seconds` is in s. */
+/** Return a duration in s as text with the symbols of SI units. */
 export function duration(seconds: number): string {
   if (seconds < 0.995) return `${decimal(seconds * 1000, 0)} ms`;
   if (seconds < 59.5) return `${fixed(seconds, 1)} s`;
@@ -119,7 +119,7 @@ export function duration(seconds: number): string {
   return `${Math.floor(whole / 60)} min ${whole % 60} s`;
 }
 
-/** Return how long something took, with hours. `seconds` is in s. */
+/** Return a duration in s as text with hours. */
 export function hours(seconds: number): string {
   if (seconds < 3600) return duration(seconds);
   const minutes = Math.round(seconds / 60);

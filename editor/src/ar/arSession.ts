@@ -36,7 +36,7 @@ const BLINK = 300;
 const REPORT = 250;
 /** Time for which a correction is reported, ms. */
 const CORRECTION = 4000;
-/** How much of the items is hidden, by phase: before the first registration, they are somewhere else. */
+/** The hidden fraction of the items by phase. Before the first registration, their place is not known. */
 const VEILS: Readonly<Record<Ar["phase"], number>> = {
   starting: 1,
   looking: 1,

@@ -10,7 +10,7 @@ const inverse = new Matrix4();
 const plane = new Matrix4();
 const pose = new Matrix4();
 
-/** Where a picture is in a view that it fills: factor, and pixels of the view. */
+/** The position of a picture in a view that it fills: factor, and pixels of the view. */
 export interface Placement {
   scale: number;
   width: number;

@@ -16,7 +16,7 @@ export interface Sighting {
 
 /** Radius of the neighbourhood for the threshold, pixels of the half-size picture. */
 const RADIUS = 14;
-/** How much darker than its neighbourhood a dark pixel is. */
+/** Minimum difference between a dark pixel and its neighbourhood. */
 const DARKER = 7;
 /** Smallest difference between white and black cells. */
 const CONTRAST = 22;

@@ -52,7 +52,7 @@ export interface HeadsetHost {
   grab: (id: string, at: Vector3) => Grab | null;
 }
 
-/** What a controller or hand does from press to release. */
+/** The gesture of a controller or hand from press to release. */
 interface Press {
   source: XRInputSource;
   end: () => unknown;

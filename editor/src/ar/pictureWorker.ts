@@ -12,7 +12,7 @@ export interface WithLens {
   pixels: Pixels;
   lens: Lens;
 }
-/** What a picture shows, and the time that it took, ms. */
+/** The result for a picture, and the duration of the processing, ms. */
 export interface FromWorker {
   found: Found;
   ms: number;

@@ -28,7 +28,7 @@ export interface Sight {
   target: Vec3;
 }
 
-/** What a device stores: the last view that was set by hand, and the correction of the view from markers. */
+/** The data stored by a device: the last view that was set by hand, and the correction of the view from markers. */
 export interface Placement {
   sight?: Sight;
   nudge?: Movement;

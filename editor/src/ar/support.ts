@@ -3,10 +3,10 @@
 import type { Layout } from "./places";
 
 /**
- * Why AR cannot start. `insecure`: the page is not trusted; `browser`: it lacks a function; `session`: WebXR did not
- * start; `overlay`: the page cannot be shown over it; the others are about the camera. With two of them, AR starts, and
- * the user places the workplace by hand: `markers`: none is configured; `dictionary`: AR does not detect the configured
- * markers.
+ * The reason why AR cannot start. `insecure`: the page is not trusted; `browser`: it lacks a function; `session`:
+ * WebXR did not start; `overlay`: the page cannot be shown over it; the others are about the camera. With two of
+ * them, AR starts, and the user places the workplace by hand: `markers`: none is configured; `dictionary`: AR does
+ * not detect the configured markers.
  */
 export type Obstacle =
   | "insecure"
@@ -56,7 +56,7 @@ export async function methodsOf(scope: typeof globalThis): Promise<ArMethod[]> {
   return [...(xr ? (["xr"] as const) : []), ...(able.camera && able.workers ? (["camera"] as const) : [])];
 }
 
-/** Return what prevents AR or registration; null if nothing is known to. */
+/** Return the known reason that prevents AR or registration; null if there is none. */
 export function obstacleOf({ secure, camera, workers }: Abilities, layout: Layout | null): Obstacle | null {
   if (!secure) return "insecure"; // without it, browsers hide the camera
   if (!camera || !workers) return "browser";

@@ -25,7 +25,7 @@ export interface Known {
   at: Vec3;
 }
 
-/** A fit, or why there is none: the points are on a line, or those at `points` are not where they should be. */
+/** A fit, or the reason why there is none: the points are on a line, or those at `points` contradict the others. */
 export type Touched =
   | { workplace: Matrix4; error: number; grade: Grade }
   | { problem: "line" | "contradicting"; points: number[] };

@@ -1,4 +1,4 @@
-/** What the worker does with each picture: detect markers, register the camera, and search for the focal length. */
+/** Processing of a picture by the worker: detect markers, register the camera, and search for the focal length. */
 
 import { detect, type Sighting } from "./detector";
 import { type Grey, half } from "./grey";
@@ -6,7 +6,7 @@ import { ASSUMED, type FocalLength, KNOWN, type LensLearner, lensOf } from "./le
 import type { Lens, Places, View } from "./pose";
 import { markerErrors, type Registration, register } from "./registration";
 
-/** Why no marker is found: darkness, a blurred picture, or another reason. */
+/** The reason why no marker is found: darkness, a blurred picture, or another one. */
 export type Loss = "dark" | "blurred" | "unseen";
 
 export interface Setup {

@@ -93,7 +93,7 @@ export class XrOutput {
   constructor(
     private readonly renderer: Renderer,
     private readonly camera: PerspectiveCamera,
-    /** What is drawn after the items, in the frame of WebXR. */
+    /** The objects that are drawn after the items, in the frame of WebXR. */
     private readonly local: Scene,
   ) {
     this.camera.matrixAutoUpdate = this.camera.matrixWorldAutoUpdate = false;

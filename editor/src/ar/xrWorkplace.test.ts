@@ -123,7 +123,7 @@ test("an anchor holds the workplace while the tracking drifts, until markers cor
   await device.frame(workplace);
   expect(shift(workplace)).toBeCloseTo(0.06, 6);
   expect(device.anchors).toBe(1);
-  // The device moved the origin of its frame: the anchor still knows where the workplace is.
+  // The device has moved the origin of its frame; the anchor still has the pose of the workplace.
   expect(workplace.reset()).toBe(false);
   device.tracked = true;
   device.drift = -0.5;

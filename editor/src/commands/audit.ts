@@ -1,4 +1,4 @@
-/** The audit trail of the server: who changed or commanded what. */
+/** The audit trail of the server: changes and commands with their users. */
 
 import { t } from "@lingui/core/macro";
 import { FILE_DEADLINE, rest } from "../session/rest";

@@ -32,7 +32,7 @@ export function renewForces(): void {
   const ids = now()
     .forces.filter(isOwn)
     .map((each) => each.id);
-  // Refused if one has ended meanwhile; lost with the connection, which ends all of them.
+  // The request is refused if one of the forces has ended. The end of the connection ends all of them.
   if (ids.length > 0) call("RenewForces", { ids, valid_ms: VALID }).catch(() => {});
 }
 

@@ -11,7 +11,7 @@ export type Decision = Omit<DecideHeldArgs, "number">;
 /** Restarting the safety system of a controller takes 20 s. */
 const ACKNOWLEDGE_TIMEOUT = 40;
 
-/** Decide how the program continues. Return why it was refused; notify the user of it if `notifies`. */
+/** Decide how the program continues. Return the reason of a refusal; notify the user of it if `notifies`. */
 export async function decide(held: HeldData, decision: Decision, notifies = true): Promise<string> {
   const why = await refusal(() => call("DecideHeld", { number: held.number, ...decision }));
   if (why && notifies) notify("error", why);

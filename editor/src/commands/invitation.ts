@@ -1,4 +1,4 @@
-/** How other users can join this server. */
+/** The data with which other users can join this server. */
 
 import { rest } from "../session/rest";
 

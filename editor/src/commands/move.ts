@@ -1,6 +1,6 @@
 /**
- * Move, turn and resize an item: shown at once, previewed to other users meanwhile, and sent to the server as one edit
- * at the end. The item is locked meanwhile.
+ * Move, turn and resize an item. It is locked and previewed to other users during the motion, and sent to the server
+ * as one edit at the end.
  */
 
 import type { ObjectModel, Pose } from "../protocol/types";

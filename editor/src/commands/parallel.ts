@@ -76,7 +76,7 @@ export async function addBranch(action_id: string, functionId: string): Promise<
   }
 }
 
-/** Remove a branch with its call. If something uses its results, nothing is changed. */
+/** Remove a branch with its call. The branch is kept if its results are used. */
 export async function removeBranch(action_id: string, id: string): Promise<void> {
   const { doc } = now();
   const action = doc?.actions[action_id];

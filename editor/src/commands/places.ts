@@ -1,4 +1,4 @@
-/** Where the view draws devices whose type has no pose: stored with the scene for all users. Programs do not use it. */
+/** The poses at which the view draws devices without a pose: stored with the scene, not used by programs. */
 
 import type { Pose } from "../protocol/types";
 import { call, serves } from "../session/connection";

@@ -98,7 +98,7 @@ async function serviceObject(object: string, step: CallOptions): Promise<string>
   return awaited(of);
 }
 
-/** Return the point for an action without a place: that of its predecessor, else one on the device or in the world. */
+/** Return the point for an action without a place: that of its predecessor, or one on the device or in the world. */
 async function anyPlace(objectId: string, slot: Slot | null, step: CallOptions): Promise<Where> {
   const { doc } = now();
   const before = doc?.actions[slot?.after ?? ""]?.pointId ?? Object.keys(doc?.points ?? {})[0];
@@ -149,7 +149,7 @@ export const nameResults = (actionId: string, outputs: string[]): Promise<string
     held(actionId, () => call("UpdateAction", { action_id: actionId, flows: [{ type: "default", outputs }] })),
   );
 
-/** Set how often an action is repeated after it has failed; 0 removes the retry. Return why it was refused. */
+/** Set the number of repetitions of a failed action; 0 removes the retry. Return the reason of a refusal. */
 export const setRetry = (actionId: string, retry: Retry): Promise<string> =>
   refusal(() => held(actionId, () => call("UpdateAction", { action_id: actionId, retry })));
 

@@ -1,4 +1,4 @@
-/** Send requests from commands: a refusal becomes a notice, and the caller gets to know that it failed. */
+/** Send requests from commands. A refusal is shown as a notice and reported to the caller. */
 
 import type { CallOptions } from "../protocol/client";
 import { ConnectionLost, Refused } from "../protocol/errors";
@@ -23,7 +23,7 @@ export async function ask<N extends keyof Requests>(
 /** Return an option for requests whose edits Undo reverts together. */
 export const newStep = (): CallOptions => ({ step: Math.random().toString(36).slice(2) });
 
-/** Return why a request would be refused, an empty string if it would be accepted; nothing is changed. */
+/** Return the reason why a request would be refused, an empty string if it would be accepted. Nothing is changed. */
 export async function whyNot<N extends keyof Requests>(request: N, args?: Requests[N]["args"]): Promise<string> {
   try {
     await call(request, args, { dryRun: true });
@@ -75,7 +75,7 @@ export async function holding<T>(id: string, work: () => Promise<T | undefined>,
   }
 }
 
-/** Do something for a form. Return why it was refused, to be shown in the form; an empty string on success. */
+/** Run an operation for a form. Return the reason of a refusal, to be shown in the form; an empty string on success. */
 export async function refusal(work: () => Promise<unknown>): Promise<string> {
   try {
     await work();

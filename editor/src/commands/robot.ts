@@ -20,7 +20,7 @@ export interface Chosen {
   effector: string;
 }
 
-/** Return the active robot: the one that the user chose last, else the first; null without a robot. */
+/** Return the active robot: the robot that the user chose last, otherwise the first; null without a robot. */
 export const chosenRobot = stable(
   found,
   (one, other) => one?.robotId === other?.robotId && one?.armId === other?.armId && one?.effector === other?.effector,
@@ -94,7 +94,7 @@ export interface Step {
   pose?: Pose | undefined;
 }
 
-/** Return the reason if the step was refused, else an empty string. */
+/** Return the reason if the step was refused, otherwise an empty string. */
 export function stepEffector(
   { robotId, armId, effector }: Chosen,
   { pose, ...step }: Step,

@@ -81,7 +81,7 @@ export function addObject(type: ObjectTypeMeta, name: string, parameters: Parame
 /** Time limit of a connection check, s; the server has a shorter one. */
 const CHECK_TIMEOUT = 45;
 
-/** Connect a device without adding it, and return what it reports, or why it cannot be connected. */
+/** Connect a device without adding it, and return its report, or the reason why it cannot be connected. */
 export async function checkConnection(
   type: string,
   parameters: Parameter[],
@@ -124,7 +124,7 @@ export function shapeModel(kind: ShapeKind, id: string): ObjectModel {
   return { type: "Sphere", sphere: { id, radius: size / 2 } };
 }
 
-/** Add a shape with a generated name at once; everything else can be changed later. */
+/** Add a shape with a generated name at once. Its properties can be changed later. */
 export async function addShape(kind: ShapeKind): Promise<void> {
   const name = freeObjectName(kind);
   const model = shapeModel(kind, name);
@@ -174,7 +174,7 @@ export async function duplicateObject({ name, type, pose, parameters, node }: Sc
         ...(beside ? { pose: beside } : {}),
         ...(node ? { node } : {}),
       });
-  if (done) await taken(copy).catch(() => {}); // another user has removed it meanwhile
+  if (done) await taken(copy).catch(() => {}); // another user has removed it
 }
 
 /** Return the same model with another type name. */

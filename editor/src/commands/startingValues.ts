@@ -16,7 +16,7 @@ import { now, store } from "../store/store";
 import { awaited } from "./awaited";
 import { held } from "./requests";
 
-/** Where to add an action: at a point, or at a position in the world, where a point is added. */
+/** The place for a new action: a point, or a position in the world, where a point is added. */
 export type Where = { pointId: string; orientationId?: string } | { position: Position; orientation: Orientation };
 
 /** The tool points down, which suits a gripper above a table. */

@@ -20,7 +20,7 @@ function setThumbnail(document: string, thumbnail: Thumbnail): void {
   store.setState(({ thumbnails }) => ({ thumbnails: put(thumbnails, document, thumbnail) }));
 }
 
-/** Store a picture of the view as the thumbnail of a document, which may be closed meanwhile. */
+/** Store a picture of the view as the thumbnail of a document, even if the document is then closed. */
 export async function keepThumbnail(document: string, picture: Promise<Blob | null>): Promise<void> {
   const blob = serves("SetViewState") ? await picture : null;
   if (!blob) return;

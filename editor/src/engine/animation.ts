@@ -1,4 +1,4 @@
-/** Models whose parts move: called before each frame until they are where they are reported to be. */
+/** Models with moving parts: called before each frame until the parts have reached their reported positions. */
 
 import type { Quality } from "./surface";
 import type { Thing } from "./thing";

@@ -142,7 +142,7 @@ void main() {
 }`,
 };
 
-/** What instances are drawn as: their geometry, or squares that show a sphere or an upright puck. */
+/** The shape of drawn instances: their geometry, or squares that show a sphere or an upright puck. */
 export type Drawn = "corners" | "discs" | "pucks";
 const SHADERS: Record<Drawn, { vertexShader: string; fragmentShader: string }> = {
   corners: CORNERS,

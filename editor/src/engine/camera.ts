@@ -38,7 +38,7 @@ export class View {
   private width = 1;
   private height = 1;
   private fittedTo = { width: 1, height: 1 };
-  /** What the user saw before a measured camera was shown; null without one. */
+  /** The view before a measured camera was shown; null without a measured camera. */
   private before: (Viewpoint & { fov: number }) | null = null;
   private readonly forget = new AbortController();
 
@@ -138,7 +138,7 @@ export class View {
     this.changed();
   }
 
-  /** Return to what was seen before, or `stay` where the camera was. */
+  /** Return to the previous view, or `stay` at the pose of the camera. */
   release(stay = false): void {
     const { before } = this;
     if (!before) return;
@@ -195,7 +195,7 @@ export class View {
     return this.controls.target;
   }
 
-  /** Disabled while something else is dragged. */
+  /** Disabled while another item is dragged. */
   enable(on: boolean): void {
     this.controls.enabled = on && !this.measured;
   }

@@ -36,7 +36,7 @@ export interface EngineOptions {
   telemetry: Telemetry;
   asset: Context["asset"];
   reportFault: Context["reportFault"];
-  /** What draws cheaply, at low quality; null at high quality. */
+  /** The module that draws at low quality; null at high quality. */
   low: LowQuality | null;
   dark: boolean;
 }
@@ -355,7 +355,7 @@ export class Engine {
     return flying || moving;
   }
 
-  /** Update all frames, or only those of robots, whose joints have no children. */
+  /** Update all frames, or only the frames of robots, whose joints have no children. */
   private place(): void {
     const movedRobots = [...this.movedRobots];
     this.movedRobots.clear();

@@ -1,4 +1,4 @@
-/** Where the camera has to be so that what matters fills the free part of the view. Pure functions. */
+/** The pose of the camera at which the relevant items fill the free part of the view. Pure functions. */
 
 import { type Box3, Vector3 } from "three";
 

@@ -7,7 +7,7 @@ export type Shape =
   | { kind: "cylinder"; radius: number; height: number }
   | { kind: "sphere"; radius: number }
   | { kind: "mesh"; asset: string }
-  /** Without a collision model: a device by the icon of its type, else a marker. */
+  /** Without a collision model: a device by the icon of its type, otherwise a marker. */
   | { kind: "none"; icon?: string };
 
 interface Base {
@@ -96,7 +96,7 @@ export interface PuckItem extends Base {
   level: number;
   /** Number of these pucks. */
   count: number;
-  /** The pucks of the point lie around it; else they are stacked, and the uppermost shows their number. */
+  /** The pucks of the point lie around it; otherwise they are stacked, and the uppermost shows their number. */
   open: boolean;
   role: "action" | "call" | "start" | "end";
   running: boolean;

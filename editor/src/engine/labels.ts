@@ -64,7 +64,7 @@ export class Labels {
       const [half, tall] = [element.offsetWidth / 2, element.offsetHeight];
       // Keep the label inside the view.
       const centre = Math.min(Math.max(x, half + 4), Math.max(half + 4, width - half - 4));
-      // Above the item, else below it.
+      // Above the item if possible, otherwise below it.
       const box = [y - tall - 8, y + 12]
         .map((edge) => Math.max(4, edge))
         .map((top) => ({ left: centre - half, right: centre + half, top, bottom: top + tall }))
@@ -84,7 +84,7 @@ export class Labels {
     }
   }
 
-  /** Reserve the place of something drawn in the view, pixels; return whether it overlaps nothing. */
+  /** Reserve a rectangle of the view, pixels; return whether it overlaps no other one. */
   reserve(box: Rect): boolean {
     if (this.placed.some((other) => overlap(box, other))) return false;
     this.placed.push(box);

@@ -59,7 +59,7 @@ export interface Strip {
 
 export interface Arrow {
   strips: readonly Strip[];
-  /** Where the arrowhead is, and its direction. */
+  /** The position and the direction of the arrowhead. */
   head: readonly [Vector3, Vector3];
 }
 

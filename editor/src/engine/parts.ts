@@ -9,9 +9,9 @@
 import { BoxGeometry, type Material, Mesh, type Object3D } from "three";
 import type { DetectedPart } from "./items";
 
-/** Time that a part waits at a sensor which does not detect it, s; then somebody has taken it. */
+/** Time after which a part at a sensor that does not detect it is assumed to be taken away, s. */
 const LATE = 2;
-/** Time that a part which has left a sensor of a stopped belt waits for the speed, s; then somebody has taken it. */
+/** Time after which a part that has left a sensor of a stopped belt is assumed to be taken away, s. */
 const STARTS_WITHIN = 0.6;
 
 interface Glider {

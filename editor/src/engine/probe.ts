@@ -21,7 +21,7 @@ export interface Probe {
   badge: string;
   /** Meaning of the symbol drawn on it. */
   sign: string;
-  /** Why its model is not shown; empty if it is. */
+  /** The reason why its model is not shown; empty if it is shown. */
   problem: string;
   /** Triangles of its model without the ghost; 0 if it is drawn as an instance. */
   triangles: number;

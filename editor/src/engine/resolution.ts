@@ -1,6 +1,6 @@
 /**
- * Whether the camera moves, and the resolution of the picture: at low quality half of it meanwhile, because pixels cost
- * most of a frame.
+ * Whether the camera moves, and the resolution of the picture. At low quality it is halved during motion, because
+ * pixels cost most of a frame.
  */
 
 import { type Camera, Matrix4 } from "three";

@@ -2,10 +2,10 @@
 
 import { MeshLambertMaterial, type MeshLambertMaterialParameters } from "three";
 
-/** How much the view costs to draw: "low" is for machines without a graphics processor. */
+/** The quality of the view: "low" is for machines without a graphics processor. */
 export type Quality = "low" | "high";
 
-/** What draws cheaply, loaded at low quality only. */
+/** The module that draws at low quality, loaded only if needed. */
 export type LowQuality = typeof import("./baked");
 
 /** Return a diffuse material with a colour that can be changed. */

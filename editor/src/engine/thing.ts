@@ -12,13 +12,13 @@ export interface Context {
   palette: Palette;
   batches: Batches;
   quality: Quality;
-  /** What draws cheaply at low quality; else null. */
+  /** The module that draws at low quality; null at high quality. */
   low: LowQuality | null;
   /** Time between two frames during a motion, s. */
   period: number;
   /** Load an asset of the server for display. */
   asset: (id: string) => Promise<ArrayBuffer>;
-  /** Report what cannot be shown, and why. */
+  /** Report an item that cannot be shown, and the reason. */
   reportFault: (sentence: string) => void;
   /** Return the model with an id. */
   thing: (id: string) => Thing | undefined;
@@ -60,7 +60,7 @@ export abstract class Thing<I extends Item = Item> {
     return this.root.getWorldPosition(target);
   }
 
-  /** Why the model is not shown; empty if it is. */
+  /** The reason why the model is not shown; empty if it is shown. */
   get problem(): string {
     return "";
   }

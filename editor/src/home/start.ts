@@ -1,4 +1,4 @@
-/** What the home screen proposes first. Pure functions. */
+/** The first proposal of the home screen. Pure functions. */
 
 import type { Lists } from "../store/state";
 import type { RecentIds } from "./opened";

@@ -1,4 +1,4 @@
-/** Where a new action goes in the program. Pure functions. */
+/** The position of a new action in the program. Pure functions. */
 
 import type { ObjectAction, ProjectLogicIf } from "../protocol/types";
 import type { OpenDocument, State } from "../store/state";
@@ -33,7 +33,7 @@ export interface Slot {
 /** Text that identifies a slot. */
 export const slotKey = ({ after, condition, exit }: Slot): string => JSON.stringify([after, condition, exit]);
 
-/** Return the slots after a step, the one that is usually wanted first. */
+/** Return the slots after a step, the usual one first. */
 function slotsAfter(doc: OpenDocument, types: State["types"], after: string): Slot[] {
   return [...regular(doc, types, after), ...errorExits(doc, after).map(({ id }) => ({ after, exit: id }))];
 }
@@ -50,7 +50,7 @@ function regular(doc: OpenDocument, types: State["types"], after: string): Slot[
           .map((value) => ({ after, condition: { what: linkTo(own), value } }))
       : [];
   if (!plain) return steps.length === 0 || steps.some(hasComparisons) ? [{ after }, ...free] : [...free, ...taken];
-  // What already follows becomes the other branch; an action before End is usually continued instead.
+  // The present successor becomes the other branch; an action before End is usually continued instead.
   return placeOf(plain.end) === END ? [{ after }, ...free] : [...free, { after }];
 }
 
@@ -60,7 +60,7 @@ export const slotsOf = (doc: OpenDocument, types: State["types"]): Slot[] =>
     slotsAfter(doc, types, after),
   );
 
-/** Return where the next action goes: after the selected one, else at the end of the program. */
+/** Return the position of the next action: after the selected action, otherwise at the end of the program. */
 export function slotFor(doc: OpenDocument, types: State["types"], selected: string): Slot {
   const exit = doc.logic[selected];
   if (isErrorExit(exit)) return { after: placeOf(exit.start), exit: exit.id };
@@ -80,13 +80,13 @@ function lastOf(doc: OpenDocument): string {
   return at;
 }
 
-/** How an action is put into a slot. */
+/** The way in which an action is inserted into a slot. */
 export interface Insertion {
   /** Connection that leads to the new action from now on. */
   redirect?: string;
   /** Connection that becomes the other branch. */
   branch?: { id: string; condition: ProjectLogicIf };
-  /** Where the new action leads to. */
+  /** The successor of the new action. */
   to: string;
 }
 

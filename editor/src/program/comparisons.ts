@@ -1,4 +1,4 @@
-/** Conditions of connections as comparisons: what can be compared, new ones, and whether they are complete. */
+/** Conditions of connections as comparisons: comparable values, new comparisons, and completeness. */
 
 import { t } from "@lingui/core/macro";
 import type { LogicComparison, LogicWhen, Operator, ProjectLogicIf } from "../protocol/types";

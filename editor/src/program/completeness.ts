@@ -17,7 +17,7 @@ type Values = Record<string, Value>;
 /** Maximum number of combinations of values for which conditions are tested, as on the server. */
 const MAX_CASES = 2000;
 
-/** What conditions that are tested in order do for all values. */
+/** The coverage of all values by conditions that are tested in order. */
 export interface Cases {
   /** Indexes of the conditions that never apply. */
   unused: number[];
@@ -135,7 +135,7 @@ function valuesWords(doc: OpenDocument, types: State["types"], values: Values): 
     .join(", ");
 }
 
-/** What is wrong with the conditions of the connections from an action. */
+/** The problem of the conditions of the connections from an action. */
 export interface BranchProblem {
   /** Id of the action, or of the connection. */
   id: string;

@@ -26,7 +26,7 @@ export function kindWords(kind: string): string {
   return known ? i18n._(known) : kind;
 }
 
-/** Return what an error exit says at its line: "on error: Refused". */
+/** Return the text of an error exit at its line: "on error: Refused". */
 export function errorWords(kinds: readonly string[]): string {
   const [only = ANY] = kinds;
   if (kinds.length > 1) return plural(kinds.length, { one: "on error: # kind", other: "on error: # kinds" });

@@ -13,7 +13,7 @@ export const MAX_BRANCHES = 4;
 
 type Call = Pick<Action, "name" | "type">;
 
-/** What a function uses, also through the functions that it calls. */
+/** The devices and the parallel work that a function uses, also through the functions that it calls. */
 interface Use {
   /** Names of the first action with each device, by the id of the device. */
   devices: Map<string, string>;

@@ -41,7 +41,7 @@ export function listingOf(doc: OpenDocument): Row[] {
   const waiting: (Row | { kind: "block"; id: string; depth: number; next: string | null })[] = [];
   const later: typeof waiting = [];
   const block = (id: string, depth: number, next: string | null) => later.push({ kind: "block", id, depth, next });
-  /** List the actions after a connection: here if they belong to it, else where they are listed. */
+  /** List the actions after a connection here if they belong to it, otherwise refer to their place in the list. */
   const follow = (item: LogicItem, owner: string, depth: number, next: string | null, head = false) => {
     const target = placeOf(item.end);
     const only = incoming(doc, target).length === 1;

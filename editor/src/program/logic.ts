@@ -1,4 +1,4 @@
-/** What can follow an action of a program: results, conditions and free branches. */
+/** The possible successors of an action: results, conditions and free branches. */
 
 import { t } from "@lingui/core/macro";
 import type { Action, LogicItem, ProjectLogicIf } from "../protocol/types";
@@ -90,7 +90,7 @@ export function conditionsOf(doc: OpenDocument, types: State["types"], id: strin
 }
 
 // ------------------------------------------------------------------------------------------------ branches
-/** What a new connection from an action has to be to go with the existing ones. */
+/** The kind of a new connection from an action that fits the existing connections. */
 export interface NewStep {
   condition?: ProjectLogicIf;
   /** The existing connection, which needs a condition first. */

@@ -35,7 +35,7 @@ export function movableRuns(doc: OpenDocument): Map<string, readonly string[]> {
   return found;
 }
 
-/** How the connections change. The connection between the action and its successor is removed first. */
+/** The changes of the connections. The connection between the action and its successor is removed first. */
 export interface Move {
   remove: string;
   /** Connections that lead elsewhere from now on, in this order. */
@@ -44,7 +44,7 @@ export interface Move {
   add: { start: string; end: string };
 }
 
-/** Return how an action moves to a place among those of `movableRuns`; a sentence if it cannot. */
+/** Return the move of an action to a place of `movableRuns`; a sentence if it is not possible. */
 export function moveOf(doc: OpenDocument, id: string, to: number): Move | string {
   const run = movableRuns(doc).get(id) ?? [];
   const from = run.indexOf(id);

@@ -1,6 +1,6 @@
 /**
- * What the actions of a program are and return, and conditions as text. Part of the shell; what can follow an action is
- * in `logic.ts`.
+ * The names and results of actions, and conditions as text. Part of the shell; the successors of actions are in
+ * `logic.ts`.
  */
 
 import { plural, t } from "@lingui/core/macro";

@@ -1,4 +1,4 @@
-/** Where the running program is: the calls around the present actions. Pure functions. */
+/** The position of the running program: the calls around the present actions. Pure functions. */
 
 import { anyAction } from "../store/scope";
 import type { State } from "../store/state";

@@ -1,4 +1,4 @@
-/** Settings of devices: what is missing, and how they are grouped. Pure functions. */
+/** Settings of devices: missing values and groups. Pure functions. */
 
 import type { ObjectTypeMeta, Parameter, ParameterMeta } from "../protocol/types";
 import type { OpenDocument, State } from "../store/state";

@@ -1,4 +1,4 @@
-/** The running action in words: what it does, its parameters, and how long it usually takes. Pure functions. */
+/** The running action in words: its description, its parameters, and its usual duration. Pure functions. */
 
 import { t } from "@lingui/core/macro";
 import type { Action, ActionParameter, TraceEntry } from "../protocol/types";
@@ -23,7 +23,7 @@ export interface Step {
   name: string;
   /** Name of its device. */
   device: string;
-  /** What it does, as its object type describes it; empty if unknown. */
+  /** The description of the action by its object type; empty if unknown. */
   does: string;
   /** Its most telling parameters as text; empty if it has none. */
   values: string;

@@ -26,7 +26,7 @@ export class DocumentDetails implements Follower {
 
 async function loadDetails(document: string, scene: string, project: boolean, isCurrent: () => boolean): Promise<void> {
   const ask = async (work: Promise<Partial<State>>) => {
-    const change = await work.catch(() => null); // refused if the document was closed meanwhile
+    const change = await work.catch(() => null); // refused if the document has been closed
     if (change && isCurrent()) store.setState(change);
   };
   if (serves("GetViewState")) {

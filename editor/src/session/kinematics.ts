@@ -7,7 +7,7 @@ export interface RobotKinematics {
   object_id: string;
   in_force: "none" | "nominal" | "measured";
   read?: string;
-  /** Why the calibration of the controller is not used, in the user's language. */
+  /** The reason why the calibration of the controller is not used, in the user's language. */
   refused?: string;
 }
 

@@ -1,4 +1,4 @@
-/** What this browser stores: user, token, language and display settings. Everything else is stored on the server. */
+/** The data stored by this browser: user, token, language, display settings. All other data is on the server. */
 
 const KEYS = {
   name: "arcor2-hw.name",
@@ -9,7 +9,7 @@ const KEYS = {
   language: "arcor2-hw.language",
   /** Focal lengths of the cameras of this device. */
   lenses: "arcor2-hw.lenses",
-  /** Where users placed the workplace by hand in AR, by camera. */
+  /** The poses at which users placed the workplace by hand in AR, by camera. */
   placements: "arcor2-hw.placements",
 };
 

@@ -1,4 +1,4 @@
-/** What this page did recently, for the diagnosis file: events, refusals, faults. It is not sent anywhere. */
+/** The recent activity of this page for the diagnosis file: events, refusals, faults. It is not sent. */
 
 import type { DiaryEntry } from "../store/runtime";
 import { now } from "../store/store";

@@ -40,7 +40,7 @@ export async function waitForPerson(): Promise<void> {
 
 async function resumed(): Promise<LogOnData | null> {
   let tried = "";
-  // Another session may start meanwhile, by the card of the next person.
+  // Another session may have started by the card of the next person.
   for (let session = stored(); session && session !== tried; session = stored()) {
     const data = await call("LogOn", { session }).catch(() => null);
     if (data) return data;
@@ -69,7 +69,7 @@ export async function logOn(args: LogOnArgs): Promise<void> {
 /** Log the person off; the log-on screen follows. */
 export const logOff = (): Promise<unknown> => call("LogOff");
 
-/** Take the data of LogOnChanged. `enter` starts over when nobody is logged on any more. */
+/** Process the data of LogOnChanged. `enter` starts again after a log-off. */
 export function changed(data: LogOnChangedData, enter: () => void): void {
   setConnection({ role: ROLES[data.role] });
   if (data.person) return;

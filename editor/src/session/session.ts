@@ -137,7 +137,7 @@ export class Session {
     else if (event.event === "InterlockStates" || event.event === "InterlockChanged")
       for (const take of now().runtime.takeInterlocks ?? []) take(event);
     else {
-      // Frequent events would push everything else out of the diary.
+      // Frequent events would displace all other entries of the diary.
       if (event.event !== "MovePreview" && event.event !== "UserPresence")
         note("event", `${event.event} ${event.change_type ?? ""}`);
       applyEvent(event);

@@ -45,7 +45,7 @@ async function subscribe(robot_id: string): Promise<void> {
     const asked = serves("StreamRobot")
       ? call("StreamRobot", { robot_id, what, rate: RATE[what] })
       : call("RegisterForRobotEvent", { robot_id, what, send: true });
-    // Refused by a robot that disconnects meanwhile, or has no such data; stale poses are shown as stale.
+    // The request is refused if the robot has disconnected or has no such data; stale poses are marked.
     await asked.catch(() => {});
   }
 }

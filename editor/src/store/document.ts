@@ -84,7 +84,7 @@ export function itemOf(doc: OpenDocument | null, id: string): unknown {
   return doc?.objects[id] ?? doc?.points[id] ?? doc?.orientations[id];
 }
 
-/** Return the document after an event, with the same function open; the same object if it concerns something else. */
+/** Return the document after an event, with the same function open; the same object if the event does not affect it. */
 export function changed(doc: OpenDocument, event: ServerEvent): OpenDocument {
   const program = inScope(doc, []);
   const after = afterEvent(program, event);

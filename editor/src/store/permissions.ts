@@ -1,4 +1,4 @@
-/** What the user may do, judged by the state alone. */
+/** The permissions of the user, derived from the state alone. */
 
 import { t } from "@lingui/core/macro";
 import { MIN_ROLE, type Requests } from "../protocol/types";

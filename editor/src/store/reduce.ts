@@ -236,7 +236,7 @@ function isAnswering(objects: State["live"]["objects"]): boolean {
   return Object.values(objects).every((each) => each.answering !== false);
 }
 
-/** Return the state of the online scene; null if the event concerns something else. */
+/** Return the state of the online scene; null if the event does not affect it. */
 function live(state: State, event: ServerEvent, time: number): Partial<State> | null {
   const now = state.live;
   const become = (change: Partial<typeof now>) => ({ live: { ...now, ...change } });
@@ -322,7 +322,7 @@ export function withRuns(program: State["program"], added: Run[]): State["progra
   return { ...program, runs, watched };
 }
 
-/** Return the state of the running program; null if the event concerns something else. */
+/** Return the state of the running program; null if the event does not affect it. */
 function program(state: State, event: ServerEvent): Partial<State> | null {
   const now = state.program;
   const become = (change: Partial<typeof now>) => ({ program: { ...now, ...change } });

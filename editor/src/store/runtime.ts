@@ -1,6 +1,6 @@
 /**
- * What this page is doing, as far as it is not data: its connection, its 3D view, its operations. It is part of the
- * store, but changes without notifying subscribers. A module above the store declares the type of its object with
+ * The activity of this page: its connection, its 3D view, its operations. This part of the store changes without
+ * notifying subscribers. A module above the store declares the type of its object with
  * `declare module`.
  */
 

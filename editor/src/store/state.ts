@@ -51,7 +51,7 @@ export type ConnectionStatus = "left" | "connecting" | "person" | "joining" | "r
 
 export interface Connection {
   status: ConnectionStatus;
-  /** Why it is lost or refused, as a sentence. */
+  /** The reason why it is lost or refused, a sentence. */
   reason: string;
   /** The server refused the connection because of a missing or invalid token. */
   needsToken: boolean;
@@ -87,7 +87,7 @@ export interface OpenDocument {
   points: Record<string, BareActionPoint>;
   orientations: Record<string, Of<NamedOrientation>>;
   joints: Record<string, Of<ProjectRobotJoints>>;
-  /** Actions and connections of the function that is open, else of the program. */
+  /** Actions and connections of the open function, otherwise of the program. */
   actions: Record<string, Of<Action>>;
   logic: Record<string, LogicItem>;
   program: Body;
@@ -138,7 +138,7 @@ export interface Live {
   message: string;
   objects: Record<string, ObjectStateData>;
   health: Record<string, ObjectHealthData>;
-  /** What one can see of devices, and the parts that robots carry. */
+  /** The visible state of devices, and the parts that robots carry. */
   values: Record<string, ObjectValuesData>;
   holds: Record<string, RobotHoldData>;
   /** Moving robots with the kind of motion. */

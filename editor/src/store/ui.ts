@@ -30,7 +30,7 @@ export interface Ghost {
   joints: Joint[];
   /** Pose of its base in the world; by default that of the robot. */
   at?: Pose | undefined;
-  /** Why the robot cannot reach it, as a sentence; empty if it can. */
+  /** The reason why the robot cannot reach it, a sentence; empty if it can. */
   problem: string;
 }
 
@@ -87,7 +87,7 @@ export interface Measurement {
   fit: Fit | null;
 }
 
-/** How well the touched points fit to the known ones. */
+/** The fit of the touched points to the known points. */
 export interface Fit {
   /** Whether there are enough points for the errors to be meaningful. */
   checked: boolean;
@@ -148,13 +148,13 @@ export interface Ar {
   seenAt: number;
   /** Why no marker is found. */
   loss: "dark" | "blurred" | "unseen";
-  /** How far the last correction moved the overlay, m, if it was visible; 0 otherwise. */
+  /** Distance by which the last correction moved the overlay, m, if it was visible; 0 otherwise. */
   corrected: number;
   /** Number of configured markers. */
   configured: number;
   /** Whether the device has an orientation sensor. */
   sensor: boolean;
-  /** How far the user moved the overlay away from where markers put it, m and rad. */
+  /** Offset by which the user moved the overlay away from its pose by markers, m and rad. */
   nudge: { distance: number; angle: number } | null;
   /** Whether the controls for placing are open. */
   placing: boolean;

@@ -1,4 +1,4 @@
-/** What one can see of devices: their place, reported values, grippers and parts at robots. Pure functions. */
+/** The visible state of devices: their place, reported values, grippers and parts at robots. Pure functions. */
 
 import type { CarriedItem, DetectedPart, RobotItem } from "../engine/items";
 import type { Pose, Position, SceneObject } from "../protocol/types";
@@ -12,7 +12,7 @@ const GRIPPERS = ["gripper", "suction"];
 /** Icons of types without a pose that the view can draw; the rest are services, and grippers, which are at robots. */
 const DRAWN = ["light", "printer", "reader", "io", "scale", "axis", "machine"];
 
-/** Return where an object is drawn: its pose, or where users put a device that has none; undefined without both. */
+/** Return the pose at which an object is drawn: its own, or one chosen by users; undefined without both. */
 export function placeOf({ view }: Pick<State, "view">, object: SceneObject): Pose | undefined {
   if (object.pose) return object.pose;
   const place = view.scene[`place/${object.id}`];
@@ -57,7 +57,7 @@ export function gripperOf({ doc, types }: Pick<State, "doc" | "types">, robot: S
   });
 }
 
-/** Return what the view shows at the flange of a robot: its gripper, and what it carries. */
+/** Return the items at the flange of a robot in the view: its gripper and the carried parts. */
 export function toolOf(state: State, robot: SceneObject): Pick<RobotItem, "tool" | "parts"> {
   const own = state.live.values[robot.id];
   const parts = own?.parts.map(({ name, link, pose, model }): CarriedItem => {

@@ -1,4 +1,4 @@
-/** How the program is drawn in space: stacks, what is pale, and where Start and End are. Pure functions. */
+/** The drawing of the program in space: stacks, pale items, positions of Start and End. Pure functions. */
 
 import { END, incoming, outgoing, placeOf, START } from "../program/steps";
 import type { Position } from "../protocol/types";

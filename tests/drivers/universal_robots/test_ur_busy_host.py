@@ -129,7 +129,7 @@ def test_a_slow_command_may_have_tripped_the_watchdog() -> None:
 
 
 def test_a_frozen_owner_stops_the_arm(owner: Owner, fake: FakeUr) -> None:
-    assert UR5e.loss_reaction.kind is LossKind.MAX_STOP_TIME
+    assert UR5e.loss_reaction.kind is LossKind.STOPS_WITHIN
     process = owner()
     time.sleep(0.3)  # at full speed
     os.kill(process.pid, signal.SIGSTOP)

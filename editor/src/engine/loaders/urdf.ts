@@ -14,7 +14,7 @@ export interface RobotMaterials {
 
 export interface LoadedRobot {
   robot: URDFRobot;
-  /** Why meshes are missing, a sentence each. */
+  /** The reasons why meshes are missing, one sentence each. */
   problems: string[];
 }
 

@@ -38,7 +38,7 @@ const DASHES: Record<LinkItem["branch"], number[] | null> = {
 };
 /** How far error exits bend to the side, as a part of their length and at most, m: another line may have their ends. */
 const ASIDE = [0.2, 0.1] as const;
-/** Where the arrowhead is, as a part of the line. */
+/** The position of the arrowhead, as a fraction of the line. */
 const HEAD = 0.86;
 /** Height of the label, m, and its limits on the screen, pixels. */
 const PLATE = 0.036;

@@ -114,7 +114,7 @@ export class RobotThing extends Thing<RobotItem> {
     });
   }
 
-  /** Called before a frame when joints or anything else changed. Return whether the motion continues. */
+  /** Called before a frame if joints or other data have changed. Return whether the motion continues. */
   frame(): boolean {
     this.placeTips();
     const drawn = this.context.telemetry.interpolated(this.item.id, this.context.period);

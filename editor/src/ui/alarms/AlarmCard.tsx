@@ -1,4 +1,4 @@
-/** The alarm that an operator should see first: what happened, why, and what to do. The others are folded under it. */
+/** The alarm that an operator should see first: the event, its cause and its remedy. The others are folded below. */
 
 import { plural, t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
@@ -58,7 +58,7 @@ export function AlarmCard({ alarms }: { alarms: readonly AlarmRecord[] }) {
           </p>
         </div>
         {first.picture && <Picture number={first.number} />}
-        {/* With a key, a press never acknowledges an alarm that took this place meanwhile. */}
+        {/* With a key, a press never acknowledges another alarm that has just taken this place. */}
         {!first.acknowledged && <Acknowledge key={first.number} record={first} />}
       </div>
       {count > 0 && (

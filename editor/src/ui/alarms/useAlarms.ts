@@ -52,7 +52,7 @@ function translated(record: AlarmRecord): AlarmRecord {
   return { ...translatedAlarm(record), cause: translate({ text: record.cause }) };
 }
 
-/** Return in words how often something happened. */
+/** Return a number of occurrences in words. */
 export const timesOf = (count: number): string => plural(count, { one: "# time", other: "# times" });
 
 /** The order of priorities, most urgent first. */
@@ -64,7 +64,7 @@ export function firstUp(alarms: readonly AlarmRecord[]): { first: AlarmRecord | 
   for (const each of alarms) groups.set(each.first_up, [...(groups.get(each.first_up) ?? []), each]);
   const urgency = (group: AlarmRecord[]) => Math.min(...group.map((each) => PRIORITIES.indexOf(each.priority)));
   const oldest = (group: AlarmRecord[]) => Math.min(...group.map((each) => each.number));
-  // What nobody has seen comes first, then what is most urgent, then what happened first.
+  // Unacknowledged alarms come first, then the most urgent ones, then the oldest ones.
   const seen = (group: AlarmRecord[]) => Number(group.every((each) => each.acknowledged));
   const [group] = [...groups.values()].sort(
     (a, b) => seen(a) - seen(b) || urgency(a) - urgency(b) || oldest(a) - oldest(b),

@@ -1,4 +1,4 @@
-/** Where other users in AR are and look: a small camera with their name, in their colour. */
+/** The poses of other users in AR: a small camera with their name, in their colour. */
 
 import { t } from "@lingui/core/macro";
 import { useLayoutEffect, useRef } from "react";

@@ -1,4 +1,4 @@
-/** What AR does and needs, before the browser asks for the camera; or why it cannot start, and what to do. */
+/** An explanation of AR before the browser asks for the camera; or the reason why AR cannot start, with a remedy. */
 
 import { plural, t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";

@@ -1,4 +1,4 @@
-/** Why AR cannot start, in words. */
+/** The reason why AR cannot start, in words. */
 
 import { t } from "@lingui/core/macro";
 import type { Obstacle } from "../../ar/support";

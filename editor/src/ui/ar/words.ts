@@ -1,4 +1,4 @@
-/** What AR says about its quality, and what to do. */
+/** Texts about the quality of AR, with remedies. */
 
 import { plural, t } from "@lingui/core/macro";
 import { decimal } from "../../formats";

@@ -1,4 +1,4 @@
-/** The audit trail: who changed or commanded what, newest first. A separate chunk. */
+/** The audit trail: changes and commands with their users, newest first. A separate chunk. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";

@@ -1,4 +1,4 @@
-/** How far a calibration has moved an object, and its previous pose, to be accepted or reverted. */
+/** The change of the pose of an object by a calibration, to be accepted or reverted. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";

@@ -1,4 +1,4 @@
-/** The picture of a camera: one, or live. It tells its rate, its age if it is old, and what went wrong. */
+/** A single picture or the live picture of a camera, with its rate, its age if it is old, and errors. */
 
 import { plural, t } from "@lingui/core/macro";
 import { useEffect, useRef, useState } from "react";
@@ -18,7 +18,7 @@ const reasonOf = (error: unknown): string =>
   error instanceof TypeError ? t`The server cannot be reached.` : sentence(error); // `fetch` rejects with a TypeError
 const NOTHING: Feed = { failure: "" };
 
-/** `why` is why the camera cannot take pictures; empty if it can. */
+/** `why`: the reason why the camera cannot take pictures; empty if it can. */
 export function CameraPicture({ id, why }: { id: string; why: string }) {
   const image = useRef<HTMLImageElement>(null);
   const [live, setLive] = useState(false);

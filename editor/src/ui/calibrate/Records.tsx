@@ -16,7 +16,7 @@ const endedTasks = ({ tasks }: State): ReadonlySet<string> =>
 
 export function Records({ id }: { id: string }) {
   const name = useEditor((state) => nameOf(state, id));
-  // The cause of an earlier failure may have been removed meanwhile, for example by configuring markers.
+  // The cause of an earlier failure may have been removed in the meantime, for example by configuring markers.
   const [before] = useState(() => endedTasks(now()));
   const task = useEditor((state) =>
     Object.values(state.tasks).findLast(

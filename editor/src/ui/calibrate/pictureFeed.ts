@@ -1,4 +1,4 @@
-/** Live pictures of a camera: the next is requested when the previous one has been drawn and somebody can see it. */
+/** Live pictures of a camera: the next picture is requested when the previous one is drawn and visible. */
 
 /** Shortest time between the requests of two pictures, s. */
 export const PERIOD = 0.1;
@@ -16,7 +16,7 @@ export interface Feed {
   taken?: number;
   /** Pictures per second; undefined until two have been drawn in succession. */
   rate?: number;
-  /** Why there is no new picture; empty if the last one succeeded. */
+  /** The reason why there is no new picture; empty if the last request succeeded. */
   failure: string;
 }
 
@@ -24,7 +24,7 @@ export interface Source {
   take: () => Promise<Blob>;
   /** Draw a picture; resolve when it is on the screen. */
   draw: (picture: Blob) => Promise<void>;
-  /** Whether the place of the picture can be seen. */
+  /** Whether the place of the picture is visible. */
   isSeen: () => boolean;
   reason: (error: unknown) => string;
   changed: (feed: Feed) => void;
@@ -83,7 +83,7 @@ function rateOf(drawn: readonly number[]): Pick<Feed, "rate"> {
   return { rate: ((drawn.length - 1) * 1000) / (last - first) };
 }
 
-/** Return the age of a shown picture in s if it has to be marked, else 0. */
+/** Return the age of a shown picture in s if it has to be marked, otherwise 0. */
 export function staleness(feed: Feed, time: number): number {
   const age = feed.taken === undefined ? 0 : (time - feed.taken) / 1000;
   return age >= STALE || (feed.failure !== "" && age > 0) ? age : 0;

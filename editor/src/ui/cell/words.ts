@@ -42,7 +42,7 @@ const nameOf = <Id>(options: readonly Option<Id>[], id: Id): string => {
   return option ? i18n._(option.name) : String(id);
 };
 
-/** Return what the PLC has commanded, or why the cell is aborted; an empty string otherwise. */
+/** Return the command of the PLC, or the reason why the cell is aborted; an empty string otherwise. */
 export function programText({ state, held_by_plc, job }: CellStatus): string {
   if (held_by_plc) return t`The PLC holds the program and resumes it.`;
   if (job !== undefined) return t`Job ${job} of the PLC is active.`;

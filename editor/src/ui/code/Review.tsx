@@ -1,4 +1,4 @@
-/** What an edited script changes: the items of the project, and the text. */
+/** The changes by an edited script: the items of the project, and the text. */
 
 import { unifiedMergeView } from "@codemirror/merge";
 import { EditorState } from "@codemirror/state";

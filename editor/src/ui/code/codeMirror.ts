@@ -41,7 +41,7 @@ import { t } from "@lingui/core/macro";
 import { completing } from "./completing";
 import { actionsOf, boilerplate, idsOf, type ScriptAction } from "./script";
 
-/** What the lines of a script show about their actions, by name. */
+/** The marks at the lines of a script, by name of the action. */
 export interface Marks {
   selected: string;
   running: readonly string[];

@@ -1,4 +1,4 @@
-/** What the text editor offers while a user types: names, actions, points, signatures. Pure functions. */
+/** Completions in the text editor: names, actions, points, signatures. Pure functions. */
 
 import { t } from "@lingui/core/macro";
 import { decoded } from "../../program/decoded";
@@ -15,7 +15,7 @@ export interface Offer {
   /** Short text next to it. */
   detail: string;
   info?: string;
-  /** What is inserted, with fields as `${name}`. */
+  /** The inserted text, with fields as `${name}`. */
   snippet?: string;
   /** It has the type of the parameter at the cursor. */
   fits?: boolean;
@@ -173,7 +173,7 @@ const expression = (label: string, type: string): Offer => ({
   fits: true,
 });
 
-/** Return what can be typed at a position; null if nothing is known there. */
+/** Return the completions at a position; null if there are none. */
 export function offersAt(source: string, at: number, doc: OpenDocument, types: State["types"]): Offers | null {
   const line = source.slice(source.lastIndexOf("\n", at - 1) + 1, at);
   if (/^[^"'#]*#/.test(line) || inString(line)) return null;

@@ -1,4 +1,4 @@
-/** What a generated script contains: its actions by line, the parts that are folded, ids. Pure functions. */
+/** The content of a generated script: its actions by line, the folded parts, ids. Pure functions. */
 
 /** A range of characters. */
 export interface Range {

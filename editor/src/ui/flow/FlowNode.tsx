@@ -27,7 +27,7 @@ export type FlowNodeType = Node<
   "box"
 >;
 
-/** Where error exits leave a node. */
+/** The connection point of a node for error exits. */
 export const FAILS = "fails";
 
 const onError = (): Branch => ({ id: "error", label: t`On error` });

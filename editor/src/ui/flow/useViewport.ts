@@ -1,4 +1,4 @@
-/** The shown part of the graph: its start, then the running action, else the selection, until the user moves it. */
+/** The shown part of the graph: its start, then the running action or the selection, until the user moves it. */
 
 import { useReactFlow, useStore } from "@xyflow/react";
 import { useEffect, useRef } from "react";

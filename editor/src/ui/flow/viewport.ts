@@ -38,8 +38,8 @@ export function wholeView(boxes: readonly Rect[], { width, height }: Size): View
 }
 
 /**
- * Return the first view: the whole graph if it stays readable, else its start at the upper edge. All columns are shown
- * if they fit.
+ * Return the first view: the whole graph if it stays readable, otherwise its start at the upper edge. All columns are
+ * shown if they fit.
  */
 export function firstView(boxes: readonly Rect[], start: Rect | undefined, size: Size): Viewport {
   const whole = wholeView(boxes, size);

@@ -1,4 +1,4 @@
-/** Where the open function is: Program › handle_board, with Back and the menu of the function. */
+/** The position of the open function: Program › handle_board, with Back and the menu of the function. */
 
 import { t } from "@lingui/core/macro";
 import { Button as AriaButton } from "react-aria-components";

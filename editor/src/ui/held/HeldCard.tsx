@@ -1,4 +1,4 @@
-/** What happened to a program that is held at a failed action, what to do, and how it may continue. */
+/** A program that is held at a failed action: the cause, the remedy, and the ways to continue. */
 
 import { t } from "@lingui/core/macro";
 import { type ReactNode, useState } from "react";

@@ -1,4 +1,4 @@
-/** The form of an interlock: what it applies to, its conditions, and what happens while one is not met. */
+/** The form of an interlock: its target, its conditions, and the reaction while one is not met. */
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";

@@ -19,7 +19,7 @@ export function pauseOf(span: Span): number {
 
 type Column = (number | null)[];
 
-/** Return times in s, and the mean, lowest and highest value times `factor`, with gaps where nothing is known. */
+/** Return times in s, and the mean, lowest and highest value times `factor`, with gaps at unknown values. */
 export function columnsOf(
   { since, until, times, mean, lowest, highest }: PointSummary,
   factor: number,

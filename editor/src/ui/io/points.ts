@@ -12,7 +12,7 @@ export const RATE = 2;
 /** Time without an event after which values are stale, s. */
 const LATE = 2.5;
 
-/** What a device has reported, and when it arrived, s. */
+/** The report of a device, and the time of its arrival, s. */
 export interface Reported extends ObjectPointsData {
   at: number;
 }
@@ -35,7 +35,7 @@ export interface ShownDevice {
   id: string;
   name: string;
   points: ShownPoint[];
-  /** Why the points are not known. */
+  /** The reason why the points are not known. */
   reason: string;
 }
 
@@ -82,7 +82,7 @@ function shownPoint(
   };
 }
 
-/** What is searched for: a device, and words in the names of device and point. */
+/** The search: a device, and words in the names of device and point. */
 export interface Filter {
   device: string;
   text: string;

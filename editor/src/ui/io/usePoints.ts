@@ -30,7 +30,7 @@ export function usePoints(objects: readonly SceneObject[]): ReadonlyMap<string, 
       }, DRAWN_AFTER);
     };
     const send = (on: boolean) => {
-      // Refused if the scene went offline meanwhile, which ends the streams too.
+      // The request is refused if the scene has gone offline, which also ends the streams.
       for (const object_id of streamed)
         call("StreamPoints", on ? { object_id, rate: RATE } : { object_id, send: false }).catch(() => {});
     };

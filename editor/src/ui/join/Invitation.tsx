@@ -1,4 +1,4 @@
-/** How others can join: the address as a QR code, and the fingerprint to compare. */
+/** Data for others to join: the address as a QR code, and the fingerprint to compare. */
 
 import { t } from "@lingui/core/macro";
 import encodeQR from "qr";

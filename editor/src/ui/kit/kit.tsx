@@ -12,7 +12,7 @@ interface PlainButtonProps extends Omit<ButtonProps, "children" | "className"> {
   icon?: IconName;
   children?: ReactNode;
   className?: string;
-  /** Why it is not available, as a sentence that is shown when it is pressed; empty if it is available. */
+  /** The reason why it is not available, a sentence shown when it is pressed; empty if it is available. */
   why?: string;
 }
 

@@ -10,7 +10,7 @@ export interface ConfirmProps {
   children: ReactNode;
   /** Text of the button that confirms. */
   yes: string;
-  /** Why it cannot be done now, as a sentence. */
+  /** The reason why it is not possible now, a sentence. */
   not?: string;
   onYes: () => void;
   onClose: () => void;

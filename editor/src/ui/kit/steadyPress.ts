@@ -28,7 +28,7 @@ export const movedAway = (pressed: Point, released: Point, rect: Rect): boolean 
   Math.hypot(released.clientX - pressed.clientX, released.clientY - pressed.clientY) <= STILL &&
   !contains(rect, released);
 
-/** Watch the presses of a page. A control that was removed or replaced meanwhile is not pressed. */
+/** Watch the presses of a page. A control that was removed or replaced during the press is not activated. */
 export function keepPresses(page: Document): void {
   let press: Press | null = null;
   const listen = (type: "pointerdown" | "pointerup" | "pointercancel", act: (event: PointerEvent) => void) =>

@@ -17,7 +17,7 @@ import { Button } from "../kit/kit";
 import { openOverlay } from "../search/overlay";
 import "./notices.css";
 
-/** How long a message that is not an error stays, s. */
+/** Time for which a message that is not an error is shown, s. */
 const STAY = 6;
 
 export function Notices({ docked = false }: { docked?: boolean }) {

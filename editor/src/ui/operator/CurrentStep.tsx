@@ -1,4 +1,4 @@
-/** The running action in words, how long it has run, and what the operator can do next. */
+/** The running action in words, its duration up to now, and the next steps of the operator. */
 
 import { t } from "@lingui/core/macro";
 import { decimal, duration } from "../../formats";

@@ -91,7 +91,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   const cell = useCell();
   const note = cell && noteText(cell);
   const alarms = listed ?? [];
-  // The cards are shown together with what is below them: buttons do not move when something is loaded.
+  // The cards are shown together with the content below them, so that buttons do not move after loading.
   const loaded =
     (listed || !serves("ListAlarms")) &&
     (inventories || !serves("GetParts")) &&
@@ -99,7 +99,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   // Until a package is chosen, Start produces the product.
   const made = product && !packages.some((each) => each.id === chosen) ? product : null;
   const before = useRef("");
-  // A package that is built meanwhile does not replace the selected one.
+  // A package that is built later does not replace the selected one.
   const known = [made?.recipe.package_id ?? chosen, program.packageId, before.current, packages[0]?.id]
     .map((id) => packages.find((each) => each.id === id))
     .find((each) => each !== undefined);
@@ -109,9 +109,9 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
   const idle = !runs && !starting;
   const run = idle ? undismissedRun(state) : null;
   const result = resultOf(run ?? undefined);
-  // The card of an alarm says more than the error of the run.
+  // The card of an alarm contains more information than the error of the run.
   const explained = alarms.some((each) => !each.acknowledged && each.run === run?.number);
-  // The card about the parts says that the run was interrupted.
+  // The card about the parts shows that the run was interrupted.
   const asked = result?.tone === "warn" && inventories?.some((each) => each.run);
   useTicking();
   // The shown screen is not part of the state, so the session does not notice the change by itself.
@@ -199,7 +199,7 @@ export default function Operator({ kiosk, Cell }: { kiosk: boolean; Cell: Compon
         data-runs={runs}
         data-held={program.held !== null}
         hidden={listing || !loaded}
-        // It scrolls, and may contain nothing else that a keyboard reaches.
+        // It scrolls, and may contain no other element that is reachable by keyboard.
         tabIndex={runs ? 0 : undefined}
       >
         {!program.held && !asked && (
@@ -322,7 +322,7 @@ function Alarms({ alarms }: { alarms: readonly AlarmRecord[] }) {
   );
 }
 
-/** List the devices that are not connected, without `known` ones; nothing if there are none. */
+/** List the devices that are not connected, without `known` devices. Nothing is shown for an empty list. */
 function Devices({ known }: { known: ReadonlySet<string | undefined> }) {
   const live = useEditor((state) => state.live);
   const doc = useEditor((state) => state.doc);

@@ -1,4 +1,4 @@
-/** What the program has produced: cycles and their durations, good and bad parts, counters. */
+/** The production of the program: cycles and their durations, good and bad parts, counters. */
 
 import { t } from "@lingui/core/macro";
 import { decimal, duration } from "../../formats";

@@ -1,4 +1,4 @@
-/** Why the server would refuse to start or resume a program, as far as this page knows. Pure functions. */
+/** The reasons known to this page why the server would refuse to start or resume a program. Pure functions. */
 
 import { t } from "@lingui/core/macro";
 import type { CellStatus } from "../../protocol/types";

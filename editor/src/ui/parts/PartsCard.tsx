@@ -1,4 +1,4 @@
-/** Where the parts in the cell are: what was running, expected next to sensed, and one question for each part. */
+/** The places of the parts in the cell: the interrupted action, expected and sensed parts, a question for each part. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";
@@ -166,7 +166,7 @@ function Inventory({
       {part && (
         <>
           <h2>{t`Where is part ${shown(part)}?`}</h2>
-          {/* With a key, a press never answers for a part that took this place meanwhile. */}
+          {/* With a key, a press never answers for another part that has just taken this place. */}
           <div key={part.number} className="held-choices">
             {answersFor(part, inventory).map((place) => (
               <Button

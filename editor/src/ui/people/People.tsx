@@ -1,4 +1,4 @@
-/** Who is connected, and who left and still holds locks. */
+/** The users who are connected, and those who left and still hold locks. */
 
 import { plural, t } from "@lingui/core/macro";
 import { Suspense, useState } from "react";

@@ -97,7 +97,7 @@ function Tiles({ persons, onChoose }: { persons: readonly Person[]; onChoose: (p
   );
 }
 
-/** The first start: nobody can log on yet. */
+/** The first start: no person can log on yet. */
 function FirstAdministrator({ onDone }: { onDone: () => void }) {
   const [name, setName] = useState("");
   const [pin, setPin] = useState("");

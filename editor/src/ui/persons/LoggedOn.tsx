@@ -1,4 +1,4 @@
-/** Who is logged on at this shared device, and one tap to log off. It also reads the card of the next person. */
+/** The person who is logged on at this shared device, with log-off. Also reads the card of the next person. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect } from "react";
@@ -22,7 +22,7 @@ export default function LoggedOn() {
     const used = (event: Event) => {
       if (event.timeStamp - reported < pause) return;
       reported = event.timeStamp;
-      call("KeepLoggedOn").catch(() => {}); // the connection is lost: nobody is logged on by it
+      call("KeepLoggedOn").catch(() => {}); // the connection is lost, and with it the log-on
     };
     const events = ["pointerdown", "keydown", "wheel"] as const;
     for (const each of events) window.addEventListener(each, used, { capture: true, passive: true });

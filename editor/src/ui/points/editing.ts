@@ -1,4 +1,4 @@
-/** Why an item of the open document cannot be changed by this user now. */
+/** The reason why this user cannot change an item of the open document now. */
 
 import { t } from "@lingui/core/macro";
 import type { Requests } from "../../protocol/types";

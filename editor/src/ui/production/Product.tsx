@@ -32,7 +32,7 @@ export default function Product({ selected, onSelect, onFound }: Props) {
   const [recipe, setRecipe] = useState<Recipe | null>();
   const [releasedOnly, setReleasedOnly] = useState(false);
   const [order, setOrder] = useState("");
-  /** What was entered in place of the values of the recipe, by name. */
+  /** The values that were entered in place of those of the recipe, by name. */
   const [texts, setTexts] = useState<Record<string, string>>({});
   useEffect(() => {
     if (!ready || overlay) return;

@@ -1,4 +1,4 @@
-/** The signature of a recipe: who, what it means, and the PIN. */
+/** The signature of a recipe: the person, the meaning, and the PIN. */
 
 import { i18n, type MessageDescriptor } from "@lingui/core";
 import { msg, t } from "@lingui/core/macro";

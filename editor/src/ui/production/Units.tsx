@@ -88,7 +88,7 @@ export function Units({ onClose }: { onClose: () => void }) {
   );
 }
 
-/** What the cell has produced in a period. */
+/** The production of the cell in a period. */
 function Numbers() {
   const [period, setPeriod] = useState<Period>("8");
   const [found, setFound] = useState<Production | null>(null);

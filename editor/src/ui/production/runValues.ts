@@ -21,7 +21,7 @@ export function limitsOf({ min, max }: RecipeValue): string {
   return t`${decimal(min, 6)} to ${decimal(max, 6)}`;
 }
 
-/** What the next run uses in place of the values of the recipe, JSON by name, or why it cannot start. */
+/** The values of the next run in place of those of the recipe, JSON by name, or the reason why it cannot start. */
 export interface RunValues {
   values: Record<string, string>;
   problem: string;

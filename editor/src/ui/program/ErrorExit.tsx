@@ -24,7 +24,7 @@ interface ErrorKind {
   kind: string;
   /** When an action fails with such an error. */
   about: MessageDescriptor;
-  /** Whose actions fail with it; by default all devices. */
+  /** The devices whose actions fail with it; by default all devices. */
   of?: "robot" | "camera";
 }
 

@@ -59,7 +59,7 @@ function Values({ engine, id, name, puck, values }: ValuesProps) {
       const at = bearingOf(engine, puck);
       const { offsetWidth: width, offsetHeight: height } = element;
       const others = taken(view, element);
-      // Below the puck, else next to it, else above its name.
+      // Below the puck, if possible; otherwise next to it, or above its name.
       const places = at?.inView
         ? [
             [at.x - width / 2, at.y + AWAY],

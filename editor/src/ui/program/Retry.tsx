@@ -1,4 +1,4 @@
-/** How often an action is repeated after it has failed. Shown for actions that are safe to repeat. */
+/** The number of repetitions of a failed action. Shown for actions that are safe to repeat. */
 
 import { t } from "@lingui/core/macro";
 import { notEditable, setRetry } from "../../commands/program";

@@ -35,7 +35,7 @@ interface ValueFieldProps {
   hint?: string;
   /** A secret value: the server sends a placeholder for it. */
   secret?: boolean;
-  /** Why it cannot be changed; empty if it can. */
+  /** The reason why it cannot be changed; empty if it can be changed. */
   why?: string;
   /** It must be entered: marked, and empty while it has its default value, which means "not set". */
   required?: boolean;

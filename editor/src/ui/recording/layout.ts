@@ -1,4 +1,4 @@
-/** How a recording is drawn: which signals, as which columns, and which time is visible. Pure functions. */
+/** The layout of a recording: signals, columns, and the visible time. Pure functions. */
 
 import type { RecordedAction, Recording, Signal } from "../../commands/recordings";
 import { translate } from "../../i18n/serverMessages";

@@ -187,7 +187,7 @@ function useWay(chosen: Chosen, goal: Pose | null, answer: GoalAnswer | null): v
   useEffect(() => () => theEngine()?.showPath(null), []);
 }
 
-/** Why the target cannot be reached; null before the check. */
+/** The reason why the target cannot be reached; null before the check. */
 export function Answer({ answer }: { answer: string | null }) {
   if (answer === null) return null;
   return (

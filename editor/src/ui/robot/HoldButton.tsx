@@ -11,7 +11,7 @@ import { notify } from "../../store/store";
 interface HoldButtonProps {
   /** Label for screen readers. */
   label: string;
-  /** Why it is not available; empty if it is. */
+  /** The reason why it is not available; empty if it is available. */
   why?: string;
   className?: string;
   onHold: () => Held;

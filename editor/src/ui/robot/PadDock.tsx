@@ -15,14 +15,14 @@ export const PadPlace = createContext<HTMLElement | null>(null);
 
 interface PadDockProps {
   chosen: Chosen;
-  /** Why the last request was refused; empty if it was not. */
+  /** The reason why the last request was refused; empty if it was accepted. */
   refused: string;
   /** Shown while there is nothing to report. */
   hint: string;
   children: ReactNode;
 }
 
-/** Show the pad in its place. Neither a message nor anything else in the panel changes its position. */
+/** Show the pad in its place. Messages and other content of the panel do not change its position. */
 export function PadDock({ chosen, refused, hint, children }: PadDockProps) {
   const place = useContext(PadPlace);
   if (!place) return null;
@@ -35,7 +35,7 @@ export function PadDock({ chosen, refused, hint, children }: PadDockProps) {
   );
 }
 
-/** Return in words how a motion goes or ended. */
+/** Return the progress or the result of a motion in words. */
 function phaseWords(phase: "start" | "end" | "failed", goal: string): string {
   switch (phase) {
     case "start":
@@ -47,7 +47,7 @@ function phaseWords(phase: "start" | "end" | "failed", goal: string): string {
   }
 }
 
-/** Report why a request was refused, who moves the robot, or how its last motion ended. */
+/** Show the reason of a refusal, the user who moves the robot, or the result of its last motion. */
 function MotionNote({ chosen: { robotId }, refused, hint }: Omit<PadDockProps, "children">) {
   const motion = useEditor((state) => state.live.motions[robotId]);
   const goal = useEditor((state) => (motion?.goal ? nameOf(state, motion.goal) : ""));

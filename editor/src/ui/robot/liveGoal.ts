@@ -11,7 +11,7 @@ export const PAUSE = 100;
 export interface GoalAnswer {
   /** The target that was checked. */
   goal: Pose;
-  /** Why the target cannot be reached; empty if it can. */
+  /** The reason why the target cannot be reached; empty if it can be reached. */
   problem: string;
   /** State of the straight path, and the id of the obstacle. */
   path: PathState;

@@ -1,4 +1,4 @@
-/** How the user moves robots: frame, step size, speed. Stored while the page is open. */
+/** The user's choices for moving robots: frame, step size, speed. Stored while the page is open. */
 
 import { now, setUi, useEditor } from "../../store/store";
 import type { Jogging, MotionOptions } from "../../store/ui";

@@ -42,7 +42,7 @@ export function useGoalGizmo(
         );
       }
     };
-    // The view may be recreated meanwhile with another quality.
+    // The view may be recreated with another quality in the meantime.
     const bind = () => {
       const engine = theEngine();
       if (engine === bound) return;

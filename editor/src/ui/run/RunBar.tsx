@@ -61,7 +61,7 @@ export default function RunBar() {
   );
 }
 
-/** What happened and how to continue, while the program is held at a failed action. */
+/** The failure, and the ways to continue, while the program is held at a failed action. */
 export function Held() {
   const held = useEditor((state) => state.program.held);
   return held ? (

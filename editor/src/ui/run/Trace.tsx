@@ -63,7 +63,7 @@ export function Trace({ onChoose }: { onChoose: (actionId: string) => void }) {
   );
 }
 
-/** Return how long the program was held at an action, and who decided how it continues. */
+/** Return the duration of a hold of the program at an action, and the user who decided about it. */
 function heldWords({ duration: held = 0, choice, by = "" }: ActionHold): string {
   const words: Record<HoldChoice, string> = {
     retry: t`Try again`,

@@ -1,4 +1,4 @@
-/** Search for devices when the user asks for it, and offer those found as values of a setting. */
+/** Search for devices on request, and offer the found devices as values of a setting. */
 
 import { t } from "@lingui/core/macro";
 import { useState } from "react";

@@ -1,4 +1,4 @@
-/** Where the view draws a device whose type has no pose. */
+/** The pose at which the view draws a device whose type has no pose. */
 
 import { t } from "@lingui/core/macro";
 import { aimedPlace } from "../../commands/crosshair";

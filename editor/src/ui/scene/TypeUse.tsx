@@ -1,4 +1,4 @@
-/** Where an object type is used; an unused uploaded type can be deleted. */
+/** The scenes that use an object type. An unused uploaded type can be deleted. */
 
 import { t } from "@lingui/core/macro";
 import { useEffect, useState } from "react";

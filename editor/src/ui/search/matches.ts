@@ -5,7 +5,7 @@ export interface Entry {
   words: string;
   /** Kind or state of the entry. */
   detail: string;
-  /** Why it is not available; empty if it is. */
+  /** The reason why it is not available; empty if it is available. */
   why: string;
   act: () => void;
 }
@@ -13,7 +13,7 @@ export interface Entry {
 /** Largest number of results. */
 const MOST = 40;
 
-/** Return the matching entries: those that start with the text first; recently used ones first without a text. */
+/** Return the matching entries. Those that start with the text come first; without a text, recently used ones. */
 export function found(entries: readonly Entry[], search: string, recent: readonly string[]): Entry[] {
   const parts = search.trim().toLowerCase().split(/\s+/).filter(Boolean);
   if (parts.length === 0) {

@@ -12,7 +12,7 @@ const state = (change: object = {}): State =>
     ...change,
   }) as unknown as State;
 
-/** What a user does in each step; null: read, then press “Next”. */
+/** The action of the user in each step; null: read, then press “Next”. */
 const DONE: readonly (object | null)[] = [
   null,
   { ui: { tool: "things" } },

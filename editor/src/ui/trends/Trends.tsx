@@ -89,7 +89,7 @@ function Observations({ id }: { id: string }) {
     call("StreamObservations", { object_id: id, rate: RATE }).catch((error: unknown) => setFailed(sentence(error)));
     return () => {
       runtime.takeObservations = undefined;
-      // Refused if the scene went offline meanwhile, which ends the stream too.
+      // The request is refused if the scene has gone offline, which also ends the stream.
       call("StreamObservations", { object_id: id, send: false }).catch(() => {});
     };
   }, [id, live, seen]);

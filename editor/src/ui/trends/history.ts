@@ -18,7 +18,7 @@ export interface Series {
   name: string;
   unit: string;
   binary: boolean;
-  /** One value for each time; null where the quality was bad or nothing was known. */
+  /** One value for each time; null if the quality was bad or no value was known. */
   values: (number | null)[];
   /** The newest observation, to be shown as text. */
   last: Observation;
@@ -28,7 +28,7 @@ export interface History {
   /** s since 1970, ascending. */
   times: number[];
   series: Series[];
-  /** Why there is no new value; empty if there is one. */
+  /** The reason why there is no new value; empty if there is one. */
   failure: string;
 }
 

@@ -22,7 +22,7 @@ interface UsedEngine {
   canvas: RefObject<HTMLCanvasElement | null>;
   labels: RefObject<HTMLDivElement | null>;
   engine: Engine | null;
-  /** Why the engine does not work; empty if it does. */
+  /** The reason why the engine does not work; empty if it works. */
   failed: string;
   /** Quality set by the user, the key of the canvas. */
   quality: string;
