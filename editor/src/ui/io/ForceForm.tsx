@@ -37,7 +37,7 @@ export function ForceForm({ objectId, device, point, onClose }: Props) {
       <p className="quiet small">
         {t`The force ends when you end it, log off, or this device loses its connection.`}{" "}
         {t`The output then returns to its previous value. Until then, no program can start.`}{" "}
-          {t`This is not a safety function.`}
+        {t`This is not a safety function.`}
       </p>
       {point.force === "analog" && (
         <Field
