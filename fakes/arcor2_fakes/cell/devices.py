@@ -37,7 +37,7 @@ class Fake:
         """Connect; wait for a fake that is still starting.
 
         Raises:
-            DeviceGone: It cannot be reached within `patience` s.
+            DeviceUnreachable: It cannot be reached within `patience` s.
         """
         deadline = asyncio.get_running_loop().time() + patience
         while True:
