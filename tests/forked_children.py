@@ -25,7 +25,8 @@ IMPORTS: Final = {
     "arcor2_hw.opcua": ("arcor2_hw.opcua.process",),
 }
 """Children that are forked, and the modules that they need."""
-_start_python: Final = child_process._start_python
+start_python: Final = child_process._start_python
+"""Starts the real process."""
 
 
 @functools.cache
@@ -65,7 +66,7 @@ async def _fork(command: Sequence[str], inherited: Sequence[int], environment: M
                 _name(os.getpid(), module),
             )
             return await awaited(process)
-    return await _start_python(command, inherited, environment)
+    return await start_python(command, inherited, environment)
 
 
 child_process._start_python = _fork

@@ -125,7 +125,7 @@ async def test_a_revoked_token_closes_the_client() -> None:
         await server.sockets[-1].close(4401, "the token is no longer valid")
         await client.next_event("ShowMainScreen")
         for _ in range(2):
-            with pytest.raises(NotAdmitted, match="not valid any more"):
+            with pytest.raises(NotAdmitted, match="no longer valid"):
                 await client.next_event()
             with pytest.raises(NotAdmitted):
                 await client.save_scene()

@@ -59,7 +59,7 @@ async def test_token_is_requested_remembered_and_revoked(server: ServerProcess, 
         await screen.page.reload()
         await home(screen)
         TokenFile(server.data_dir).revoke(made.name)
-        await screen.sees("not valid any more")
+        await screen.sees("no longer valid")
         await field.wait_for()
 
 

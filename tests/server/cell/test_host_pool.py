@@ -13,9 +13,11 @@ from msgspec import UNSET, UnsetType
 from arcor2_hw.data.cell import BROKER_URL, Cell, CellDevice
 from arcor2_hw.data.scene import SceneObject
 from arcor2_hw.exceptions import Arcor2Error
+from arcor2_server import child_process
 from arcor2_server.hosts import pool
 from arcor2_server.hosts.process import CellHost, HostUser
 from arcor2_server.nodes.credentials import Credentials
+from tests import forked_children
 
 USER = cast("HostUser", None)
 """The hosts of these tests load no object types, so that they notify nobody."""
@@ -25,6 +27,7 @@ USER = cast("HostUser", None)
 def killed(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """Kill each started host before it is ready if its flag, which is then removed, is true; later hosts run."""
     kills: list[bool] = []
+    monkeypatch.setattr(child_process, "_start_python", forked_children.start_python)  # a forked host is ready at once
 
     class Host(CellHost):
         @classmethod

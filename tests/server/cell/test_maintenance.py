@@ -159,7 +159,7 @@ async def test_another_device_is_refused_until_a_technician_confirms_it(tmp_path
             await place.act()
         assert refused.value.code == "different_device"
 
-        with pytest.raises(RequestRefused, match="Meanwhile another device"):
+        with pytest.raises(RequestRefused, match="A different device is now connected"):
             await place.ask("ConfirmDevice", object_id="obj_unit", identity=FIRST)
         with audit.collecting() as changes:
             await place.ask("ConfirmDevice", object_id="obj_unit", identity=FIRST | {"serial": "B2"})

@@ -204,7 +204,7 @@ def test_migrations_lead_to_the_models_and_back(settings: ServerSettings) -> Non
 @pytest.mark.parametrize(
     ("statement", "reason"),
     [
-        ("UPDATE alembic_version SET version_num = '9999'", "schema '9999', which this version does not know"),
+        ("UPDATE alembic_version SET version_num = '9999'", "schema '9999', which this version does not support"),
         ("DROP TABLE alembic_version", "not a database of this program"),
     ],
 )

@@ -32,6 +32,7 @@ ADDED = {
     "RobotJoints.Data": {"time_ms"},
     "ListProjects.Response.Data": {"problem_messages"},
     "ListScenes.Response.Data": {"problem_messages"},
+    "AddObjectToScene.Request.Args": {"node"},
     "SceneObject": {"node"},
     "ActionResult.Data": TRANSLATION,
     "Notification.Data": TRANSLATION,
