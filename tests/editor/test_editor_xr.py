@@ -160,11 +160,17 @@ async def test_tablet_follows_itself_and_markers_correct_it(server: ServerProces
         # The seat view keeps the selection and the viewpoint.
         await screen.tap(box)
         await page.get_by_role("complementary").get_by_role("heading", name="box").wait_for()
-        eye = await page.evaluate("__engine.view.camera.position.toArray()")
+        # At the click, since a marker may correct the view before it.
+        await page.evaluate(
+            "() => addEventListener('click', () => { window.__eye = __engine.view.camera.position.toArray(); },"
+            " { capture: true, once: true })"
+        )
         await screen.press("Seat view")
         await page.get_by_role("button", name="Show all").wait_for()
         await page.get_by_role("complementary").get_by_role("heading", name="box").wait_for()
-        assert await page.evaluate("__engine.view.viewpoint.position") == pytest.approx(eye, abs=1e-3)
+        assert await page.evaluate("__engine.view.viewpoint.position") == pytest.approx(
+            await page.evaluate("window.__eye"), abs=1e-3
+        )
         assert await page.evaluate("__xr.state.session.ended ?? !document.body.classList.contains('xr')")
         assert await page.evaluate("__engine.scene.background !== null")
         # Without markers, the workplace is placed on the surface ahead and stays there.
