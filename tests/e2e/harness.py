@@ -162,7 +162,8 @@ class Cell:
         reader, writer = await asyncio.open_connection(host, int(port), limit=1 << 22)
         try:
             writer.write(msgspec.json.encode({"id": 1, "do": do, **arguments}) + b"\n")
-            answer = msgspec.json.decode(await asyncio.wait_for(reader.readline(), WITHIN))
+            async with asyncio.timeout(WITHIN):  # `wait_for` of Python 3.11 may ignore a cancellation
+                answer = msgspec.json.decode(await reader.readline())
         finally:
             writer.close()
             with contextlib.suppress(OSError):

@@ -167,7 +167,8 @@ class NodeBoard:
             raise ConnectionLost("The broker closed the connection.", str(error)) from error
         finally:
             with contextlib.suppress(NatsError, OSError, TimeoutError):
-                await asyncio.wait_for(client.close(), CLOSE_TIMEOUT)
+                async with asyncio.timeout(CLOSE_TIMEOUT):
+                    await client.close()
 
     # -------------------------------------------------------------------------------- state
     async def _watch(self) -> None:

@@ -121,4 +121,5 @@ async def close(connections: Connections) -> None:
 
 async def _close(client: Client) -> None:
     with contextlib.suppress(NatsError, OSError, TimeoutError):
-        await asyncio.wait_for(client.close(), CLOSE_TIMEOUT)
+        async with asyncio.timeout(CLOSE_TIMEOUT):
+            await client.close()

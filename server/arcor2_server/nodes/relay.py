@@ -177,7 +177,8 @@ class Relay:
             if self._records is not None and not self._over.done():
                 await self._records.server_ended()
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(asyncio.shield(self._over), END_TIMEOUT)
+                async with asyncio.timeout(END_TIMEOUT):
+                    await asyncio.shield(self._over)
         self.ended(reason, False)
 
 
