@@ -66,7 +66,6 @@ class Units:
         """Data of the present run for new units."""
         self._run_number = 0
         self._scene_id = ""
-        self._run_calibrations: list[UsedCalibration] = []
         self._concerned: dict[int, PartStep] = {}
         """Reports about actions whose end is not known yet, by the number of the action."""
         self._unwritten: dict[int, UnitRecord] = {}
@@ -115,11 +114,11 @@ class Units:
             "recipe": how.used or UNSET,
             "started_by": how.by,
             "package_hash": "" if how.used is None else how.used.package_hash,
+            "calibrations": [],
         }
-        self._run_calibrations = []
-        self._background.spawn(self._describe(number, package_id), "description of the units of a run")
+        self._background.spawn(self._describe(number, package_id, self._run), "description of the units of a run")
 
-    async def _describe(self, number: int, package_id: str) -> None:
+    async def _describe(self, number: int, package_id: str, run: dict[str, Any]) -> None:
         try:
             summary = await asyncio.to_thread(self._packages.summary, package_id)
             digest = await asyncio.to_thread(self._packages.digest, package_id)
@@ -128,19 +127,14 @@ class Units:
         except Arcor2Error as error:
             log.warning("package of the units cannot be read", run=number, reason=str(error))
             return
-        if number != self._run_number:
-            return
-        self._run |= {"package_name": summary.package_meta.name, "package_hash": self._run["package_hash"] or digest}
-        self._run_calibrations = [
+        run["package_name"] = summary.package_meta.name
+        run["package_hash"] = run["package_hash"] or digest
+        run["calibrations"] = [
             UsedCalibration(each.id, each.object_id, each.object_name, each.kind.value, each.date) for each in latest
         ]
-        for record in list(self._in_cell.values()):  # units that entered in the meantime
+        for record in (*self._in_cell.values(), *self._recent.values()):  # units that entered, or also left, before
             if record.runs == [number] and not record.package_name:
-                self._put(replace(record, **self._described(record)))
-
-    def _described(self, record: UnitRecord | None = None) -> dict[str, Any]:
-        order = self._run.get("order", "") if record is None else record.order or self._run.get("order", "")
-        return self._run | {"order": order, "calibrations": self._run_calibrations}
+                self._put(replace(record, **run | {"order": record.order or run["order"]}))
 
     def concern(self, step: PartStep) -> None:
         """Record that the action that is ending concerns a part."""
@@ -199,7 +193,7 @@ class Units:
                 state=UnitState.IN_CELL,
                 entered=now(),
                 verdict=part.good,
-                **(self._described() | {"runs": [self._run_number]} if running else {}),
+                **(self._run | {"runs": [self._run_number]} if running else {}),
             )
             self._next += 1
             self._put(record, publish=True)
