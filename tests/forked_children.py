@@ -1,7 +1,7 @@
 """Imported where servers run in tests: cell hosts, compute workers and relays are forked instead of started.
 
-They are forked from a process that has imported them. In its place the server's own process would start an interpreter,
-which takes most of the processor time of a short-lived child. Servers that tests start by the real command do so.
+They are forked from a process that has already imported their modules. Starting an interpreter and importing takes
+most of the processor time of a short-lived child. Servers that tests start by the real command start real children.
 """
 
 import asyncio

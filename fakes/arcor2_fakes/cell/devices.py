@@ -185,7 +185,7 @@ class DeviceFeed:
                 try:
                     take(msgspec.convert(truth, _FakeState))
                 except (msgspec.ValidationError, KeyError) as e:
-                    self._problem = DeviceUnreachable(f"the {fake.name} at {fake.address} tells something else: {e}")
+                    self._problem = DeviceUnreachable(f"the {fake.name} at {fake.address} sent an invalid answer: {e}")
 
             try:
                 update(await fake.client.do(source))
