@@ -271,7 +271,7 @@ class Execution(PackageLibrary, RunObservers):
             self._killing = asyncio.get_running_loop().call_later(self.stop_within, self._kill, self._host.host)
 
     def begin_stop_all(self, by: str) -> HostGroup | None:
-        """Begin to stop the program in any state. Return its host, None if there is no host."""
+        """Begin to stop the program in any state. Return its host, or None without one."""
         if self.state in RUN_STATES | {S.STARTED}:
             self._stop(by)
         return self._host.host
