@@ -49,7 +49,7 @@ async def test_persons_share_a_tablet(tmp_path: Path, built_editor: Path, browse
     async with running(data) as server, screen_of(browser, server.url, touch=True) as screen:
         page = screen.page
         await page.goto(f"{screen.url}/?token={token}&q=low")
-        await page.get_by_label("Name").fill("Eva")
+        await page.get_by_label("Name", exact=True).fill("Eva")
         await page.get_by_label("PIN", exact=True).fill(PIN)
         await page.get_by_label("PIN again").fill(PIN)
         await screen.picture("persons-first-administrator")

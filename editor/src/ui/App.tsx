@@ -47,7 +47,7 @@ export function App() {
   const operator = hash.startsWith("#/operator");
   const language = useLanguage();
   useScreenSettings();
-  const { status, shared } = useEditor((state) => state.connection);
+  const { status, shared, user, reason } = useEditor((state) => state.connection);
   const open = useEditor((state) => state.doc !== null);
   const live = useEditor(isLive);
   const touring = useEditor(({ ui, doc, connection }) =>
@@ -73,10 +73,14 @@ export function App() {
   if (status === "ready" && !been) setBeen(true);
   if ((status === "left" || status === "refused" || status === "person") && been) setBeen(false);
   if (!been) {
+    // Without a name there is only a token, and the server decides whether users enter a name or log on with a PIN.
+    const authenticating = (status === "connecting" || status === "joining") && !user && !shared && !reason;
     return (
       <div className="screen">
         <Suspense fallback={<Waiting>{t`Connecting…`}</Waiting>}>
-          {shared && status !== "left" && status !== "refused" ? (
+          {authenticating ? (
+            <Waiting>{t`Connecting…`}</Waiting>
+          ) : shared && status !== "left" && status !== "refused" ? (
             <LogOn Stop={StopMotion} Notices={Notices} />
           ) : (
             <Join />

@@ -218,7 +218,7 @@ def test_invalid_answers_of_the_device_are_typed_errors(
 
 def test_a_late_answer_is_discarded(fake: FakeProcess, scale: MtSicsScale, wait_for: Callable[..., Any]) -> None:
     with scale.line.held():
-        fake.control.do("slow", seconds=0.6)
+        fake.control.do("slow", seconds=1.5)  # a busy driver may wait for three times its limit of 0.4 s
         with pytest.raises(DeviceTimeout):
             scale.weigh()
         fake.control.do("heal")
