@@ -37,7 +37,7 @@ def bearer(secret: str) -> dict[str, str]:
 
 @pytest.fixture
 async def server(tmp_path: Path) -> AsyncIterator[ServerProcess]:
-    """Start a server that requires a token, with `secret` of an operator and of a programmer in its data directory."""
+    """Start a server that requires a token."""
     TokenFile(tmp_path / "data").add("first", Role.TECHNICIAN)
     async with running(tmp_path / "data") as process:
         yield process
@@ -72,7 +72,7 @@ def test_tokens_are_stored_only_as_hashes(tmp_path: Path) -> None:
     assert other.find("") is None
 
 
-def test_a_token_expires(tmp_path: Path) -> None:
+def test_revoked_and_expired_tokens_are_refused_and_free_their_names(tmp_path: Path) -> None:
     tokens = TokenFile(tmp_path)
     made, secret = tokens.add("tablet", Role.OPERATOR)
     with pytest.raises(Exception, match="already"):
@@ -99,7 +99,7 @@ def test_a_damaged_file_is_repaired_from_its_copy(tmp_path: Path) -> None:
     tokens = TokenFile(tmp_path)
     made, secret = tokens.add("tablet", Role.OPERATOR)
     (tmp_path / FILE).write_text("{")
-    assert tokens.find(secret) == made  # by a running server
+    assert tokens.find(secret) == made  # a running server reads the copy
     assert TokenFile(tmp_path).find(secret) == made
     damage = TokenFile(tmp_path).repair()
     assert damage is not None
@@ -156,14 +156,14 @@ async def test_the_server_starts_with_damaged_token_files(tmp_path: Path) -> Non
 
 
 # ------------------------------------------------------------------------------------------------ the websocket
-@pytest.mark.parametrize("way", ["header", "query", "message"])
-async def test_a_token_admits_with_its_role(server: ServerProcess, way: str) -> None:
+@pytest.mark.parametrize("sent_in", ["header", "query", "message"])
+async def test_a_token_admits_with_its_role(server: ServerProcess, sent_in: str) -> None:
     secret = token(server, "Operator 1", Role.OPERATOR)
-    url = f"{server.url}/?token={secret}" if way == "query" else server.url
-    headers = bearer(secret) if way == "header" else {}
+    url = f"{server.url}/?token={secret}" if sent_in == "query" else server.url
+    headers = bearer(secret) if sent_in == "header" else {}
     async with connect(url, additional_headers=headers) as socket:
         talker = RawConnection(socket)
-        if way == "message":
+        if sent_in == "message":
             assert "Authenticate" in await talker.refused("ListScenes")
             assert await talker.granted("Authenticate", {"token": secret}) == {"name": "Operator 1", "role": "operator"}
         await talker.event("ShowMainScreen")
@@ -240,10 +240,10 @@ async def test_rest_requires_token_and_role(server: ServerProcess) -> None:
         assert (await http.put("/object-types", json=body, headers=bearer(programmer))).status_code != 403
         # Operators may register AR by the markers; only technicians may move them.
         advanced, technician = token(server, "a", Role.ADVANCED_USER), token(server, "t", Role.TECHNICIAN)
-        markers, nowhere = "/api/calibration/markers", {"markers": []}
+        markers, no_markers = "/api/calibration/markers", {"markers": []}
         assert (await http.get(markers, headers=bearer(operator))).json()["markers"] == []
         statuses = [
-            (await http.put(markers, json=nowhere, headers=bearer(secret))).status_code
+            (await http.put(markers, json=no_markers, headers=bearer(secret))).status_code
             for secret in (operator, advanced, technician)
         ]
         assert statuses[:2] == [403, 403]
@@ -324,7 +324,7 @@ def test_clients_without_token_are_never_programmers(tmp_path: Path) -> None:
         LegacyListener("127.0.0.1", 1, Role.PROGRAMMER)
 
 
-def test_an_unusable_certificate_is_named(tmp_path: Path) -> None:
+def test_the_error_names_an_unusable_certificate(tmp_path: Path) -> None:
     file = tmp_path / "c.pem"
     file.write_text("nothing")
     ended = start(tmp_path, "--tls", str(file), str(file))
@@ -337,7 +337,7 @@ def trusting(file: Path) -> ssl.SSLContext:
     return ssl.create_default_context(cafile=str(file))
 
 
-async def test_tls_with_a_generated_certificate(tmp_path: Path) -> None:
+async def test_a_generated_certificate_is_used_again_after_a_restart(tmp_path: Path) -> None:
     secret = TokenFile(tmp_path / "data").add("first", Role.OPERATOR)[1]
     async with running(tmp_path / "data", "--self-signed") as server:
         assert server.url.startswith("wss://")

@@ -59,19 +59,19 @@ class Cell:
 
 
 @contextlib.asynccontextmanager
-async def cell(directory: Path, **settings: Any) -> AsyncIterator[Cell]:
+async def open_cell(directory: Path, **settings: Any) -> AsyncIterator[Cell]:
     async with open_server(directory, **settings) as server:
-        found = Cell(server, directory)
-        await found.add_persons()
-        yield found
+        cell = Cell(server, directory)
+        await cell.add_persons()
+        yield cell
 
 
-def noted(server: SessionServer) -> list[Any]:
+def audit_entries(server: SessionServer) -> list[Any]:
     """Return the entries of the audit trail, which the test server does not write."""
-    waiting, found = server.services.audit._waiting, []
+    waiting, entries = server.services.audit._waiting, []
     while not waiting.empty():
-        found.append(waiting.get())
-    return found
+        entries.append(waiting.get())
+    return entries
 
 
 # ------------------------------------------------------------------------------------------------ rules
@@ -116,8 +116,8 @@ def test_cards_are_hashed_with_a_key_of_the_server(tmp_path: Path) -> None:
 
 # ------------------------------------------------------------------------------------------------ log on
 async def test_a_person_logs_on_with_pin_or_card(tmp_path: Path) -> None:
-    async with cell(tmp_path) as found:
-        device = await found.at_tablet()
+    async with open_cell(tmp_path) as cell:
+        device = await cell.at_tablet()
         listed = await device.ask("ListPersons")
         assert [(each["name"], each["pin"], each["card"]) for each in listed["persons"]] == [
             ("Eva", True, False),
@@ -131,13 +131,13 @@ async def test_a_person_logs_on_with_pin_or_card(tmp_path: Path) -> None:
         with pytest.raises(Refused, match="Log on"):
             await device.ask("ResumePackage")
         await device.ask("StopPackage")
-        assert found.stopped_by == ["tablet"]
+        assert cell.stopped_by == ["tablet"]
 
-        answer = await device.ask("LogOn", person=found.ids["Eva"], pin=PIN)
+        answer = await device.ask("LogOn", person=cell.ids["Eva"], pin=PIN)
         assert (answer["person"]["name"], answer["role"]) == ("Eva", "technician")  # the ceiling of the tablet
         await device.ask("NewScene", name="hall")
         with pytest.raises(Refused, match="programmer"):
-            await device.ask("RemovePerson", id=found.ids["Ivo"])
+            await device.ask("RemovePerson", id=cell.ids["Ivo"])
 
         answer = await device.ask("LogOn", card=CARD)  # the next person does not need to log off the previous one
         assert (answer["person"]["name"], answer["role"]) == ("Ivo", "operator")
@@ -147,25 +147,25 @@ async def test_a_person_logs_on_with_pin_or_card(tmp_path: Path) -> None:
         with pytest.raises(Refused, match="Log on"):
             await device.ask("SaveScene")
 
-        entries = [(each.request, each.user, each.outcome.value) for each in noted(found.server)]
+        entries = [(each.request, each.user, each.outcome.value) for each in audit_entries(cell.server)]
         assert ("NewScene", "Eva", "done") in entries
         assert ("SaveScene", "Ivo", "forbidden") in entries
         assert [user for request, user, _ in entries if request == "LogOff"] == ["Eva", "Ivo"]
 
 
 async def test_clients_with_their_own_token_need_no_person(tmp_path: Path) -> None:
-    async with cell(tmp_path) as found:
-        program = await found.server.person("line", found.program)
+    async with open_cell(tmp_path) as cell:
+        program = await cell.server.person("line", cell.program)
         await program.ask("NewScene", name="hall")
         with pytest.raises(Refused, match="PIN"):
             await program.ask("RegisterUser", user_name="eva")
 
 
 async def test_a_person_is_logged_on_at_one_device(tmp_path: Path) -> None:
-    async with cell(tmp_path) as found:
-        first, second = await found.at_tablet("Eva", PIN), await found.at_tablet()
+    async with open_cell(tmp_path) as cell:
+        first, second = await cell.at_tablet("Eva", PIN), await cell.at_tablet()
         await first.ask("NewScene", name="hall")
-        await second.ask("LogOn", person=found.ids["Eva"], pin=PIN)
+        await second.ask("LogOn", person=cell.ids["Eva"], pin=PIN)
         (event,) = [each["data"] for each in first.events() if each["event"] == "LogOnChanged"]
         assert event["reason"] == "Eva logged on at another device."
         assert "person" not in event
@@ -178,14 +178,14 @@ async def test_wrong_pins_lock_the_person_out_longer_each_time(tmp_path: Path, m
     clock = 1_800_000_000.0
     monkeypatch.setattr(persons.time, "time", lambda: clock)
 
-    async def wrong(device: Person, key: str) -> str:
+    async def wrong(device: Person, person_id: str) -> str:
         with pytest.raises(Refused) as refused:
-            await device.ask("LogOn", person=key, pin="4444")
+            await device.ask("LogOn", person=person_id, pin="4444")
         return str(refused.value)
 
-    async with cell(tmp_path) as found:
-        eva = found.ids["Eva"]
-        device = await found.at_tablet()
+    async with open_cell(tmp_path) as cell:
+        eva = cell.ids["Eva"]
+        device = await cell.at_tablet()
         assert [await wrong(device, eva) for _ in range(4)] == ["The PIN of Eva is wrong."] * 4
         assert "Try again in 60 s" in await wrong(device, eva)
         with pytest.raises(Refused, match="60 s"):  # the correct PIN is not checked either
@@ -193,14 +193,14 @@ async def test_wrong_pins_lock_the_person_out_longer_each_time(tmp_path: Path, m
         await device.ask("LogOn", card=CARD)  # other persons can log on
         clock += 61
         assert "Try again in 120 s" in await wrong(device, eva)
-        other = await found.server.person("", found.tokens.add("other tablet", Role.OPERATOR, shared=True)[1])
+        other = await cell.server.person("", cell.tokens.add("other tablet", Role.OPERATOR, shared=True)[1])
         await other.ask("LogOn", person=eva, pin=PIN)  # the lock-out applies to one device only
     async with open_server(tmp_path) as server:  # it survives a restart
-        found.server = server
-        device = await found.at_tablet()
+        cell.server = server
+        device = await cell.at_tablet()
         with pytest.raises(Refused, match="120 s"):
             await device.ask("LogOn", person=eva, pin=PIN)
-        administrator = await server.person("line", found.program)
+        administrator = await server.person("line", cell.program)
         listed = (await administrator.ask("ListPersons"))["persons"]
         assert [(each["device"], each["wrong"]) for each in listed[0]["lock_outs"]] == [("tablet", 6)]
         assert (await device.ask("ListPersons"))["persons"][0]["lock_outs"] == []
@@ -209,8 +209,8 @@ async def test_wrong_pins_lock_the_person_out_longer_each_time(tmp_path: Path, m
 
 
 async def test_unknown_cards_lock_the_device_out(tmp_path: Path) -> None:
-    async with cell(tmp_path) as found:
-        device = await found.at_tablet()
+    async with open_cell(tmp_path) as cell:
+        device = await cell.at_tablet()
         messages = []
         for number in range(6):
             with pytest.raises(Refused) as refused:
@@ -222,10 +222,10 @@ async def test_unknown_cards_lock_the_device_out(tmp_path: Path) -> None:
 
 # ------------------------------------------------------------------------------------------------ log off
 async def test_an_idle_person_is_logged_off(tmp_path: Path) -> None:
-    async with cell(tmp_path, log_off_after=0.3) as found:
+    async with open_cell(tmp_path, log_off_after=0.3) as cell:
         ended: asyncio.Queue[Message] = asyncio.Queue()
-        found.server.services.log_ons.on_end.append(lambda _, reason: ended.put_nowait(reason))
-        device = await found.at_tablet("Eva", PIN)
+        cell.server.services.log_ons.on_end.append(lambda _, reason: ended.put_nowait(reason))
+        device = await cell.at_tablet("Eva", PIN)
         await device.ask("NewScene", name="hall")
         reason = str(await ended.get())  # ends hold-to-run motions
         assert "without use" in reason
@@ -234,10 +234,10 @@ async def test_an_idle_person_is_logged_off(tmp_path: Path) -> None:
         assert event["key"] == "{name} was logged off after {seconds} s without use."
         with pytest.raises(Refused, match="Log on"):
             await device.ask("SaveScene")
-        assert found.stopped_by == []  # a program goes on
+        assert cell.stopped_by == []  # a running program continues
         await device.ask("StopPackage")
-        assert found.stopped_by == ["tablet"]
-        assert found.server.services.users.names() == []
+        assert cell.stopped_by == ["tablet"]
+        assert cell.server.services.users.names() == []
 
 
 async def test_logging_off_ends_hold_to_run_motions(tmp_path: Path) -> None:
@@ -246,14 +246,14 @@ async def test_logging_off_ends_hold_to_run_motions(tmp_path: Path) -> None:
 
 
 async def test_a_device_resumes_after_a_lost_connection(tmp_path: Path) -> None:
-    async with cell(tmp_path) as found:
-        device = await found.at_tablet()
-        session = (await device.ask("LogOn", person=found.ids["Eva"], pin=PIN))["session"]
+    async with open_cell(tmp_path) as cell:
+        device = await cell.at_tablet()
+        session = (await device.ask("LogOn", person=cell.ids["Eva"], pin=PIN))["session"]
         await device.leave()
-        stranger = await found.server.person("", found.tokens.add("other", Role.PROGRAMMER, shared=True)[1])
+        stranger = await cell.server.person("", cell.tokens.add("other", Role.PROGRAMMER, shared=True)[1])
         with pytest.raises(Refused, match="logged off"):
             await stranger.ask("LogOn", session=session)
-        device = await found.at_tablet()
+        device = await cell.at_tablet()
         assert (await device.ask("LogOn", session=session))["person"]["name"] == "Eva"
         await device.ask("LogOff")
         with pytest.raises(Refused, match="logged off"):
@@ -261,14 +261,14 @@ async def test_a_device_resumes_after_a_lost_connection(tmp_path: Path) -> None:
 
 
 async def test_changes_of_a_person_apply_at_once(tmp_path: Path) -> None:
-    async with cell(tmp_path) as found:
-        device = await found.at_tablet("Ivo", OTHER_PIN)
-        administrator = await found.server.person("line", found.program)
+    async with open_cell(tmp_path) as cell:
+        device = await cell.at_tablet("Ivo", OTHER_PIN)
+        administrator = await cell.server.person("line", cell.program)
         await administrator.ask("SubscribeEvents", events=["PersonChanged"])
         administrator.take()
-        await administrator.ask("ChangePerson", id=found.ids["Ivo"], role="technician")
+        await administrator.ask("ChangePerson", id=cell.ids["Ivo"], role="technician")
         await device.ask("NewScene", name="hall")
-        await administrator.ask("RemovePerson", id=found.ids["Ivo"])
+        await administrator.ask("RemovePerson", id=cell.ids["Ivo"])
         with pytest.raises(Refused, match="Log on"):
             await device.ask("SaveScene")
         assert [name for name in administrator.names() if name.startswith("Person")] == [
@@ -279,12 +279,12 @@ async def test_changes_of_a_person_apply_at_once(tmp_path: Path) -> None:
 
 async def test_persons_change_their_own_pin(tmp_path: Path) -> None:
     new = "48151623"
-    async with cell(tmp_path) as found:
-        device = await found.at_tablet()
+    async with open_cell(tmp_path) as cell:
+        device = await cell.at_tablet()
         with pytest.raises(Refused, match="Log on"):
             await device.ask("ChangeOwnPin", pin=OTHER_PIN, new_pin=new)
-        await device.ask("LogOn", person=found.ids["Ivo"], pin=OTHER_PIN)
-        noted(found.server)
+        await device.ask("LogOn", person=cell.ids["Ivo"], pin=OTHER_PIN)
+        audit_entries(cell.server)
         for old, wanted, reason in (
             (PIN, new, "The PIN of Ivo is wrong"),
             (OTHER_PIN, "1234", "digits"),
@@ -293,11 +293,11 @@ async def test_persons_change_their_own_pin(tmp_path: Path) -> None:
             with pytest.raises(Refused, match=reason):
                 await device.ask("ChangeOwnPin", pin=old, new_pin=wanted)
         await device.ask("ChangeOwnPin", pin=OTHER_PIN, new_pin=new)
-        entries = [each for each in noted(found.server) if each.request == "ChangeOwnPin"]
+        entries = [each for each in audit_entries(cell.server) if each.request == "ChangeOwnPin"]
         assert [(each.user, each.outcome) for each in entries] == [("Ivo", "refused")] * 3 + [("Ivo", "done")]
         assert not any(secret in str(entries) for secret in (OTHER_PIN, new))
-        await found.server.services.log_ons.refresh()
-        assert (await device.ask("ListPersons"))["logged_on"] == found.ids["Ivo"]  # remains logged on
+        await cell.server.services.log_ons.refresh()
+        assert (await device.ask("ListPersons"))["logged_on"] == cell.ids["Ivo"]  # remains logged on
         for _ in range(5):
             with pytest.raises(Refused, match="wrong"):
                 await device.ask("ChangeOwnPin", pin=OTHER_PIN, new_pin=PIN)
@@ -305,7 +305,7 @@ async def test_persons_change_their_own_pin(tmp_path: Path) -> None:
             await device.ask("ChangeOwnPin", pin=new, new_pin=PIN)
         await device.ask("LogOff")
         with pytest.raises(Refused, match="too many wrong PINs"):
-            await device.ask("LogOn", person=found.ids["Ivo"], pin=new)
+            await device.ask("LogOn", person=cell.ids["Ivo"], pin=new)
 
 
 # ------------------------------------------------------------------------------------------------ administrators
@@ -331,16 +331,16 @@ async def test_the_first_administrator_is_created_at_a_shared_device(tmp_path: P
                 await first.ask(request, id=eva["id"], **({"role": "operator"} if request == "ChangePerson" else {}))
 
 
-async def test_secrets_are_stored_and_noted_nowhere(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+async def test_secrets_are_neither_stored_nor_logged(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level("DEBUG")
-    async with cell(tmp_path) as found:
-        device = await found.at_tablet("Ivo", OTHER_PIN)
+    async with open_cell(tmp_path) as cell:
+        device = await cell.at_tablet("Ivo", OTHER_PIN)
         with pytest.raises(Refused):
             await device.ask("LogOn", card="77777777")
-        entries = str(noted(found.server))
-    kept = b"".join(path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()).decode(errors="replace")
+        entries = str(audit_entries(cell.server))
+    stored = b"".join(path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()).decode(errors="replace")
     for secret in (OTHER_PIN, CARD, "77777777"):
-        assert secret not in kept
+        assert secret not in stored
         assert secret not in entries
         assert secret not in caplog.text
 

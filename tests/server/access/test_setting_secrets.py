@@ -80,12 +80,12 @@ def digest(code: str) -> Parameter:
     return setting("digest", hashlib.sha256(code.encode()).hexdigest())
 
 
-def leaks(directory: Path, *secrets: str, besides: str = "secrets.json") -> list[str]:
+def leaks(directory: Path, *secrets: str, except_in: str = "secrets.json") -> list[str]:
     """Return the files that contain one of the secrets."""
     return [
         str(path.relative_to(directory))
         for path in directory.rglob("*")
-        if path.is_file() and path.name != besides and any(each.encode() in path.read_bytes() for each in secrets)
+        if path.is_file() and path.name != except_in and any(each.encode() in path.read_bytes() for each in secrets)
     ]
 
 
@@ -130,10 +130,10 @@ async def test_a_secret_is_sent_only_to_the_device(tmp_path: Path) -> None:
         obj = (await client.next_event("SceneObjectChanged")).data
         reference = msgspec.json.decode(obj.parameters[1].value)
         assert is_reference(reference)
-        # A client sends back what it received: the secret does not change. The same holds for `***`.
+        # The secret does not change if a client sends the received reference, or `***`.
         await call("WriteLock", rpc.WriteLockArgs(obj.id))
-        for kept in (reference, HIDDEN):
-            again = [digest(CODE), setting("code", kept)]
+        for unchanged in (reference, HIDDEN):
+            again = [digest(CODE), setting("code", unchanged)]
             await call("UpdateObjectParameters", rpc.UpdateObjectParametersArgs(obj.id, again))
             updated = (await client.next_event("SceneObjectChanged")).data
             assert msgspec.json.decode(updated.parameters[1].value) == reference
@@ -185,7 +185,7 @@ async def test_a_secret_is_sent_only_to_the_device(tmp_path: Path) -> None:
         while (await client.next_event("PackageState")).data.state is not PackageStateEnum.STOPPED:
             pass
 
-        # A package that contains a secret in clear loses it on upload.
+        # The server removes a secret in clear text from an uploaded package.
         files = {"executionPackage": clear(package)}
         assert (await http.post(f"/packages/{built.package_id}", files=files)).is_success
         package = (await http.get(f"/packages/{built.package_id}")).content
@@ -245,15 +245,15 @@ async def test_data_with_secrets_in_clear_is_migrated(tmp_path: Path) -> None:
             scene = services.session.require_scene()
             (opened,) = [each for obj in scene.objects for each in obj.parameters if each.name == "password"]
             saved = await services.storage.scene(scene.id)
-            (kept,) = [each for obj in saved.objects for each in obj.parameters if each.name == "password"]
+            (stored,) = [each for obj in saved.objects for each in obj.parameters if each.name == "password"]
             (project,) = [await services.storage.project(bare.id) for bare in await services.storage.projects()]
             (override,) = project.object_overrides[0].parameters
-            found = [store.find(msgspec.json.decode(each.value)) for each in (opened, kept, override)]
+            found = [store.find(msgspec.json.decode(each.value)) for each in (opened, stored, override)]
             assert [None if each is None else each.value for each in found] == [CLEAR[2], CLEAR[0], CLEAR[1]]
             (directory,) = (tmp_path / "packages").iterdir()
             (packaged,) = services.secrets.values_for_package(directory).values()
             assert packaged == ObjectSecrets({"password": CLEAR[1]})
-            references.append((opened, kept, override))
+            references.append((opened, stored, override))
             assert services.session.has_changes
             # Undo returns to the saved password: it is one secret, not two.
             await services.session.commit(
@@ -313,14 +313,14 @@ async def test_a_secret_is_not_sent_to_another_host(tmp_path: Path) -> None:
         obj = (await client.next_event("SceneObjectChanged")).data
         code = obj.parameters[1]
         await call("WriteLock", rpc.WriteLockArgs(obj.id))
-        for kept in (code, setting("code", HIDDEN)):
-            moved = [digest(CODE), setting("host", "evil"), kept]
+        for unchanged in (code, setting("code", HIDDEN)):
+            moved = [digest(CODE), setting("host", "evil"), unchanged]
             with pytest.raises(BadRequest, match=AGAIN) as refused:
                 await call("UpdateObjectParameters", rpc.UpdateObjectParametersArgs(obj.id, moved))
             assert refused.value.reason == AddressChanged.code
         with pytest.raises(BadRequest, match=AGAIN.replace("vault", "thief")):
             await call("AddObjectToScene", rpc.AddObjectToSceneArgs("thief", "Vault", parameters=[*moved[:2], code]))
-        # With the code entered again, the host may change; undo returns to host and code before.
+        # After the code is entered again, the host may change. Undo restores the previous host and code.
         moved = [digest(CODE), setting("host", "plc2"), setting("code", CODE)]
         await call("UpdateObjectParameters", rpc.UpdateObjectParametersArgs(obj.id, moved))
         entered = (await client.next_event("SceneObjectChanged")).data.parameters
@@ -375,21 +375,23 @@ async def test_the_cell_host_gets_only_the_secrets_it_needs(tmp_path: Path) -> N
         package = tmp_path / "package"
         (package / "data").mkdir(parents=True)
         (package / "data" / "scene.json").write_bytes(msgspec.json.encode(scene_with(host, password)))
-        for overrides, expected in (([], found), (over, withheld)):
-            project = Project("ringing", "scn_1", id="pro_1", object_overrides=overrides)
+        for package_overrides, expected in (([], found), (over, withheld)):
+            project = Project("ringing", "scn_1", id="pro_1", object_overrides=package_overrides)
             (package / "data" / "project.json").write_bytes(msgspec.json.encode(project))
             assert secrets.values_for_package(package) == expected
         # The cell file changes the device's address. A password entered afterwards is for the new address.
         cell = Cell([CellDevice("yumi", "YuMi", {"host": "yumi2"})])
-        here = SettingSecrets(services.types, secrets.store, cell)
-        laid = overlay(cell, scene_with(host, password))
-        assert here.values_for(scene_with(host, password), laid)["obj_1"].problem.text == moved.format("yumi2")
-        (_, again) = here.hide("YuMi", [host, setting("password", CODE)], [host, password], name="yumi")
-        assert here.values_for(scene_with(host, again), laid) == found
-        # Only the setting for which it was entered gets it, and only an object with an id of its own.
+        cell_secrets = SettingSecrets(services.types, secrets.store, cell)
+        overrides = overlay(cell, scene_with(host, password))
+        assert cell_secrets.values_for(scene_with(host, password), overrides)["obj_1"].problem.text == moved.format(
+            "yumi2"
+        )
+        (_, again) = cell_secrets.hide("YuMi", [host, setting("password", CODE)], [host, password], name="yumi")
+        assert cell_secrets.values_for(scene_with(host, again), overrides) == found
+        # A secret reaches only the setting for which it was entered, and only if the object's id is unique.
         assert secrets.values_for(scene_with(host, msgspec.structs.replace(password, name="user"))) == {}
-        twin = scene_with(setting("host", "evil")).objects + scene_with(host, password).objects
-        assert secrets.values_for(Scene("bank", id="scn_1", objects=twin)) == {}
+        duplicates = scene_with(setting("host", "evil")).objects + scene_with(host, password).objects
+        assert secrets.values_for(Scene("bank", id="scn_1", objects=duplicates)) == {}
         # A secret without an address belongs to the first address with which it is used.
         (unbound,) = [setting("password", secrets.store.add(Secret("YuMi", "password", OTHER)))]
         with pytest.raises(AddressChanged, match=moved.format("evil")):

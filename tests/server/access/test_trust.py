@@ -118,25 +118,25 @@ def test_damaged_files_are_replaced(tmp_path: Path, name: str) -> None:
     check(made.files)
 
 
-def test_an_unwritable_directory_is_named(tmp_path: Path) -> None:
+def test_the_error_names_an_unwritable_directory(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(CertificateProblem, match="file"):
         Authority(tmp_path / "file", lambda: ["192.168.0.10"]).renew()
 
 
-def test_the_language_of_the_page() -> None:
+def test_the_page_is_in_the_preferred_language() -> None:
     assert [preferred_language(given) for given in ("", "fr, de-AT;q=0.8", "cs-CZ,cs;q=0.9", "*")] == [
         "en", "de", "cs", "en",
     ]  # fmt: skip
 
 
-def plain(server: ServerProcess) -> httpx.AsyncClient:
+def plain_http(server: ServerProcess) -> httpx.AsyncClient:
     return httpx.AsyncClient(base_url=server.url.replace("wss", "http", 1), timeout=60)
 
 
 async def test_a_device_installs_the_authority_over_http_and_then_trusts_the_server(tmp_path: Path) -> None:
     secret = TokenFile(tmp_path / "data").add("first", Role.OPERATOR)[1]
-    async with running(tmp_path / "data", "--self-signed") as server, plain(server) as http:
+    async with running(tmp_path / "data", "--self-signed") as server, plain_http(server) as http:
         page = await http.get("/", headers={"Accept-Language": "de"})
         assert "Diesem ARCOR2-HW-Server vertrauen" in page.text
         file = server.data_dir / module.AUTHORITY
@@ -162,10 +162,10 @@ async def test_a_device_installs_the_authority_over_http_and_then_trusts_the_ser
         assert joining["authority"] == fingerprint(file)
 
 
-async def test_own_certificates_are_served_without_the_page(tmp_path: Path) -> None:
+async def test_a_server_with_custom_certificates_has_no_trust_page(tmp_path: Path) -> None:
     own = Authority(tmp_path, lambda: ["127.0.0.1"])
     own.renew()
-    async with running(tmp_path / "data", "--tls", *map(str, own.files)) as server, plain(server) as http:
+    async with running(tmp_path / "data", "--tls", *map(str, own.files)) as server, plain_http(server) as http:
         with pytest.raises(httpx.TransportError):
             await http.get("/")
         assert not (server.data_dir / module.AUTHORITY).exists()
