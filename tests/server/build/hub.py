@@ -1,4 +1,4 @@
-"""The parts of a server that Build and import need: real storage, assets and registry; nothing is open."""
+"""The parts of a server that Build and import need: real storage, assets and registry, and no open project."""
 
 import contextlib
 import types
@@ -27,7 +27,7 @@ async def opened(
     monkeypatch: pytest.MonkeyPatch,
     models: Mapping[str, ObjectModel] | None = None,
 ) -> AsyncIterator[Any]:
-    """Return services on a storage with the uploaded types of `code` only. The other types are installed."""
+    """Yield services whose storage contains the types that have a source. The other types are installed."""
     settings = ServerSettings(data_dir=directory)
     settings.data_dir.mkdir(parents=True)
     storage = await Storage.open(settings)

@@ -1,4 +1,4 @@
-"""Projects made for the tests of Build, and a direct walk through a project's logic to compare programs with."""
+"""Random projects for the tests of Build, and an interpreter of their logic as reference for generated programs."""
 
 import builtins
 import collections
@@ -246,7 +246,7 @@ def _met(one: LogicComparison, value: Any, *others: Any) -> bool:
 
 
 def walk(project: Project, oracle: Oracle, count: int) -> list[tuple[str, tuple[Any, ...]]]:
-    """Follow the logic item by item, without blocks; yield the executed actions with their linked values."""
+    """Interpret the logic item by item, and return the executed actions with their linked values."""
     actions = {action.id: action for point in project.action_points for action in point.actions}
     exits = exits_of(project)
     done: list[tuple[str, tuple[Any, ...]]] = []
@@ -368,7 +368,7 @@ def run(source: str, oracle: Oracle, count: int, exits: Exits | None = None) -> 
 
 
 def same_runs(draft: Draft, oracle: Oracle, count: int) -> None:
-    """Compare the program with the logic."""
+    """Assert that the generated program executes the same actions as the interpreted logic."""
     project = draft.project()
     source = from_logic(SCENE, project, TYPES)
     assert run(source, oracle, count, exits_of(project)) == walk(project, oracle, count), source
@@ -619,7 +619,7 @@ def with_exits(draft: Draft, rng: random.Random) -> Draft:
 
 # ------------------------------------------------------------------------------------------------ functions
 class TypesOfTests:
-    """The object types of the drafts, or others, as the checks of documents see them."""
+    """The object types of the drafts, or others, as the consistency check needs them."""
 
     def __init__(self, facts: Mapping[str, TypeFacts] = TYPES) -> None:
         self._facts = facts
@@ -667,7 +667,7 @@ def with_functions(project: Project, rng: random.Random, count: int) -> Project:
 
 
 def with_parallel_work(project: Project, rng: random.Random) -> tuple[Scene, Project]:
-    """Let pairs of actions that follow each other run at once, as calls of functions with a device of their own.
+    """Run pairs of consecutive actions in parallel, each in a function with its own device.
 
     Return the project, and its scene with these devices.
     """

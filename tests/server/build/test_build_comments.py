@@ -182,7 +182,7 @@ def test_an_imported_script_is_generated_unchanged(made: tuple[Scene, Project], 
     imported = read_with_text(source, scene, project, TYPES)
     assert replace(imported, script=UNSET) == project, source
     assert from_logic(scene, imported, TYPES) == source
-    # A script without a person's text is not stored, and stored text does not change without an edit.
+    # A script without edited text is not stored, and stored text does not change without an edit.
     assert read_with_text(source, scene, imported, TYPES) == imported
     plain = from_logic(scene, project, TYPES)
     assert read_with_text(plain, scene, imported, TYPES) == project
@@ -219,7 +219,7 @@ SCAN = '        code = reader.scan(2.5, Mode.TWICE, an="scan code")\n'
 TWICE = "mode=M.TWICE, an='scan code')"
 BACK = "        robot.move_joints(aps.feeder.joints.above, an="
 PICK = '        robot.pick(aps.feeder.poses.default, grip=Grip.FIRM, an="pick")\n'
-OWN = [
+EDITS = [
     ('"""Main script of the project Sort boards."""', '"""Sorts boards.\n\nWritten by the night shift.\n"""'),
     ("    # Objects of the scene\n    robot: Arm", "    arm: Arm"),
     ("import AcmeReader, Mode", "import AcmeReader, Mode as M"),
@@ -239,7 +239,7 @@ OWN = [
 
 def commented(*more: tuple[str, str]) -> str:
     source = PLAIN
-    for old, new in [*OWN, *more]:
+    for old, new in [*EDITS, *more]:
         assert source.count(old) == 1, old
         source = source.replace(old, new)
     return re.sub(r"\brobot\.", "arm.", source)
@@ -254,7 +254,7 @@ def generated(project: Project) -> str:
 
 
 def changed(project: Project, of: str, **fields: object) -> Project:
-    """Return the project with other fields of an action."""
+    """Return the project with changed fields of one action."""
     points = [
         replace(point, actions=[replace(one, **fields) if one.name == of else one for one in point.actions])
         for point in project.action_points

@@ -59,7 +59,7 @@ def _oracle(seed: int) -> Any:
     return results
 
 
-def test_large_random_graphs() -> None:
+def test_programs_of_large_graphs_do_what_their_logic_defines() -> None:
     rng = random.Random(7)
     for size in (200, 400):
         for merging, window in ((0.3, 5), (0.6, 50), (0.05, 3)):
@@ -69,7 +69,7 @@ def test_large_random_graphs() -> None:
 
 # ------------------------------------------------------------------------------------------------ shapes
 def loop(source: str) -> str:
-    """Return the body of the loop without the objects' names, for comparison by eye."""
+    """Return the unindented body of the main loop."""
     lines = source.splitlines()
     start = lines.index("    while True:") + 1
     body = lines[start : lines.index('if __name__ == "__main__":')]
@@ -271,7 +271,7 @@ def test_build_time_grows_linearly(make: Any) -> None:
     assert large / small < 8 * 1.35, f"eight times the actions take {large / small:.1f} times the steps"
 
 
-def test_common_ancestors() -> None:
+def test_the_tree_finds_the_nearest_common_ancestor() -> None:
     rng = random.Random(1)
     tree = Tree()
     ancestors: list[list[int]] = []
@@ -323,7 +323,7 @@ def _linked_to_itself() -> Draft:
         (_linked_to_itself(), "'a' uses a result of 'a'"),
     ],
 )
-def test_invalid_logic_is_refused_by_name(draft: Draft, text: str) -> None:
+def test_the_refusal_of_invalid_logic_names_the_action(draft: Draft, text: str) -> None:
     with pytest.raises(InvalidProject) as caught:
         draft.script()
     assert text in str(caught.value)
@@ -346,7 +346,7 @@ def choosing(*values: int | str | None) -> Draft:
     return draft.chain("z", END)
 
 
-def test_a_choice_between_numbers_reads_well() -> None:
+def test_a_choice_between_numbers_becomes_if_elif_else() -> None:
     draft = choosing(0, None, 2)
     assert (
         loop(draft.script())
@@ -364,20 +364,20 @@ thing.do(an="z")"""
     same_runs(draft, _oracle(1), 60)
 
 
-def test_a_choice_between_texts() -> None:
+def test_a_choice_between_texts_compares_strings() -> None:
     draft = choosing("low", "high", None)
     assert 'if r == "low":' in draft.script()
     same_runs(draft, _oracle(2), 60)
 
 
-def test_a_default_branch_to_the_end() -> None:
+def test_a_default_branch_to_the_end_is_omitted() -> None:
     draft = Draft(methods={"a": "count"}).action("a", "r").edge(START, "a").action("b")
     draft.edge("a", "b", ("a", "r", 1)).edge("a", END).edge("b", END)
     assert loop(draft.script()).splitlines()[1:] == ["if r == 1:", '    thing.do(an="b")']
     same_runs(draft, _oracle(3), 40)
 
 
-def test_a_default_branch_with_actions() -> None:
+def test_a_default_branch_inverts_the_only_condition() -> None:
     draft = Draft(methods={"a": "count"}).action("a", "r").edge(START, "a").action("b").chain("b", "z", END)
     draft.edge("a", "z", ("a", "r", 1)).edge("a", "b")
     assert loop(draft.script()).splitlines()[1:3] == ["if r != 1:", '    thing.do(an="b")']
@@ -442,7 +442,7 @@ def comparing(*conditions: list[LogicComparison] | None, match: Match = Match.AL
     return draft.chain("z", END)
 
 
-def test_comparisons_read_well() -> None:
+def test_comparisons_become_conditions() -> None:
     draft = comparing(
         [compared(N, "[)", 3, 7), compared(P, "==", True)],
         [compared(X, "<", -0.5)],

@@ -54,7 +54,7 @@ def inputs(code: list[PackageType]) -> BuildInput:
 
 
 # ------------------------------------------------------------------------------------------------ content
-def test_a_script_and_its_points_read_well(inputs: BuildInput) -> None:
+def test_the_script_and_its_points_equal_the_golden_files(inputs: BuildInput) -> None:
     files = files_of(inputs)
     for name, golden in (("script.py", "workplace_script.txt"), ("action_points.py", "workplace_points.txt")):
         assert files[name].decode() == Path(__file__).with_name(golden).read_text()
@@ -106,7 +106,7 @@ def test_no_file_is_written_outside_the_package(path: str, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("module", ["../evil", "", "a.b", "a/b", "ä"])
-def test_invalid_type_names_name_no_file(module: str, inputs: BuildInput) -> None:
+def test_invalid_module_names_are_refused(module: str, inputs: BuildInput) -> None:
     inputs.types.append(PackageType("Bad", module, "x = 1"))
     with pytest.raises(InvalidProject, match="Bad"):
         files_of(inputs)
@@ -133,7 +133,9 @@ def test_links_out_of_a_driver_folder_are_not_followed(driver: PackageType, inpu
     assert not [name for name in files_of(inputs) if name.endswith("innocent.txt")]
 
 
-def test_two_drivers_with_folders_of_the_same_name(driver: PackageType, inputs: BuildInput, tmp_path: Path) -> None:
+def test_two_drivers_may_have_folders_with_the_same_name(
+    driver: PackageType, inputs: BuildInput, tmp_path: Path
+) -> None:
     other = tmp_path / "other" / "acme_reader"
     other.mkdir(parents=True)
     (other / "__init__.py").write_text("class Other: ...\n")
@@ -144,7 +146,7 @@ def test_two_drivers_with_folders_of_the_same_name(driver: PackageType, inputs: 
 
 
 @pytest.mark.parametrize("above", ["acme_devices", "acme_reader"])
-def test_a_module_with_the_name_of_its_folder(inputs: BuildInput, tmp_path: Path, above: str) -> None:
+def test_a_module_may_have_the_name_of_its_folder(inputs: BuildInput, tmp_path: Path, above: str) -> None:
     folder = tmp_path / "like" / above / "acme_reader"
     folder.mkdir(parents=True)
     (folder / "__init__.py").write_text("")
@@ -165,7 +167,7 @@ def directory(inputs: BuildInput, tmp_path: Path) -> Path:
 
 def test_a_package_runs_on_its_own_code(directory: Path, driver: PackageType) -> None:
     assert driver.folder is not None
-    (driver.folder / "codes.py").write_text("FIRST = 100\n")  # the hub was upgraded since
+    (driver.folder / "codes.py").write_text("FIRST = 100\n")  # the server was upgraded after the build
     done = subprocess.run(
         [sys.executable, "script.py"],
         cwd=directory,
@@ -211,7 +213,7 @@ def test_a_type_checker_accepts_a_package(directory: Path, pytestconfig: pytest.
     assert '"GoodPoses" has no attribute "nope"' in done.stdout
 
 
-def test_differing_versions_are_named(directory: Path) -> None:
+def test_the_check_lists_different_versions(directory: Path) -> None:
     assert package_versions.check_versions(directory) == []
     file = directory / "versions.json"
     built = json.loads(file.read_bytes())
@@ -243,12 +245,12 @@ def test_our_modules_in_older_sources_are_not_a_foreign_dependency(monkeypatch: 
     assert package_versions.present({"arcor2", "arcor2_web", "arcor2_object_types"}).distributions == {}
 
 
-def test_a_package_appears_atomically(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failed_write_leaves_no_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sync = os.fsync
-    left = iter((None, OSError(28, "No space left on device")))
+    outcomes = iter((None, OSError(28, "No space left on device")))
 
     def full(descriptor: int) -> None:
-        if (error := next(left)) is not None:
+        if (error := next(outcomes)) is not None:
             raise error
         sync(descriptor)
 
@@ -310,11 +312,13 @@ async def test_a_build_does_not_block_the_event_loop(service: tuple[BuildService
     await asyncio.wait_for(build.publish("pro_1"), 60)
     await publishing
     turning.cancel()
-    # If the build ran in the event loop, the loop would iterate only a few times meanwhile.
+    # If the build ran in the event loop, the loop would iterate only a few times during the build.
     assert turns > 100
 
 
-async def test_projects_without_logic(service: tuple[BuildService, Storage], tmp_path: Path) -> None:
+async def test_a_project_without_logic_is_built_from_its_handwritten_script(
+    service: tuple[BuildService, Storage], tmp_path: Path
+) -> None:
     build, storage = service
     await storage.put_project(msgspec.structs.replace(workplace.project(), has_logic=False, logic=[]))
     inputs = await build.collect("pro_1")
@@ -329,7 +333,7 @@ async def test_projects_without_logic(service: tuple[BuildService, Storage], tmp
     assert not (tmp_path / "data" / "packages").exists()
 
 
-async def test_missing_parts_are_named(service: tuple[BuildService, Storage]) -> None:
+async def test_the_error_names_a_missing_project_or_object(service: tuple[BuildService, Storage]) -> None:
     build, storage = service
     with pytest.raises(NotFound, match="pro_none"):
         await build.build("pro_none", "x")
@@ -371,8 +375,8 @@ async def test_the_request_builds_under_the_lock_of_the_project() -> None:
     client: Any = types.SimpleNamespace(user="ann", name="ann")
     args = BuildProjectArgs("pro_1", "Boards")
     assert await requests.build_project(Context(client), args) == BuildProjectData("pkg_1")
-    begun = f"{TaskKind.BUILD.value} 'Building the package Boards' of ann"
-    assert seen == ["locked ann ('pro_1',)", begun, "build pro_1 Boards", "finished", "unlocked", "added pkg_1"]
+    task = f"{TaskKind.BUILD.value} 'Building the package Boards' of ann"
+    assert seen == ["locked ann ('pro_1',)", task, "build pro_1 Boards", "finished", "unlocked", "added pkg_1"]
     client.user = None
     with pytest.raises(RequestRefused):
         await requests.build_project(Context(client), args)

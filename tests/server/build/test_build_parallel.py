@@ -48,7 +48,7 @@ def function(name: str, *actions: Action, returns: tuple[str, ...] = ()) -> Proj
 
 
 def project(*functions: ProjectFunction) -> Project:
-    """Return a project that fetches and presses at once, then uses the result of fetch. A refusal leads to the end."""
+    """Return a project that fetches and presses in parallel, and uses the result. A refusal leads to the end."""
     link = ActionParameter("flag", "link", json.dumps("act_fetch it/default/0"))
     actions = [
         action("both", PARALLEL, branches=["act_fetch it", "act_press it"], error_output="problem"),
@@ -94,7 +94,7 @@ LOOP = """
 """
 
 
-def test_parallel_work_is_one_readable_statement_and_read_back() -> None:
+def test_parallel_work_round_trips_as_one_statement() -> None:
     source = from_logic(SCENE, project(), TYPES)
     assert LOOP in source, source
     assert from_script(source, SCENE, project(), TYPES) == project()
@@ -170,7 +170,7 @@ def test_a_branch_has_no_connections() -> None:
         ('res.parallel(lambda: fetch(an="a"), lambda: push(an="b"), an="both", wait=1)', "has no parameter wait"),
     ],
 )
-def test_other_forms_are_refused_at_their_line(statement: str, reason: str) -> None:
+def test_the_refusal_of_another_form_names_its_line(statement: str, reason: str) -> None:
     source = from_logic(SCENE, project(), TYPES)
     start = source.index("        try:\n            found")
     end = source.index("\n\nif __name__")

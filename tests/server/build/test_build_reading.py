@@ -244,7 +244,7 @@ def test_a_changed_literal_changes_nothing_else() -> None:
     assert values_of(read(("0.5, an=", "1, an=")), "above feeder")["speed"] == ("double", "1.0")
 
 
-def test_arguments_of_every_kind() -> None:
+def test_edited_arguments_of_every_kind_are_read() -> None:
     changes = [
         ("poses.default, grip=Grip.FIRM", "poses.default, 0.75, Grip.SOFT"),
         ("reader.scan(2.5, Mode.TWICE", "reader.scan(pause, mode=Mode.ONCE"),
@@ -274,7 +274,7 @@ def test_arguments_of_every_kind() -> None:
     assert point_of(project, "into good box") == "acp_good"
 
 
-def test_calls_in_another_order() -> None:
+def test_reordered_calls_change_only_the_logic() -> None:
     project = read((ABOVE + PICK, PICK + ABOVE))
     before = workplace.project()
     assert project.action_points == before.action_points
@@ -334,7 +334,7 @@ def test_data_that_scripts_do_not_show_is_kept() -> None:
     assert [start for start, end, _ in steps_of(without) if end == "pick"] == []
 
 
-def test_new_branches() -> None:
+def test_added_and_removed_branches_are_read() -> None:
     pack = '            robot.place(aps.good.poses.default, an="pack")\n'
     project = read(
         (
@@ -361,7 +361,7 @@ def test_new_branches() -> None:
     assert kept["lit_known?_into good box"] in project.logic
 
 
-def test_a_renamed_result() -> None:
+def test_a_renamed_result_keeps_the_action_and_the_logic() -> None:
     project = read(
         ("known = reader.known(code, ", "fine = reader.known(label, "),
         ("code = reader.scan(", "label = reader.scan("),
@@ -487,7 +487,7 @@ def test_retries_are_read() -> None:
         read(("robot.pick(", "res.retry(robot, 3).pick("))
 
 
-def test_a_script_of_the_original_is_read() -> None:
+def test_a_script_with_the_older_module_names_is_read() -> None:
     source = edited(
         ("from arcor2_hw.runtime.exceptions import", "from arcor2_runtime.exceptions import"),
         ("from arcor2_hw.runtime.resources import", "from arcor2_runtime.resources import"),
@@ -579,7 +579,7 @@ def test_a_script_of_the_original_is_read() -> None:
         ("    boards = 2\n", "    boards = (2  #!\n", "never closed"),
     ],
 )
-def test_unsupported_code_is_named_with_its_line(old: str, new: str, text: str) -> None:
+def test_the_refusal_of_unsupported_code_names_its_line(old: str, new: str, text: str) -> None:
     source = edited((old, new))
     line = next(number for number, content in enumerate(source.splitlines(), 1) if "#!" in content)
     with pytest.raises(NotUnderstood) as caught:
@@ -589,7 +589,7 @@ def test_unsupported_code_is_named_with_its_line(old: str, new: str, text: str) 
     assert text in str(caught.value)
 
 
-def test_a_result_that_may_be_missing_is_named() -> None:
+def test_the_refusal_names_a_result_that_may_be_missing() -> None:
     source = edited(
         (GOOD, GOOD + '            label = reader.scan(1.0, an="label")\n'),
         (BACK, '        reader.known(label, an="late")\n'),
@@ -605,7 +605,7 @@ def test_files_that_are_not_scripts_are_refused(source: str) -> None:
         from_script(source, workplace.scene(), workplace.project(), workplace.FACTS)
 
 
-def test_joints_of_another_robot() -> None:
+def test_joints_of_another_robot_are_refused() -> None:
     project = workplace.project()
     scene = workplace.scene()
     scene = replace(scene, objects=[*scene.objects, SceneObject("other", "Arm", Pose(), id="obj_other")])

@@ -28,18 +28,18 @@ from tests.server.cell.conftest import Recorder, Server, serving
 
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs" / "reference" / "scripts.md").read_text()
-BY_HAND = re.findall(r"^```python\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)[0]
+HANDWRITTEN = re.findall(r"^```python\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)[0]
 COUNT = 1000
 
 
-def by_hand() -> Project:
-    """Return the workplace's project without logic and without actions, as one that is programmed by hand."""
+def handwritten_project() -> Project:
+    """Return the workplace's project without logic and actions, as for a handwritten script."""
     points = [replace(point, actions=[]) for point in workplace.project().action_points]
     return replace(workplace.project(), has_logic=False, logic=[], action_points=points)
 
 
 async def build(directory: Path, project: Project, source: str | None = None) -> dict[str, bytes]:
-    """Return the files of a package that a hub makes of a stored project."""
+    """Return the files of the package that a server builds from a stored project."""
     with pytest.MonkeyPatch.context() as patch:
         async with hub.opened(directory / "hub", make_code(directory), patch) as services:
             await services.storage.put_scene(workplace.scene())
@@ -55,7 +55,7 @@ async def upload(server: Server, files: dict[str, bytes]) -> None:
 
 
 def long_project() -> Project:
-    """Return a chain of distinct actions, each on a point of its own; the last one ends the program."""
+    """Return a chain of distinct actions, each at its own action point. The last action ends the program."""
     points, names = [], []
     for n in range(COUNT):
         key = f"ori_{n}"
@@ -75,7 +75,7 @@ def long_project() -> Project:
     return replace(workplace.project(), action_points=points, logic=logic)
 
 
-async def ended(server: Server) -> None:
+async def until_ended(server: Server) -> None:
     await server.client.event("ShowMainScreen")
 
 
@@ -87,18 +87,18 @@ async def test_a_thousand_distinct_actions_run(server: Server) -> None:
     seen: list[dict[str, Any]] = []
     put = client.put
 
-    def keep(message: bytes) -> None:
+    def record(message: bytes) -> None:
         put(message)
         seen.append(client.got[-1])
 
-    client.put = keep  # type: ignore[method-assign]
+    client.put = record  # type: ignore[method-assign]
     await server.ask("RunPackage", {"id": "pkg_1"})
-    await ended(server)
+    await until_ended(server)
     failures = [event for event in seen if event["event"] == "ProjectException"]
     assert not failures, (len(seen), seen[-3:])
     before = [event["data"] for event in seen if event["event"] == "ActionStateBefore"]
     assert [data["action_id"] for data in before] == [a.id for point in project.action_points for a in point.actions]
-    # Each action had the parameters of its own point.
+    # Each action had the parameters of its action point.
     assert [data.get("action_point_ids") for data in before[:-1:2]] == [[f"acp_{n}"] for n in range(0, COUNT, 2)]
     assert before[1]["parameters"][1] == "0.2"
 
@@ -143,7 +143,7 @@ async def test_a_function_is_stepped_into_and_traced(server: Server) -> None:
     await client.state("paused", "PackageState")
     assert msgspec.to_builtins(await server.ask("GetProgramPosition"))["branches"] == [position]
     [_, running] = server.services.execution.greeting()[1:]
-    assert running.data["action_id"] == ids["handle_board"], "a new client of the original knows only the call"
+    assert running.data["action_id"] == ids["handle_board"], "a new legacy client gets only the call"
     await server.ask("StepAction", {"mode": "out"})
     while True:  # the loop has one board for each repetition
         state = await client.event("PackageState", lambda data: data["state"] in ("paused", "stopped"))
@@ -156,7 +156,7 @@ async def test_a_function_is_stepped_into_and_traced(server: Server) -> None:
     inside = {action.id for action in project.functions[0].actions}
     announced = [e["data"]["action_id"] for e in older.got if e["event"] == "ActionStateBefore"]
     assert ids["handle_board"] in announced
-    assert not inside.intersection(announced), "other clients do not know the actions of functions"
+    assert not inside.intersection(announced), "legacy clients do not get the actions of functions"
     trace = await server.services.runs.run_trace(1)
     call = next(span for span in trace.spans if span.action_id == ids["handle_board"])
     assert (call.device, call.call) == ("", UNSET)
@@ -168,8 +168,8 @@ async def test_a_function_is_stepped_into_and_traced(server: Server) -> None:
 
 @serving()
 async def test_a_handwritten_script_runs_and_can_be_debugged(server: Server) -> None:
-    files = await build(server.services.settings.data_dir, by_hand(), BY_HAND)
-    assert files["script.py"].decode() == BY_HAND
+    files = await build(server.services.settings.data_dir, handwritten_project(), HANDWRITTEN)
+    assert files["script.py"].decode() == HANDWRITTEN
     await upload(server, files)
     client = server.client
     await server.ask("RunPackage", {"id": "pkg_1", "start_paused": True, "breakpoints": ["acp_good"]})
@@ -188,41 +188,45 @@ async def test_a_handwritten_script_runs_and_can_be_debugged(server: Server) -> 
     await server.ask("ResumePackage")
     dropped = await client.event("ActionStateBefore", lambda data: data["parameters"][1:] == ["0.2"])
     assert '"x"' in dropped["parameters"][0]
-    await ended(server)
+    await until_ended(server)
     assert server.services.execution.program.error is None
 
 
 @serving()
-async def test_handwritten_scripts_that_fail_or_are_stopped(server: Server) -> None:
-    body = BY_HAND.replace("    good = 0\n", "    robot.pick(aps.feeder.poses.default, grip=Grip.SOFT)\n    good = 0\n")
-    await upload(server, await build(server.services.settings.data_dir, by_hand(), body))
+async def test_a_handwritten_script_can_fail_and_can_be_stopped(server: Server) -> None:
+    body = HANDWRITTEN.replace(
+        "    good = 0\n", "    robot.pick(aps.feeder.poses.default, grip=Grip.SOFT)\n    good = 0\n"
+    )
+    await upload(server, await build(server.services.settings.data_dir, handwritten_project(), body))
     await server.ask("RunPackage", {"id": "pkg_1"})
     found = await server.client.event("ProjectException")
     assert found["type"] == "AssertionError"
     assert "robot" in found["message"]
-    await ended(server)
+    await until_ended(server)
 
     (server.services.settings.packages_dir / "pkg_1" / "script.py").write_text(
-        BY_HAND.replace("    good = 0\n", "    while True:\n        robot.drop(aps.good.position, 0.1)\n").split(
+        HANDWRITTEN.replace("    good = 0\n", "    while True:\n        robot.drop(aps.good.position, 0.1)\n").split(
             "    for _ in range"
         )[0]
-        + BY_HAND[BY_HAND.index("\n\nif __name__") :]
+        + HANDWRITTEN[HANDWRITTEN.index("\n\nif __name__") :]
     )
     await server.ask("RunPackage", {"id": "pkg_1"})
     await server.client.event("ActionStateBefore")
     await server.ask("StopPackage")
-    await ended(server)
+    await until_ended(server)
     assert server.services.execution.program.error is None
 
 
 async def test_a_handwritten_script_is_checked_before_a_build(tmp_path: Path) -> None:
     with pytest.raises(InvalidProject, match=r"script\.py, line 3"):
-        await build(tmp_path, by_hand(), "a = 1\n\nb = (\n")
+        await build(tmp_path, handwritten_project(), "a = 1\n\nb = (\n")
 
 
-async def test_editors_and_type_checkers_understand_a_script(tmp_path: Path, pytestconfig: pytest.Config) -> None:
+async def test_a_type_checker_finds_the_errors_of_a_handwritten_script(
+    tmp_path: Path, pytestconfig: pytest.Config
+) -> None:
     directory = tmp_path / "package"
-    package.write(await build(tmp_path, by_hand(), BY_HAND), directory)
+    package.write(await build(tmp_path, handwritten_project(), HANDWRITTEN), directory)
     wrong = {
         "aps.feeder.poses.defautl": '"FeederPoses" has no attribute "defautl"',
         "aps.feder": '"ActionPoints" has no attribute "feder"',

@@ -133,7 +133,7 @@ def test_generated_names_are_unique_identifiers(texts: list[str]) -> None:
     assert all(class_name(text).isidentifier() for text in texts)
 
 
-def test_valid_names_are_kept() -> None:
+def test_names_become_valid_identifiers() -> None:
     assert [identifier(name) for name in ("ap1", "_x", "Größe", "1st", "a b", "if")] == [
         "ap1", "_x", "Gr__e", "_1st", "a_b", "if_",
     ]  # fmt: skip
@@ -198,7 +198,7 @@ def test_a_long_call_is_wrapped_at_arguments() -> None:
 
 # ------------------------------------------------------------------------------------------------ refusals
 def _with(name: str, *arguments: tuple[str, str, str], method: str = "", results: tuple[str, ...] = ()) -> Project:
-    """Return the workplace's project with another action of that name."""
+    """Return the workplace's project with one action replaced."""
     project = workplace.project()
     found = []
     for point in project.action_points:
@@ -244,7 +244,7 @@ def _with(name: str, *arguments: tuple[str, str, str], method: str = "", results
         (_with("known?", ("code", "link", '"act_scan_code/default/0"')), "'known?'"),
     ],
 )
-def test_an_invalid_action_is_refused_by_name(project: Project, text: str) -> None:
+def test_the_refusal_of_an_invalid_action_names_it(project: Project, text: str) -> None:
     with pytest.raises(InvalidProject) as caught:
         script.from_logic(workplace.scene(), project, workplace.FACTS)
     assert text in str(caught.value)

@@ -1,7 +1,6 @@
 """Build reports overlapping zones, and robots that may wait for each other's zone for ever."""
 
 import json
-from typing import Any
 
 import pytest
 
@@ -42,14 +41,16 @@ PLACES = {"left": 0.0, "right": 1.0, "free": 3.0, "beside": -2.0}
         (Cylinder("a", 0.5, 1), Sphere("b", 0.5), 1.2, Orientation(), False),
     ],
 )
-def test_overlap_of_bodies(one: Models, other: Models, x: float, orientation: Orientation, expected: bool) -> None:
+def test_overlapping_bodies_are_detected(
+    one: Models, other: Models, x: float, orientation: Orientation, expected: bool
+) -> None:
     first = Obstacle("a", one, Pose())
     second = Obstacle("b", other, Pose(Position(x, 0.0, 0.0), orientation))
     assert overlap(first, second) is expected
     assert overlap(second, first) is expected
 
 
-def scene(right: float = 1.0) -> Scene:
+def make_scene(right: float = 1.0) -> Scene:
     objects = [SceneObject(name, "Arm", Pose(), id=f"obj_{name}") for name in ("alpha", "beta")]
     objects += [
         SceneObject(name, name.capitalize(), Pose(Position(x, 0.0, 0.0)), id=f"obj_{name}")
@@ -57,6 +58,9 @@ def scene(right: float = 1.0) -> Scene:
     ]
     locks = [Interlock(name, InterlockTarget.ZONE, f"obj_{name}", id=f"ilk_{name}") for name in ("left", "right")]
     return Scene("scene", id="scn_1", objects=objects, interlocks=locks)
+
+
+SCENE = make_scene()
 
 
 def move(text: str) -> Action:
@@ -84,12 +88,12 @@ def points(*actions: Action) -> list[ActionPoint]:
     return found
 
 
-def in_turn(*moves: str) -> Project:
+def sequential(*moves: str) -> Project:
     actions = [move(each) for each in moves]
     return Project("project", "scn_1", id="pro_1", action_points=points(*actions), logic=chain([a.id for a in actions]))
 
 
-def at_once(first: list[str], second: list[str]) -> Project:
+def parallel(first: list[str], second: list[str]) -> Project:
     functions = []
     for name, moves in (("one", first), ("two", second)):
         actions = [move(each) for each in moves]
@@ -106,29 +110,29 @@ def at_once(first: list[str], second: list[str]) -> Project:
     )
 
 
-def check(project: Project, where: Any = None) -> None:
-    check_zones(where or scene(), project, MODELS.get, lambda name: name == "Arm")
+def check(project: Project, scene: Scene = SCENE) -> None:
+    check_zones(scene, project, MODELS.get, lambda name: name == "Arm")
 
 
-def test_overlapping_zones_are_named() -> None:
+def test_overlapping_zones_are_refused() -> None:
     with pytest.raises(InvalidProject, match="The zones left and right overlap"):
-        check(in_turn(), scene(right=0.3))
+        check(sequential(), make_scene(right=0.3))
 
 
 @pytest.mark.parametrize(
     ("project", "reason"),
     [
         (
-            in_turn("alpha left", "beta left"),
+            sequential("alpha left", "beta left"),
             "'beta left' moves beta into left, in which alpha stays after 'alpha left'",
         ),
-        (in_turn("alpha beside", "beta right", "alpha free"), "alpha into right, in which beta stays"),
-        (in_turn("alpha free", "beta free", "alpha left", "beta beside", "alpha free"), "beta into left"),
-        (at_once(["alpha left", "alpha right", "alpha free"], ["beta right", "beta left", "beta beside"]), "needs"),
-        (at_once(["alpha left"], ["beta left", "beta beside"]), "in which alpha stays after 'alpha left'"),
+        (sequential("alpha beside", "beta right", "alpha free"), "alpha into right, in which beta stays"),
+        (sequential("alpha free", "beta free", "alpha left", "beta beside", "alpha free"), "beta into left"),
+        (parallel(["alpha left", "alpha right", "alpha free"], ["beta right", "beta left", "beta beside"]), "needs"),
+        (parallel(["alpha left"], ["beta left", "beta beside"]), "in which alpha stays after 'alpha left'"),
     ],
 )
-def test_possible_deadlocks_are_named(project: Project, reason: str) -> None:
+def test_possible_deadlocks_are_refused(project: Project, reason: str) -> None:
     with pytest.raises(InvalidProject, match=reason):
         check(project)
 
@@ -136,10 +140,10 @@ def test_possible_deadlocks_are_named(project: Project, reason: str) -> None:
 @pytest.mark.parametrize(
     "project",
     [
-        in_turn("alpha left", "alpha beside", "beta right", "beta free"),
-        at_once(["alpha left", "alpha beside"], ["beta right", "beta free"]),
-        at_once(["alpha left", "alpha right", "alpha free"], ["beta left", "beta right", "beta free"]),
-        in_turn("alpha left"),
+        sequential("alpha left", "alpha beside", "beta right", "beta free"),
+        parallel(["alpha left", "alpha beside"], ["beta right", "beta free"]),
+        parallel(["alpha left", "alpha right", "alpha free"], ["beta left", "beta right", "beta free"]),
+        sequential("alpha left"),
     ],
 )
 def test_programs_without_deadlocks_are_accepted(project: Project) -> None:

@@ -31,13 +31,13 @@ class Grip(StrEnum):
 
 
 def action(name: str, method: str, *arguments: tuple[str, str, str], results: tuple[str, ...] = ()) -> Action:
-    """Make an action; an argument is name, type and value as JSON."""
+    """Return an action. Each argument is its name, type and value as JSON."""
     given = [ActionParameter(*argument) for argument in arguments]
     return Action(name, method, f"act_{name.replace(' ', '_')}", given, [Flow(outputs=list(results))])
 
 
-def step(start: str, end: str, what: str = "", value: bool = True) -> LogicItem:
-    condition = ProjectLogicIf(f"act_{what}/default/0", "true" if value else "false") if what else UNSET
+def step(start: str, end: str, tested: str = "", value: bool = True) -> LogicItem:
+    condition = ProjectLogicIf(f"act_{tested}/default/0", "true" if value else "false") if tested else UNSET
     ids = [name if name in (START, END) else f"act_{name.replace(' ', '_')}" for name in (start, end)]
     return LogicItem(ids[0], ids[1], condition, f"lit_{start}_{end}")
 
