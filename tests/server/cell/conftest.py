@@ -57,10 +57,11 @@ from tests.runtime.conftest import type_code
 from tests.server.parts import Parts
 
 PATIENCE = 40.0
+"""Longest wait for an event, s."""
 
 
 class Recorder:
-    """A client that stores the messages that it gets."""
+    """A client that stores the received messages."""
 
     def __init__(self, user: str | None) -> None:
         self.user = user
@@ -70,11 +71,11 @@ class Recorder:
         self.device = "tablet"
         self.person = None
         self.got: list[dict[str, Any]] = []
-        self._news = asyncio.Event()
+        self._received = asyncio.Event()
 
     def put(self, message: bytes) -> None:
         self.got.append(json.loads(message))
-        self._news.set()
+        self._received.set()
 
     def put_newest(self, stream: str, message: bytes) -> None:
         self.put(message)
@@ -88,8 +89,8 @@ class Recorder:
                     if event["event"] == name and where(data):
                         del self.got[: index + 1]
                         return data
-                self._news.clear()
-                await self._news.wait()
+                self._received.clear()
+                await self._received.wait()
 
     async def state(self, wanted: str, name: str = "SceneState") -> dict[str, Any]:
         return await self.event(name, lambda data: data["state"] == wanted)
@@ -138,7 +139,7 @@ class Server:
         services.hub.add(self.client)  # type: ignore[arg-type]
 
     async def ask(self, name: str, args: Any = None, client: Recorder | None = None, codes: bool = False) -> Any:
-        """Send a request like the endpoint: the response gets its place among the events."""
+        """Handle a request like the endpoint, and store the response among the events in the order of sending."""
         client = client or self.client
         context = Context(client, codes=codes)  # type: ignore[arg-type]
         if isinstance(args, dict):
@@ -244,7 +245,7 @@ Prepare = Callable[[Server], Awaitable[None]]
 
 
 def serving(prepare: Prepare | None = None) -> Callable[[Test], Callable[[Path], Awaitable[None]]]:
-    """Run a test with a server inside its own body: the tasks of hosts must end before fixtures do."""
+    """Start a server in the task of the test, because the tasks of hosts must end before fixtures do."""
 
     def wrap(test: Test) -> Callable[[Path], Awaitable[None]]:
         async def run(tmp_path: Path) -> None:

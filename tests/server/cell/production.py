@@ -69,7 +69,7 @@ class ProductionServer:
             found = await self.ask("SignRecipe", arguments)
         return found
 
-    async def released(self, product: str = "board", package: str = "pkg_1", **values: Any) -> Any:
+    async def released_recipe(self, product: str = "board", package: str = "pkg_1", **values: Any) -> Any:
         recipe = await self.ask("PutRecipe", {"product": product, "package_id": package, **values})
         return await self.sign(recipe.id, "tested", "released")
 

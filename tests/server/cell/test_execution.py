@@ -63,7 +63,7 @@ def states(events: list[dict[str, Any]]) -> list[str]:
 
 
 async def until_stopped(server: Server, client: Recorder | None = None) -> list[str]:
-    """Wait for the end. Return all states, and the other events, in order."""
+    """Wait for the end of the run, and return the received states and other events in order."""
     client = client or server.client
     await until(lambda: client.got and client.got[-1]["event"] == "ShowMainScreen")
     return states(client.got)
@@ -92,7 +92,7 @@ async def test_clients_see_each_state_of_a_run(server: Server) -> None:
     [summary] = await server.ask("ListPackages")
     assert (summary.id, summary.package_meta.name, summary.project_meta.name) == ("pkg_1", "demo", "project")
     server.client.got.clear()
-    await server.ask("RunPackage", {"id": "pkg_1"})  # and again
+    await server.ask("RunPackage", {"id": "pkg_1"})  # it can run again
     assert (await until_stopped(server))[-2:] == ["stopped", "ShowMainScreen"]
 
 

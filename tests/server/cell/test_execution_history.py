@@ -33,7 +33,7 @@ def subscribe(server: Server, *names: str) -> None:
     server.services.hub.subscribe(server.client, set(names) or EVENTS, True)  # type: ignore[arg-type]
 
 
-async def newest(server: Server, codes: bool = False) -> Run:
+async def newest_run(server: Server, codes: bool = False) -> Run:
     found: list[Run] = (await server.ask("ListRuns", {"limit": 1}, codes=codes)).runs
     return found[0]
 
@@ -51,9 +51,9 @@ async def test_a_run_is_recorded_from_start_to_end(server: Server) -> None:
     await server.ask("RunPackage", {"id": "pkg_1"})
     await until_stopped(server)
     async with asyncio.timeout(30):  # names are added concurrently
-        while (await newest(server)).package_name != "demo":
+        while (await newest_run(server)).package_name != "demo":
             await asyncio.sleep(0.01)
-    run = await newest(server)
+    run = await newest_run(server)
     assert (run.number, run.package_id, run.started_by, run.end) == (1, "pkg_1", "alice", RunEnd.FINISHED)
     assert (run.project_id, run.project_name, run.project_modified) == (PROJECT.id, PROJECT.name, PROJECT.modified)
     assert isinstance(run.ended, str)
@@ -81,7 +81,7 @@ async def test_a_run_is_recorded_from_start_to_end(server: Server) -> None:
 
 
 @serving()
-async def test_the_end_of_a_run_is_recorded(server: Server) -> None:
+async def test_a_run_records_how_it_ended(server: Server) -> None:
     subscribe(server)
     write(server, 'lamp.blink(1, an="a")\nlamp.wait(an="b")', "pkg_wait")
     write(server, 'lamp.blink(1, an="a")\nlamp.blink("x" + 1, an="b")', "pkg_script")
@@ -90,28 +90,28 @@ async def test_the_end_of_a_run_is_recorded(server: Server) -> None:
     server.services.hub.add(bob)  # type: ignore[arg-type]
     await server.ask("RunPackage", {"id": "pkg_wait", "start_paused": True})
     await server.client.state("paused", "PackageState")
-    assert ((await newest(server)).end, (await newest(server)).start_paused) == (RunEnd.RUNNING, True)
+    assert ((await newest_run(server)).end, (await newest_run(server)).start_paused) == (RunEnd.RUNNING, True)
     await server.ask("ResumePackage")
     await server.client.event("ActionStateBefore", lambda data: data["action_id"] == "act_b")
     await server.ask("StopPackage", client=bob)
     await server.client.state("stopped", "PackageState")
-    run = await newest(server)
+    run = await newest_run(server)
     assert (run.end, run.started_by, run.stopped_by) == (RunEnd.STOPPED, "alice", "bob")
     assert run.last_action.name == "b"  # type: ignore[union-attr]
 
     await server.ask("RunPackage", {"id": "pkg_script"})
     await server.client.state("stopped", "PackageState")
-    run = await newest(server)
+    run = await newest_run(server)
     assert (run.end, run.error_type, run.last_action.name) == (RunEnd.FAILED, "TypeError", "a")  # type: ignore[union-attr]
     assert run.error
 
     await server.ask("RunPackage", {"id": "pkg_action"}, client=bob)
     exception = await server.client.event("ProjectException")
     await server.client.state("stopped", "PackageState")
-    run = await newest(server)
+    run = await newest_run(server)
     assert (run.end, run.error, run.started_by) == (RunEnd.FAILED, exception["message"], "bob")
     assert run == run.untranslated()
-    translatable = await newest(server, codes=True)
+    translatable = await newest_run(server, codes=True)
     assert (translatable.error, translatable.key) == (run.error, exception["key"])
     assert msgspec.to_builtins(translatable.values) == exception["values"]
 
@@ -121,7 +121,7 @@ async def test_the_end_of_a_run_is_recorded(server: Server) -> None:
     assert host is not None
     host.kill()
     await server.client.state("stopped", "PackageState")
-    run = await newest(server)
+    run = await newest_run(server)
     assert (run.end, run.error_type) == (RunEnd.LOST, "ConnectionLost")
     numbers = [one.number for one in (await server.ask("ListRuns", {"package_id": "pkg_wait"})).runs]
     assert numbers == [4, 1]
@@ -172,7 +172,7 @@ async def test_shared_breakpoints_apply_on_request_and_can_change(server: Server
     server.services.breakpoints._data = shared
     await server.open(Scene("scene", id="scn_1", objects=[scene_object("lamp", "Lamp")]), PROJECT)
     write(server, 'for n in ("a", "b", "c", "a"): lamp.blink(2, an=n)')
-    await server.ask("RunPackage", {"id": "pkg_1"})  # it was not requested
+    await server.ask("RunPackage", {"id": "pkg_1"})  # without the option
     assert "paused" not in await until_stopped(server)
     server.client.got.clear()
     await server.ask("RunPackage", {"id": "pkg_1", "shared_breakpoints": True, "breakpoints": ["act_c"]})

@@ -40,7 +40,7 @@ class Valves(Generic):
         return [Observation("Pressure", 6.5, "bar"), Observation("Flow", 2.0, "l/min")]
 """
 VALVE = {"object_id": "obj_valves", "point": "valve", "value": True}
-LONG = 10_000
+LEASE_MS = 10_000
 
 
 async def with_valves(server: Server) -> None:
@@ -50,7 +50,7 @@ async def with_valves(server: Server) -> None:
     server.services.hub.subscribe(server.client, {"ForcesChanged"}, True)
 
 
-async def force(server: Server, valid_ms: int = LONG, **changed: Any) -> str:
+async def force(server: Server, valid_ms: int = LEASE_MS, **changed: Any) -> str:
     return str((await server.ask("ForcePoint", VALVE | {"valid_ms": valid_ms} | changed)).id)
 
 
@@ -58,7 +58,7 @@ async def values(server: Server) -> Any:
     return await server.services.online.ask(dict[str, bool], "obj_valves", "state")
 
 
-async def ended(server: Server) -> None:
+async def until_none(server: Server) -> None:
     await server.client.event("ForcesChanged", lambda data: data["forces"] == [])
 
 
@@ -83,9 +83,9 @@ async def test_every_client_sees_a_force_and_may_end_it(server: Server) -> None:
         await force(server)
 
     with pytest.raises(RequestRefused, match="Another device has forced valves: valve"):
-        await server.ask("RenewForces", {"ids": [force_id], "valid_ms": LONG}, other)
+        await server.ask("RenewForces", {"ids": [force_id], "valid_ms": LEASE_MS}, other)
     await server.ask("EndForce", {"id": force_id}, other)
-    await ended(server)
+    await until_none(server)
     assert await values(server) == {"valve": False, "clamp": True}
     with pytest.raises(NotFound, match="ended"):
         await server.ask("EndForce", {"id": force_id})
@@ -93,35 +93,35 @@ async def test_every_client_sees_a_force_and_may_end_it(server: Server) -> None:
 
 @serving(with_valves)
 async def test_a_force_ends_with_its_client(server: Server) -> None:
-    noted: list[tuple[Force, Message]] = []
-    server.services.online.forces.on_end.append(lambda *end: noted.append(end))
+    ended_forces: list[tuple[Force, Message]] = []
+    server.services.online.forces.on_end.append(lambda *end: ended_forces.append(end))
     tablet = Recorder("eva")
     hub = server.services.hub
     hub.add(tablet)
 
-    async def by_tablet(point: str, valid_ms: int = LONG) -> None:
+    async def by_tablet(point: str, valid_ms: int = LEASE_MS) -> None:
         await server.ask(
             "ForcePoint", VALVE | {"point": point, "value": point == "valve", "valid_ms": valid_ms}, tablet
         )
 
     await by_tablet("valve", 500)
-    await ended(server)
+    await until_none(server)
     await by_tablet("valve")
     server.services.online.forces.logged_off(tablet, Message.of("eva logged off."))
-    await ended(server)
+    await until_none(server)
     await by_tablet("valve")
     await by_tablet("clamp")
     hub.remove(tablet)
-    await ended(server)
+    await until_none(server)
     assert await values(server) == {"valve": False, "clamp": True}
-    await until(lambda: len(noted) == 4)
-    assert [reason.text for _, reason in noted] == [
+    await until(lambda: len(ended_forces) == 4)
+    assert [reason.text for _, reason in ended_forces] == [
         "valves: the force of valve was not renewed in time",
         "eva logged off.",
         "eva is no longer connected",
         "eva is no longer connected",
     ]
-    assert {end.output for end, _ in noted} == {"valves: valve", "valves: clamp"}
+    assert {end.output for end, _ in ended_forces} == {"valves: valve", "valves: clamp"}
 
 
 @serving(with_valves)
@@ -141,7 +141,7 @@ async def test_no_program_starts_while_an_output_is_forced(server: Server) -> No
 
     # Offline, all forces have ended.
     await server.ask("StopScene")
-    await ended(server)
+    await until_none(server)
     await server.client.state("stopped")
     forces.require_none()
     with pytest.raises(RequestRefused, match="offline"):
@@ -152,7 +152,7 @@ async def test_no_program_starts_while_an_output_is_forced(server: Server) -> No
 async def test_a_force_ends_with_the_host(server: Server) -> None:
     await force(server)
     server.services.online.host.host.kill()
-    await ended(server)
+    await until_none(server)
     server.services.online.forces.require_none()
 
 
@@ -165,13 +165,13 @@ async def test_points_and_signals_are_streamed(server: Server) -> None:
         "clamp": ("output", True),
         "pressure": ("signal", 6.5),
         "Flow": ("signal", 2.0),
-    }, "an observation that is also marked is sent once"
+    }, "a value that is also in observations() is sent once"
     with pytest.raises(RequestRefused, match=r"0\.2 to 5 Hz"):
         await server.ask("StreamPoints", {"object_id": "obj_valves", "rate": 6})
     await server.ask("StreamPoints", {"object_id": "obj_valves", "send": False})
 
 
-def test_roles_and_audit() -> None:
+def test_forcing_requires_a_technician_and_is_audited() -> None:
     assert (RPCS["ForcePoint"].role, RPCS["EndForce"].role) == (Role.TECHNICIAN, Role.OPERATOR)
     assert commands.is_command(RPCS["ForcePoint"])
     assert commands.is_command(RPCS["EndForce"])

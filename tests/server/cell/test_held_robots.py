@@ -115,7 +115,7 @@ async def with_arm(server: Server) -> None:
     server.client.got.clear()
 
 
-class Hand:
+class HoldButton:
     """A client that presses a jog or hand-teaching button."""
 
     def __init__(self, server: Server, client: Recorder | None = None) -> None:
@@ -160,34 +160,34 @@ def subscribe(server: Server, client: Recorder) -> None:
 
 
 @serving(with_arm)
-async def test_a_jog_runs_from_press_to_release(arm: Server) -> None:
-    subscribe(arm, arm.client)
-    hand = Hand(arm)
-    assert (await hand.jog(new=True)).scale == 1.0
-    assert await arm.client.event("RobotHold") == {
+async def test_a_jog_runs_from_press_to_release(server: Server) -> None:
+    subscribe(server, server.client)
+    button = HoldButton(server)
+    assert (await button.jog(new=True)).scale == 1.0
+    assert await server.client.event("RobotHold") == {
         "robot_id": OBJ, "kind": "jog", "user": "alice", "held": True,
     }  # fmt: skip
     step = {"robot_id": OBJ, "end_effector_id": "tool", "axis": "x", "what": "position", "mode": "world", "step": 0.1}
     with pytest.raises(RequestRefused, match="arm is being moved by alice"):
-        await arm.ask("StepRobotEef", step)
+        await server.ask("StepRobotEef", step)
     with pytest.raises(RequestRefused, match="arm is"):
-        await arm.ask("ExecuteAction", {"action_id": "act_wave"})
-    assert (await hand.jog(linear={"z": 0.5})).scale == 0.5
-    assert (await hand.jog(0)).scale == 0.0
-    event = await arm.client.event("RobotHold")
+        await server.ask("ExecuteAction", {"action_id": "act_wave"})
+    assert (await button.jog(linear={"z": 0.5})).scale == 0.5
+    assert (await button.jog(0)).scale == 0.0
+    event = await server.client.event("RobotHold")
     assert (event["held"], "reason" in event) == (False, False)
-    jogs, stops, *_ = await report(arm)
+    jogs, stops, *_ = await report(server)
     assert jogs == [[[0.1, 0, 0, 0, 0, 0], None, "world"], [[0, 0, 0.25, 0, 0, 0], None, "world"]]
     assert stops == 1
     with pytest.raises(RequestRefused, match="press it again"):
-        await hand.jog()
-    await hand.jog(0)  # a second release has no effect
-    await arm.ask("ExecuteAction", {"action_id": "act_wave"})
+        await button.jog()
+    await button.jog(0)  # a second release has no effect
+    await server.ask("ExecuteAction", {"action_id": "act_wave"})
 
 
 @serving(with_arm)
-async def test_only_one_client_can_jog_a_robot(arm: Server) -> None:
-    alice, bob = Hand(arm), Hand(arm, await join(arm, "bob"))
+async def test_only_one_client_can_jog_a_robot(server: Server) -> None:
+    alice, bob = HoldButton(server), HoldButton(server, await join(server, "bob"))
     with pytest.raises(RequestRefused, match="arm is locked by alice"):
         await bob.jog(new=True)
     await alice.jog(new=True)
@@ -195,134 +195,134 @@ async def test_only_one_client_can_jog_a_robot(arm: Server) -> None:
         await bob.jog(new=True)
     with pytest.raises(RequestRefused, match="arm is being moved by alice"):
         await bob.teach(new=True)
-    await arm.services.locks.write_unlock("alice", OBJ)
+    await server.services.locks.write_unlock("alice", OBJ)
     with pytest.raises(RequestRefused, match="Lock arm before"):
         await alice.jog()
     event = await bob.client.event("RobotHold", lambda data: not data["held"])
     assert "alice no longer holds the lock" in event["reason"]
-    assert (await report(arm))[1] == 1
-    await arm.services.locks.write_lock("bob", OBJ)
+    assert (await report(server))[1] == 1
+    await server.services.locks.write_lock("bob", OBJ)
     await bob.jog(new=True)
     await bob.jog(0)
 
 
 @serving(with_arm)
-async def test_motion_that_is_not_renewed_stops_until_the_next_press(arm: Server) -> None:
-    subscribe(arm, arm.client)
-    hand = Hand(arm)
-    await hand.jog(1000, new=True)
-    event = await arm.client.event("RobotHold", lambda data: not data["held"])
+async def test_motion_that_is_not_renewed_stops_until_the_next_press(server: Server) -> None:
+    subscribe(server, server.client)
+    button = HoldButton(server)
+    await button.jog(1000, new=True)
+    event = await server.client.event("RobotHold", lambda data: not data["held"])
     assert "not renewed in time" in event["reason"]
-    assert (await report(arm))[1] == 1
+    assert (await report(server))[1] == 1
     with pytest.raises(RequestRefused, match="press it again"):
-        await hand.jog()
-    await hand.jog(new=True)
-    await hand.jog(0)
+        await button.jog()
+    await button.jog(new=True)
+    await button.jog(0)
 
 
 @serving(with_arm)
-async def test_a_closed_connection_stops_the_motion(arm: Server) -> None:
-    bob = await join(arm, "bob")
-    hand = Hand(arm)
-    await hand.jog(new=True)
-    arm.services.hub.remove(arm.client)  # type: ignore[arg-type]
+async def test_a_closed_connection_stops_the_motion(server: Server) -> None:
+    bob = await join(server, "bob")
+    button = HoldButton(server)
+    await button.jog(new=True)
+    server.services.hub.remove(server.client)  # type: ignore[arg-type]
     event = await bob.event("RobotHold", lambda data: not data["held"])
     assert "alice is no longer connected" in event["reason"]
-    assert (await report(arm))[1] == 1
-    assert arm.services.online.held.holder(OBJ) is None
-    assert arm.services.online.moving == set()
+    assert (await report(server))[1] == 1
+    assert server.services.online.held.holder(OBJ) is None
+    assert server.services.online.moving == set()
 
 
 @serving(with_arm)
-async def test_logging_off_stops_the_motion(arm: Server) -> None:
-    bob = await join(arm, "bob")
-    hand = Hand(arm)
-    await hand.jog(new=True)
-    arm.services.online.held.logged_off(bob, Message.of("bob logged off"))  # he holds no robot
-    arm.services.online.held.logged_off(arm.client, Message.of("alice logged off"))
+async def test_logging_off_stops_the_motion(server: Server) -> None:
+    bob = await join(server, "bob")
+    button = HoldButton(server)
+    await button.jog(new=True)
+    server.services.online.held.logged_off(bob, Message.of("bob logged off"))  # bob holds no robot
+    server.services.online.held.logged_off(server.client, Message.of("alice logged off"))
     event = await bob.event("RobotHold", lambda data: not data["held"])
     assert event["reason"] == "alice logged off"
-    assert (await report(arm))[1] == 1
+    assert (await report(server))[1] == 1
     with pytest.raises(RequestRefused, match="press it again"):
-        await hand.jog()
+        await button.jog()
 
 
 @serving(with_arm)
-async def test_hand_teaching_mode_ends_with_its_user(arm: Server) -> None:
-    bob = await join(arm, "bob")
-    held, on = arm.services.online.held, {"robot_id": OBJ, "enable": True}
+async def test_hand_teaching_mode_ends_when_its_user_leaves(server: Server) -> None:
+    bob = await join(server, "bob")
+    held, on = server.services.online.held, {"robot_id": OBJ, "enable": True}
 
     async def ended() -> str:
         assert not (await bob.event("HandTeachingMode", lambda data: not data["enabled"]))["enabled"]
         return str((await bob.event("Notification"))["message"])
 
-    await arm.ask("HandTeachingMode", on)
-    held.logged_off(bob, Message.of("bob logged off"))  # type: ignore[arg-type]  # he teaches nothing
-    held.logged_off(arm.client, Message.of("alice logged off"))  # type: ignore[arg-type]
+    await server.ask("HandTeachingMode", on)
+    held.logged_off(bob, Message.of("bob logged off"))  # type: ignore[arg-type]  # bob does not teach
+    held.logged_off(server.client, Message.of("alice logged off"))  # type: ignore[arg-type]
     assert await ended() == "Hand teaching of arm was switched off: alice logged off."
-    assert (await report(arm))[2] == [True, False]
+    assert (await report(server))[2] == [True, False]
     bob.got.clear()
-    await arm.ask("HandTeachingMode", on)
-    arm.services.hub.remove(arm.client)  # type: ignore[arg-type]
+    await server.ask("HandTeachingMode", on)
+    server.services.hub.remove(server.client)  # type: ignore[arg-type]
     assert await ended() == "Hand teaching of arm was switched off: alice is no longer connected."
-    assert (await report(arm))[2] == [True, False, True, False]
+    assert (await report(server))[2] == [True, False, True, False]
 
 
 @serving(with_arm)
-async def test_late_requests_are_ignored(arm: Server) -> None:
-    """The sender's clock differs from ours."""
-    hand = Hand(arm)
+async def test_late_requests_are_ignored(server: Server) -> None:
+    """The delay is measured although the clocks of client and server differ."""
+    button = HoldButton(server)
 
-    def theirs(late: float = 0.0) -> float:
+    def client_clock(late: float = 0.0) -> float:
         return (time.monotonic() - late) * 1e3 + 123_456.0
 
-    await hand.jog(new=True, sent_ms=theirs())
+    await button.jog(new=True, sent_ms=client_clock())
     with pytest.raises(RequestRefused, match="ms late"):
-        await hand.jog(sent_ms=theirs(LEASE_MS / 1e3 + 0.1))
+        await button.jog(sent_ms=client_clock(LEASE_MS / 1e3 + 0.1))
     with pytest.raises(RequestRefused, match="ms late"):
-        await hand.jog(new=True, sent_ms=theirs(2.0 * LEASE_MS / 1e3))
-    hand.number -= 1
-    await hand.jog(sent_ms=theirs(LEASE_MS / 1e3 - 2.0))  # the lease ends 2 s from now
-    await until(lambda: arm.services.online.held.holder(OBJ) is None, LEASE_MS / 1e3 / 2.0)
-    assert len((await report(arm))[0]) == 2
+        await button.jog(new=True, sent_ms=client_clock(2.0 * LEASE_MS / 1e3))
+    button.number -= 1
+    await button.jog(sent_ms=client_clock(LEASE_MS / 1e3 - 2.0))  # the lease ends 2 s from now
+    await until(lambda: server.services.online.held.holder(OBJ) is None, LEASE_MS / 1e3 / 2.0)
+    assert len((await report(server))[0]) == 2
 
 
 @serving(with_arm)
-async def test_a_backlog_of_an_ended_press_moves_nothing(arm: Server) -> None:
-    subscribe(arm, arm.client)
-    hand = Hand(arm)
-    await hand.jog(1000, new=True)
-    await arm.client.event("RobotHold", lambda data: not data["held"])
-    for outcome in await asyncio.gather(*(hand.jog() for _ in range(5)), return_exceptions=True):
+async def test_queued_requests_of_an_ended_hold_do_not_move_the_robot(server: Server) -> None:
+    subscribe(server, server.client)
+    button = HoldButton(server)
+    await button.jog(1000, new=True)
+    await server.client.event("RobotHold", lambda data: not data["held"])
+    for outcome in await asyncio.gather(*(button.jog() for _ in range(5)), return_exceptions=True):
         assert isinstance(outcome, RequestRefused)
-    assert len((await report(arm))[0]) == 1
+    assert len((await report(server))[0]) == 1
 
 
 @serving(with_arm)
-async def test_renewals_need_not_wait_for_answers_and_a_press_may_follow_at_once(arm: Server) -> None:
-    hand = Hand(arm)
-    burst = [asyncio.create_task(hand.jog(new=number == 0)) for number in range(4)]
+async def test_renewals_and_a_new_press_need_not_wait_for_answers(server: Server) -> None:
+    button = HoldButton(server)
+    burst = [asyncio.create_task(button.jog(new=number == 0)) for number in range(4)]
     assert {answer.scale for answer in await asyncio.gather(*burst)} == {1.0}
-    await do(arm, "be_slow", slow=0.1)
-    going = asyncio.create_task(hand.jog(0))
+    await do(server, "be_slow", slow=0.1)
+    releasing = asyncio.create_task(button.jog(0))
     await asyncio.sleep(0)
-    assert (await hand.jog(new=True)).scale == 1.0  # once it has stopped
-    assert (await going).scale == 0.0
-    await hand.jog(0)
+    assert (await button.jog(new=True)).scale == 1.0  # after the robot has stopped
+    assert (await releasing).scale == 0.0
+    await button.jog(0)
 
 
 @serving(with_arm)
-async def test_frames_and_joints(arm: Server) -> None:
-    hand = Hand(arm)
+async def test_jogging_uses_the_requested_frame_or_joints(server: Server) -> None:
+    button = HoldButton(server)
     along_y = pytest.approx([0, 0.1, 0, 0, 0, 0.2], abs=1e-9)
-    what = {"linear": {"x": 0.1}, "angular": {"z": 0.2}}
-    await hand.jog(new=True, frame="user", object_id=TABLE, **what)
-    await hand.jog(frame="user", pose=msgspec.to_builtins(Pose(Position(5, 5, 5), TURNED)), **what)
+    velocity = {"linear": {"x": 0.1}, "angular": {"z": 0.2}}
+    await button.jog(new=True, frame="user", object_id=TABLE, **velocity)
+    await button.jog(frame="user", pose=msgspec.to_builtins(Pose(Position(5, 5, 5), TURNED)), **velocity)
     for frame in ("robot", "tool"):
-        await hand.jog(frame=frame, **what)
-    await hand.jog(joints=[{"name": "j0", "value": 0.3}])
-    await hand.jog(0)
-    jogs = (await report(arm))[0]
+        await button.jog(frame=frame, **velocity)
+    await button.jog(joints=[{"name": "j0", "value": 0.3}])
+    await button.jog(0)
+    jogs = (await report(server))[0]
     assert [jog[2] for jog in jogs] == ["world", "world", "base", "tool", "world"]
     assert jogs[0][0] == along_y
     assert jogs[1][0] == along_y
@@ -330,7 +330,7 @@ async def test_frames_and_joints(arm: Server) -> None:
     assert jogs[4][:2] == [None, [0.3]]
 
 
-WRONG: list[tuple[dict[str, Any], str]] = [
+INVALID: list[tuple[dict[str, Any], str]] = [
     ({"valid_ms": LEASE_MS + 1}, f"valid_ms must be 0 to {LEASE_MS}"),
     ({"valid_ms": -1}, f"valid_ms must be 0 to {LEASE_MS}"),
     ({"linear": None}, "either joint velocities"),
@@ -347,91 +347,91 @@ WRONG: list[tuple[dict[str, Any], str]] = [
 
 
 @serving(with_arm)
-async def test_wrong_arguments(arm: Server) -> None:
-    for number, (more, text) in enumerate(WRONG):
+async def test_invalid_arguments_are_refused(server: Server) -> None:
+    for number, (more, text) in enumerate(INVALID):
         args = {"robot_id": OBJ, "hold": number, "valid_ms": LEASE_MS, "linear": {"x": 0.1}} | more
         args = {key: value for key, value in args.items() if value is not None}
         with pytest.raises(Arcor2Error, match=text):
-            await arm.ask("JogRobot", args | {"sent_ms": time.monotonic() * 1e3})
-        assert arm.services.online.moving == set(), text
-    assert (await report(arm))[0] == []
+            await server.ask("JogRobot", args | {"sent_ms": time.monotonic() * 1e3})
+        assert server.services.online.moving == set(), text
+    assert (await report(server))[0] == []
 
 
 @serving(with_arm)
-async def test_hand_teaching_lasts_while_the_button_is_held(arm: Server) -> None:
-    subscribe(arm, arm.client)
-    hand = Hand(arm)
-    await hand.teach(new=True)
-    event = await arm.client.event("HandTeachingMode")
+async def test_hand_teaching_lasts_while_the_button_is_held(server: Server) -> None:
+    subscribe(server, server.client)
+    button = HoldButton(server)
+    await button.teach(new=True)
+    event = await server.client.event("HandTeachingMode")
     assert event == {"robot_id": OBJ, "enabled": True}
-    await hand.teach()
-    assert arm.services.online.held.states()[0].kind == "hand_teaching"
-    await hand.teach(0)
-    assert await arm.client.event("HandTeachingMode") == {"robot_id": OBJ, "enabled": False}
-    assert (await report(arm))[2] == [True, False]
-    await hand.teach(1000, new=True)
-    await arm.client.event("HandTeachingMode", lambda data: not data["enabled"])
-    assert (await report(arm))[2] == [True, False] * 2
-    await arm.ask("HandTeachingMode", {"robot_id": OBJ, "enable": True})
+    await button.teach()
+    assert server.services.online.held.states()[0].kind == "hand_teaching"
+    await button.teach(0)
+    assert await server.client.event("HandTeachingMode") == {"robot_id": OBJ, "enabled": False}
+    assert (await report(server))[2] == [True, False]
+    await button.teach(1000, new=True)
+    await server.client.event("HandTeachingMode", lambda data: not data["enabled"])
+    assert (await report(server))[2] == [True, False] * 2
+    await server.ask("HandTeachingMode", {"robot_id": OBJ, "enable": True})
     with pytest.raises(RequestRefused, match="moved by hand"):
-        await hand.jog(new=True)
+        await button.jog(new=True)
     with pytest.raises(RequestRefused, match="moved by hand"):
-        await hand.teach(new=True)
+        await button.teach(new=True)
 
 
 @serving(with_arm)
-async def test_a_protective_stop_ends_hand_teaching_and_that_is_published(arm: Server) -> None:
-    subscribe(arm, arm.client)
-    hand = Hand(arm)
-    await hand.teach(new=True)
-    await arm.client.event("HandTeachingMode", lambda data: data["enabled"])
-    await do(arm, "be", safety="protective_stop")
-    event = await arm.client.event("RobotHold", lambda data: not data["held"])
+async def test_clients_are_notified_when_a_protective_stop_ends_hand_teaching(server: Server) -> None:
+    subscribe(server, server.client)
+    button = HoldButton(server)
+    await button.teach(new=True)
+    await server.client.event("HandTeachingMode", lambda data: data["enabled"])
+    await do(server, "be", safety="protective_stop")
+    event = await server.client.event("RobotHold", lambda data: not data["held"])
     assert "protective stop" in event["reason"]
-    assert await arm.client.event("HandTeachingMode") == {"robot_id": OBJ, "enabled": False}
+    assert await server.client.event("HandTeachingMode") == {"robot_id": OBJ, "enabled": False}
 
-    await do(arm, "be", safety="normal")
-    await arm.ask("HandTeachingMode", {"robot_id": OBJ, "enable": True})
-    await arm.client.event("HandTeachingMode", lambda data: data["enabled"])
-    await do(arm, "be", safety="protective_stop")
-    assert await arm.client.event("HandTeachingMode") == {"robot_id": OBJ, "enabled": False}
-    assert "protective stop" in (await arm.client.event("Notification"))["message"]
-    assert (await report(arm))[2][-1] is False
+    await do(server, "be", safety="normal")
+    await server.ask("HandTeachingMode", {"robot_id": OBJ, "enable": True})
+    await server.client.event("HandTeachingMode", lambda data: data["enabled"])
+    await do(server, "be", safety="protective_stop")
+    assert await server.client.event("HandTeachingMode") == {"robot_id": OBJ, "enabled": False}
+    assert "protective stop" in (await server.client.event("Notification"))["message"]
+    assert (await report(server))[2][-1] is False
 
 
 @serving(with_arm)
-async def test_any_client_can_stop_and_going_offline_stops(arm: Server) -> None:
-    operator = await join(arm, "olga", Role.OPERATOR)
-    hand = Hand(arm)
-    await hand.jog(new=True)
-    await arm.ask("StopRobot", {"robot_id": OBJ}, operator)
+async def test_any_client_can_stop_a_jog_and_going_offline_stops_it(server: Server) -> None:
+    operator = await join(server, "olga", Role.OPERATOR)
+    button = HoldButton(server)
+    await button.jog(new=True)
+    await server.ask("StopRobot", {"robot_id": OBJ}, operator)
     event = await operator.event("RobotHold", lambda data: not data["held"])
     assert "arm was stopped" in event["reason"]
     with pytest.raises(Arcor2Error):
-        await hand.jog()
-    await hand.jog(new=True)
-    assert [outcome.stopped for outcome in (await arm.ask("StopAll", client=operator)).outcomes] == [True]
+        await button.jog()
+    await button.jog(new=True)
+    assert [outcome.stopped for outcome in (await server.ask("StopAll", client=operator)).outcomes] == [True]
     event = await operator.event("RobotHold", lambda data: not data["held"])
     assert event["reason"] == "olga stopped all motion"
     with pytest.raises(Arcor2Error):
-        await hand.jog()
-    await hand.jog(new=True)
-    await arm.ask("StopScene")
+        await button.jog()
+    await button.jog(new=True)
+    await server.ask("StopScene")
     event = await operator.event("RobotHold", lambda data: not data["held"])
     assert event["reason"]
-    assert arm.services.online.held.states() == []
+    assert server.services.online.held.states() == []
 
 
 @serving(with_arm)
-async def test_a_type_that_cannot_be_jogged(arm: Server) -> None:
-    arm.types.robots["Arm"] = robot_meta("Arm", stop=True)
-    hand = Hand(arm)
+async def test_hold_to_run_functions_that_a_type_lacks_are_refused(server: Server) -> None:
+    server.types.robots["Arm"] = robot_meta("Arm", stop=True)
+    button = HoldButton(server)
     with pytest.raises(RequestRefused, match="arm cannot be jogged"):
-        await hand.jog(new=True)
+        await button.jog(new=True)
     with pytest.raises(RequestRefused, match="arm cannot be moved by hand"):
-        await hand.teach(new=True)
+        await button.teach(new=True)
     with pytest.raises(RequestRefused, match="arm cannot be acknowledged from here"):
-        await arm.ask("AcknowledgeStop", {"object_id": OBJ})
+        await server.ask("AcknowledgeStop", {"object_id": OBJ})
 
 
 # ---------------------------------------------------------------------------------------------- acknowledging
@@ -440,52 +440,52 @@ async def acknowledge(server: Server, client: Recorder | None = None, **args: An
 
 
 @serving(with_arm)
-async def test_a_protective_stop_is_acknowledged_by_name(arm: Server) -> None:
-    subscribe(arm, arm.client)
-    operator = await join(arm, "olga", Role.OPERATOR)
-    hand = Hand(arm)
-    await hand.jog(new=True)
-    await do(arm, "be", safety="protective_stop")
+async def test_acknowledging_a_protective_stop_records_the_operator(server: Server) -> None:
+    subscribe(server, server.client)
+    operator = await join(server, "olga", Role.OPERATOR)
+    button = HoldButton(server)
+    await button.jog(new=True)
+    await do(server, "be", safety="protective_stop")
     with pytest.raises(Arcor2Error, match="protective stop of arm"):
-        await hand.jog()
-    event = await arm.client.event("RobotHold", lambda data: not data["held"])
+        await button.jog()
+    event = await server.client.event("RobotHold", lambda data: not data["held"])
     assert "protective stop" in event["reason"]
     with pytest.raises(Arcor2Error, match="protective stop of arm"):
-        await hand.jog(new=True)
-    await acknowledge(arm, operator)
-    assert (await report(arm))[3] == [["protective stop", "olga"]]
+        await button.jog(new=True)
+    await acknowledge(server, operator)
+    assert (await report(server))[3] == [["protective stop", "olga"]]
     with pytest.raises(Arcor2Error, match="press it again"):
-        await hand.jog()  # the button that is still pressed does not move the arm
-    await hand.jog(new=True)
+        await button.jog()  # the button that is still pressed does not move the arm
+    await button.jog(new=True)
     with pytest.raises(RequestRefused, match="arm is being moved by alice"):
-        await acknowledge(arm, operator)
-    await hand.jog(0)
+        await acknowledge(server, operator)
+    await button.jog(0)
 
 
 @serving(with_arm)
-async def test_acknowledging_is_refused_without_fault_or_role(arm: Server) -> None:
-    operator, technician = await join(arm, "olga", Role.OPERATOR), await join(arm, "tom", Role.TECHNICIAN)
+async def test_acknowledging_is_refused_without_fault_or_role(server: Server) -> None:
+    operator, technician = await join(server, "olga", Role.OPERATOR), await join(server, "tom", Role.TECHNICIAN)
     with pytest.raises(RequestRefused, match="no stop that could be"):
-        await acknowledge(arm, operator)
+        await acknowledge(server, operator)
     for safety, text in (("emergency_stop", "where it was pressed"), ("safeguard_stop", "guard")):
-        await do(arm, "be", safety=safety)
+        await do(server, "be", safety=safety)
         with pytest.raises(RequestRefused, match=text):
-            await acknowledge(arm, technician)
+            await acknowledge(server, technician)
     for safety in ("fault", "violation"):
-        await do(arm, "be", safety=safety)
+        await do(server, "be", safety=safety)
         with pytest.raises(RequestRefused, match="needs the role technician"):
-            await acknowledge(arm, operator)
-        await acknowledge(arm, technician)
-    assert (await report(arm))[3] == [["restart", "tom"]] * 2
+            await acknowledge(server, operator)
+        await acknowledge(server, technician)
+    assert (await report(server))[3] == [["restart", "tom"]] * 2
     with pytest.raises(RequestRefused, match="not logged in"):
-        await acknowledge(arm, Recorder(None))
+        await acknowledge(server, Recorder(None))
     with pytest.raises(RequestRefused, match="table is not a robot"):
-        await acknowledge(arm, object_id=TABLE)
+        await acknowledge(server, object_id=TABLE)
 
 
 @serving(with_arm)
-async def test_an_alarm_of_any_device_is_acknowledged_by_code(arm: Server) -> None:
-    await acknowledge(arm, code="E7")
-    assert (await report(arm))[3] == [["E7"]]
+async def test_an_alarm_of_any_device_is_acknowledged_by_code(server: Server) -> None:
+    await acknowledge(server, code="E7")
+    assert (await report(server))[3] == [["E7"]]
     with pytest.raises(Arcor2Error, match="no alarm E8"):
-        await acknowledge(arm, code="E8")
+        await acknowledge(server, code="E8")

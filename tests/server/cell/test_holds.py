@@ -36,7 +36,7 @@ from tests.e2e.harness import until
 from tests.runtime.conftest import Package, scene_object
 
 from .conftest import Recorder, Server, serving
-from .test_execution_history import newest, subscribe
+from .test_execution_history import newest_run, subscribe
 
 BOX = """
 class Box(Generic):
@@ -69,7 +69,7 @@ def write(server: Server, body: str) -> Path:
     return Package(directory).write({"Box": BOX}, [scene_object("box", "Box")], PROJECT, lines)
 
 
-async def held(server: Server, client: Recorder | None = None) -> dict[str, Any]:
+async def until_held(server: Server, client: Recorder | None = None) -> dict[str, Any]:
     client = client or server.client
     data = await client.event("Held")
     await client.state("paused", "PackageState")
@@ -83,7 +83,7 @@ async def test_operator_recovers_a_held_program(server: Server) -> None:
     server.services.hub.add(old)  # type: ignore[arg-type]
     write(server, 'box.put(an="put")')
     await server.ask("RunPackage", {"id": "pkg_1", "on_error": "hold"})
-    data = await held(server)
+    data = await until_held(server)
     assert data | {"since": ""} == {
         "run": 1,
         "number": 1,
@@ -120,7 +120,7 @@ async def test_operator_recovers_a_held_program(server: Server) -> None:
     await server.client.state("stopped", "PackageState")
     assert (await server.ask("GetHeld")).held is UNSET
 
-    run = await newest(server)
+    run = await newest_run(server)
     assert run.end is RunEnd.FINISHED
     assert run.statistics.held > 0  # type: ignore[union-attr, operator]
     again, first = (await server.ask("GetExecutionTrace", {})).entries
@@ -146,22 +146,22 @@ async def test_entered_result_is_in_the_trace_next_to_the_error(server: Server) 
     await server.client.state("stopped", "PackageState")
     [entry] = (await server.ask("GetExecutionTrace", {})).entries
     assert (entry.results, entry.error, entry.hold.choice) == (["0.5"], "no answer", "result")
-    assert (await newest(server)).end is RunEnd.FINISHED
+    assert (await newest_run(server)).end is RunEnd.FINISHED
 
 
 @serving()
-async def test_stop_during_a_hold_and_without_the_option(server: Server) -> None:
+async def test_a_held_program_can_be_stopped_and_only_the_option_holds_programs(server: Server) -> None:
     subscribe(server, "Held")
     write(server, 'box.put(an="put")')
     await server.ask("RunPackage", {"id": "pkg_1", "on_error": "hold"})
-    await held(server)
+    await until_held(server)
     with pytest.raises(RequestRefused, match="cannot be paused"):
         await server.ask("PausePackage")
     await server.ask("StopPackage")
     await server.client.state("stopped", "PackageState")
     with pytest.raises(RequestRefused, match="not held"):
         await server.ask("DecideHeld", {"number": 1, "choice": "end"})
-    run = await newest(server)
+    run = await newest_run(server)
     assert (run.end, run.stopped_by) == (RunEnd.STOPPED, "alice")
     [entry] = (await server.ask("GetExecutionTrace", {})).entries
     assert isinstance(entry.hold.duration, float)
@@ -194,7 +194,7 @@ class Station(Generic):
 
 
 def parallel_package(server: Server) -> None:
-    """Write a package whose program fills a box and presses at once, and reports when both have ended."""
+    """Write a package whose program fills a box and presses in parallel, and then reports."""
 
     def function(name: str, device: str) -> ProjectFunction:
         logic = [LogicItem(START, f"act_{name}", id=f"lit_{name}"), LogicItem(f"act_{name}", END, id=f"lit_{name}_end")]
@@ -235,7 +235,7 @@ async def test_a_failed_branch_is_retried_while_the_other_one_waits(server: Serv
     subscribe(server, "Held", "ProgramPosition")
     parallel_package(server)
     await server.ask("RunPackage", {"id": "pkg_1", "on_error": "hold"})
-    data = await held(server)
+    data = await until_held(server)
     assert (data["action_id"], data["device"], data["choices"]) == ("act_fill", "obj_box", ["retry", "skip", "end"])
 
     async def ended() -> set[str]:
@@ -262,8 +262,8 @@ async def test_a_failed_branch_is_retried_while_the_other_one_waits(server: Serv
     assert again.start + again.duration <= report.start
 
 
-class _Nothing:
-    """Accepts every call: the event hub, the list of runs, the cell host."""
+class _Stub:
+    """Stub of the event hub, the list of runs and the cell host."""
 
     def broadcast(self, event: object) -> None: ...
     def set_hold(self, number: int, hold: object) -> None: ...
@@ -271,15 +271,15 @@ class _Nothing:
 
 
 async def test_an_action_may_fail_after_the_program_was_held_before_it() -> None:
-    nothing: Any = _Nothing()
-    hold = ProgramHold(nothing, nothing)
+    stub: Any = _Stub()
+    hold = ProgramHold(stub, stub)
     data = HeldData(
         0, 7, "act_put", "put", "obj_box", "connection_lost", "lost", [HoldChoice.RETRY], now(), before=True
     )
     retry = DecideHeldArgs(7, HoldChoice.RETRY)
     for held in (data, replace(data, kind="device_fault", before=UNSET)):
         hold.begin(1, held)
-        await hold.decide(nothing, retry, "ann")
+        await hold.decide(stub, retry, "ann")
         with pytest.raises(RequestRefused, match="ann has already decided"):
-            await hold.decide(nothing, retry, "ben")
+            await hold.decide(stub, retry, "ben")
         hold.end()

@@ -20,12 +20,12 @@ from arcor2_server.nodes.credentials import Credentials
 from tests import forked_children
 
 USER = cast("HostUser", None)
-"""The hosts of these tests load no object types, so that they notify nobody."""
+"""The hosts of these tests load no object types, so they send no notifications."""
 
 
 @pytest.fixture
 def killed(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
-    """Kill each started host before it is ready if its flag, which is then removed, is true; later hosts run."""
+    """Return a list of flags for the next hosts. A host whose flag is true is killed before it is ready."""
     kills: list[bool] = []
     monkeypatch.setattr(child_process, "_start_python", forked_children.start_python)  # a forked host is ready at once
 

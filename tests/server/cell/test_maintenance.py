@@ -1,4 +1,4 @@
-"""Device cards: another device is noticed and confirmed; hours, cycles and backups of parameters."""
+"""Device cards: detection of a replaced device, operating hours, cycles, and parameter backups."""
 
 import contextlib
 import json
@@ -263,7 +263,7 @@ async def test_a_restore_is_refused_for_another_model_and_while_a_program_runs(t
         assert place.values()["gain"] == 1
 
 
-async def test_files_of_backups_are_checked(tmp_path: Path) -> None:
+async def test_an_uploaded_backup_is_checked_and_the_oldest_backups_are_deleted(tmp_path: Path) -> None:
     async with workplace(tmp_path) as place:
         await place.restart()
         info = await place.ask("BackUpParameters", object_id="obj_unit")

@@ -56,11 +56,11 @@ class Boxes:
     def __init__(self, server: Server) -> None:
         self.server = server
         directory = server.services.settings.data_dir
-        self.here, self.away = directory / "here", directory / "away"
+        self.present, self.absent = directory / "present", directory / "absent"
 
     async def open(self) -> None:
-        self.here.touch()
-        objects = [scene_object(name, "Box", file=str(directory)) for name, directory in self._files()]
+        self.present.touch()
+        objects = [scene_object(name, "Box", file=str(file)) for name, file in self._files()]
         actions = [Action(f"open_{name}", f"obj_{name}/open", f"act_{name}", [], [Flow()]) for name, _ in self._files()]
         point = ActionPoint("top", Position(), id="acp_1", actions=actions)
         self.server.types.add("Box", BOX, [action("open", "boolean")])
@@ -69,7 +69,7 @@ class Boxes:
         )
 
     def _files(self) -> list[tuple[str, Path]]:
-        return [("here", self.here), ("away", self.away)]
+        return [("present", self.present), ("absent", self.absent)]
 
 
 def subscribed(server: Server, *events: str) -> Recorder:
@@ -95,7 +95,7 @@ async def test_objects_are_added_to_the_online_scene(server: Server) -> None:
     server.types.settings["Box"] = [ParameterMeta("file", "string")]
     server.types.add("Clock", CLOCK, [action("read", "boolean")])
     await boxes.open()
-    boxes.away.touch()
+    boxes.absent.touch()
     await server.start()
 
     await server.ask("AddSceneObject", {"name": "clock", "type": "Clock"})
@@ -104,7 +104,7 @@ async def test_objects_are_added_to_the_online_scene(server: Server) -> None:
     assert [state["state"] for state in states] == ["connecting", "online"]
     assert await server.services.online.call(added, "read", deadline=5.0) == b"true"
 
-    missing = boxes.away.with_name("missing")
+    missing = boxes.absent.with_name("missing")
     await server.ask("AddSceneObject", {"name": "late", "type": "Box", "parameters": _file(missing)})
     failed = await client.event("ObjectState", lambda data: data["state"] == "failed")
     assert "192.0.2.7:502" in failed["reason"]
@@ -120,16 +120,16 @@ async def test_a_connection_is_checked_without_a_scene_object(server: Server) ->
     boxes = Boxes(server)
     server.types.settings["Box"] = [ParameterMeta("file", "string")]
     await boxes.open()
-    check = {"type": "Box", "parameters": _file(boxes.away)}
+    check = {"type": "Box", "parameters": _file(boxes.absent)}
     with pytest.raises(Arcor2Error, match=r"192\.0\.2\.7:502"):
         await server.ask("CheckConnection", check)
-    boxes.away.touch()
+    boxes.absent.touch()
     answer = await server.ask("CheckConnection", check)
     assert answer.health == "normal"
     assert len(server.services.session.require_scene().objects) == 2
     await server.start()
     with pytest.raises(RequestRefused, match="connected already"):
-        await server.ask("CheckConnection", check | {"id": "obj_away"})
+        await server.ask("CheckConnection", check | {"id": "obj_absent"})
     assert (await server.ask("CheckConnection", check)).alarms == [], "another device can be checked meanwhile"
 
 
@@ -138,32 +138,32 @@ async def test_a_scene_starts_without_a_device_and_a_retry_connects_it(server: S
     boxes, client = Boxes(server), subscribed(server, "ObjectState")
     await boxes.open()
     with pytest.raises(RequestRefused, match="offline"):
-        await server.ask("RetryObject", {"object_id": "obj_away"})
+        await server.ask("RetryObject", {"object_id": "obj_absent"})
     await server.ask("StartSceneKeepGoing")
     failed = await client.event("ObjectState", lambda data: data["state"] == "failed")
-    assert failed["object_id"] == "obj_away"
+    assert failed["object_id"] == "obj_absent"
     assert "192.0.2.7:502" in failed["reason"]
-    assert (await client.state("started"))["message"] == "Not connected: away."
+    assert (await client.state("started"))["message"] == "Not connected: absent."
     with pytest.raises(RequestRefused, match="online"):
         await server.ask("StartSceneKeepGoing")
 
-    with pytest.raises(RequestRefused, match=r"away is not connected: .*192\.0\.2\.7:502"):
-        await server.ask("ExecuteAction", {"action_id": "act_away"})
-    await server.ask("ExecuteAction", {"action_id": "act_here"})
+    with pytest.raises(RequestRefused, match=r"absent is not connected: .*192\.0\.2\.7:502"):
+        await server.ask("ExecuteAction", {"action_id": "act_absent"})
+    await server.ask("ExecuteAction", {"action_id": "act_present"})
     assert (await client.event("ActionResult"))["results"] == ["true"]
     await until(lambda: [one.state for one in server.services.online.board.states()] == ["online", "failed"])
 
     with pytest.raises(Arcor2Error, match=r"192\.0\.2\.7:502"):
-        await server.ask("RetryObject", {"object_id": "obj_away"})
-    boxes.away.touch()
+        await server.ask("RetryObject", {"object_id": "obj_absent"})
+    boxes.absent.touch()
     client.got.clear()
-    await server.ask("RetryObject", {"object_id": "obj_away"})
+    await server.ask("RetryObject", {"object_id": "obj_absent"})
     states = [await client.event("ObjectState") for _ in range(2)]
     assert [state["state"] for state in states] == ["connecting", "online"]
-    await server.ask("ExecuteAction", {"action_id": "act_away"})
+    await server.ask("ExecuteAction", {"action_id": "act_absent"})
     assert (await client.event("ActionResult"))["results"] == ["true"]
-    with pytest.raises(Arcor2Error, match="away has not failed"):
-        await server.ask("RetryObject", {"object_id": "obj_away"})
+    with pytest.raises(Arcor2Error, match="absent has not failed"):
+        await server.ask("RetryObject", {"object_id": "obj_absent"})
     with pytest.raises(Arcor2Error, match="obj_nobody"):
         await server.ask("RetryObject", {"object_id": "obj_nobody"})
     await server.ask("StopScene")
@@ -176,39 +176,39 @@ async def test_other_errors_still_prevent_the_start_of_a_scene(server: Server) -
     with pytest.raises(RequestRefused, match="No scene is open"):
         await server.ask("StartSceneKeepGoing")
     await boxes.open()
-    boxes.away.touch()
+    boxes.absent.touch()
     await server.ask("StartSceneKeepGoing")
     assert "message" not in await server.client.state("started")  # every device is connected
     await server.ask("StopScene")
     await server.client.state("stopped")
-    boxes.away.unlink()
+    boxes.absent.unlink()
     await server.ask("StartScene")
     assert "192.0.2.7:502" in (await server.client.state("stopping"))["message"]
     await server.client.state("stopped")
 
 
 @serving()
-async def test_health_and_alarms_are_announced(server: Server) -> None:
+async def test_health_and_alarms_are_published(server: Server) -> None:
     boxes, client = Boxes(server), subscribed(server, "ObjectHealth")
     await boxes.open()
-    boxes.away.touch()
+    boxes.absent.touch()
     await server.start()
-    await server.services.online.call("obj_here", "heat")
+    await server.services.online.call("obj_present", "heat")
     hot = await client.event("ObjectHealth", lambda data: data["health"] == "off_spec" and data["alarms"])
-    assert hot["object_id"] == "obj_here"
+    assert hot["object_id"] == "obj_present"
     assert [alarm["remedy"] for alarm in hot["alarms"]] == ["let it cool"]
     assert [one.health for one in server.services.online.board.healths()] == ["off_spec", "normal"]
 
 
 @serving()
-async def test_visible_states_are_announced(server: Server) -> None:
+async def test_shown_values_are_published(server: Server) -> None:
     boxes, client = Boxes(server), subscribed(server, "ObjectValues")
     await boxes.open()
-    boxes.away.touch()
+    boxes.absent.touch()
     await server.start()
-    await server.services.online.call("obj_here", "heat")
+    await server.services.online.call("obj_present", "heat")
     opened = await client.event("ObjectValues", lambda data: data["values"] == {"lid": 1.0})
-    assert opened == {"object_id": "obj_here", "values": {"lid": 1.0}, "parts": []}
+    assert opened == {"object_id": "obj_present", "values": {"lid": 1.0}, "parts": []}
     assert [one.values for one in server.services.online.board.values()] == [{"lid": 1.0}, {"lid": 0.0}]
 
 
@@ -224,7 +224,7 @@ class Arm(Robot):
 
 
 class Slow(Recorder):
-    """A client that does not read; only the newest message of each stream waits for it."""
+    """A client that does not read; only the newest message of each stream is queued for it."""
 
     def __init__(self, user: str) -> None:
         super().__init__(user)
@@ -245,15 +245,15 @@ def joints(client: Recorder) -> list[dict[str, Any]]:
 
 
 @serving(with_arm)
-async def test_each_client_chooses_its_streaming_rate(arm: Server) -> None:
-    quick, other, slow = arm.client, Recorder("bob"), Slow("carl")
+async def test_each_client_chooses_its_streaming_rate(server: Server) -> None:
+    quick, other, slow = server.client, Recorder("bob"), Slow("carl")
     for client in (other, slow):
-        arm.services.hub.add(client)  # type: ignore[arg-type]
-    what = {"robot_id": "obj_arm", "what": "joints"}
+        server.services.hub.add(client)  # type: ignore[arg-type]
+    stream = {"robot_id": "obj_arm", "what": "joints"}
     for client in (quick, other, slow):
-        await arm.ask("RegisterForRobotEvent", what | {"send": True}, client)
-    await arm.ask("StreamRobot", what | {"rate": 30}, quick)
-    await arm.ask("StreamRobot", what | {"rate": 30}, slow)
+        await server.ask("RegisterForRobotEvent", stream | {"send": True}, client)
+    await server.ask("StreamRobot", stream | {"rate": 30}, quick)
+    await server.ask("StreamRobot", stream | {"rate": 30}, slow)
     await until(lambda: any("time_ms" in data for data in joints(quick)))
     quick.got.clear()
     await until(lambda: len(joints(quick)) >= 20 and joints(other) and slow.newest)
@@ -265,28 +265,28 @@ async def test_each_client_chooses_its_streaming_rate(arm: Server) -> None:
     assert min(steps) <= 60.0, "as slow as the ordinary events"
     assert all("time_ms" not in data for data in joints(other))
     (newest,) = slow.newest.values()
-    assert newest["data"]["time_ms"] >= seen[-5]["time_ms"], "an old event waits"
+    assert newest["data"]["time_ms"] >= seen[-5]["time_ms"], "the client that reads slowly gets an old event"
 
-    await arm.ask("StreamRobot", what | {"send": False}, quick)
+    await server.ask("StreamRobot", stream | {"send": False}, quick)
     await until(lambda: "time_ms" not in (joints(quick) or [{"time_ms": 0.0}])[-1])
     quick.got.clear()
     await until(lambda: len(joints(quick)) >= 3)
     assert all("time_ms" not in data for data in joints(quick))
     with pytest.raises(RequestRefused, match="not subscribed"):
-        await arm.ask("StreamRobot", what | {"send": False}, quick)
+        await server.ask("StreamRobot", stream | {"send": False}, quick)
 
 
 @serving(with_arm)
-async def test_invalid_streams_are_refused(arm: Server) -> None:
-    what = {"robot_id": "obj_arm", "what": "eef_pose"}
+async def test_invalid_streams_are_refused(server: Server) -> None:
+    stream = {"robot_id": "obj_arm", "what": "eef_pose"}
     for rate in (0.5, 31.0):
         with pytest.raises(RequestRefused, match="1 to 30 Hz"):
-            await arm.ask("StreamRobot", what | {"rate": rate})
+            await server.ask("StreamRobot", stream | {"rate": rate})
     with pytest.raises(Arcor2Error, match="obj_nobody"):
-        await arm.ask("StreamRobot", what | {"robot_id": "obj_nobody"})
-    await arm.ask("StreamRobot", what)
-    await arm.client.event("RobotEef", lambda data: "time_ms" in data)
-    await arm.ask("StopScene")
-    await arm.client.state("stopped")
+        await server.ask("StreamRobot", stream | {"robot_id": "obj_nobody"})
+    await server.ask("StreamRobot", stream)
+    await server.client.event("RobotEef", lambda data: "time_ms" in data)
+    await server.ask("StopScene")
+    await server.client.state("stopped")
     with pytest.raises(RequestRefused, match="offline"):
-        await arm.ask("StreamRobot", what)
+        await server.ask("StreamRobot", stream)

@@ -34,7 +34,7 @@ class Meter(Generic):
             raise ConnectionLost("{device}: the connection is lost", device=self.name)
         return [Observation("Voltage", 24.5, "V"), Observation("Current", None, "A", Quality.BAD)]
 """
-WHAT = {"object_id": "obj_meter"}
+STREAM = {"object_id": "obj_meter"}
 
 
 async def with_meter(server: Server) -> None:
@@ -50,8 +50,8 @@ def observed(server: Server) -> list[dict[str, Any]]:
 @serving(with_meter)
 async def test_observations_are_streamed_while_an_action_runs(server: Server) -> None:
     host = server.services.online.host
-    held = asyncio.create_task(host.call("obj_meter", "hold"))
-    await server.ask("StreamObservations", WHAT | {"rate": 10})
+    holding = asyncio.create_task(host.call("obj_meter", "hold"))
+    await server.ask("StreamObservations", STREAM | {"rate": 10})
     await until(lambda: len(observed(server)) >= 5)
     first, *_ = seen = observed(server)
     assert first["object_id"] == "obj_meter"
@@ -63,28 +63,28 @@ async def test_observations_are_streamed_while_an_action_runs(server: Server) ->
     assert sum(steps) >= (len(steps) - 1) * 100.0, "faster than requested"
 
     # A device that cannot be read reports the reason.
-    held.cancel()
+    holding.cancel()
     await host.call("obj_other", "lose")
     await until(lambda: "reason" in observed(server)[-1])
     assert observed(server)[-1]["observations"] == []
     assert observed(server)[-1]["reason"] == "meter: the connection is lost"
     assert observed(server)[-1]["values"] == {"device": "meter"}
-    await server.ask("StreamObservations", WHAT | {"send": False})
+    await server.ask("StreamObservations", STREAM | {"send": False})
     with pytest.raises(RequestRefused, match="not subscribed"):
-        await server.ask("StreamObservations", WHAT | {"send": False})
+        await server.ask("StreamObservations", STREAM | {"send": False})
 
 
 @serving(with_meter)
 async def test_invalid_streams_are_refused(server: Server) -> None:
     for rate in (0.1, 11.0):
         with pytest.raises(RequestRefused, match=r"0\.2 to 10 Hz"):
-            await server.ask("StreamObservations", WHAT | {"rate": rate})
+            await server.ask("StreamObservations", STREAM | {"rate": rate})
     with pytest.raises(NotFound):
         await server.ask("StreamObservations", {"object_id": "obj_nobody"})
     await server.ask("StopScene")
     await server.client.state("stopped")
     with pytest.raises(RequestRefused, match="offline"):
-        await server.ask("StreamObservations", WHAT)
+        await server.ask("StreamObservations", STREAM)
 
 
 class Block(IOBlock):

@@ -167,33 +167,33 @@ async def test_a_setting_cannot_name_a_file_outside_the_device_files(server: Ser
 
 
 @serving(with_arm)
-async def test_a_scene_starts_and_stops(arm: Server) -> None:
-    cell, client = arm.services.online, arm.client
+async def test_a_scene_starts_and_stops(server: Server) -> None:
+    cell, client = server.services.online, server.client
     unexpected: list[Message] = []
     cell.host.on_death.append(unexpected.append)
     with pytest.raises(RequestRefused):
-        await arm.ask("StopScene")
-    await arm.ask("StartScene")
+        await server.ask("StopScene")
+    await server.ask("StartScene")
     with pytest.raises(RequestRefused):
-        await arm.ask("StartScene")
+        await server.ask("StartScene")
     await client.state("started")
     assert cell.online
-    assert arm.services.locks.locked_roots() == []
+    assert server.services.locks.locked_roots() == []
     assert [(d.name, d.type, d.answering) for d in cell.board.statuses()] == [("arm", "Arm", True)]
     with pytest.raises(RequestRefused):
-        await arm.ask("StartScene")
-    await arm.ask("StopScene")
+        await server.ask("StartScene")
+    await server.ask("StopScene")
     await client.state("stopped")
     assert not cell.online
     assert unexpected == []
-    await arm.start()
+    await server.start()
 
 
 @serving(with_arm)
-async def test_scene_states_are_sent_in_order_after_the_answer(arm: Server) -> None:
-    await arm.ask("StartScene")
-    await arm.client.event("response StartScene")
-    states = [(await arm.client.event("SceneState")) for _ in range(2)]
+async def test_scene_states_are_sent_in_order_after_the_answer(server: Server) -> None:
+    await server.ask("StartScene")
+    await server.client.event("response StartScene")
+    states = [(await server.client.event("SceneState")) for _ in range(2)]
     assert states == [{"state": "starting"}, {"state": "started"}]
 
 
@@ -225,33 +225,33 @@ async def test_a_failed_start_gives_the_reason_and_can_be_repeated(server: Serve
 
 
 @serving(with_arm)
-async def test_a_crash_takes_the_scene_offline(arm: Server) -> None:
-    await arm.start()
-    cell = arm.services.online
+async def test_a_crash_takes_the_scene_offline(server: Server) -> None:
+    await server.start()
+    cell = server.services.online
     unexpected: list[Message] = []
     cell.host.on_death.append(unexpected.append)
     assert cell.host.host is not None
     call = asyncio.create_task(cell.call(OBJ, "pick", {"where": Pose(), "offset": 9.0}))
     await asyncio.sleep(0.05)
     os.kill(cell.host.host.pid, signal.SIGKILL)
-    stopped = await arm.client.state("stopped")
+    stopped = await server.client.state("stopped")
     assert "SIGKILL" in stopped["message"]
     with pytest.raises(ConnectionLost):
         await call
     assert [reason.text for reason in unexpected] == ["the cell host was killed by SIGKILL"]
-    await arm.start()
+    await server.start()
 
 
 @serving(with_arm)
-async def test_a_driver_that_ends_the_process_takes_the_scene_offline(arm: Server) -> None:
-    await arm.start()
+async def test_a_driver_that_ends_the_process_takes_the_scene_offline(server: Server) -> None:
+    await server.start()
     with pytest.raises(ConnectionLost):
-        await arm.services.online.call(OBJ, "vanish")
-    assert "status 9" in (await arm.client.state("stopped"))["message"]
+        await server.services.online.call(OBJ, "vanish")
+    assert "status 9" in (await server.client.state("stopped"))["message"]
 
 
 @serving()
-async def test_a_driver_that_ends_the_process_while_connecting(server: Server) -> None:
+async def test_a_driver_that_ends_the_process_while_connecting_stops_the_start(server: Server) -> None:
     server.types.add(
         "Bomb", "class Bomb(Generic):\n    _ABSTRACT = False\n    def connect(self, timeout=5.0): os._exit(11)\n"
     )
@@ -265,32 +265,32 @@ async def test_a_driver_that_ends_the_process_while_connecting(server: Server) -
 
 
 @serving(with_arm)
-async def test_an_unresponsive_host_is_reported_and_may_recover(arm: Server) -> None:
-    await arm.start()
-    cell = arm.services.online
-    arm.services.hub.subscribe(arm.client, {"ObjectState"}, True)  # type: ignore[arg-type]
+async def test_an_unresponsive_host_is_reported_and_may_recover(server: Server) -> None:
+    await server.start()
+    cell = server.services.online
+    server.services.hub.subscribe(server.client, {"ObjectState"}, True)  # type: ignore[arg-type]
     call = asyncio.create_task(cell.call(OBJ, "freeze"))
-    state = await arm.client.event("ObjectState", lambda data: data.get("answering") is False)
+    state = await server.client.event("ObjectState", lambda data: data.get("answering") is False)
     assert not call.done()
     assert state == {"object_id": OBJ, "state": "online", "answering": False}
     assert not cell.board.statuses()[0].answering
     assert cell.board.states()[0].answering is False, "new subscribers are notified, too"
     await call
-    assert await arm.client.event("ObjectState") == {"object_id": OBJ, "state": "online"}
+    assert await server.client.event("ObjectState") == {"object_id": OBJ, "state": "online"}
     assert cell.board.statuses()[0].answering
     assert cell.online
 
 
 @serving(with_arm)
-async def test_robot_metadata_and_poses_are_returned(arm: Server) -> None:
+async def test_robot_metadata_and_poses_are_returned(server: Server) -> None:
     with pytest.raises(RequestRefused):
-        await arm.ask("GetRobotJoints", {"robot_id": OBJ})
-    await arm.start()
-    assert await arm.ask("GetRobotJoints", {"robot_id": OBJ}) == [Joint("j0", 0.5)]
-    assert await arm.ask("GetEndEffectors", {"robot_id": OBJ}) == ["tool"]
-    assert await arm.ask("GetGrippers", {"robot_id": OBJ}) == ["fingers"]
-    assert await arm.ask("GetSuctions", {"robot_id": OBJ}) == []
-    pose = await arm.ask("GetEndEffectorPose", {"robot_id": OBJ, "end_effector_id": "tool"})
+        await server.ask("GetRobotJoints", {"robot_id": OBJ})
+    await server.start()
+    assert await server.ask("GetRobotJoints", {"robot_id": OBJ}) == [Joint("j0", 0.5)]
+    assert await server.ask("GetEndEffectors", {"robot_id": OBJ}) == ["tool"]
+    assert await server.ask("GetGrippers", {"robot_id": OBJ}) == ["fingers"]
+    assert await server.ask("GetSuctions", {"robot_id": OBJ}) == []
+    pose = await server.ask("GetEndEffectorPose", {"robot_id": OBJ, "end_effector_id": "tool"})
     assert pose == Pose(Position(0.1, 0.2, 0.3))
     for refused, args in [
         ("GetRobotArms", {"robot_id": OBJ}),
@@ -298,153 +298,153 @@ async def test_robot_metadata_and_poses_are_returned(arm: Server) -> None:
         ("GetEndEffectorPose", {"robot_id": OBJ, "end_effector_id": "other"}),
     ]:
         with pytest.raises(RequestRefused):
-            await arm.ask(refused, args)
+            await server.ask(refused, args)
     pose = {"position": {"x": 0.7, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
     args = {"robot_id": OBJ, "end_effector_id": "tool", "pose": pose}
-    assert await arm.ask("InverseKinematics", args) == [Joint("j0", 0.7)]
+    assert await server.ask("InverseKinematics", args) == [Joint("j0", 0.7)]
     pose["position"]["z"] = -1
     with pytest.raises(CellError, match="below the table"):
-        await arm.ask("InverseKinematics", args)
+        await server.ask("InverseKinematics", args)
 
 
 @serving(with_arm)
-async def test_streams_are_sent_only_to_subscribers(arm: Server) -> None:
-    await arm.start()
+async def test_streams_are_sent_only_to_subscribers(server: Server) -> None:
+    await server.start()
     other = Recorder("bob")
-    arm.services.hub.add(other)  # type: ignore[arg-type]
+    server.services.hub.add(other)  # type: ignore[arg-type]
     subscribe = {"robot_id": OBJ, "what": "joints", "send": True}
-    await arm.ask("RegisterForRobotEvent", subscribe)
+    await server.ask("RegisterForRobotEvent", subscribe)
     for _ in range(2):
-        data = await arm.client.event("RobotJoints")
+        data = await server.client.event("RobotJoints")
     assert [j["name"] for j in data["joints"]] == ["j0", "finger"]
     assert other.got == []
-    await arm.ask("RegisterForRobotEvent", subscribe | {"send": False})
+    await server.ask("RegisterForRobotEvent", subscribe | {"send": False})
     with pytest.raises(RequestRefused):
-        await arm.ask("RegisterForRobotEvent", subscribe | {"send": False})
+        await server.ask("RegisterForRobotEvent", subscribe | {"send": False})
 
 
 @serving(with_arm)
-async def test_a_motion_reports_start_and_end(arm: Server) -> None:
-    await arm.start()
-    locks = arm.services.locks
+async def test_a_motion_reports_start_and_end(server: Server) -> None:
+    await server.start()
+    locks = server.services.locks
     request = {"robot_id": OBJ, "end_effector_id": "tool", "speed": 0.5, "position": {"x": 1, "y": 0, "z": 0}}
-    await arm.ask("MoveToPose", request)
-    await arm.client.event("response MoveToPose")
-    start = await arm.client.event("RobotMoveToPose")
+    await server.ask("MoveToPose", request)
+    await server.client.event("response MoveToPose")
+    start = await server.client.event("RobotMoveToPose")
     assert start["move_event_type"] == "start"
     assert start["target_pose"]["position"]["x"] == 1
     assert "message" not in start
-    assert (await arm.client.event("RobotMoveToPose"))["move_event_type"] == "end"
+    assert (await server.client.event("RobotMoveToPose"))["move_event_type"] == "end"
     assert locks.writer_of(OBJ) is None
     for wrong in ({"speed": 0.0}, {"speed": 1.5}):
         with pytest.raises(RequestRefused):
-            await arm.ask("MoveToPose", request | wrong)
-    await arm.ask("MoveToJoints", {"robot_id": OBJ, "speed": 0.5, "joints": [{"name": "j0", "value": 4}]})
-    failed = await arm.client.event("RobotMoveToJoints", lambda d: d["move_event_type"] != "start")
+            await server.ask("MoveToPose", request | wrong)
+    await server.ask("MoveToJoints", {"robot_id": OBJ, "speed": 0.5, "joints": [{"name": "j0", "value": 4}]})
+    failed = await server.client.event("RobotMoveToJoints", lambda d: d["move_event_type"] != "start")
     assert failed["move_event_type"] == "failed"
     assert "3 rad" in failed["message"]
     assert locks.writer_of(OBJ) is None
 
 
 @serving(with_arm)
-async def test_stop_robot_stops_the_motion(arm: Server) -> None:
-    await arm.start()
+async def test_stop_robot_stops_the_motion(server: Server) -> None:
+    await server.start()
     with pytest.raises(RequestRefused):
-        await arm.ask("StopRobot", {"robot_id": OBJ})
+        await server.ask("StopRobot", {"robot_id": OBJ})
     request = {"robot_id": OBJ, "end_effector_id": "tool", "speed": 0.5, "position": {"x": 0, "y": 0, "z": 2}}
-    await arm.ask("MoveToPose", request)
-    assert arm.services.locks.writer_of(OBJ) == "alice"
+    await server.ask("MoveToPose", request)
+    assert server.services.locks.writer_of(OBJ) == "alice"
     with pytest.raises(RequestRefused):
-        await arm.ask("MoveToActionPoint", {"robot_id": OBJ, "speed": 0.5, "joints_id": "joi_1"})
-    await arm.ask("StopRobot", {"robot_id": OBJ})
-    failed = await arm.client.event("RobotMoveToPose", lambda d: d["move_event_type"] != "start")
+        await server.ask("MoveToActionPoint", {"robot_id": OBJ, "speed": 0.5, "joints_id": "joi_1"})
+    await server.ask("StopRobot", {"robot_id": OBJ})
+    failed = await server.client.event("RobotMoveToPose", lambda d: d["move_event_type"] != "start")
     assert failed["move_event_type"] == "failed"
-    assert arm.services.locks.writer_of(OBJ) is None
+    assert server.services.locks.writer_of(OBJ) is None
 
 
 @serving(with_arm)
-async def test_move_to_action_point(arm: Server) -> None:
-    await arm.start()
+async def test_a_robot_moves_to_the_poses_and_joints_of_action_points(server: Server) -> None:
+    await server.start()
     args = {"robot_id": OBJ, "speed": 0.5, "orientation_id": "ori_1", "end_effector_id": "tool"}
-    await arm.ask("MoveToActionPoint", args)
+    await server.ask("MoveToActionPoint", args)
     name = "RobotMoveToActionPointOrientation"
-    assert (await arm.client.event(name, lambda d: d["move_event_type"] == "end"))["orientation_id"] == "ori_1"
-    pose = await arm.ask("GetEndEffectorPose", {"robot_id": OBJ, "end_effector_id": "tool"})
+    assert (await server.client.event(name, lambda d: d["move_event_type"] == "end"))["orientation_id"] == "ori_1"
+    pose = await server.ask("GetEndEffectorPose", {"robot_id": OBJ, "end_effector_id": "tool"})
     assert pose.position == Position(2, 0, 0)  # the parent of the point is the arm at x = 1
-    await arm.ask("MoveToActionPoint", {"robot_id": OBJ, "speed": 0.5, "joints_id": "joi_1"})
-    await arm.client.event("RobotMoveToActionPointJoints", lambda d: d["move_event_type"] == "end")
+    await server.ask("MoveToActionPoint", {"robot_id": OBJ, "speed": 0.5, "joints_id": "joi_1"})
+    await server.client.event("RobotMoveToActionPointJoints", lambda d: d["move_event_type"] == "end")
 
 
 @serving(with_arm)
-async def test_steps_and_hand_teaching_need_the_lock(arm: Server) -> None:
-    await arm.start()
+async def test_steps_and_hand_teaching_need_the_lock(server: Server) -> None:
+    await server.start()
     step = {"robot_id": OBJ, "end_effector_id": "tool", "axis": "x", "what": "position", "mode": "world", "step": 0.1}
     teach = {"robot_id": OBJ, "enable": True}
     for name, args in (("StepRobotEef", step), ("HandTeachingMode", teach)):
         with pytest.raises(RequestRefused):
-            await arm.ask(name, args)
-    await arm.services.locks.write_lock("alice", OBJ)
-    await arm.ask("StepRobotEef", step)
-    end = await arm.client.event("RobotMoveToPose", lambda d: d["move_event_type"] == "end")
+            await server.ask(name, args)
+    await server.services.locks.write_lock("alice", OBJ)
+    await server.ask("StepRobotEef", step)
+    end = await server.client.event("RobotMoveToPose", lambda d: d["move_event_type"] == "end")
     assert end["target_pose"]["position"] == {"x": pytest.approx(0.2), "y": 0.2, "z": 0.3}
-    await arm.ask("HandTeachingMode", teach)
-    assert await arm.client.event("HandTeachingMode") == {"robot_id": OBJ, "enabled": True}
+    await server.ask("HandTeachingMode", teach)
+    assert await server.client.event("HandTeachingMode") == {"robot_id": OBJ, "enabled": True}
     with pytest.raises(RequestRefused):
-        await arm.ask("HandTeachingMode", teach)
+        await server.ask("HandTeachingMode", teach)
     with pytest.raises(RequestRefused, match="by hand"):
-        await arm.ask("StepRobotEef", step)
+        await server.ask("StepRobotEef", step)
 
 
-async def _execute(arm: Server, action_id: str) -> dict[str, Any]:
-    await arm.ask("ExecuteAction", {"action_id": action_id})
-    await arm.client.event("response ExecuteAction")
-    assert await arm.client.event("ActionExecution") == {"action_id": action_id}
-    return await arm.client.event("ActionResult")
+async def _execute(server: Server, action_id: str) -> dict[str, Any]:
+    await server.ask("ExecuteAction", {"action_id": action_id})
+    await server.client.event("response ExecuteAction")
+    assert await server.client.event("ActionExecution") == {"action_id": action_id}
+    return await server.client.event("ActionResult")
 
 
 @serving(with_arm)
-async def test_single_actions_with_links_and_parameters(arm: Server) -> None:
+async def test_a_single_action_uses_project_parameters_and_earlier_results(server: Server) -> None:
     with pytest.raises(RequestRefused):
-        await arm.ask("ExecuteAction", {"action_id": "act_literal"})
-    await arm.start()
-    assert await _execute(arm, "act_literal") == {"action_id": "act_literal"}
+        await server.ask("ExecuteAction", {"action_id": "act_literal"})
+    await server.start()
+    assert await _execute(server, "act_literal") == {"action_id": "act_literal"}
     with pytest.raises(RequestRefused, match="measure"):
-        await arm.ask("ExecuteAction", {"action_id": "act_linked"})
-    assert await _execute(arm, "act_measure") == {"action_id": "act_measure", "results": ["3.0", '"mm"']}
-    assert await _execute(arm, "act_linked") == {"action_id": "act_linked"}
+        await server.ask("ExecuteAction", {"action_id": "act_linked"})
+    assert await _execute(server, "act_measure") == {"action_id": "act_measure", "results": ["3.0", '"mm"']}
+    assert await _execute(server, "act_linked") == {"action_id": "act_linked"}
     with pytest.raises(RequestRefused):
-        await arm.ask("CancelAction")
+        await server.ask("CancelAction")
 
 
 @serving(with_arm)
-async def test_a_single_action_can_be_cancelled(arm: Server) -> None:
-    await arm.start()
-    await arm.ask("ExecuteAction", {"action_id": "act_long"})
-    await arm.client.event("ActionExecution")
+async def test_a_single_action_can_be_cancelled(server: Server) -> None:
+    await server.start()
+    await server.ask("ExecuteAction", {"action_id": "act_long"})
+    await server.client.event("ActionExecution")
     for refused, args in (("ExecuteAction", {"action_id": "act_literal"}), ("StopScene", None)):
         with pytest.raises(RequestRefused):
-            await arm.ask(refused, args)
-    await arm.ask("CancelAction")
-    await arm.client.event("ActionCancelled")
-    await until(lambda: arm.services.online.running_action is None)
-    assert all(event["event"] != "ActionResult" for event in arm.client.got)
-    await _execute(arm, "act_literal")
+            await server.ask(refused, args)
+    await server.ask("CancelAction")
+    await server.client.event("ActionCancelled")
+    await until(lambda: server.services.online.running_action is None)
+    assert all(event["event"] != "ActionResult" for event in server.client.got)
+    await _execute(server, "act_literal")
 
 
 @serving(with_arm)
-async def test_an_action_cut_off_by_a_crash_ends_with_an_error(arm: Server) -> None:
-    await arm.start()
-    await arm.ask("ExecuteAction", {"action_id": "act_long"})
-    assert arm.services.online.host.host is not None
-    arm.services.online.host.host.kill()
-    assert "SIGKILL" in (await arm.client.event("ActionResult"))["error"]
-    assert arm.services.online.running_action is None
-    assert arm.services.online.results == {}
+async def test_an_action_interrupted_by_a_crash_ends_with_an_error(server: Server) -> None:
+    await server.start()
+    await server.ask("ExecuteAction", {"action_id": "act_long"})
+    assert server.services.online.host.host is not None
+    server.services.online.host.host.kill()
+    assert "SIGKILL" in (await server.client.event("ActionResult"))["error"]
+    assert server.services.online.running_action is None
+    assert server.services.online.results == {}
 
 
 @serving(with_arm)
-async def test_moving_an_object_updates_the_running_scene(arm: Server) -> None:
-    await arm.start()
-    await arm.services.online.object_pose_changed(OBJ, Pose(Position(5, 0, 0)))
-    raw = await arm.services.online.call(OBJ, "pose")
+async def test_moving_an_object_updates_the_running_scene(server: Server) -> None:
+    await server.start()
+    await server.services.online.object_pose_changed(OBJ, Pose(Position(5, 0, 0)))
+    raw = await server.services.online.call(OBJ, "pose")
     assert json.loads(raw)["position"]["x"] == 5

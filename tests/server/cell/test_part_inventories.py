@@ -107,7 +107,7 @@ async def test_parts_are_confirmed_one_after_the_other(tmp_path: Path) -> None:
         await inventory.require_continues("scn_1", "pkg_1")
 
 
-def test_a_run_names_the_result_because_of_which_it_cannot_continue() -> None:
+def test_a_run_that_cannot_continue_names_the_missing_result() -> None:
     done = [DoneAction("main", "act_1", "picture", "obj_camera", stored=False)]
     run = RunCheckpoint(1, "pkg_1", "", now(), cycle=1, complete=True, done=done)
     assert (run.published().continues, run.published().missing) == (False, "picture")

@@ -54,7 +54,7 @@ def test_spans_name_device_and_branch_and_exclude_pauses() -> None:
     trace.ended(2, 0.25, 4.0)  # the program was paused before
     begin(trace, 3, "act_c", "obj_lamp", 1004.75)
     trace.ended(3, 0.5, 0.0, "It jams.")
-    trace.ended(9, 0.5, 0.0)  # never announced
+    trace.ended(9, 0.5, 0.0)  # this action never started
     begin(trace, 4, "act_a", "obj_lamp", 1010.0)  # still running
     found = trace.trace()
     assert found.spans == [
@@ -66,7 +66,7 @@ def test_spans_name_device_and_branch_and_exclude_pauses() -> None:
     assert (found.run, found.started) == (3, "1970-01-01T00:16:40.000000+00:00")
 
 
-def test_an_action_after_an_error_exit_followed_no_condition() -> None:
+def test_a_span_after_an_error_exit_names_no_branch() -> None:
     trace = RunTraceCollector(3)
     trace.describe(INFO)
     begin(trace, 1, "act_a", "obj_lamp", 1000.0)

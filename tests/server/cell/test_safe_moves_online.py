@@ -73,10 +73,10 @@ async def test_a_safe_move_avoids_a_mesh_or_is_refused(server: Server) -> None:
     assert "at the start" in str(stuck["message"])
 
 
-# ---------------------------------------------------------------------------------------------------- the same world
+# ------------------------------------------------------------------------------------------ obstacles, calibrations
 OBJ = "obj_arm"
 LONGER = 0.004
-TELLS = f"""
+CALIBRATED_ARM = f"""
 import msgspec
 from arcor2_hw.data.robot import KinematicCalibration
 {ARM}
@@ -87,7 +87,7 @@ from arcor2_hw.data.robot import KinematicCalibration
 
 async def with_arm_alone(server: Server) -> None:
     meta = robot_meta("Arm", move_to_pose=True, move_to_joints=True, kinematic_calibration=True)
-    server.types.add("Arm", TELLS, [], replace(meta, urdf_package_filename="arm.urdf"))
+    server.types.add("Arm", CALIBRATED_ARM, [], replace(meta, urdf_package_filename="arm.urdf"))
     await server.services.assets.put(_pieces(URDF.read_bytes()), "arm.urdf")
     await server.open(Scene("scene", id="scn_1", objects=[placed("arm", "Arm", Pose())]))
 
@@ -122,9 +122,9 @@ async def test_added_and_gripped_bodies_are_obstacles_online_and_in_programs(ser
         world.remove("crate")
         assert await line(server, aside) == ""
         world.put(box("rod", Position(0.0, 0.0, 0.16), 0.03, 0.03, 0.3, Attachment(OBJ, "tcp")))
-        met = await line(server, aside)
-        assert "rod" in met
-        assert "table" in met
+        message = await line(server, aside)
+        assert "rod" in message
+        assert "table" in message
         world.stop()
         assert await line(server, aside) == ""
         await server.ask("StopScene")
@@ -135,9 +135,9 @@ async def test_added_and_gripped_bodies_are_obstacles_online_and_in_programs(ser
         world.put(box("rod", Position(0.0, 0.0, 0.16), 0.03, 0.03, 0.3, Attachment(OBJ, "tcp")))
         write(server)
         await server.ask("RunPackage", {"id": "pkg_1"})
-        met = (await server.client.event("ProjectException"))["message"]
-        assert "rod" in met
-        assert "table" in met
+        message = (await server.client.event("ProjectException"))["message"]
+        assert "rod" in message
+        assert "table" in message
         await server.client.state("stopped", "PackageState")
         world.remove("rod")
         await server.ask("RunPackage", {"id": "pkg_1"})
@@ -158,7 +158,7 @@ def _at(data: dict[str, Any]) -> Position:
 
 
 def write(server: Server) -> None:
-    """Write a package that moves the tip to the side in a line, again and again."""
+    """Write a package that repeatedly moves the tip sideways in a line."""
     target = msgspec.json.encode(Pose(TIP + Position(0.0, 0.25, 0.0), UPSIDE_DOWN)).decode()
     ready = [(joint.name, joint.value) for joint in joints(READY)]
     body = f"""
@@ -173,15 +173,15 @@ def write(server: Server) -> None:
     """
     objects = [placed("arm", "Arm", Pose())]
     directory = server.services.settings.packages_dir / "pkg_1"
-    Package(directory).write({"Arm": TELLS}, objects, Project("project", "scn_1", id="pro_1"), body)
+    Package(directory).write({"Arm": CALIBRATED_ARM}, objects, Project("project", "scn_1", id="pro_1"), body)
 
 
 @serving(with_arm_alone)
 async def test_the_controllers_calibration_is_used_online_and_in_programs(server: Server) -> None:
-    kept = server.services.robot_calibrations
+    calibrations = server.services.robot_calibrations
     try:
         await server.start()
-        await kept.settled()
+        await calibrations.settled()
         assert await height(server) == pytest.approx(TIP.z + LONGER, abs=1e-4)
         await server.ask("StopScene")
         await server.client.state("stopped")
@@ -199,5 +199,5 @@ async def test_the_controllers_calibration_is_used_online_and_in_programs(server
         await server.ask("StopPackage")
         await server.client.state("stopped", "PackageState")
     finally:
-        await kept.close()
+        await calibrations.close()
         await server.services.compute.close()

@@ -1,4 +1,4 @@
-"""StopAll stops all devices with one request and immediately names those that cannot be stopped."""
+"""StopAll stops all devices with one request and immediately reports those that cannot be stopped."""
 
 import os
 import signal
@@ -30,7 +30,7 @@ class Screwdriver(Generic):
         self.stopped.set()
     @action
     def run(self, *, an: str | None = None) -> None:
-        Path(BEGAN).touch()
+        Path(STARTED_FILE).touch()
         if self.stopped.wait(300):
             self.stopped.clear()
             raise Cancelled("stopped")
@@ -46,7 +46,7 @@ class Timer(Generic):
         self.cancelled.set()
     @action
     def run(self, *, an: str | None = None) -> None:
-        Path(BEGAN).touch()
+        Path(STARTED_FILE).touch()
         if self.cancelled.wait(300):
             raise Cancelled("cancelled")
 """,
@@ -55,7 +55,7 @@ class Press(Generic):
     _ABSTRACT = False
     @action
     def run(self, *, an: str | None = None) -> None:
-        Path(BEGAN).touch()
+        Path(STARTED_FILE).touch()
         time.sleep(300)
 """,
     "Stubborn": """
@@ -65,7 +65,7 @@ class Stubborn(Generic):
         time.sleep(300)
     @action
     def run(self, *, an: str | None = None) -> None:
-        Path(BEGAN).touch()
+        Path(STARTED_FILE).touch()
         time.sleep(300)
 """,
     "Slow": """
@@ -79,7 +79,7 @@ class Slow(Generic):
         pass
     @action
     def run(self, *, an: str | None = None) -> None:
-        Path(BEGAN).touch()
+        Path(STARTED_FILE).touch()
         pass
 """,
 }
@@ -101,8 +101,8 @@ PROJECT = Project(
 
 
 def sources(server: Server, *names: str) -> dict[str, str]:
-    began = f"BEGAN = {str(server.services.settings.data_dir / 'began')!r}"
-    return {name.capitalize(): began + TYPES[name.capitalize()] for name in names}
+    started_file = f"STARTED_FILE = {str(server.services.settings.data_dir / 'started_file')!r}"
+    return {name.capitalize(): started_file + TYPES[name.capitalize()] for name in names}
 
 
 def devices(*names: str) -> Callable[[Server], Awaitable[None]]:
@@ -117,12 +117,12 @@ def devices(*names: str) -> Callable[[Server], Awaitable[None]]:
 
 async def until_running(server: Server) -> None:
     """Wait until the device executes its action."""
-    path = server.services.settings.data_dir / "began"
+    path = server.services.settings.data_dir / "started_file"
     await until(path.exists)
     path.unlink()
 
 
-async def trying(server: Server, name: str) -> None:
+async def start_action(server: Server, name: str) -> None:
     await server.ask("ExecuteAction", {"action_id": f"act_{name}"})
     await server.client.event("ActionExecution")
     await until_running(server)
@@ -134,57 +134,57 @@ async def stop_all(server: Server, codes: bool = False) -> StopAllData:
     return data
 
 
-def missed(data: StopAllData) -> dict[str, Any]:
+def not_stopped(data: StopAllData) -> dict[str, Any]:
     return {outcome.name: outcome.reason for outcome in data.outcomes if not outcome.stopped}
 
 
-async def ended(server: Server) -> None:
+async def until_action_ended(server: Server) -> None:
     await until(lambda: server.services.online.running_action is None)
 
 
 @serving(devices("screwdriver", "timer"))
-async def test_a_tried_action_is_stopped_with_or_without_cancel_mapping(server: Server) -> None:
+async def test_a_single_action_is_stopped_with_or_without_cancel_mapping(server: Server) -> None:
     await server.start()
     for name in ("screwdriver", "timer"):
-        await trying(server, name)
+        await start_action(server, name)
         data = await stop_all(server)
         of_action = [outcome for outcome in data.outcomes if outcome.kind is StopKind.ACTION]
         assert [(one.id, one.name, one.stopped) for one in of_action] == [(f"act_{name}", f"{name}_1", True)]
-        assert missed(data) == {}
+        assert not_stopped(data) == {}
         await server.client.event("ActionCancelled")
-        await ended(server)
+        await until_action_ended(server)
     assert all(event["event"] != "ActionResult" for event in server.client.got)
 
 
 @serving(devices("screwdriver", "press"))
-async def test_an_action_that_cannot_be_stopped_is_named_at_once(server: Server) -> None:
+async def test_an_action_that_cannot_be_stopped_is_reported_at_once(server: Server) -> None:
     await server.start()
-    await trying(server, "press")
+    await start_action(server, "press")
     with pytest.raises(RequestRefused):
         await server.ask("StopScene")
     data = await stop_all(server)
     assert {outcome.name for outcome in data.outcomes if outcome.stopped} == {"screwdriver"}
-    assert "press: run cannot be stopped" in missed(data)["press_1"]
-    assert all(word in missed(data)["press_1"] for word in ("Press", "stop()", "CANCEL_MAPPING"))
+    assert "press: run cannot be stopped" in not_stopped(data)["press_1"]
+    assert all(word in not_stopped(data)["press_1"] for word in ("Press", "stop()", "CANCEL_MAPPING"))
     assert all(outcome == outcome.untranslated() for outcome in data.outcomes)
     (action,) = [each for each in (await stop_all(server, codes=True)).outcomes if not each.stopped]
-    assert action.reason == missed(data)["press_1"]
+    assert action.reason == not_stopped(data)["press_1"]
     assert str(action.key).startswith("{device}: {method} cannot be stopped, because {kind} has neither")
     assert action.values == {"device": "press", "method": "run", "kind": "Press"}
     assert server.services.online.running_action is not None
     assert all(event["event"] != "ActionCancelled" for event in server.client.got)
     await server.ask("StopScene")
     await server.client.state("stopped")
-    await ended(server)
+    await until_action_ended(server)
 
 
 @serving(devices("screwdriver", "stubborn"))
-async def test_a_stop_that_hangs_is_named_and_delays_no_other(server: Server) -> None:
+async def test_a_stop_that_hangs_is_reported_and_delays_no_other_device(server: Server) -> None:
     await server.start()
-    await trying(server, "stubborn")
+    await start_action(server, "stubborn")
     data = await stop_all(server)
-    assert set(missed(data)) == {"stubborn_1"}
-    assert "stop did not finish within 2 s" in missed(data)["stubborn_1"]
+    assert set(not_stopped(data)) == {"stubborn_1"}
+    assert "stop did not finish within 2 s" in not_stopped(data)["stubborn_1"]
     assert {outcome.name for outcome in data.outcomes if outcome.stopped} == {"screwdriver"}
 
 
@@ -192,28 +192,28 @@ async def test_a_stop_that_hangs_is_named_and_delays_no_other(server: Server) ->
 async def test_stop_all_works_while_the_scene_starts_and_stops(server: Server) -> None:
     await server.ask("StartScene")
     await server.client.state("starting")
-    assert missed(await stop_all(server)) == {}
+    assert not_stopped(await stop_all(server)) == {}
     await server.client.state("started")
     await server.ask("StopScene")
     await server.client.state("stopping")
-    assert missed(await stop_all(server)) == {}
+    assert not_stopped(await stop_all(server)) == {}
     assert "message" not in await server.client.state("stopped")
     assert (await stop_all(server)).outcomes == []
 
 
 @serving(devices("press"))
-async def test_requests_from_before_a_stop_do_not_start_after_it(server: Server) -> None:
+async def test_a_stop_cancels_an_action_that_has_not_reached_its_device(server: Server) -> None:
     await server.start()
     await server.ask("ExecuteAction", {"action_id": "act_press"})
     await stop_all(server)  # before the call has reached the device
     await server.client.event("ActionCancelled")
-    await ended(server)
+    await until_action_ended(server)
 
 
 @serving(devices("screwdriver", "timer"))
-async def test_a_frozen_host_is_named(server: Server) -> None:
+async def test_devices_of_a_frozen_host_are_reported(server: Server) -> None:
     await server.start()
-    await trying(server, "screwdriver")
+    await start_action(server, "screwdriver")
     host = server.services.online.host.host
     assert host is not None
     os.kill(host.pid, signal.SIGSTOP)
@@ -221,10 +221,10 @@ async def test_a_frozen_host_is_named(server: Server) -> None:
         data = await stop_all(server, codes=True)
     finally:
         os.kill(host.pid, signal.SIGCONT)
-    assert set(missed(data)) == {"timer", "screwdriver_1"}
+    assert set(not_stopped(data)) == {"timer", "screwdriver_1"}
     timer = next(outcome for outcome in data.outcomes if outcome.name == "timer")
     assert (timer.key, timer.values) == ("{device}: {reason}", {"device": "timer", "reason": HOST_SILENT})
-    assert all("does not answer" in reason for reason in missed(data).values())
+    assert all("does not answer" in reason for reason in not_stopped(data).values())
 
 
 def write(server: Server, script: str, name: str) -> None:
@@ -250,7 +250,7 @@ async def test_a_program_is_stopped_with_its_devices(server: Server) -> None:
 
 
 @serving()
-async def test_a_starting_program_is_stopped_before_it_begins(server: Server) -> None:
+async def test_a_starting_program_is_stopped_before_its_first_action(server: Server) -> None:
     write(server, "device.run(an='screwdriver_1')", "screwdriver")
     await server.ask("RunPackage", {"id": "pkg_1"})
     data = await stop_all(server)
@@ -260,10 +260,10 @@ async def test_a_starting_program_is_stopped_before_it_begins(server: Server) ->
 
 
 @serving()
-async def test_a_program_whose_device_cannot_be_stopped_ends_and_names_it(server: Server) -> None:
+async def test_a_stopped_program_reports_a_device_that_cannot_be_stopped(server: Server) -> None:
     write(server, "device.run(an='press_1')", "press")
     await server.ask("RunPackage", {"id": "pkg_1"})
     await until_running(server)
     data = await stop_all(server)
-    assert set(missed(data)) == {"press"}
+    assert set(not_stopped(data)) == {"press"}
     await server.client.state("stopped", "PackageState")

@@ -28,19 +28,19 @@ SERIAL = {"name": "serial", "value": '"A-1"'}
 
 
 async def test_a_run_yields_the_record_of_each_unit(tmp_path: Path) -> None:
-    async with production(tmp_path) as made:
-        made.package()
+    async with production(tmp_path) as cell:
+        cell.package()
         calibration = CalibrationRecord(CalibrationKind.BY_HAND, "", "obj_camera", "camera", "world", "")
-        await made.services.units._calibrations.put(calibration)
-        recipe = await made.released(planned_rate=60.0)
-        subscribe(made.server, "UnitChanged")
-        async with made.services.units._describing:  # the unit leaves before its package is described
-            await made.ask("RunPackage", {"id": "pkg_1", "recipe_id": recipe.id, "order": "O-1"})
-            gone = await made.client.event("UnitChanged", lambda data: data["state"] != "in_cell")
+        await cell.services.units._calibrations.put(calibration)
+        recipe = await cell.released_recipe(planned_rate=60.0)
+        subscribe(cell.server, "UnitChanged")
+        async with cell.services.units._describing:  # the unit leaves before its package is described
+            await cell.ask("RunPackage", {"id": "pkg_1", "recipe_id": recipe.id, "order": "O-1"})
+            gone = await cell.client.event("UnitChanged", lambda data: data["state"] != "in_cell")
         assert (gone["serial"], gone["state"], "steps" in gone) == ("A-1", "good", False)
-        await made.client.state("stopped", "PackageState")
-        (unit,) = (await made.ask("ListUnits", {})).units
-        while not (record := await made.ask("GetUnit", {"number": unit.number})).package_name:
+        await cell.client.state("stopped", "PackageState")
+        (unit,) = (await cell.ask("ListUnits", {})).units
+        while not (record := await cell.ask("GetUnit", {"number": unit.number})).package_name:
             await asyncio.sleep(0.01)
         assert (record.serial, record.state, record.verdict, record.order) == ("A-1", UnitState.GOOD, True, "O-1")
         assert (record.recipe.revision, record.package_name, record.package_hash) == (1, "demo", recipe.package_hash)
@@ -52,13 +52,13 @@ async def test_a_run_yields_the_record_of_each_unit(tmp_path: Path) -> None:
 
 
 async def test_units_are_found_by_serial_number_and_exported(tmp_path: Path) -> None:
-    async with production(tmp_path) as made:
-        made.package()
+    async with production(tmp_path) as cell:
+        cell.package()
         failing = SCRIPT.replace('"A-1"', '"B_1"').replace("test(True", "test(False").partition("arm.pick(i")[0]
-        made.package("pkg_2", failing, [ProjectParameter("serial", "string", '"B_1"', id="prm_serial")])
-        await made.run()
-        await made.run("pkg_2", order="=1+1")
-        for asked, expected in (
+        cell.package("pkg_2", failing, [ProjectParameter("serial", "string", '"B_1"', id="prm_serial")])
+        await cell.run()
+        await cell.run("pkg_2", order="=1+1")
+        for query, expected in (
             ({"serial": "A"}, ["A-1"]),
             ({"serial": "b"}, ["B_1"]),
             ({"serial": "_"}, []),
@@ -71,79 +71,79 @@ async def test_units_are_found_by_serial_number_and_exported(tmp_path: Path) -> 
             ({"before": 2}, ["A-1"]),
             ({"since": "2000-01-01T00:00:00+00:00", "until": "2000-01-02T00:00:00+00:00"}, []),
         ):
-            found = (await made.ask("ListUnits", asked)).units
-            assert [unit.serial for unit in found] == expected, asked
-        lines = list(csv.DictReader(io.StringIO(units_as_csv((await made.ask("ListUnits", {})).units).decode())))
+            found = (await cell.ask("ListUnits", query)).units
+            assert [unit.serial for unit in found] == expected, query
+        lines = list(csv.DictReader(io.StringIO(units_as_csv((await cell.ask("ListUnits", {})).units).decode())))
         assert [(each["serial"], each["verdict"], each["order"]) for each in lines] == [
             ("B_1", "failed", "'=1+1"),
             ("A-1", "passed", ""),
         ]
         with pytest.raises(NotFound, match="no record of a unit with the number 7"):
-            await made.ask("GetUnit", {"number": 7})
+            await cell.ask("GetUnit", {"number": 7})
 
 
 async def test_a_unit_survives_the_end_of_the_program_and_of_the_server(tmp_path: Path) -> None:
     (tmp_path / "hang").touch()
-    async with production(tmp_path) as made:
-        made.package()
-        recipe = await made.released(values=[SERIAL])
-        subscribe(made.server, "PartsChanged")
-        await made.ask("RunPackage", {"id": "pkg_1", "on_error": "hold", "recipe_id": recipe.id, "order": "O-1"})
-        await made.client.event("PartsChanged", lambda data: data["parts"] and "moving_to" in data["parts"][0])
-        os.kill(made.services.execution._host.host.pid, signal.SIGKILL)
-        await made.client.state("stopped", "PackageState")
+    async with production(tmp_path) as cell:
+        cell.package()
+        recipe = await cell.released_recipe(values=[SERIAL])
+        subscribe(cell.server, "PartsChanged")
+        await cell.ask("RunPackage", {"id": "pkg_1", "on_error": "hold", "recipe_id": recipe.id, "order": "O-1"})
+        await cell.client.event("PartsChanged", lambda data: data["parts"] and "moving_to" in data["parts"][0])
+        os.kill(cell.services.execution._host.host.pid, signal.SIGKILL)
+        await cell.client.state("stopped", "PackageState")
     (tmp_path / "hang").unlink()
-    async with production(tmp_path) as made:
-        subscribe(made.server, "PartsChanged", "Held")
-        await made.ask("ConfirmParts", {"scene_id": "scn_1", "parts": [{"number": 1, "place": "obj_arm"}]})
-        await made.ask("RunPackage", {"id": "pkg_1", "on_error": "hold", "continues": True})
-        held = await made.client.event("Held")
-        await made.ask("DecideHeld", {"number": held["number"], "choice": "skip"})
-        await made.client.state("stopped", "PackageState")
-        (unit,) = (await made.ask("ListUnits", {})).units
-        record = await made.ask("GetUnit", {"number": unit.number})
+    async with production(tmp_path) as cell:
+        subscribe(cell.server, "PartsChanged", "Held")
+        await cell.ask("ConfirmParts", {"scene_id": "scn_1", "parts": [{"number": 1, "place": "obj_arm"}]})
+        await cell.ask("RunPackage", {"id": "pkg_1", "on_error": "hold", "continues": True})
+        held = await cell.client.event("Held")
+        await cell.ask("DecideHeld", {"number": held["number"], "choice": "skip"})
+        await cell.client.state("stopped", "PackageState")
+        (unit,) = (await cell.ask("ListUnits", {})).units
+        record = await cell.ask("GetUnit", {"number": unit.number})
         assert (record.state, record.order, record.recipe.revision, record.runs) == (UnitState.GOOD, "O-1", 1, [1, 2])
         assert [step.name for step in record.steps if not isinstance(step.error, str)][-4:] == STEPS[2:]
-        run = (await made.ask("ListRuns", {})).runs[0]
+        run = (await cell.ask("ListRuns", {})).runs[0]
         assert (run.recipe.id, run.order) == (recipe.id, "O-1")  # it continues with the recipe
 
 
 async def test_a_part_that_a_person_takes_out_is_rejected(tmp_path: Path) -> None:
-    async with production(tmp_path) as made:
-        made.package(script=SCRIPT.partition("arm.pick(i")[0])
-        await made.run()
-        await made.ask("ConfirmParts", {"scene_id": "scn_1", "parts": [{"number": 1, "place": ""}]})
-        (unit,) = (await made.ask("ListUnits", {})).units
+    async with production(tmp_path) as cell:
+        cell.package(script=SCRIPT.partition("arm.pick(i")[0])
+        await cell.run()
+        await cell.ask("ConfirmParts", {"scene_id": "scn_1", "parts": [{"number": 1, "place": ""}]})
+        (unit,) = (await cell.ask("ListUnits", {})).units
         assert (unit.serial, unit.state) == ("A-1", UnitState.REJECTED)
 
 
-async def test_the_time_of_the_cell_and_its_counts(tmp_path: Path) -> None:
-    async with production(tmp_path) as made:
-        made.package()
-        recipe = await made.released(planned_rate=3600.0)
-        await made.run(recipe_id=recipe.id)
-        found = await made.ask("GetProduction", None)
+async def test_the_production_report_contains_times_counts_and_effectiveness(tmp_path: Path) -> None:
+    async with production(tmp_path) as cell:
+        cell.package()
+        recipe = await cell.released_recipe(planned_rate=3600.0)
+        await cell.run(recipe_id=recipe.id)
+        found = await cell.ask("GetProduction", None)
         assert (found.counts.good, found.counts.bad, found.counts.in_cell) == (1, 0, 0)
         assert found.seconds[CellActivity.RUNNING] > 0.0
         assert sum(found.seconds.values()) == pytest.approx(8 * 3600.0, abs=0.1)
         assert found.seconds[CellActivity.OFF] > 7 * 3600.0
         assert found.effectiveness.quality == 1.0
         assert isinstance(found.effectiveness.oee, float)
-        await made.run()  # without a planned rate
-        found = await made.ask("GetProduction", {"since": found.since})
+        await cell.run()  # without a planned rate
+        found = await cell.ask("GetProduction", {"since": found.since})
         assert not isinstance(found.effectiveness.oee, float)
         with pytest.raises(InvalidData, match="has to start before it ends"):
-            await made.ask("GetProduction", {"since": "2999-01-01T00:00:00+00:00"})
+            await cell.ask("GetProduction", {"since": "2999-01-01T00:00:00+00:00"})
 
 
 async def test_times_are_split_at_the_ends_of_a_period(tmp_path: Path) -> None:
     storage = await Storage.open(ServerSettings(data_dir=tmp_path))
-    at: dict[str, Any] = {"time": 1000.0, "activity": CellActivity.IDLE}
-    times = CellTime(UnitStore(storage), lambda: at["activity"], lambda: at["time"])
+    clock: dict[str, Any] = {"time": 1000.0, "activity": CellActivity.IDLE}
+    times = CellTime(UnitStore(storage), lambda: clock["activity"], lambda: clock["time"])
     for time, activity in ((1010.0, CellActivity.RUNNING), (1040.0, CellActivity.HELD), (1050.0, CellActivity.IDLE)):
-        at.update(time=time, activity=activity)
+        clock.update(time=time, activity=activity)
         times.changed()
-    at["time"] = 1060.0
+    clock["time"] = 1060.0
     args: Any = type("Period", (), {"since": "1970-01-01T00:17:00+00:00", "until": "1970-01-01T00:17:25+00:00"})
     found = await times.production(args)  # 1020 to 1045
     assert {key.value: value for key, value in found.seconds.items() if value} == {"running": 20.0, "held": 5.0}
