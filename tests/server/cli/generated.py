@@ -9,7 +9,7 @@ from pathlib import Path
 def run_tests(root: Path, *arguments: str) -> str:
     """Run the tests in a separate process. They must pass; return the output.
 
-    Of pytest's installed plugins, only ours is loaded: the others take several seconds.
+    Only the pytest plugin of ARCOR2-HW is loaded, because loading the other plugins takes several seconds.
     """
     command = [sys.executable, "-m", "pytest", "-q", "-p", "arcor2_hw.testing.plugin", "-p", "no:cacheprovider", "-rs"]
     environment = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}

@@ -134,7 +134,7 @@ def test_errors_have_an_exit_status_and_one_line(files: Path, tmp_path: Path, ca
         assert "Traceback" not in ran.err
 
 
-def test_touched_points(tmp_path: Path, calibrate: Cli) -> None:
+def test_frames_and_tips_are_computed_from_touched_points(tmp_path: Path, calibrate: Cli) -> None:
     turned = Orientation.from_rotation_vector(0.0, 0.0, math.radians(30))
     known = [Position(0, 0, 0), Position(0.3, 0, 0), Position(0, 0.2, 0), Position(0.3, 0.2, 0)]
     touched = [point.rotated(turned) + Position(0.5, 0.1, 0.0) for point in known]
@@ -212,26 +212,28 @@ def test_calibrations_are_sent_to_and_read_from_a_running_server(files: Path, tm
             base = server.url.replace("ws", "http", 1)
             assert [m["marker_id"] for m in httpx.get(f"{base}/api/calibration/markers").json()["markers"]] == [3, 17]
             by_hand = {"object_id": "obj_1", "object_name": "cam", "pose": {"position": {"x": 0.25}}, "before": {}}
-            kept = httpx.post(f"{base}/api/calibrations", json=by_hand).json()
+            stored = httpx.post(f"{base}/api/calibrations", json=by_hand).json()
             ran = calibrate("online", "records", *url)
             assert "by_hand" in ran.out
             assert "250.0 mm" in ran.out
             assert "There are no calibrations" in calibrate("online", "records", "other", *url).out
-            checked = httpx.put(f"{base}/api/calibrations/{kept['id']}/check", json={"pose": {"position": {"x": 0.26}}})
+            checked = httpx.put(
+                f"{base}/api/calibrations/{stored['id']}/check", json={"pose": {"position": {"x": 0.26}}}
+            )
             assert checked.json()["passed"] is False
             near, far = tmp_path / "near.yaml", tmp_path / "far.yaml"
             near.write_text("position: {x: 0.2515}")
             far.write_text("position: {x: 0.26}")
             ran = calibrate("online", "check", "cam", "--pose", near, *url)
             assert (ran.status, "cam is still as calibrated" in ran.out, "1.5 mm" in ran.out) == (0, True, True)
-            ran = calibrate("online", "check", "cam", "--pose", far, "--record", kept["id"], *url)
+            ran = calibrate("online", "check", "cam", "--pose", far, "--record", stored["id"], *url)
             assert (ran.status, ran.out) == (ExitStatus.DIFFERENT, "")
             assert "cam differs by 10.0 mm" in ran.err
             ran = calibrate("online", "check", "cam", "--pose", far, "--distance", "0.011", *url)
             assert ran.status == 0
             for words, status in (
                 (("other", "--pose", near), ExitStatus.NOT_FOUND),
-                (("other", "--pose", near, "--record", kept["id"]), ExitStatus.DOCUMENT_PROBLEMS),
+                (("other", "--pose", near, "--record", stored["id"]), ExitStatus.DOCUMENT_PROBLEMS),
                 (("cam", "--pose", near, "--record", "cal_none"), ExitStatus.NOT_FOUND),
                 (("cam",), ExitStatus.CONFLICT),
             ):

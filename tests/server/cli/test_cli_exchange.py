@@ -52,7 +52,7 @@ class Ran(NamedTuple):
     err: str
 
 
-class Place(NamedTuple):
+class Servers(NamedTuple):
     """Two servers: documents from the first are imported into the second."""
 
     first: str
@@ -69,28 +69,28 @@ class Place(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
+def servers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Servers]:
     directory: Path = tmp_path_factory.mktemp("exchange")
     first, second = ServerProcess(directory / "first"), ServerProcess(directory / "second")
     with asyncio.Runner() as loop:
-        loop.run(_started(first, second))
-        made = Place(first.url, second.url, loop, directory)
+        loop.run(_start(first, second))
+        made = Servers(first.url, second.url, loop, directory)
         try:
-            loop.run(_filled(first.url))
+            loop.run(_fill(first.url))
             yield made
         finally:
-            loop.run(_stopped(first, second))
+            loop.run(_stop(first, second))
 
 
-async def _started(*servers: ServerProcess) -> None:
+async def _start(*servers: ServerProcess) -> None:
     await asyncio.gather(*(server.start() for server in servers))
 
 
-async def _stopped(*servers: ServerProcess) -> None:
+async def _stop(*servers: ServerProcess) -> None:
     await asyncio.gather(*(server.stop() for server in servers))
 
 
-async def _filled(url: str) -> None:
+async def _fill(url: str) -> None:
     """Create a scene with a mesh, a virtual box and dependent types, and projects with logic and with a script."""
     async with Client(url, "author") as author:
         rest = author.rest
@@ -147,8 +147,8 @@ async def _filled(url: str) -> None:
 
 
 @pytest.fixture
-def cli(place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
-    """Run the command line in this process, in a directory of its own."""
+def cli(servers: Servers, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
+    """Run the command line in this process, in a temporary directory."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("ARCOR2_HW_TOKEN", raising=False)
 
@@ -167,7 +167,7 @@ def _named(items: list[dict[str, Any]], name: str) -> dict[str, Any]:
 
 
 def repacked(source: Path, target: Path, change: Callable[[dict[str, bytes]], None]) -> Path:
-    """Write an export with other content."""
+    """Write a changed copy of an export."""
     with zipfile.ZipFile(source) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
     change(files)
@@ -188,10 +188,10 @@ def changed(path: str, change: Callable[[Any], None]) -> Callable[[dict[str, byt
     return work
 
 
-def test_an_exported_project_is_imported_and_builds_on_an_empty_server(cli: Any, place: Place) -> None:
-    listed = cli("project", "list", at=place.first)
+def test_an_exported_project_is_imported_and_builds_on_an_empty_server(cli: Any, servers: Servers) -> None:
+    listed = cli("project", "list", at=servers.first)
     assert [line.split("  ")[0] for line in listed.out.splitlines()[1:]] == ["by hand", "open it"]
-    done = cli("project", "export", "open it", at=place.first)
+    done = cli("project", "export", "open it", at=servers.first)
     assert done == (0, "open_it.zip: project open it, its scene bench, 5 object types, 1 asset\n", "")
     with zipfile.ZipFile("open_it.zip") as archive:
         assert {name for name in archive.namelist() if name.startswith("object_types/")} == {
@@ -200,18 +200,18 @@ def test_an_exported_project_is_imported_and_builds_on_an_empty_server(cli: Any,
         }
     # The same content results in the same file, and no file is overwritten by accident.
     first = Path("open_it.zip").read_bytes()
-    again = cli("project", "export", "open it", at=place.first)
+    again = cli("project", "export", "open it", at=servers.first)
     assert (again.status, "--force" in again.err) == (ExitStatus.CONFLICT, True)
-    assert cli("project", "export", "open it", "--force", at=place.first).status == 0
+    assert cli("project", "export", "open it", "--force", at=servers.first).status == 0
     assert Path("open_it.zip").read_bytes() == first
     assert cli("project", "validate", "open_it.zip") == (0, "open_it.zip: project open it has no problems\n", "")
 
-    dry = cli("project", "import", "open_it.zip", "--dry-run", at=place.second)
+    dry = cli("project", "import", "open_it.zip", "--dry-run", at=servers.second)
     assert dry.status == 0
     assert "project open it: would be new" in dry.out
-    assert cli("project", "list", at=place.second).out == "There are no projects.\n"
-    assert "scene bench: new" in cli("project", "import", "open_it.zip", at=place.second).out
-    both = [place.ask(url, _picture) for url in (place.first, place.second)]
+    assert cli("project", "list", at=servers.second).out == "There are no projects.\n"
+    assert "scene bench: new" in cli("project", "import", "open_it.zip", at=servers.second).out
+    both = [servers.ask(url, _project_content) for url in (servers.first, servers.second)]
     assert both[1] == both[0]
 
     async def build(client: Client) -> str:
@@ -219,15 +219,15 @@ def test_an_exported_project_is_imported_and_builds_on_an_empty_server(cli: Any,
         built = await client.build_project(project_id=(await client.list_projects())[0].id, package_name="moved")
         return built.package_id
 
-    assert place.ask(place.second, build).startswith("pkg_")
+    assert servers.ask(servers.second, build).startswith("pkg_")
     # The second import changes nothing, and there is no difference.
-    once_more = cli("project", "import", "open_it.zip", at=place.second)
+    once_more = cli("project", "import", "open_it.zip", at=servers.second)
     assert {line.partition(": ")[2] for line in once_more.out.splitlines()} == {"same"}
-    same = cli("project", "diff", "open_it.zip", "open it", at=place.second)
+    same = cli("project", "diff", "open_it.zip", "open it", at=servers.second)
     assert same == (0, "No differences.\n", "")
 
 
-async def _picture(client: Client) -> Any:
+async def _project_content(client: Client) -> Any:
     """Return everything that belongs to the project, except for the times."""
     rest = client.rest
     listed = {one.name: one.id for one in await rest.projects()}
@@ -241,9 +241,9 @@ async def _picture(client: Client) -> Any:
     return untimed, types, sorted(models, key=lambda model: model.id), disabled, kept
 
 
-def test_differences_are_named_and_replaced_only_on_request(cli: Any, place: Place) -> None:
-    assert cli("project", "export", "open it", "-o", "out.zip", at=place.first).status == 0
-    cli("project", "import", "out.zip", "--overwrite", "all", at=place.second)
+def test_differences_are_named_and_replaced_only_on_request(cli: Any, servers: Servers) -> None:
+    assert cli("project", "export", "open it", "-o", "out.zip", at=servers.first).status == 0
+    cli("project", "import", "out.zip", "--overwrite", "all", at=servers.second)
 
     def alter(files: dict[str, bytes]) -> None:
         changed("data/scene.json", lambda scene: scene["objects"][0]["pose"]["position"].update(x=9.0))(files)
@@ -252,13 +252,13 @@ def test_differences_are_named_and_replaced_only_on_request(cli: Any, place: Pla
         files["assets/0001"] += b"more"
 
     repacked(Path("out.zip"), Path("other.zip"), alter)
-    refused = cli("project", "import", "other.zip", at=place.second)
+    refused = cli("project", "import", "other.zip", at=servers.second)
     assert refused.status == ExitStatus.CONFLICT
-    for what in ("The asset crate_mesh", "The object type Crate", "The scene bench", "The project open it"):
-        assert f"{what} exists and differs" in refused.err
-    partly = cli("project", "import", "other.zip", "--overwrite", "types", "--overwrite", "assets", at=place.second)
+    for document in ("The asset crate_mesh", "The object type Crate", "The scene bench", "The project open it"):
+        assert f"{document} exists and differs" in refused.err
+    partly = cli("project", "import", "other.zip", "--overwrite", "types", "--overwrite", "assets", at=servers.second)
     assert (partly.status, "The object type" in partly.err, "The scene bench" in partly.err) == (17, False, True)
-    compared = cli("project", "diff", "open it", "other.zip", at=place.second)
+    compared = cli("project", "diff", "open it", "other.zip", at=servers.second)
     assert compared.status == ExitStatus.DIFFERENT
     lines = compared.out.splitlines()
     assert "~ scene › objects › crate › pose › position: (0, 0, 0) → (9, 0, 0)" in lines
@@ -266,7 +266,7 @@ def test_differences_are_named_and_replaced_only_on_request(cli: Any, place: Pla
     assert "    +# changed" in lines
     assert any(line.startswith("~ assets › crate_mesh: ") for line in lines)
     assert "4 places" in compared.err
-    found = json.loads(cli("project", "diff", "open it", "other.zip", "--json", at=place.second).out)
+    found = json.loads(cli("project", "diff", "open it", "other.zip", "--json", at=servers.second).out)
     assert {
         "change": "changed",
         "path": ["project", "parameters", "angle", "value"],
@@ -274,13 +274,13 @@ def test_differences_are_named_and_replaced_only_on_request(cli: Any, place: Pla
         "new": "0.5",
     } in found
 
-    done = cli("project", "import", "other.zip", "--overwrite", "all", at=place.second)
+    done = cli("project", "import", "other.zip", "--overwrite", "all", at=servers.second)
     assert done.out.count(": replaced") == 4
-    assert cli("project", "diff", "other.zip", "open it", at=place.second).status == 0
-    cli("project", "import", "out.zip", "--overwrite", "all", at=place.second)
+    assert cli("project", "diff", "other.zip", "open it", at=servers.second).status == 0
+    cli("project", "import", "out.zip", "--overwrite", "all", at=servers.second)
 
     # A document that another user has open is not changed.
-    ann = Client(place.second, "ann")
+    ann = Client(servers.second, "ann")
 
     async def open_it() -> None:
         await ann.open()
@@ -291,15 +291,15 @@ def test_differences_are_named_and_replaced_only_on_request(cli: Any, place: Pla
         await ann.close_project()
         await ann.close()
 
-    place.loop.run(open_it())
-    open_there = cli("project", "import", "other.zip", "--overwrite", "all", at=place.second)
-    place.loop.run(leave())
-    assert open_there.status == ExitStatus.CONFLICT
-    assert "The scene bench is open on the server. Close it first." in open_there.err
-    assert "The project open it is open on the server. Close it first." in open_there.err
+    servers.loop.run(open_it())
+    refused = cli("project", "import", "other.zip", "--overwrite", "all", at=servers.second)
+    servers.loop.run(leave())
+    assert refused.status == ExitStatus.CONFLICT
+    assert "The scene bench is open on the server. Close it first." in refused.err
+    assert "The project open it is open on the server. Close it first." in refused.err
 
 
-async def _whole(client: Client, directory: Path) -> Any:
+async def _all_content(client: Client, directory: Path) -> Any:
     assets = {}
     for asset in await client.rest.assets():
         await client.rest.download_asset(asset.id, directory / "asset")
@@ -308,12 +308,14 @@ async def _whole(client: Client, directory: Path) -> Any:
     for one in await client.rest.projects():
         with contextlib.suppress(ResourceNotFound):
             scripts[one.name] = await client.rest.project_script(one.id)
-    return await _picture(client), assets, scripts, sorted(one.name for one in await client.rest.scenes())
+    return await _project_content(client), assets, scripts, sorted(one.name for one in await client.rest.scenes())
 
 
-def test_a_failed_import_is_reverted(cli: Any, place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert cli("project", "export", "open it", "-o", "out.zip", at=place.first).status == 0
-    assert cli("project", "import", "out.zip", "--overwrite", "all", at=place.second).status == 0
+def test_a_failed_import_is_reverted(
+    cli: Any, servers: Servers, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert cli("project", "export", "open it", "-o", "out.zip", at=servers.first).status == 0
+    assert cli("project", "import", "out.zip", "--overwrite", "all", at=servers.second).status == 0
 
     def alter(files: dict[str, bytes]) -> None:
         changed("data/scene.json", lambda scene: scene["objects"][0]["pose"]["position"].update(x=9.0))(files)
@@ -323,82 +325,82 @@ def test_a_failed_import_is_reverted(cli: Any, place: Place, tmp_path: Path, mon
         files["assets/0001"] += b"more"
 
     repacked(Path("out.zip"), Path("other.zip"), alter)
-    picture = lambda: place.ask(place.second, lambda client: _whole(client, tmp_path))  # noqa: E731
-    before, full = picture(), RequestFailed("PUT", ["The disk is full."])
+    content = lambda: servers.ask(servers.second, lambda client: _all_content(client, tmp_path))  # noqa: E731
+    before, full = content(), RequestFailed("PUT", ["The disk is full."])
     real = Rest.put_kept_overrides
 
     async def fails(rest: Rest, key: str, overrides: Any) -> None:
         """Fail in the last step of an import."""
         monkeypatch.setattr(Rest, "put_kept_overrides", real)
-        async with Client(place.second) as client:
+        async with Client(servers.second) as client:
             names = {one.name for one in await client.rest.projects()}
-            assert "copy" in names or await _whole(client, tmp_path) != before, "all other steps are done by now"
+            assert "copy" in names or await _all_content(client, tmp_path) != before, "all other steps are done by now"
         raise full
 
     monkeypatch.setattr(Rest, "put_kept_overrides", fails)
-    failed = cli("project", "import", "other.zip", "--overwrite", "all", at=place.second)
+    failed = cli("project", "import", "other.zip", "--overwrite", "all", at=servers.second)
     assert failed.status == ExitStatus.FAILED
     taken = "asset crate_mesh, object type Crate, object type Wall, scene bench, project open it"
     assert f"The disk is full. Undone: {taken}." in failed.err
-    assert picture() == before
+    assert content() == before
 
     # New documents are removed again.
     monkeypatch.setattr(Rest, "put_kept_overrides", fails)
-    failed = cli("project", "import", "out.zip", "--name", "copy", at=place.second)
+    failed = cli("project", "import", "out.zip", "--name", "copy", at=servers.second)
     assert "Undone: project copy." in failed.err
-    assert picture() == before
+    assert content() == before
 
     # Changes that cannot be undone are named.
-    async def gone(rest: Rest, scene: Any) -> None:
-        monkeypatch.setattr(Rest, "put_scene", put_again)
+    async def put_once(rest: Rest, scene: Any) -> None:
+        monkeypatch.setattr(Rest, "put_scene", fail_again)
         await put_scene(rest, scene)
 
-    async def put_again(rest: Rest, scene: Any) -> None:
+    async def fail_again(rest: Rest, scene: Any) -> None:
         raise full
 
     put_scene = Rest.put_scene
     monkeypatch.setattr(Rest, "put_kept_overrides", fails)
-    monkeypatch.setattr(Rest, "put_scene", gone)
-    failed = cli("project", "import", "other.zip", "--overwrite", "all", at=place.second)
+    monkeypatch.setattr(Rest, "put_scene", put_once)
+    failed = cli("project", "import", "other.zip", "--overwrite", "all", at=servers.second)
     assert "Undone: asset crate_mesh, object type Crate, object type Wall, project open it." in failed.err
     assert "Could not be undone: scene bench. Import the file again to replace it." in failed.err
     monkeypatch.undo()
     monkeypatch.chdir(tmp_path)
-    assert cli("project", "import", "out.zip", "--overwrite", "all", at=place.second).status == 0
-    assert picture() == before
+    assert cli("project", "import", "out.zip", "--overwrite", "all", at=servers.second).status == 0
+    assert content() == before
 
 
-def test_a_copy_gets_its_own_name_and_id(cli: Any, place: Place) -> None:
-    assert cli("scene", "export", "bench", at=place.first).out.startswith("bench.zip: scene bench, ")
-    cli("scene", "import", "bench.zip", "--overwrite", "all", at=place.second)
-    assert cli("scene", "import", "bench.zip", "--name", "bench two", at=place.second).status == 0
-    listed = {one["name"]: one["id"] for one in json.loads(cli("scene", "list", "--json", at=place.second).out)}
+def test_a_copy_gets_its_own_name_and_id(cli: Any, servers: Servers) -> None:
+    assert cli("scene", "export", "bench", at=servers.first).out.startswith("bench.zip: scene bench, ")
+    cli("scene", "import", "bench.zip", "--overwrite", "all", at=servers.second)
+    assert cli("scene", "import", "bench.zip", "--name", "bench two", at=servers.second).status == 0
+    listed = {one["name"]: one["id"] for one in json.loads(cli("scene", "list", "--json", at=servers.second).out)}
     # The file of a project contains its scene, too.
-    cli("project", "export", "open it", at=place.first)
+    cli("project", "export", "open it", at=servers.first)
     assert cli("scene", "diff", "open_it.zip", "bench.zip") == (0, "No differences.\n", "")
     assert listed.keys() >= {"bench", "bench two"}
     assert listed["bench"] != listed["bench two"]
-    taken = cli("scene", "import", "bench.zip", "--name", "bench two", at=place.second)
+    taken = cli("scene", "import", "bench.zip", "--name", "bench two", at=servers.second)
     assert (taken.status, "--name" in taken.err) == (ExitStatus.CONFLICT, True)
-    differing = cli("scene", "diff", "bench", "bench two", at=place.second)
+    differing = cli("scene", "diff", "bench", "bench two", at=servers.second)
     assert [line.split(":")[0] for line in differing.out.splitlines()] == ["~ scene › name", "~ scene › id"]
 
 
-def test_projects_with_handwritten_scripts_and_packages_are_imported(cli: Any, place: Place) -> None:
-    assert cli("project", "export", "by hand", at=place.first).status == 0
-    assert cli("project", "import", "by_hand.zip", "--overwrite", "all", at=place.second).status == 0
+def test_projects_with_handwritten_scripts_and_packages_are_imported(cli: Any, servers: Servers) -> None:
+    assert cli("project", "export", "by hand", at=servers.first).status == 0
+    assert cli("project", "import", "by_hand.zip", "--overwrite", "all", at=servers.second).status == 0
 
-    async def look(client: Client) -> tuple[str, Any]:
+    async def publish(client: Client) -> str:
         listed = {one.name: one.id for one in await client.rest.projects()}
-        await client.rest.publish(listed["by hand"], place.directory / "package.zip")
-        return await client.rest.project_script(listed["by hand"]), None
+        await client.rest.publish(listed["by hand"], servers.directory / "package.zip")
+        return await client.rest.project_script(listed["by hand"])
 
-    assert place.ask(place.second, look)[0] == SCRIPT
-    package = str(place.directory / "package.zip")
+    assert servers.ask(servers.second, publish) == SCRIPT
+    package = str(servers.directory / "package.zip")
     checked = cli("project", "validate", package)
     assert (checked.status, "note: " in checked.out and "'crate_mesh', which is missing" in checked.out) == (0, True)
-    assert "project by hand: same" in cli("project", "import", package, at=place.second).out
-    other = cli("project", "diff", package, "open it", at=place.second)
+    assert "project by hand: same" in cli("project", "import", package, at=servers.second).out
+    other = cli("project", "diff", package, "open it", at=servers.second)
     assert (other.status, "- script" in other.out, "+ project › logic › open_the_lid → wait" in other.out) == (
         15,
         True,
@@ -406,15 +408,15 @@ def test_projects_with_handwritten_scripts_and_packages_are_imported(cli: Any, p
     )
 
 
-def test_object_types_are_exported_with_their_dependencies(cli: Any, place: Place) -> None:
-    done = cli("object-type", "export", "ArmM1", at=place.first)
+def test_object_types_are_exported_with_their_dependencies(cli: Any, servers: Servers) -> None:
+    done = cli("object-type", "export", "ArmM1", at=servers.first)
     assert done.out == "ArmM1.zip: object-type AbstractArm\n" or done.out.startswith("ArmM1.zip: ")
     with zipfile.ZipFile("ArmM1.zip") as archive:
         assert sum(name.startswith("object_types/") for name in archive.namelist()) == 3
     assert cli("object-type", "validate", "ArmM1.zip").status == 0
-    cli("object-type", "import", "ArmM1.zip", "--overwrite", "all", at=place.second)
-    assert "ArmM1: same" in cli("object-type", "import", "ArmM1.zip", at=place.second).out
-    assert cli("object-type", "diff", "ArmM1.zip", "ArmM1", at=place.second).status == 0
+    cli("object-type", "import", "ArmM1.zip", "--overwrite", "all", at=servers.second)
+    assert "ArmM1: same" in cli("object-type", "import", "ArmM1.zip", at=servers.second).out
+    assert cli("object-type", "diff", "ArmM1.zip", "ArmM1", at=servers.second).status == 0
     repacked(
         Path("ArmM1.zip"),
         Path("renamed.zip"),
@@ -425,25 +427,25 @@ def test_object_types_are_exported_with_their_dependencies(cli: Any, place: Plac
     source = cli("object-type", "diff", "ArmM1.zip", "renamed.zip")
     assert (source.status, "~ object types › ArmM1 › source:" in source.out) == (ExitStatus.DIFFERENT, True)
 
-    def forget(files: dict[str, bytes]) -> None:
+    def remove_base(files: dict[str, bytes]) -> None:
         del files["object_types/abstract_arm.py"]
         changed("export.json", lambda head: head["types"].pop("object_types/abstract_arm.py"))(files)
 
-    lonely = repacked(Path("ArmM1.zip"), Path("lonely.zip"), forget)
-    broken = cli("object-type", "validate", str(lonely))
+    incomplete = repacked(Path("ArmM1.zip"), Path("incomplete.zip"), remove_base)
+    broken = cli("object-type", "validate", str(incomplete))
     assert broken.status == ExitStatus.DOCUMENT_PROBLEMS
     assert "object_types/ArmM1: " in broken.err
     assert "abstract_arm" in broken.err
-    listed = cli("object-type", "list", "--json", at=place.second)
+    listed = cli("object-type", "list", "--json", at=servers.second)
     assert "ArmM1" in [one["name"] for one in json.loads(listed.out)]
-    wrong_kind = cli("scene", "import", "ArmM1.zip", at=place.second)
+    wrong_kind = cli("scene", "import", "ArmM1.zip", at=servers.second)
     assert (wrong_kind.status, "arcor2-hw object-type" in wrong_kind.err) == (ExitStatus.USAGE, True)
-    assert cli("object-type", "export", "UR5e", at=place.first).status == ExitStatus.NOT_FOUND
-    assert cli("object-type", "export", at=place.first).status == ExitStatus.USAGE
+    assert cli("object-type", "export", "UR5e", at=servers.first).status == ExitStatus.NOT_FOUND
+    assert cli("object-type", "export", at=servers.first).status == ExitStatus.USAGE
 
 
 BROKEN: dict[str, tuple[str, Callable[[Any], None], str]] = {
-    "a number is a text": (
+    "a text instead of a number": (
         "data/scene.json",
         lambda scene: scene["objects"][0]["pose"]["position"].update(x="far"),
         "data/scene.json: Expected `float`, got `str` - at `$.objects[0].pose.position.x`",
@@ -473,12 +475,12 @@ BROKEN: dict[str, tuple[str, Callable[[Any], None], str]] = {
         lambda project: project["action_points"][0].update(parent=project["action_points"][0]["id"]),
         "data/project.json: action_points[0] (lid): The action point lid is its own ancestor",
     ),
-    "a step to nowhere": (
+    "a connection to a missing action": (
         "data/project.json",
         lambda project: project["logic"][1].update(end="act_gone"),
         "data/project.json: logic[1]: The connection leads from or to action act_gone",
     ),
-    "one id for two": (
+    "two items with one id": (
         "data/project.json",
         lambda project: project["logic"][1].update(id=project["logic"][0]["id"]),
         "2 entries have the id",
@@ -488,7 +490,11 @@ BROKEN: dict[str, tuple[str, Callable[[Any], None], str]] = {
         lambda project: project.update(scene_id="scn_other"),
         "data/project.json: scene_id: The project open it belongs to another scene than bench",
     ),
-    "no id": ("data/scene.json", lambda scene: scene.update(id="a/b"), "data/scene.json: 'a/b' is not a valid id"),
+    "an invalid id": (
+        "data/scene.json",
+        lambda scene: scene.update(id="a/b"),
+        "data/scene.json: 'a/b' is not a valid id",
+    ),
     "a later format": (
         "export.json",
         lambda head: head.update(format=2),
@@ -518,15 +524,17 @@ BROKEN: dict[str, tuple[str, Callable[[Any], None], str]] = {
 
 
 @pytest.fixture(scope="module")
-def exported(place: Place) -> Path:
-    path = place.directory / "exported.zip"
+def exported(servers: Servers) -> Path:
+    path = servers.directory / "exported.zip"
     if not path.exists():
-        assert app(["project", "export", "open it", "-o", str(path), "--url", place.first]) == 0
+        assert app(["project", "export", "open it", "-o", str(path), "--url", servers.first]) == 0
     return path
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_an_invalid_entry_is_named_and_nothing_is_imported(cli: Any, exported: Path, place: Place, case: str) -> None:
+def test_the_error_names_an_invalid_entry_and_nothing_is_imported(
+    cli: Any, exported: Path, servers: Servers, case: str
+) -> None:
     path, change, expected = BROKEN[case]
     repacked(exported, Path("broken.zip"), changed(path, change))
     checked = cli("project", "validate", "broken.zip")
@@ -536,8 +544,8 @@ def test_an_invalid_entry_is_named_and_nothing_is_imported(cli: Any, exported: P
     assert (first["file"], first["level"]) == ("broken.zip", "error")
     assert first["entry"] or "id " in first["text"]
     if case not in ("a missing asset",):  # it may be on the server
-        brought = cli("project", "import", "broken.zip", "--overwrite", "all", at=place.second)
-        assert brought.status == ExitStatus.DOCUMENT_PROBLEMS
+        imported = cli("project", "import", "broken.zip", "--overwrite", "all", at=servers.second)
+        assert imported.status == ExitStatus.DOCUMENT_PROBLEMS
 
 
 def _bomb(archive: zipfile.ZipFile) -> None:
@@ -560,7 +568,7 @@ def _link(archive: zipfile.ZipFile) -> None:
         (_bomb, "larger than"),
     ],
 )
-def test_a_foreign_file_is_not_trusted(
+def test_a_malicious_export_is_refused(
     cli: Any, exported: Path, spoil: Any, expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("arcor2_server.exchange.archive.MAX_SIZE", 2 << 20)
@@ -572,7 +580,7 @@ def test_a_foreign_file_is_not_trusted(
     assert {path.name for path in Path().iterdir()} == {"evil.zip"}
 
 
-def test_a_foreign_file_cannot_send_terminal_sequences(cli: Any, exported: Path) -> None:
+def test_texts_of_an_export_cannot_send_terminal_sequences(cli: Any, exported: Path) -> None:
     evil = "\x1b]0;owned\x07 [red]lid[/] \x9b2J"
 
     def spoil(files: dict[str, bytes]) -> None:
@@ -590,19 +598,19 @@ def test_a_foreign_file_cannot_send_terminal_sequences(cli: Any, exported: Path)
     assert (half.status, "data/scene.json: " in half.err) == (ExitStatus.DOCUMENT_PROBLEMS, True)
 
 
-def test_failures_have_an_exit_status(cli: Any, place: Place, exported: Path, tmp_path: Path) -> None:
+def test_failures_have_an_exit_status(cli: Any, servers: Servers, exported: Path, tmp_path: Path) -> None:
     Path("none.zip").write_text("no zip")
     half = Path("half.zip")
     half.write_bytes(exported.read_bytes()[:2000])
     for words, status, expected in (
         (("scene", "list", "--url", "ws://127.0.0.1:9"), ExitStatus.NO_SERVER, "127.0.0.1:9"),
-        (("scene", "export", "nowhere", "--url", place.first), ExitStatus.NOT_FOUND, "has no scene nowhere"),
-        (("project", "import", "missing.zip", "--url", place.first), ExitStatus.NOT_FOUND, "missing.zip"),
+        (("scene", "export", "nowhere", "--url", servers.first), ExitStatus.NOT_FOUND, "has no scene nowhere"),
+        (("project", "import", "missing.zip", "--url", servers.first), ExitStatus.NOT_FOUND, "missing.zip"),
         (("project", "validate", "none.zip"), ExitStatus.DOCUMENT_PROBLEMS, "none.zip"),
         (("project", "validate", "half.zip"), ExitStatus.DOCUMENT_PROBLEMS, "not a valid zip archive"),
         (("project", "validate"), ExitStatus.USAGE, "specify the files"),
-        (("scene", "list", "--ca", "none.zip", "--url", place.first), ExitStatus.CERTIFICATE_UNUSABLE, "none.zip"),
-        (("scene", "export", "bench", "-o", "no/where.zip", "--url", place.first), ExitStatus.FAILED, "written"),
+        (("scene", "list", "--ca", "none.zip", "--url", servers.first), ExitStatus.CERTIFICATE_UNUSABLE, "none.zip"),
+        (("scene", "export", "bench", "-o", "no/where.zip", "--url", servers.first), ExitStatus.FAILED, "written"),
     ):
         ran = cli(*words)
         assert (ran.status, expected in ran.err, ran.err.count("\n")) == (status, True, 1), ran.err
@@ -616,13 +624,13 @@ def test_an_unfinished_program_is_valid_with_a_note(cli: Any, exported: Path) ->
 
 
 def test_tokens_and_trusted_certificates_are_used(
-    cli: Any, place: Place, exported: Path, monkeypatch: pytest.MonkeyPatch
+    cli: Any, servers: Servers, exported: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    data = place.directory / "guarded"
+    data = servers.directory / "guarded"
     data.mkdir()
     _, secret = TokenFile(data).add("reader", Role.OPERATOR)
     server = ServerProcess(data, "--self-signed")
-    place.loop.run(server.start())
+    servers.loop.run(server.start())
     try:
         strange = cli("scene", "list", at=server.url)
         assert (strange.status, "certificate verify failed" in strange.err) == (ExitStatus.NO_SERVER, True)
@@ -635,13 +643,13 @@ def test_tokens_and_trusted_certificates_are_used(
         monkeypatch.setenv("ARCOR2_HW_URL", server.url)
         assert cli("scene", "list", *ca).status == 0
         assert cli("package", "list", *ca).status == 0
-        brought = cli("project", "import", str(exported), *ca)
-        assert (brought.status, "technician" in brought.err or "programmer" in brought.err) == (18, True)
+        imported = cli("project", "import", str(exported), *ca)
+        assert (imported.status, "technician" in imported.err or "programmer" in imported.err) == (18, True)
     finally:
-        place.loop.run(server.stop())
+        servers.loop.run(server.stop())
 
 
-def test_a_function_is_taken_from_one_project_to_another(cli: Any, place: Place) -> None:
+def test_a_function_is_exported_and_imported_into_another_project(cli: Any, servers: Servers) -> None:
     async def prepare(client: Client) -> str:
         await client.register_user("author")
         source = next(one for one in await client.list_projects() if one.name == "open it")
@@ -667,18 +675,18 @@ def test_a_function_is_taken_from_one_project_to_another(cli: Any, place: Place)
             if one.name in ("with function", "other"):
                 await client.delete_project(one.id)
 
-    place.ask(place.first, prepare)
+    servers.ask(servers.first, prepare)
     exporting = ("project", "export-function", "with function")
-    assert "has no function nothing" in cli(*exporting, "nothing", at=place.first).err
-    assert cli(*exporting, "open_and_wait", at=place.first).out == (
+    assert "has no function nothing" in cli(*exporting, "nothing", at=servers.first).err
+    assert cli(*exporting, "open_and_wait", at=servers.first).out == (
         "open_and_wait.json: functions open_and_wait; 2 references\n"
     )
-    assert "already exists" in cli(*exporting, "open_and_wait", at=place.first).err
+    assert "already exists" in cli(*exporting, "open_and_wait", at=servers.first).err
     importing = ("project", "import-function", "other", "open_and_wait.json")
-    assert cli(*importing, "--dry-run", at=place.first).out == "other: can import open_and_wait\n"
-    assert place.ask(place.first, functions) == []
-    assert "--point needs OLD=NEW" in cli(*importing, "--point", "lid", at=place.first).err
-    assert cli(*importing, at=place.first).out == "other: imported open_and_wait\n"
-    assert cli(*importing, at=place.first).status == 0
-    assert place.ask(place.first, functions) == ["open_and_wait", "open_and_wait_2"]
-    place.ask(place.first, remove)
+    assert cli(*importing, "--dry-run", at=servers.first).out == "other: can import open_and_wait\n"
+    assert servers.ask(servers.first, functions) == []
+    assert "--point needs OLD=NEW" in cli(*importing, "--point", "lid", at=servers.first).err
+    assert cli(*importing, at=servers.first).out == "other: imported open_and_wait\n"
+    assert cli(*importing, at=servers.first).status == 0
+    assert servers.ask(servers.first, functions) == ["open_and_wait", "open_and_wait_2"]
+    servers.ask(servers.first, remove)

@@ -15,7 +15,7 @@ import arcor2_server.cli.installed_fakes
 from arcor2_server.cli.installed_fakes import InstalledFake, installed_fakes
 
 CLI = [sys.executable, "-m", "arcor2_server.cli.main", "fake"]
-EVERY_WIRE = {"silence", "reset", "half_frame", "garbage", "slow", "refuse", "heal"}
+FAULTS_OF_EVERY_WIRE = {"silence", "reset", "half_frame", "garbage", "slow", "refuse", "heal"}
 
 
 def arcor2_hw_fake(*words: str) -> subprocess.CompletedProcess[str]:
@@ -29,10 +29,10 @@ class Running:
         self.process = subprocess.Popen([*CLI, "run", *words], stdout=subprocess.PIPE, text=True)
         assert self.process.stdout is not None
         self.greeting = self.process.stdout.readline()
-        self.at: dict[str, str] = {}
-        while "control" not in self.at:
+        self.addresses: dict[str, str] = {}
+        while "control" not in self.addresses:
             key, value = self.process.stdout.readline().split(maxsplit=1)
-            self.at[key] = value.strip()
+            self.addresses[key] = value.strip()
 
     def end(self, number: signal.Signals = signal.SIGINT) -> int:
         if self.process.poll() is None:
@@ -54,10 +54,10 @@ def test_every_fake_in_the_tree_is_listed_with_wire_and_text() -> None:
     listed = arcor2_hw_fake("list")
     assert listed.returncode == 0, listed.stderr
     folder = Path(arcor2_server.cli.installed_fakes.__file__).parents[2] / "fakes" / "arcor2_fakes"
-    there = {main.parent.name for main in folder.glob("*/__main__.py") if _committed(main)}
+    committed = {main.parent.name for main in folder.glob("*/__main__.py") if _committed(main)}
     found = {fake.name: fake for fake in installed_fakes()}
-    assert there <= set(found)
-    for name in there:
+    assert committed <= set(found)
+    for name in committed:
         assert found[name].problem == ""
         assert found[name].wire, name
         assert found[name].description, name
@@ -115,8 +115,8 @@ def test_a_fake_of_another_distribution_is_listed(
 def test_a_fake_in_the_foreground_prints_its_address_and_ends_cleanly(number: signal.Signals) -> None:
     running = Running("conveyor", "--", "--node", "7")
     assert running.greeting == "conveyor is ready; press Ctrl-C to stop it\n"
-    assert running.at["node"] == "7"
-    assert re.fullmatch(r"127\.0\.0\.1:\d+", running.at["can"])
+    assert running.addresses["node"] == "7"
+    assert re.fullmatch(r"127\.0\.0\.1:\d+", running.addresses["can"])
     assert running.end(number) == 0
 
 
@@ -130,7 +130,7 @@ def test_run_reports_errors() -> None:
 
 # ---------------------------------------------------------------------------------------------------- fault
 def test_a_fault_is_injected_and_its_answer_printed(tester: Running) -> None:
-    control = tester.at["control"]
+    control = tester.addresses["control"]
     done = arcor2_hw_fake("fault", control, "slow", "--seconds", "0.2", "--wire", "modbus")
     assert (done.returncode, done.stdout) == (0, f"{control}: slow done\n")
     assert arcor2_hw_fake("fault", control, "heal").returncode == 0
@@ -141,10 +141,10 @@ def test_a_fault_is_injected_and_its_answer_printed(tester: Running) -> None:
 
 
 def test_without_a_fault_the_available_ones_are_listed(tester: Running) -> None:
-    listed = arcor2_hw_fake("fault", tester.at["control"])
+    listed = arcor2_hw_fake("fault", tester.addresses["control"])
     assert listed.returncode == 0
     commands = {line.split()[0]: line for line in listed.stdout.splitlines()[2:]}
-    assert set(commands) >= EVERY_WIRE
+    assert set(commands) >= FAULTS_OF_EVERY_WIRE
     assert re.match(
         r"slow +\[wire\] seconds=1\.0 +Let the wire send everything so many seconds late\.", commands["slow"]
     )
@@ -152,7 +152,7 @@ def test_without_a_fault_the_available_ones_are_listed(tester: Running) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "status", "says"),
+    ("words", "status", "message"),
     [
         (["toast"], 1, "refuses: toast: unknown command"),
         (["silence", "--wire", "toast"], 1, "wire 'toast' does not exist; available: modbus"),
@@ -161,23 +161,23 @@ def test_without_a_fault_the_available_ones_are_listed(tester: Running) -> None:
         (["put_board", "PCB-1"], 2, "'PCB-1' must be key=value"),
     ],
 )
-def test_an_unknown_fault_is_reported_in_one_line(tester: Running, words: list[str], status: int, says: str) -> None:
-    ran = arcor2_hw_fake("fault", tester.at["control"], *words)
+def test_an_unknown_fault_is_reported_in_one_line(tester: Running, words: list[str], status: int, message: str) -> None:
+    ran = arcor2_hw_fake("fault", tester.addresses["control"], *words)
     assert ran.returncode == status
-    assert says in ran.stderr
+    assert message in ran.stderr
     assert ran.stderr.startswith("arcor2-hw fake fault: ")
     assert len(ran.stderr.splitlines()) == 1
 
 
 def test_names_are_read_from_the_running_demo(tester: Running, tmp_path: Path) -> None:
-    where = {
+    demo = {
         "url": "ws://127.0.0.1:1",
-        "tester": {"control": tester.at["control"]},
+        "tester": {"control": tester.addresses["control"]},
         "reader": {"control": "127.0.0.1:1"},
     }
-    nothing = arcor2_hw_fake("fault", "tester", "heal", "--data-dir", str(tmp_path))
-    assert (nothing.returncode, "no demo is running" in nothing.stderr) == (9, True)
-    (tmp_path / "demo.json").write_text(json.dumps(where))
+    no_demo = arcor2_hw_fake("fault", "tester", "heal", "--data-dir", str(tmp_path))
+    assert (no_demo.returncode, "no demo is running" in no_demo.stderr) == (9, True)
+    (tmp_path / "demo.json").write_text(json.dumps(demo))
     assert arcor2_hw_fake("fault", "tester", "heal", "--data-dir", str(tmp_path)).returncode == 0
     unknown = arcor2_hw_fake("fault", "url", "heal", "--data-dir", str(tmp_path))
     assert (unknown.returncode, "the demo has no url; it has tester, reader" in unknown.stderr) == (9, True)

@@ -72,9 +72,9 @@ def test_related_types_are_uploaded_together_and_separately(
     helper.write_text("SLOW = 0.1\n")
     arm.write_text(f"{arm.read_text()}\n\nfrom .gains import SLOW\n")
     assert object_type(server, "add", helper).stdout == "gains uploaded\n"
-    lonely = object_type(server, "add", arm)
-    assert lonely.returncode == ExitStatus.ANALYSIS_PROBLEMS
-    assert "arm_m1.py:3: the imported module abstract_arm does not exist" in lonely.stderr
+    incomplete = object_type(server, "add", arm)
+    assert incomplete.returncode == ExitStatus.ANALYSIS_PROBLEMS
+    assert "arm_m1.py:3: the imported module abstract_arm does not exist" in incomplete.stderr
     together = object_type(server, "add", arm, base, mixin)
     assert (together.returncode, together.stderr) == (0, "")
     assert together.stdout == "AbstractArm uploaded\nArmM1 uploaded with kinematics_mixin\n"

@@ -20,7 +20,7 @@ from arcor2_server.cli.main import app
 from tests.fakes.conftest import FakeProcess
 from tests.server.core.serving import running
 
-NOBODY = "socket://127.0.0.1:9"
+UNREACHABLE = "socket://127.0.0.1:9"
 
 
 def arcor2_hw(*arguments: str, **environment: str) -> "subprocess.CompletedProcess[str]":
@@ -67,7 +67,7 @@ def test_every_problem_is_reported(tmp_path: Path, scale: FakeProcess) -> None:
     file = cell_file(
         tmp_path,
         CellDevice("balance", "MtSicsScale", {"port": scale.ready["port"]}),
-        CellDevice("printer", "ZplPrinter", {"port": NOBODY}),
+        CellDevice("printer", "ZplPrinter", {"port": UNREACHABLE}),
         CellDevice("stranger", "Unknown"),
         CellDevice("typo", "MtSicsScale", {"prt": 7}),
     )
@@ -80,7 +80,7 @@ def test_every_problem_is_reported(tmp_path: Path, scale: FakeProcess) -> None:
     assert found["balance"]["connection"] == "online"
     assert 0.0 < found["balance"]["seconds"] < 10.0
     assert "printer" in found["printer"]["problem"]
-    assert NOBODY in found["printer"]["problem"]
+    assert UNREACHABLE in found["printer"]["problem"]
     assert found["printer"]["connection"] == "failed"
     assert found["stranger"]["problem"] == "object type Unknown is not installed and was not uploaded"
     assert "typo: Mettler Toledo scale has no setting prt" in found["typo"]["problem"]
@@ -128,7 +128,7 @@ async def test_a_scene_becomes_a_cell_file_that_can_be_read(tmp_path: Path) -> N
         assert none.returncode == 9
         assert "has no scenes" in none.stderr
         await client.call("NewScene", rpc.NewSceneArgs("bench"))
-        port = [Parameter("port", "string", f'"{NOBODY}"'), Parameter("baud_rate", "integer", "4800")]
+        port = [Parameter("port", "string", f'"{UNREACHABLE}"'), Parameter("baud_rate", "integer", "4800")]
         await client.call("AddObjectToScene", rpc.AddObjectToSceneArgs("balance", "MtSicsScale", parameters=port))
         host = [Parameter("host", "string", '"127.0.0.1"')]
         tester = rpc.AddObjectToSceneArgs("tester", "FunctionalTester", Pose(), parameters=host)
@@ -148,7 +148,7 @@ async def test_a_scene_becomes_a_cell_file_that_can_be_read(tmp_path: Path) -> N
         ("tester", "FunctionalTester"),
     ]
     balance, tester_device = cell.devices
-    assert balance.settings["port"] == NOBODY
+    assert balance.settings["port"] == UNREACHABLE
     assert balance.settings["baud_rate"] == 4800
     assert tester_device.pose == Pose()
 
@@ -191,7 +191,7 @@ class Device:
 
 @pytest.fixture
 def libraries(tmp_path: Path) -> str:
-    """Install vendor libraries with connected devices; the code under test is ours."""
+    """Write simulated vendor libraries that report connected devices, and return their directory."""
     (tmp_path / "serial" / "tools").mkdir(parents=True)
     for empty in ("serial/__init__.py", "serial/tools/__init__.py"):
         (tmp_path / empty).touch()
@@ -248,7 +248,7 @@ def test_a_crashing_library_does_not_hide_other_results(libraries: str) -> None:
     assert "OAK cameras" in done.stderr
 
 
-def test_types_are_listed_by_the_names_for_users(
+def test_types_are_listed_with_their_display_names(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "200")

@@ -146,14 +146,14 @@ def test_the_actions_are_visible_to_the_analysis(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["dispenser", "screwdriver"])
 def test_generated_code_is_clean_and_typed(tmp_path: Path, pytestconfig: pytest.Config, name: str) -> None:
     root = generate(tmp_path, name)
-    kept = getattr(pytestconfig, "cache", None)
-    known = kept.mkdir("typed-starters") if kept is not None else tmp_path / "mypy"
+    cache = getattr(pytestconfig, "cache", None)
+    mypy_cache = cache.mkdir("typed-starters") if cache is not None else tmp_path / "mypy"
     for command in (
         ["ruff", "check", "--no-cache", "."],
         ["ruff", "format", "--check", "--no-cache", "."],
         ["mypy", "--strict", "--python-version", "3.11", f"{name}/{name}.py"],
     ):
-        environment = os.environ | {"MYPYPATH": str(ROOT), "MYPY_CACHE_DIR": str(known)}
+        environment = os.environ | {"MYPYPATH": str(ROOT), "MYPY_CACHE_DIR": str(mypy_cache)}
         run = [sys.executable, "-m", *command]
         done = subprocess.run(run, cwd=root, env=environment, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
@@ -211,7 +211,7 @@ def test_a_setting_is_verified(device: Screwdriver, fake: FakeProcess) -> None:
     assert registers(fake)["light"] is False
 
 
-def test_both_word_orders(make: Callable[..., Screwdriver], fake: FakeProcess) -> None:
+def test_a_point_is_read_in_the_word_order_of_the_map(make: Callable[..., Screwdriver], fake: FakeProcess) -> None:
     device = make(
         changed("type: float32, unit: N m, text: the torque of", "type: float32, word_order: high_first, text: t")
     )
@@ -267,7 +267,7 @@ def test_a_short_change_of_a_debounced_input_does_not_count(
         device.wait_for_screw(False, 0.2)
 
 
-def test_waiting_for_an_input(device: Screwdriver, fake: FakeProcess) -> None:
+def test_waiting_for_an_input_ends_with_its_value_or_is_cancelled(device: Screwdriver, fake: FakeProcess) -> None:
     thread, outcome = run_in_thread(lambda: device.wait_for_screw(False, 10.0))
     fake.control.do("set", screw=False)
     thread.join()
@@ -280,7 +280,7 @@ def test_waiting_for_an_input(device: Screwdriver, fake: FakeProcess) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ handshake and faults
-def test_a_command_that_is_not_acknowledged(device: Screwdriver, fake: FakeProcess) -> None:
+def test_a_command_that_is_not_acknowledged_times_out(device: Screwdriver, fake: FakeProcess) -> None:
     fake.control.do("misbehave", deaf=True)
     with pytest.raises(DeviceTimeout, match=r"^driver at .*: accepting tighten took longer than 1 s"):
         device.tighten("hard", 2.0)
@@ -296,7 +296,7 @@ def test_a_command_that_does_not_end_is_stopped(make: Callable[..., Screwdriver]
     assert (end["state"], end["working"], end["start"]) == (0, False, False)
 
 
-def test_a_fault_during_a_command(device: Screwdriver, fake: FakeProcess) -> None:
+def test_a_fault_during_a_command_is_raised_and_can_be_reset(device: Screwdriver, fake: FakeProcess) -> None:
     fake.control.do("misbehave", slips_at=1.0)
     with pytest.raises(DeviceFault, match="tighten failed") as error:
         device.tighten("hard", 2.0)
@@ -310,7 +310,7 @@ def test_a_fault_during_a_command(device: Screwdriver, fake: FakeProcess) -> Non
     assert device.tighten("hard", 2.0)[0] == 2.0
 
 
-def test_a_command_that_ends_without_success(
+def test_a_command_that_ends_without_success_is_a_fault(
     device: Screwdriver, fake: FakeProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     wait, accepted = device.wait, threading.Event()
@@ -380,7 +380,7 @@ def test_control_ends_when_the_panel_takes_it(device: Screwdriver, fake: FakePro
     assert (device.connection, device.observing.losses) == (Connection.ONLINE, 0)
 
 
-def test_the_panel_has_control(device: Screwdriver, fake: FakeProcess) -> None:
+def test_control_cannot_be_taken_from_the_panel(device: Screwdriver, fake: FakeProcess) -> None:
     device.release_control()
     assert registers(fake)["owner"] == 0
     fake.control.do("panel", on=True)

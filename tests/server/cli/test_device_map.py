@@ -32,7 +32,7 @@ commands:
 """
 
 
-def wrong(tmp_path: Path, old: str, new: str) -> str:
+def error_of(tmp_path: Path, old: str, new: str) -> str:
     """Return the error of the map with a text replaced."""
     assert old in MAP
     file = tmp_path / "press.yaml"
@@ -116,11 +116,11 @@ def test_the_examples_are_valid(name: str) -> None:
         (MAP, "", ", line 1: the map: it must be a mapping"),
     ],
 )  # fmt: skip
-def test_mistakes_are_named(tmp_path: Path, old: str, new: str, expected: str) -> None:
-    assert wrong(tmp_path, old, new).startswith(expected)
+def test_the_error_names_the_line_and_the_mistake(tmp_path: Path, old: str, new: str, expected: str) -> None:
+    assert error_of(tmp_path, old, new).startswith(expected)
 
 
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
+def test_the_error_names_a_missing_file(tmp_path: Path) -> None:
     with pytest.raises(NotFound, match=r"none\.yaml does not exist"):
         read_map(tmp_path / "none.yaml")
 
@@ -128,12 +128,12 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
 def test_bits_may_share_a_register(tmp_path: Path) -> None:
     file = tmp_path / "press.yaml"
     flags = [f"  flag{n}: {{table: input_register, address: 9, bit: {n}, text: a flag}}\n" for n in (0, 15)]
-    file.write_text(MAP.replace("busy: {busy", f"{''.join(flags)}busy: {{busy", 1).replace("  busy", "  busy", 1))
+
     file.write_text(MAP.replace("  start:", f"{''.join(flags)}  start:", 1))
     assert [read_map(file).points[f"flag{n}"].bit for n in (0, 15)] == [0, 15]
 
 
-def test_the_word_order_of_the_map_is_that_of_its_points(tmp_path: Path) -> None:
+def test_points_use_the_word_order_of_the_map_by_default(tmp_path: Path) -> None:
     file = tmp_path / "press.yaml"
     file.write_text(MAP.replace("points:", "word_order: low_first\npoints:", 1))
     points = read_map(file).points

@@ -82,9 +82,9 @@ def test_lines_of_text_may_have_other_line_ends(tmp_path: Path) -> None:
     pass_tests(root, "amount or half_a_frame", 2)
 
 
-def test_the_drivers_are_typed(tmp_path: Path, pytestconfig: pytest.Config) -> None:
+def test_generated_drivers_pass_mypy(tmp_path: Path, pytestconfig: pytest.Config) -> None:
     cache = getattr(pytestconfig, "cache", None)  # mypy's cache of the library
-    known = cache.mkdir("typed-starters") if cache is not None else tmp_path / "mypy"
+    mypy_cache = cache.mkdir("typed-starters") if cache is not None else tmp_path / "mypy"
     for base, bus in RUN:
         for path, text in texts(f"{base}-of-mine", base, bus).items():
             (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
@@ -93,7 +93,7 @@ def test_the_drivers_are_typed(tmp_path: Path, pytestconfig: pytest.Config) -> N
     done = subprocess.run(
         [sys.executable, "-m", "mypy", "--strict", "--python-version", "3.11", *drivers],
         cwd=tmp_path,
-        env=os.environ | {"MYPYPATH": str(ROOT), "MYPY_CACHE_DIR": str(known)},
+        env=os.environ | {"MYPYPATH": str(ROOT), "MYPY_CACHE_DIR": str(mypy_cache)},
         capture_output=True,
         text=True,
         check=False,
@@ -126,7 +126,7 @@ def test_invalid_options_are_refused_in_one_sentence(tmp_path: Path, arguments: 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_nothing_is_overwritten(tmp_path: Path) -> None:
+def test_existing_files_are_not_overwritten(tmp_path: Path) -> None:
     generate(tmp_path, Base.GENERIC, Bus.HTTP, "scanner")
     before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     again = [*COMMAND, "device", "new", "scanner", "--base", "machine", "--bus", "tcp", "--directory", str(tmp_path)]
