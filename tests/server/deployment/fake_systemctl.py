@@ -18,7 +18,7 @@ START_TIMEOUT = 100.0
 
 
 def settings() -> dict[str, str]:
-    """Return the settings of the unit that this program obeys."""
+    """Return the settings of the unit file."""
     return dict(line.split("=", 1) for line in UNIT.read_text().splitlines() if "=" in line and line[0].isupper())
 
 

@@ -14,12 +14,12 @@ ROOT = Path(__file__).parents[3]
 SITE_PACKAGES = Path(sysconfig.get_path("purelib"))
 PACKAGES = (ROOT / "arcor2_hw", ROOT / "server" / "arcor2_server")
 LEFT_OUT = ("editor_files", "__pycache__", "testing", "starter")
-"""What a running server does not need."""
+"""Files and directories that a running server does not need."""
 _KEY_NUMBER = b"number 1"
 
 
 class Signer:
-    """Signs as minisign does."""
+    """Signer of files in the format of minisign."""
 
     def __init__(self) -> None:
         self._key = Ed25519PrivateKey.generate()

@@ -104,11 +104,11 @@ def _socket(url: str) -> str:
     return url.replace("http", "ws", 1)
 
 
-def test_the_state_is_that_of_one_moment(data: Path, tmp_path: Path) -> None:
+def test_a_backup_contains_the_state_of_one_moment(data: Path, tmp_path: Path) -> None:
     ended, started = threading.Event(), threading.Event()
 
     def write() -> None:
-        # A save: the document is stored first, then the journal notes it.
+        # The server saves a document before it records that in the journal.
         names = ("documents.sqlite", "journal.sqlite")
         with ExitStack() as stack:
             connections = [stack.enter_context(closing(sqlite3.connect(data / name, timeout=WITHIN))) for name in names]
@@ -128,11 +128,11 @@ def test_the_state_is_that_of_one_moment(data: Path, tmp_path: Path) -> None:
             write_backup(data, tmp_path / f"{number}.zip", "0.1.0")
             restore_backup(tmp_path / f"{number}.zip", restored)
             journal, documents = (_number(restored / name) for name in ("journal.sqlite", "documents.sqlite"))
-            assert journal <= documents, "the journal never notes a save that the documents do not have"
+            assert journal <= documents, "the journal records a save that the documents do not contain"
     finally:
         ended.set()
         writer.join()
-    assert _number(data / "documents.sqlite") > 10, "the server writes during backups"
+    assert _number(data / "documents.sqlite") > 10, "the writer did not write during the backups"
 
 
 def test_a_file_deleted_during_the_backup_is_left_out(
@@ -286,13 +286,13 @@ def test_every_flipped_byte_is_noticed_or_harmless(data: Path, tmp_path: Path) -
             restore_backup(tmp_path / "flipped.zip", target)
         except InvalidData:
             assert list(target.iterdir()) == []
-        else:  # the byte was one that nobody reads, such as a time
+        else:  # the byte belongs to a field that is not read, such as a time
             assert {name: expected[name] for name in _content(target)} == _content(target)
         shutil.rmtree(target)
 
 
 # ------------------------------------------------------------------------------------------------ commands
-def test_an_existing_file_is_kept(data: Path, tmp_path: Path) -> None:
+def test_an_existing_backup_is_not_overwritten(data: Path, tmp_path: Path) -> None:
     target = tmp_path / "backup.zip"
     target.write_text("mine")
     assert backup(target, data_dir=data) == ExitStatus.CONFLICT
@@ -310,7 +310,9 @@ def test_data_in_use_is_not_replaced(data: Path, tmp_path: Path, capsys: pytest.
     assert "4 files" in capsys.readouterr().out
 
 
-def test_unreadable_files_are_named(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_missing_and_unreadable_files_are_reported(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert backup(tmp_path / "backup.zip", data_dir=tmp_path / "missing") == ExitStatus.DATA_UNUSABLE
     assert restore(tmp_path / "missing.zip", data_dir=data) == ExitStatus.NOT_FOUND
     (tmp_path / "text.zip").write_text("text")

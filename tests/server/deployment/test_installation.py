@@ -1,4 +1,4 @@
-"""The how-to pages about installation, upgrade and backup, executed in namespaces with a service manager of our own."""
+"""The how-to pages about installation, upgrade and backup, executed in namespaces with a simulated service manager."""
 
 import re
 import shutil
@@ -58,7 +58,7 @@ def _blocks(page: str) -> list[str]:
 
 @pytest.mark.matrix
 @pytest.mark.skipif(not _possible(), reason="this machine does not allow namespaces")
-def test_the_pages_about_installation(tmp_path: Path) -> None:
+def test_the_commands_of_the_how_to_pages_work(tmp_path: Path) -> None:
     signer = Signer()
     for version, replaced in (
         ("0.1.0", {}),

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.skipif(shutil.which("dpkg-deb") is None, reason="dpkg-d
 
 @pytest.fixture
 def release(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """Return the module that builds releases. It takes its wheels from nowhere."""
+    """Return the module that builds releases, with simulated wheels."""
     spec = importlib.util.spec_from_file_location("release", ROOT / ".ci" / "release.py")
     assert spec is not None
     assert spec.loader is not None

@@ -28,7 +28,7 @@ START_TIME = 3
 
 
 @pytest.fixture
-def received(tmp_path: Path) -> Iterator[socket.socket]:
+def listener(tmp_path: Path) -> Iterator[socket.socket]:
     """Listen as the service manager at `tmp_path / notify`."""
     with contextlib.closing(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)) as listener:
         listener.bind(str(tmp_path / "notify"))
@@ -47,28 +47,28 @@ def _drain(listener: socket.socket) -> None:
             pass
 
 
-async def test_a_server_reports_its_states(received: socket.socket, tmp_path: Path) -> None:
+async def test_a_server_reports_its_states(listener: socket.socket, tmp_path: Path) -> None:
     environment = {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "300000", "WATCHDOG_PID": ""}
     async with running(tmp_path / "data", **environment) as server:
-        assert [await _next(received) for _ in range(3)] == ["READY=1", "WATCHDOG=1", "WATCHDOG=1"]
+        assert [await _next(listener) for _ in range(3)] == ["READY=1", "WATCHDOG=1", "WATCHDOG=1"]
         server.process.send_signal(15)
-        while (state := await _next(received)) != "STOPPING=1":
+        while (state := await _next(listener)) != "STOPPING=1":
             assert state == "WATCHDOG=1"
         assert await server.ended() == 0
 
 
 @pytest.mark.parametrize("command", ["node run press", "fleet serve --port 0"])
 async def test_a_node_and_the_page_of_a_fleet_report_their_states(
-    received: socket.socket, tmp_path: Path, command: str
+    listener: socket.socket, tmp_path: Path, command: str
 ) -> None:
-    """They are ready without a broker, to which they connect when it is reached."""
+    """Both are ready before they can reach the broker."""
     environment = os.environ | {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "300000"}
     arguments = (*command.split(), *NO_BROKER, "--data-dir", str(tmp_path / "data"))
     process = await asyncio.create_subprocess_exec(*COMMAND, *arguments, env=environment, stdout=subprocess.DEVNULL)
     try:
-        assert [await _next(received) for _ in range(3)] == ["READY=1", "WATCHDOG=1", "WATCHDOG=1"]
+        assert [await _next(listener) for _ in range(3)] == ["READY=1", "WATCHDOG=1", "WATCHDOG=1"]
         process.send_signal(15)
-        while (state := await _next(received)) != "STOPPING=1":
+        while (state := await _next(listener)) != "STOPPING=1":
             assert state == "WATCHDOG=1"
         async with asyncio.timeout(30):
             assert await process.wait() == 0
@@ -77,18 +77,18 @@ async def test_a_node_and_the_page_of_a_fleet_report_their_states(
             process.kill()
 
 
-async def test_an_event_loop_that_hangs_is_not_reported(received: socket.socket, tmp_path: Path) -> None:
+async def test_an_event_loop_that_hangs_is_not_reported(listener: socket.socket, tmp_path: Path) -> None:
     ServiceManager(str(tmp_path / "notify"), 0.03).ready()
-    assert await _next(received) == "READY=1"
-    assert await _next(received) == "WATCHDOG=1"
-    _drain(received)
+    assert await _next(listener) == "READY=1"
+    assert await _next(listener) == "WATCHDOG=1"
+    _drain(listener)
     time.sleep(0.1)  # the event loop hangs
     with pytest.raises(BlockingIOError):
-        received.recv(4096)
-    assert await _next(received) == "WATCHDOG=1"
+        listener.recv(4096)
+    assert await _next(listener) == "WATCHDOG=1"
 
 
-async def test_the_abstract_namespace_works() -> None:
+async def test_a_socket_in_the_abstract_namespace_is_notified() -> None:
     with contextlib.closing(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)) as listener:
         name = f"arcor2-hw-test-{os.getpid()}"
         listener.bind(f"\0{name}")
@@ -163,18 +163,18 @@ def test_an_upgrade_restarts_the_services_that_ran(server: str, monkeypatch: pyt
 
 @pytest.mark.parametrize(("process", "reports"), [("", True), ("own", True), ("1", False)])
 async def test_only_the_watched_process_reports(
-    process: str, reports: bool, received: socket.socket, tmp_path: Path
+    process: str, reports: bool, listener: socket.socket, tmp_path: Path
 ) -> None:
     process = str(os.getpid()) if process == "own" else process
     environment = {"NOTIFY_SOCKET": str(tmp_path / "notify"), "WATCHDOG_USEC": "30000", "WATCHDOG_PID": process}
     ServiceManager.from_environment(environment).ready()
     assert environment == {}, "children do not report to the service manager"
-    assert await _next(received) == "READY=1"
+    assert await _next(listener) == "READY=1"
     if reports:
-        assert await _next(received) == "WATCHDOG=1"
+        assert await _next(listener) == "WATCHDOG=1"
     else:
         with pytest.raises(BlockingIOError):
-            received.recv(4096)
+            listener.recv(4096)
 
 
 async def test_without_a_service_manager_nothing_is_sent() -> None:
