@@ -62,7 +62,7 @@ class Server:
 
 
 class Link:
-    """Passes connections on to a port until it is cut."""
+    """A proxy that forwards connections to a port until it is cut."""
 
     def __init__(self, target: int) -> None:
         self._target = target
@@ -72,7 +72,7 @@ class Link:
         self._tasks: set[asyncio.Task[None]] = set()
 
     async def heal(self) -> None:
-        self._server = await asyncio.start_server(self._pass_on, "127.0.0.1", self.port)
+        self._server = await asyncio.start_server(self._forward, "127.0.0.1", self.port)
 
     async def cut(self) -> None:
         assert self._server is not None
@@ -82,7 +82,7 @@ class Link:
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._server = None
 
-    async def _pass_on(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    async def _forward(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
         assert task is not None
         self._tasks.add(task)

@@ -1,4 +1,4 @@
-"""Who may use the server of the fleet, without a broker: tokens, roles, and a page that can only view."""
+"""Access to the server of the fleet, without a broker: tokens, roles, and a page that can only view."""
 
 import json
 import os
@@ -43,7 +43,7 @@ def secrets(fleet: FleetProcess) -> dict[Role, str]:
     return {role: tokens.add(role.name.lower(), role)[1] for role in (Role.OPERATOR, Role.TECHNICIAN)}
 
 
-def asked(fleet: FleetProcess, method: str, path: str, secret: str = "", **headers: str) -> httpx.Response:
+def request(fleet: FleetProcess, method: str, path: str, secret: str = "", **headers: str) -> httpx.Response:
     if secret:
         headers["Authorization"] = f"Bearer {secret}"
     return httpx.request(method, f"{fleet.url}{path}", headers=headers)
@@ -53,10 +53,10 @@ def asked(fleet: FleetProcess, method: str, path: str, secret: str = "", **heade
     ("method", "path"),
     [("GET", "/api/fleet/cells"), ("GET", "/api/fleet/results"), ("DELETE", f"/api/fleet/cells/{CARD}")],
 )
-def test_a_token_is_needed(fleet: FleetProcess, secrets: dict[Role, str], method: str, path: str) -> None:
-    assert asked(fleet, method, path).status_code == 401
-    assert asked(fleet, method, path, "wrong").status_code == 401
-    page = asked(fleet, "GET", "/")
+def test_requests_need_a_token(fleet: FleetProcess, secrets: dict[Role, str], method: str, path: str) -> None:
+    assert request(fleet, method, path).status_code == 401
+    assert request(fleet, method, path, "wrong").status_code == 401
+    page = request(fleet, "GET", "/")
     assert page.status_code == 200
     assert "connect-src 'self'" in page.headers["content-security-policy"]
 
@@ -76,17 +76,17 @@ async def test_a_page_needs_a_token_and_can_only_view(fleet: FleetProcess, secre
 
 
 def test_results_are_selected_by_valid_arguments(fleet: FleetProcess, secrets: dict[Role, str]) -> None:
-    assert asked(fleet, "GET", "/api/fleet/results?cell=press-3&kind=alarm", secrets[Role.OPERATOR]).json() == []
+    assert request(fleet, "GET", "/api/fleet/results?cell=press-3&kind=alarm", secrets[Role.OPERATOR]).json() == []
     for query in ("kind=other", "limit=0", "limit=1001", "before=-1", "before=x"):
-        refused = asked(fleet, "GET", f"/api/fleet/results?{query}", secrets[Role.OPERATOR])
+        refused = request(fleet, "GET", f"/api/fleet/results?{query}", secrets[Role.OPERATOR])
         assert refused.status_code == 400, query
         assert query.partition("=")[0] in refused.json()["message"]
 
 
 def test_a_technician_removes_a_cell_without_a_signal(fleet: FleetProcess, secrets: dict[Role, str]) -> None:
     path = f"/api/fleet/cells/{CARD}"
-    refused = asked(fleet, "DELETE", path, secrets[Role.OPERATOR], **{"Arcor2-Session": "of a cell"})
+    refused = request(fleet, "DELETE", path, secrets[Role.OPERATOR], **{"Arcor2-Session": "of a cell"})
     assert (refused.status_code, "role technician" in refused.json()["message"]) == (403, True)
-    assert asked(fleet, "DELETE", path, secrets[Role.TECHNICIAN]).status_code == 204
-    again = asked(fleet, "DELETE", path, secrets[Role.TECHNICIAN])
+    assert request(fleet, "DELETE", path, secrets[Role.TECHNICIAN]).status_code == 204
+    again = request(fleet, "DELETE", path, secrets[Role.TECHNICIAN])
     assert (again.status_code, "is not known" in again.json()["message"]) == (404, True)

@@ -32,7 +32,7 @@ pytestmark = pytest.mark.xdist_group("fleet")
 
 
 class Hub:
-    """A broker whose configuration `set_up` writes, with its data directory. That of the hub has TLS."""
+    """A broker configured by `set_up`, and its data directory. A broker that accepts sites uses TLS."""
 
     def __init__(self, folder: Path, domain: str, *, sites: bool = False) -> None:
         folder.mkdir(exist_ok=True)
@@ -128,21 +128,21 @@ FORBIDDEN = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("elsewhere", [False, True])
-async def test_a_cell_publishes_only_under_its_own_name(hub: Hub, elsewhere: bool) -> None:
+@pytest.mark.parametrize("remote_page", [False, True])
+async def test_a_cell_publishes_only_under_its_own_name(hub: Hub, remote_page: bool) -> None:
     """The page's server has the same rights on the computer of the broker and elsewhere."""
     received: list[str] = []
 
     async def receive(message: Msg) -> None:
         received.append(message.subject)
 
-    page = hub.accept("page", MemberKind.PAGE) if elsewhere else load(hub.settings.broker_credentials)
-    async with connected(page) as here, connected(hub.accept(CELL), CELL) as press:
-        stream = here.client.jetstream(domain="hub")
+    page = hub.accept("page", MemberKind.PAGE) if remote_page else load(hub.settings.broker_credentials)
+    async with connected(page) as page_client, connected(hub.accept(CELL), CELL) as press:
+        stream = page_client.client.jetstream(domain="hub")
         for cell in ("oven", CELL):
             await stream.add_stream(name=stream_name(cell), subjects=[f"arcor2hw.fleet.{cell}.unit"])
-        await here.client.subscribe("arcor2hw.fleet.*.state", cb=receive)
-        await here.client.flush()
+        await page_client.client.subscribe("arcor2hw.fleet.*.state", cb=receive)
+        await page_client.client.flush()
         for subject in FORBIDDEN:
             await press.client.publish(subject, b"x")
         for subject in ("arcor2hw.fleet.*.state", "arcor2hw.fleet.oven.>", ">", "_INBOX.>", "arcor2hw.fleet.press-3.>"):
@@ -160,14 +160,16 @@ async def test_a_cell_publishes_only_under_its_own_name(hub: Hub, elsewhere: boo
             await reached(lambda: len(received), 1)
         except TimeoutError:  # seen on a busy machine
             log = (hub.folder / "nats.log").read_text()[-4000:]
-            raise AssertionError(f"{here.client.is_connected=} {here.errors=} {press.errors=}\n{log}") from None
+            raise AssertionError(
+                f"{page_client.client.is_connected=} {page_client.errors=} {press.errors=}\n{log}"
+            ) from None
         assert (await stream.stream_info(stream_name("oven"))).state.messages == 0
         assert received == [state_subject(CELL)]
         assert all("permissions violation" in each for each in press.errors)
-        # The server of the page commands nothing.
+        # The server of the page may not send commands.
         for subject in ("arcor2hw.fleet.press-3.state", "arcor2.press.open", "$JS.API.STREAM.DELETE.X"):
-            await here.client.publish(subject, b"x")
-        await reached(lambda: len(here.errors), 3)
+            await page_client.client.publish(subject, b"x")
+        await reached(lambda: len(page_client.errors), 3)
 
 
 async def reached(read: Callable[[], int], expected: int) -> None:
@@ -193,7 +195,7 @@ async def test_a_site_delivers_states_and_results_and_is_revoked(hub: Hub, tmp_p
         await until(fleet.numbers, [1])
         alive = lambda: [each["alive"] for each in fleet.cells()]  # noqa: E731
         await until(alive, [True])
-        # A revoked site has no signal and keeps its results; it is accepted again.
+        # A revoked site has no signal. It stores its results until it is accepted again.
         await hub.accounts.revoke("brno")
         await until(alive, [False])
         await cell.units.put([unit(2)])
@@ -218,9 +220,9 @@ async def test_the_page_is_served_by_another_computer(hub: Hub, tmp_path: Path) 
     page = ServerSettings(data_dir=tmp_path / "page")
 
     def pair() -> None:
-        run, said = paired_by_commands("fleet", "page", hub.settings.data_dir, page.data_dir, "--page")
+        run, printed = paired_by_commands("fleet", "page", hub.settings.data_dir, page.data_dir, "--page")
         assert run.startswith("Run on the computer of the page: ")
-        assert said.endswith("arcor2-hw fleet serve\n")
+        assert printed.endswith("arcor2-hw fleet serve\n")
 
     await asyncio.to_thread(pair)
     assert paired_page(page).stat().st_mode & 0o077 == 0

@@ -28,10 +28,10 @@ def test_a_cell_without_states_has_no_signal_and_returns() -> None:
     assert [card.alive for card in registry.cards(revision)] == [False]
     registry.accept("press", state_of(number=2), now(), 110.0)
     assert only(registry).alive
-    assert SILENT_AFTER + 2 * 0.1 < 2.0  # the check and the update of the page come on top
+    assert SILENT_AFTER + 2 * 0.1 < 2.0  # with the periods of the check and of the update of the page
 
 
-def test_a_beat_changes_nothing_on_the_page() -> None:
+def test_a_state_without_changes_is_not_sent_to_the_page() -> None:
     registry = Registry()
     registry.accept("press", state_of(number=1), now(), 1.0)
     revision = registry.revision

@@ -32,20 +32,20 @@ NOON = 1_767_355_200
 DAY = Period(NOON - 12 * 3600, NOON + 12 * 3600)
 
 
-def at(minutes: float) -> str:
+def time_at(minutes: float) -> str:
     """Return a time some minutes after noon."""
     seconds = int(minutes * 60)
     return f"2026-01-02T{12 + seconds // 3600:02}:{seconds % 3600 // 60:02}:{seconds % 60:02}.000000+00:00"
 
 
-def left(number: int, minutes: float, state: UnitState = UnitState.GOOD, product: str = "") -> UnitRecord:
+def finished(number: int, minutes: float, state: UnitState = UnitState.GOOD, product: str = "") -> UnitRecord:
     recipe = UsedRecipe("rcp", product, 1, RecipeState.RELEASED, "") if product else UNSET
-    return replace(unit(number, state=state), entered=at(0), left=at(minutes), recipe=recipe)
+    return replace(unit(number, state=state), entered=time_at(0), left=time_at(minutes), recipe=recipe)
 
 
 def alarm(number: int, minutes: float, code: str = "no_part", **values: Any) -> AlarmRecord:
     return AlarmRecord(
-        number, "gripper-1", code, Priority.HIGH, AlarmCategory.DEVICE, "No part.", at(minutes), number, **values
+        number, "gripper-1", code, Priority.HIGH, AlarmCategory.DEVICE, "No part.", time_at(minutes), number, **values
     )
 
 
@@ -80,10 +80,10 @@ def test_units_are_counted_by_cell_and_product(
 ) -> None:
     file.put_results(
         [
-            received(left(1, 1, product="A")),
-            received(left(2, 50, UnitState.BAD, "A")),
-            received(left(3, 61, UnitState.REJECTED)),
-            received(left(1, 70, product="A"), "oven"),
+            received(finished(1, 1, product="A")),
+            received(finished(2, 50, UnitState.BAD, "A")),
+            received(finished(3, 61, UnitState.REJECTED)),
+            received(finished(1, 70, product="A"), "oven"),
         ]
     )
     assert counts(reports) == [
@@ -92,23 +92,25 @@ def test_units_are_counted_by_cell_and_product(
         ("press-3", "A", "sorting", 1, 1, 0),
     ]
     assert counts(reports, replace(DAY, cell="oven")) == [("oven", "A", "sorting", 1, 0, 0)]
-    # Whole quarters of an hour are counted, and shown as such.
+    # A period is extended to whole quarters of an hour.
     hour = reports.production(Period(NOON + 60, NOON + 3540))
     assert (hour.since, hour.until, hour.step) == (NOON, NOON + 3600, 3600)
     assert [(each.at, each.good, each.bad) for each in hour.times] == [(NOON, 1, 1)]
     assert reports.production(Period(NOON - 7 * 86400, NOON)).step == 6 * 3600
     # A newer version of a record replaces it, an older one does not; the oldest results are deleted.
-    file.put_results([received(left(2, 50, UnitState.GOOD, "A"), stamp=NOON * 1_000_000 + 1)])
-    file.put_results([received(left(2, 50, UnitState.REJECTED, "A"))])
+    file.put_results([received(finished(2, 50, UnitState.GOOD, "A"), stamp=NOON * 1_000_000 + 1)])
+    file.put_results([received(finished(2, 50, UnitState.REJECTED, "A"))])
     assert counts(reports)[2] == ("press-3", "A", "sorting", 2, 0, 0)
     monkeypatch.setattr(fleet_file, "MAX_RESULTS", 2)
-    file.put_results([received(left(9, 80, product="A"))])
+    file.put_results([received(finished(9, 80, product="A"))])
     assert counts(reports)[-1] == ("press-3", "A", "sorting", 1, 0, 0)
     assert sum(int(str(each[3])) for each in counts(reports)) == file.count()
 
 
-def test_a_file_of_the_first_version_gets_its_counts(tmp_path: Path) -> None:
-    records = [received(left(number, number, UnitState.BAD if number == 3 else UnitState.GOOD)) for number in range(5)]
+def test_opening_a_file_of_the_first_version_computes_the_counts(tmp_path: Path) -> None:
+    records = [
+        received(finished(number, number, UnitState.BAD if number == 3 else UnitState.GOOD)) for number in range(5)
+    ]
     with sqlite3.connect(tmp_path / FILE) as old:
         old.executescript(fleet_file._SCHEMA)
         old.executemany(
@@ -129,16 +131,16 @@ def test_a_file_of_the_first_version_gets_its_counts(tmp_path: Path) -> None:
 
 # ---------------------------------------------------------------------------------------------------- lists
 def test_bad_units_are_listed_with_their_reason(file: FleetFile, reports: FleetReports) -> None:
-    failed = left(1, 1, UnitState.BAD)
+    failed = finished(1, 1, UnitState.BAD)
     error = replace(failed.steps[1], name="weld", error="no arc")
     tested = replace(failed.steps[2], name="measure", results=["false"])
     file.put_results(
         [
             received(replace(failed, steps=[tested, error, failed.steps[0]])),
-            received(replace(left(2, 2, UnitState.REJECTED), steps=[failed.steps[0], tested])),
-            received(left(3, 3, UnitState.BAD)),
-            received(left(4, 4)),
-            received(left(5, 4, UnitState.BAD), "oven"),
+            received(replace(finished(2, 2, UnitState.REJECTED), steps=[failed.steps[0], tested])),
+            received(finished(3, 3, UnitState.BAD)),
+            received(finished(4, 4)),
+            received(finished(5, 4, UnitState.BAD), "oven"),
         ]
     )
     found = [(each.cell, each.unit.number, each.unit.step, each.unit.error) for each in reports.bad_units(DAY, None, 9)]
@@ -157,8 +159,8 @@ def test_units_are_found_by_a_part_of_their_serial_number(
     file: FleetFile, reports: FleetReports, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     serials = ("Ab_12", "ab-12", 'x%"*)', "řř-Ř9")
-    file.put_results([received(replace(left(n, n), serial=serial)) for n, serial in enumerate(serials)])
-    file.put_results([received(replace(left(7, 0), serial="AB_12"), "oven"), received(alarm(1, 1))])
+    file.put_results([received(replace(finished(n, n), serial=serial)) for n, serial in enumerate(serials)])
+    file.put_results([received(replace(finished(7, 0), serial="AB_12"), "oven"), received(alarm(1, 1))])
 
     def found(text: str, cell: str = "", before: tuple[int, int] | None = None) -> list[str]:
         return [each.unit.serial for each in reports.find_units(text, cell, before, 10)]
@@ -173,20 +175,20 @@ def test_units_are_found_by_a_part_of_their_serial_number(
     assert found("b", "press-3") == ["ab-12", "Ab_12"]
     assert found("%") == found('%"*') == ['x%"*)']
     assert found("ŘŘ-") == ["řř-Ř9"]
-    for nothing in ("\\", "\\\\\\", "___", "gripper", "press-3", "AB_\0", "serial : 12"):
-        assert found(nothing) == [], nothing
+    for unmatched in ("\\", "\\\\\\", "___", "gripper", "press-3", "AB_\0", "serial : 12"):
+        assert found(unmatched) == [], unmatched
     # A newer version may have another serial number. The oldest results are deleted.
-    file.put_results([received(replace(left(0, 0), serial="ZZ_99"), stamp=NOON * 1_000_000 + 1)])
+    file.put_results([received(replace(finished(0, 0), serial="ZZ_99"), stamp=NOON * 1_000_000 + 1)])
     assert found("b_12") == ["AB_12"]
     assert found("zz_") == ["ZZ_99"]
     monkeypatch.setattr(fleet_file, "MAX_RESULTS", 4)
-    file.put_results([received(left(9, 80))])
+    file.put_results([received(finished(9, 80))])
     assert found("ab-") == found("zz_") == []
     assert found("ab_") == ["AB_12"]
 
 
 def test_pages_contain_each_result_once(file: FleetFile, reports: FleetReports) -> None:
-    file.put_results([received(left(number, number // 3, UnitState.BAD)) for number in range(20)])
+    file.put_results([received(finished(number, number // 3, UnitState.BAD)) for number in range(20)])
     numbers: list[int] = []
     before = None
     while page := reports.bad_units(DAY, before, 3):
@@ -199,9 +201,9 @@ def test_the_most_frequent_causes_come_first(file: FleetFile, reports: FleetRepo
     ended = {"active": False, "object_id": "obj_1"}
     file.put_results(
         [
-            received(alarm(1, 1, cleared=at(2), count=3, **ended)),
-            received(alarm(2, 5, cleared=at(5.5), **ended)),
-            received(alarm(3, 6, "door", cleared=at(26), count=2, **ended)),
+            received(alarm(1, 1, cleared=time_at(2), count=3, **ended)),
+            received(alarm(2, 5, cleared=time_at(5.5), **ended)),
+            received(alarm(3, 6, "door", cleared=time_at(26), count=2, **ended)),
             received(alarm(4, 7, object_id="obj_1"), "oven"),
         ]
     )
@@ -213,14 +215,14 @@ def test_the_most_frequent_causes_come_first(file: FleetFile, reports: FleetRepo
     assert reports.causes(replace(DAY, cell="press-4")) == []
 
 
-def test_a_damaged_time_is_that_of_the_arrival(file: FleetFile, reports: FleetReports) -> None:
-    file.put_results([received(replace(left(1, 1, UnitState.BAD), left="2026-13-32T12:00:00Z"))])
+def test_a_damaged_time_is_replaced_by_the_time_of_arrival(file: FleetFile, reports: FleetReports) -> None:
+    file.put_results([received(replace(finished(1, 1, UnitState.BAD), left="2026-13-32T12:00:00Z"))])
     assert reports.bad_units(DAY, None, 1)[0].at == NOON
     assert NOON % SLOT == 0
 
 
 # ---------------------------------------------------------------------------------------------------- translations
-def test_an_alarm_brings_the_translations_of_its_driver(tmp_path: Path) -> None:
+def test_an_alarm_contains_the_translations_of_its_driver(tmp_path: Path) -> None:
     folder = tmp_path / "translations"
     folder.mkdir()
     texts = DriverTexts(lambda: [tmp_path])
@@ -237,19 +239,19 @@ def test_an_alarm_brings_the_translations_of_its_driver(tmp_path: Path) -> None:
     assert texts.of(texts_of(record))["cs"] == {"No part.": "Žádný díl.", "Clean the jaws.": "Očistěte čelisti."}
 
 
-def test_a_bad_unit_brings_the_translations_of_its_errors(
+def test_a_bad_unit_contains_the_translations_of_its_errors(
     tmp_path: Path, file: FleetFile, reports: FleetReports
 ) -> None:
     (tmp_path / "translations").mkdir()
     (tmp_path / "translations" / "cs.json").write_text('{"No arc at {amps} A.": "Žádný oblouk při {amps} A."}')
-    record = left(1, 1, UnitState.BAD)
+    record = finished(1, 1, UnitState.BAD)
     error = Message.of("No arc at {amps} A.", amps=40)
     failed = replace(record.steps[0], name="weld", error=error.text, **error.translation())
     record = replace(record, steps=[failed, *record.steps[1:]])
     texts = DriverTexts(lambda: [tmp_path])
     translations = texts.of_unit(record)
     assert translations == {"cs": {error.key: "Žádný oblouk při {amps} A."}}
-    assert texts.of_unit(left(1, 1)) == {}
+    assert texts.of_unit(finished(1, 1)) == {}
     file.put_results([received(record)._replace(columns=of_unit(record, translations, NOON))])
     unit = reports.bad_units(DAY, None, 1)[0].unit
     assert (unit.error, unit.message, unit.translations) == ("No arc at 40 A.", error, translations)
@@ -260,9 +262,9 @@ def test_a_bad_unit_brings_the_translations_of_its_errors(
 
 
 # ---------------------------------------------------------------------------------------------------- routes
-def test_the_page_asks_for_reports_and_files(tmp_path: Path) -> None:
+def test_reports_are_served_as_json_and_csv(tmp_path: Path) -> None:
     file = FleetFile(tmp_path / FILE)
-    file.put_results([received(replace(left(1, 1, UnitState.BAD), serial="=SUM(1)")), received(alarm(1, 1))])
+    file.put_results([received(replace(finished(1, 1, UnitState.BAD), serial="=SUM(1)")), received(alarm(1, 1))])
     file.close()
     fleet = FleetProcess(f"nats://127.0.0.1:{free_port()}", tmp_path)
     period = {"since": str(DAY.since), "until": str(DAY.until)}

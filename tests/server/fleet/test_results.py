@@ -33,7 +33,7 @@ CELL, IDENTITY = "press-3", "a" * 32
 
 
 class FleetProcess:
-    """`arcor2-hw fleet serve`."""
+    """A process that runs `arcor2-hw fleet serve`."""
 
     def __init__(self, url: str, data_dir: Path, *options: str) -> None:
         self.command = [sys.executable, "-P", "-m", "arcor2_server.cli.main", "fleet", "serve", "--port", "0"]
@@ -130,7 +130,7 @@ async def test_results_queued_while_offline_arrive_once_each(tmp_path: Path) -> 
         await cell.units.put([unit(1)])
         await until(fleet.numbers, [1])
 
-        # The link is cut: the broker of the site stores the results. Then it fails, too: the cell does.
+        # While the link is cut, the broker of the site stores the results. When that broker fails too, the cell does.
         await link.cut()
         await cell.units.put([unit(number) for number in range(2, 151)])
         await cell.sent()
@@ -169,7 +169,7 @@ def received(number: int, stamp: int, state: UnitState = UnitState.GOOD, since: 
 
 
 def test_a_result_that_is_delivered_again_is_stored_once(file: FleetFile) -> None:
-    """After kill -9 between storing and acknowledging, or after the broker has forgotten its message id."""
+    """A kill before the acknowledgement, or a broker that no longer has the message id, causes a second delivery."""
     file.put_results([received(1, 10), received(2, 11)])
     file.put_results([received(1, 10), received(1, 20, UnitState.BAD)])
     file.put_results([received(1, 10)])  # an older version, delivered late

@@ -1,4 +1,4 @@
-"""The history: recorded points, moved rows (which are seen exactly once), and that no stored row is lost."""
+"""The history: recording of points, and moving of rows, which are read exactly once and never lost."""
 
 import asyncio
 import signal
@@ -83,7 +83,7 @@ def test_changes_beyond_the_dead_band_are_recorded_with_the_time_of_their_source
     ]
 
 
-def test_dead_bands_of_the_cell_file_count_before_those_of_the_variable(tmp_path: Path) -> None:
+def test_dead_bands_of_the_cell_file_precede_those_of_the_variable(tmp_path: Path) -> None:
     file = tmp_path / "cell.yaml"
     file.write_text(
         "devices: [{name: oven, type: Oven, dead_bands: {temperature: 0.5, 'zone*': 2}}, {name: lamp, type: L}]"
@@ -100,7 +100,7 @@ def test_dead_bands_of_the_cell_file_count_before_those_of_the_variable(tmp_path
     ("name", "value"),
     [("DEAD_BANDS", "oven"), ("DEAD_BANDS", "oven=-1"), ("INTERVAL", "0.01"), ("DAYS", "0"), ("MEGABYTES", "x")],
 )
-def test_invalid_settings_are_refused_by_name(name: str, value: str) -> None:
+def test_the_error_names_an_invalid_setting(name: str, value: str) -> None:
     with pytest.raises(InvalidData, match=f"ARCOR2_HW_POINT_HISTORY_{name}"):
         ServerSettings.from_environment({f"ARCOR2_HW_POINT_HISTORY_{name}": value})
 
