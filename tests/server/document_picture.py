@@ -13,7 +13,7 @@ _OWNED = {"OrientationChanged": "orientations", "JointsChanged": "joints", "Acti
 _TIMES = ("created", "modified", "int_modified")
 
 
-class Picture:
+class DocumentCopy:
     """Items by id. An event that does not fit (adding an existing item, updating a missing one) fails the test."""
 
     def __init__(self) -> None:
@@ -23,27 +23,27 @@ class Picture:
     def _clear(self) -> None:
         self.scene: dict[str, Any] | None = None
         self.project: dict[str, Any] | None = None
-        self.things: dict[str, dict[str, Any]] = {
+        self.items: dict[str, dict[str, Any]] = {
             kind: {}
             for kind in ("objects", "points", "orientations", "joints", "actions", "parameters", "logic", "overrides")
         }
         self.owners: dict[str, str] = {}
 
     @classmethod
-    def of(cls, scene: Scene | None, project: Project | None) -> "Picture":
+    def of(cls, scene: Scene | None, project: Project | None) -> "DocumentCopy":
         """Return the state of a client that has just connected."""
-        picture = cls()
+        copy = cls()
         if scene is not None:
-            picture._load(msgspec.to_builtins(scene), None if project is None else msgspec.to_builtins(project))
-        return picture
+            copy._load(msgspec.to_builtins(scene), None if project is None else msgspec.to_builtins(project))
+        return copy
 
-    def shown(self) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """Return everything except the locks, for comparison."""
-        return {"scene": self.scene, "project": self.project, "owners": self.owners, **self.things}
+        return {"scene": self.scene, "project": self.project, "owners": self.owners, **self.items}
 
-    def see(self, event: dict[str, Any]) -> None:
-        """Take in an event."""
-        name, data, how = event["event"], event.get("data"), event.get("change_type")
+    def apply(self, event: dict[str, Any]) -> None:
+        """Apply an event."""
+        name, data, change = event["event"], event.get("data"), event.get("change_type")
         match name:
             case "OpenScene" | "OpenProject":
                 self._clear()
@@ -59,98 +59,98 @@ class Picture:
             case "SceneChanged" | "ProjectChanged":
                 self._base(name, data)
             case "ActionPointChanged":
-                self._point(how, data)
+                self._point(change, data)
             case "OverrideUpdated":
-                self._override(how, data, event["parent_id"])
+                self._override(change, data, event["parent_id"])
             case _ if name in _BY_ID:
-                self._thing(self.things[_BY_ID[name]], how, data)
+                self._apply_item(self.items[_BY_ID[name]], change, data)
             case _ if name in _OWNED:
-                self._owned(_OWNED[name], how, data, event.get("parent_id"))
+                self._owned(_OWNED[name], change, data, event.get("parent_id"))
 
     # ------------------------------------------------------------------------------------------ whole documents
     def _load(self, scene: dict[str, Any], project: dict[str, Any] | None) -> None:
         objects = scene.pop("objects", [])
         self.scene = _untimed(scene)
-        self.things["objects"] = {obj["id"]: obj for obj in objects}
+        self.items["objects"] = {obj["id"]: obj for obj in objects}
         if project is None:
             return
         for point in project.pop("action_points", []):
             for field, kind in _LISTS.items():
-                for thing in point.pop(field, []):
-                    self.things[kind][thing["id"]] = thing
-                    self.owners[thing["id"]] = point["id"]
-            self.things["points"][point["id"]] = point
+                for item in point.pop(field, []):
+                    self.items[kind][item["id"]] = item
+                    self.owners[item["id"]] = point["id"]
+            self.items["points"][point["id"]] = point
         for kind in ("parameters", "logic"):
-            self.things[kind] = {thing["id"]: thing for thing in project.pop(kind, [])}
+            self.items[kind] = {item["id"]: item for item in project.pop(kind, [])}
         for override in project.pop("object_overrides", []):
-            self.things["overrides"][override["id"]] = {p["name"]: p for p in override["parameters"]}
+            self.items["overrides"][override["id"]] = {p["name"]: p for p in override["parameters"]}
         self.project = _untimed(project)
 
     def _base(self, name: str, data: dict[str, Any]) -> None:
-        mine = self.scene if name == "SceneChanged" else self.project
-        if mine is None or mine["id"] != data["id"]:
-            return  # of a saved one
-        mine.update(_untimed(data))
+        document = self.scene if name == "SceneChanged" else self.project
+        if document is None or document["id"] != data["id"]:
+            return  # a change of a saved document, which is not open
+        document.update(_untimed(data))
         if name == "ProjectChanged" and not data["has_logic"]:
-            self.things["logic"].clear()  # these have no events of their own
+            self.items["logic"].clear()  # no event is sent for each removed logic item
 
-    # ------------------------------------------------------------------------------------------ single things
+    # ------------------------------------------------------------------------------------------ single items
     @staticmethod
-    def _thing(things: dict[str, Any], how: str | None, data: dict[str, Any]) -> None:
+    def _apply_item(items: dict[str, Any], change: str | None, data: dict[str, Any]) -> None:
         key = data["id"]
-        assert (key in things) is (how != "add"), (how, data)
-        if how == "remove":
-            del things[key]
+        assert (key in items) is (change != "add"), (change, data)
+        if change == "remove":
+            del items[key]
         else:
-            things[key] = data
+            items[key] = data
 
-    def _point(self, how: str | None, data: dict[str, Any]) -> None:
+    def _point(self, change: str | None, data: dict[str, Any]) -> None:
         key = data["id"]
-        if data.get("parent") and how != "remove":
-            assert data["parent"] in self.things["points"] or data["parent"] in self.things["objects"], data
-        if how == "remove":
-            assert not [p for p in self.things["points"].values() if p.get("parent") == key], data
-            for thing in [thing for thing, owner in self.owners.items() if owner == key]:
-                self._forget(thing)
-        if how == "update":
+        if data.get("parent") and change != "remove":
+            assert data["parent"] in self.items["points"] or data["parent"] in self.items["objects"], data
+        if change == "remove":
+            assert not [p for p in self.items["points"].values() if p.get("parent") == key], data
+            for item in [item for item, owner in self.owners.items() if owner == key]:
+                self._forget(item)
+        if change == "update":
             assert data.pop("actions") == []
             for field in ("orientations", "robot_joints"):
-                things = self.things[_LISTS[field]]
-                for old in [thing for thing in things if self.owners[thing] == key]:
+                items = self.items[_LISTS[field]]
+                for old in [item for item in items if self.owners[item] == key]:
                     self._forget(old)
-                for thing in data.pop(field):
-                    things[thing["id"]] = thing
-                    self.owners[thing["id"]] = key
-        self._thing(self.things["points"], how, data)
-        if how == "remove":
+                for item in data.pop(field):
+                    items[item["id"]] = item
+                    self.owners[item["id"]] = key
+        self._apply_item(self.items["points"], change, data)
+        if change == "remove":
             self.locks.pop(key, None)
 
     def _forget(self, key: str) -> None:
         del self.owners[key]
         self.locks.pop(key, None)
         for kind in _LISTS.values():
-            self.things[kind].pop(key, None)
+            self.items[kind].pop(key, None)
 
-    def _owned(self, kind: str, how: str | None, data: dict[str, Any], parent: str | None) -> None:
+    def _owned(self, kind: str, change: str | None, data: dict[str, Any], parent: str | None) -> None:
         key = data["id"]
-        assert (key in self.things[kind]) is (how != "add"), (how, data)
-        if how == "remove":
+        assert (key in self.items[kind]) is (change != "add"), (change, data)
+        if change == "remove":
             self._forget(key)
             return
-        if how == "add":
-            assert parent in self.things["points"], (parent, data)
+        if change == "add":
+            assert parent in self.items["points"], (parent, data)
             self.owners[key] = parent
-        self.things[kind][key] = data
+        self.items[kind][key] = data
 
-    def _override(self, how: str | None, data: dict[str, Any], obj: str) -> None:
-        known = self.things["overrides"].setdefault(obj, {})
-        assert (data["name"] in known) is (how != "add"), (how, data)
-        if how == "remove":
+    def _override(self, change: str | None, data: dict[str, Any], obj: str) -> None:
+        known = self.items["overrides"].setdefault(obj, {})
+        assert (data["name"] in known) is (change != "add"), (change, data)
+        if change == "remove":
             del known[data["name"]]
         else:
             known[data["name"]] = data
         if not known:
-            del self.things["overrides"][obj]
+            del self.items["overrides"][obj]
 
 
 def _untimed(document: dict[str, Any]) -> dict[str, Any]:

@@ -2,16 +2,16 @@
 
 from typing import Any
 
-from tests.server.document_picture import Picture
+from tests.server.document_picture import DocumentCopy
 from tests.server.session.session_server import Person, SessionServer
 
 Flat = dict[tuple[str, str], Any]
 
 
-def flat(picture: Picture) -> Flat:
+def flat(copy: DocumentCopy) -> Flat:
     """Return every item by kind and id, so that states can be compared item by item."""
     found: Flat = {}
-    for kind, content in picture.shown().items():
+    for kind, content in copy.content().items():
         if kind in ("scene", "project"):
             found[kind, ""] = content
         else:
@@ -25,10 +25,10 @@ class Client:
     def __init__(self, server: SessionServer, name: str) -> None:
         self.name = name
         self.person = Person(server)
-        self.picture = Picture()
+        self.copy = DocumentCopy()
         self.events = 0
 
     def apply_events(self) -> None:
         for event in self.person.events():
             self.events += 1
-            self.picture.see(event)
+            self.copy.apply(event)

@@ -1,4 +1,4 @@
-"""Edits to draw from. Each builds a request for the open documents from a few numbers, and states the ids to lock."""
+"""Random edits. Each builds a request for the open documents from a few numbers, and names the id to lock."""
 
 import json
 from collections.abc import Callable
@@ -60,8 +60,8 @@ class Draw:
         dice = [a for p in self.project.action_points for a in p.actions if a.outputs()]
         if not dice or self.z % 3 == 0:
             return {}
-        what = f"{dice[self.z % len(dice)].id}/default/0"
-        return {"condition": {"what": what, "value": json.dumps(self.z % 2 == 0)}}
+        link = f"{dice[self.z % len(dice)].id}/default/0"
+        return {"condition": {"what": link, "value": json.dumps(self.z % 2 == 0)}}
 
     def position(self) -> dict[str, float]:
         return {"x": self.x / 7, "y": self.y / 7, "z": self.z / 7}
@@ -175,7 +175,9 @@ EDITS: dict[str, Callable[[Draw], Request]] = {
     "add point again": _add_point,
     "rename point": _on("RenameActionPoint", "action_point_id", "points", new_name=_name),
     "move point": _on("UpdateActionPointPosition", "action_point_id", "points", True, new_position=Draw.position),
-    "hang point": _on("UpdateActionPointParent", "action_point_id", "points", new_parent_id=lambda d: d.parent(d.y)),
+    "reparent point": _on(
+        "UpdateActionPointParent", "action_point_id", "points", new_parent_id=lambda d: d.parent(d.y)
+    ),
     "copy point": _free("CopyActionPoint", id=lambda d: d.point(d.x)),
     "remove point": _free("RemoveActionPoint", id=lambda d: d.point(d.x)),
     "add orientation": _on(

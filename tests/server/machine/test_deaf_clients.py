@@ -13,12 +13,13 @@ READERS, DEAF = 40, 10
 EVENTS = 700
 TEXT = "x" * 9_900
 BOUND = 500_000
-"""Bytes that may wait for a client. The buffers of the system take less than the rest."""
+"""Bytes that may be queued for a client. The other events do not fit into the buffers of the operating system."""
 COST_MIB = 50
+"""Largest permitted growth of the server's memory, MiB."""
 
 
 async def _deaf(url: str) -> socket.socket:
-    """Return an open websocket with a small buffer of its own, which is never read."""
+    """Return an open websocket that has a small receive buffer and is never read."""
     host, _, port = url.partition("://")[2].strip("/").partition(":")
     deaf = socket.socket()
     deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -35,7 +36,7 @@ async def _deaf(url: str) -> socket.socket:
 
 
 async def _descriptions(talker: RawConnection) -> list[str]:
-    """Return the beginnings of the descriptions that a client receives, once it has all of them."""
+    """Wait until a client has received all descriptions, and return their numbers."""
     found: list[str] = []
     while len(found) < EVENTS:
         message = await talker.receive(60.0)
@@ -65,6 +66,6 @@ async def test_clients_that_never_read_are_closed_without_delaying_others(tmp_pa
         assert all(received == expected for received in await asyncio.gather(*listening))
         cost = (process.memory_full_info().pss - before) / 2**20
         assert cost <= COST_MIB
-        # They were closed for the number of waiting bytes, not for the time that these waited.
+        # The clients were closed because of the number of queued bytes, not because of their age.
         await until(lambda: server.log.read_text().count("too slow") >= DEAF)
         await author.granted("SystemInfo")

@@ -20,7 +20,7 @@ from arcor2_server.documents.checks.actions import action_meta
 from arcor2_server.documents.checks.project import project_problems
 from arcor2_server.documents.logic import check_logic_item
 from tests.server.crash_copy import copy_at_one_moment
-from tests.server.document_picture import Picture
+from tests.server.document_picture import DocumentCopy
 from tests.server.machine.client import Client, Flat, flat
 from tests.server.machine.requests import EDITS, SCENE_EDITS, Draw, Request
 from tests.server.session.session_server import Refused, open_server
@@ -83,45 +83,45 @@ class Edits(RuleBasedStateMachine):
         return self.server.session
 
     def current_items(self) -> Flat:
-        return flat(Picture.of(self.session.scene, self.session.project))
+        return flat(DocumentCopy.of(self.session.scene, self.session.project))
 
     def _opened(self) -> None:
-        """The saved document is the reference; its history is unknown to this test."""
+        """Take the saved document as the reference. The test does not know its history."""
         self.saved = self.current_items()
         self.states = {self.session.revision: self.saved}
 
     # ------------------------------------------------------------------------------------------ requests
-    def ask(self, who: str, request: str, **args: Any) -> Any:
-        return self.runner.run(self._ask(who, request, **args))
+    def ask(self, user: str, request: str, **args: Any) -> Any:
+        return self.runner.run(self._ask(user, request, **args))
 
-    async def _ask(self, who: str, request: str, /, *, dry_run: bool = False, **args: Any) -> Any:
+    async def _ask(self, user: str, request: str, /, *, dry_run: bool = False, **args: Any) -> Any:
         try:
-            return await self.clients[who].person.ask(request, dry_run=dry_run, **args)
+            return await self.clients[user].person.ask(request, dry_run=dry_run, **args)
         except Refused as error:
             refusal = error
         assert "inside the server" not in str(refusal), f"{request} {args}: {refusal}"
         return refusal
 
-    def who(self, number: int) -> str:
+    def user_of(self, number: int) -> str:
         present = sorted(self.clients)
         return present[number % len(present)]
 
-    def note(self) -> None:
+    def record_state(self) -> None:
         self.states[self.session.revision] = self.current_items()
 
-    def single(self, who: str, request: str, **args: Any) -> Any:
+    def ask_checked(self, user: str, request: str, **args: Any) -> Any:
         """Send a request. If it is refused or a dry run, assert that it changes nothing and causes no event."""
         revision, before = self.session.revision, self.current_items()
         self.apply_events()
         events_before = {client.name: client.events for client in self.clients.values()}
-        answer = self.ask(who, request, **args)
+        answer = self.ask(user, request, **args)
         if isinstance(answer, Refused) or (args.get("dry_run") and RPCS[request].dry_run):
             self.apply_events()
             assert (self.session.revision, self.current_items()) == (revision, before), (request, answer)
             assert events_before == {client.name: client.events for client in self.clients.values()}, (request, answer)
         if self.session.revision != revision:
             assert self.session.revision == revision + 1, request
-            self.note()
+            self.record_state()
         return answer
 
     def apply_events(self) -> None:
@@ -129,66 +129,66 @@ class Edits(RuleBasedStateMachine):
             client.apply_events()
 
     # ------------------------------------------------------------------------------------------ edits
-    def edit(self, who: str, wanted: Request, *, keep: bool, dry_run: bool) -> None:
+    def edit(self, user: str, wanted: Request, *, keep: bool, dry_run: bool) -> None:
         request, args, lock, tree = wanted
         if lock:
-            self.ask(who, "WriteLock", object_id=lock, lock_tree=tree)
-        self.single(who, request, dry_run=dry_run, **args)
+            self.ask(user, "WriteLock", object_id=lock, lock_tree=tree)
+        self.ask_checked(user, request, dry_run=dry_run, **args)
         if lock and not keep:
-            self.ask(who, "WriteUnlock", object_id=lock)
+            self.ask(user, "WriteUnlock", object_id=lock)
 
     @precondition(lambda self: self.session.project is not None)
     @rule(number=users, kind=edits, chosen=numbers, keep=st.booleans(), dry_run=st.integers(0, 9))
     def edit_project(self, number: int, kind: str, chosen: Any, keep: bool, dry_run: int) -> None:
         wanted = EDITS[kind](Draw(self.session, chosen))
-        self.edit(self.who(number), wanted, keep=keep and dry_run > 5, dry_run=dry_run == 0)
+        self.edit(self.user_of(number), wanted, keep=keep and dry_run > 5, dry_run=dry_run == 0)
 
     @precondition(lambda self: self.session.project is not None)
     @rule(number=users, kinds=st.lists(edits, min_size=2, max_size=3), chosen=numbers)
     def build(self, number: int, kinds: list[str], chosen: Any) -> None:
         for kind in ["add point", "add action", *kinds]:
-            self.edit(self.who(number), EDITS[kind](Draw(self.session, chosen)), keep=False, dry_run=False)
+            self.edit(self.user_of(number), EDITS[kind](Draw(self.session, chosen)), keep=False, dry_run=False)
             chosen = (chosen[0] + 1, chosen[1] + 1, chosen[2] + 1)
 
     @precondition(lambda self: self.session.scene is not None and self.session.project is None)
     @rule(number=users, kind=st.sampled_from(sorted(SCENE_EDITS)), chosen=numbers)
     def edit_scene(self, number: int, kind: str, chosen: Any) -> None:
-        self.edit(self.who(number), SCENE_EDITS[kind](Draw(self.session, chosen)), keep=False, dry_run=False)
+        self.edit(self.user_of(number), SCENE_EDITS[kind](Draw(self.session, chosen)), keep=False, dry_run=False)
 
     @precondition(lambda self: self.session.project is not None)
     @rule(parts=st.lists(parts, min_size=2, max_size=5))
     def edit_together(self, parts: list[Any]) -> None:
         async def together() -> None:
-            wanted = [(EDITS[kind](Draw(self.session, chosen)), what) for kind, chosen, what in parts]
+            wanted = [(EDITS[kind](Draw(self.session, chosen)), undo) for kind, chosen, undo in parts]
             asked = []
-            for number, ((request, args, _, _), what) in enumerate(wanted):
-                if what:
-                    request, args = what, {}
-                asked.append(self._ask(self.who(number), request, **args))
+            for number, ((request, args, _, _), undo) in enumerate(wanted):
+                if undo:
+                    request, args = undo, {}
+                asked.append(self._ask(self.user_of(number), request, **args))
             await asyncio.gather(*asked)
 
         before = self.session.revision
         self.runner.run(together())
         for revision in range(before + 1, self.session.revision):
             self.states.pop(revision, None)
-        self.note()
+        self.record_state()
 
-    # ------------------------------------------------------------------------------------------ back
+    # ------------------------------------------------------------------------------------------ undo and redo
     @precondition(lambda self: self.session.scene is not None)
     @rule(number=users, times=st.integers(1, 3), redo=st.booleans(), dry_run=st.integers(0, 9))
     def undo(self, number: int, times: int, redo: bool, dry_run: int) -> None:
-        who = self.who(number)
+        user = self.user_of(number)
         for request in ["Undo"] * times + ["Redo"] * (times if redo else 0):
             before = self.session.revision
-            answer = self.single(who, request, dry_run=dry_run == 0)
+            answer = self.ask_checked(user, request, dry_run=dry_run == 0)
             if not isinstance(answer, Refused) and dry_run:
                 self.assert_undone(before, answer["number"])
 
     @precondition(lambda self: self.session.scene is not None)
     @rule(number=users, back=st.integers(1, 8))
-    def undo_one_further_back(self, number: int, back: int) -> None:
+    def undo_an_earlier_edit(self, number: int, back: int) -> None:
         before = self.session.revision
-        answer = self.single(self.who(number), "Undo", number=before - back)
+        answer = self.ask_checked(self.user_of(number), "Undo", number=before - back)
         if not isinstance(answer, Refused):
             self.assert_undone(before, before - back)
 
@@ -206,28 +206,28 @@ class Edits(RuleBasedStateMachine):
     @rule(number=users, back=st.integers(0, 12))
     def restore_revision(self, number: int, back: int) -> None:
         revision = self.session.revision - back
-        answer = self.single(self.who(number), "RestoreRevision", revision=revision)
+        answer = self.ask_checked(self.user_of(number), "RestoreRevision", revision=revision)
         if not isinstance(answer, Refused) and revision in self.states:
             assert self.current_items() == self.states[revision]
 
-    # ------------------------------------------------------------------------------------------ locks, coming and going
+    # ------------------------------------------------------------------------------------------ locks and connections
     @precondition(lambda self: self.session.project is not None)
     @rule(number=users, chosen=numbers, tree=st.booleans(), read=st.booleans(), give_back=st.booleans())
     def lock(self, number: int, chosen: Any, tree: bool, read: bool, give_back: bool) -> None:
         draw = Draw(self.session, chosen)
         item = [draw.point(draw.x), draw.action(draw.x), draw.project.id][draw.y % 3]
         if read:
-            self.ask(self.who(number), "ReadUnlock" if give_back else "ReadLock", object_id=item)
+            self.ask(self.user_of(number), "ReadUnlock" if give_back else "ReadLock", object_id=item)
         elif give_back:
-            for held in self.server.services.locks.write_locked_by(self.who(number)):
-                self.ask(self.who(number), "WriteUnlock", object_id=held)
+            for held in self.server.services.locks.write_locked_by(self.user_of(number)):
+                self.ask(self.user_of(number), "WriteUnlock", object_id=held)
         else:
-            self.ask(self.who(number), "WriteLock", object_id=item, lock_tree=tree)
+            self.ask(self.user_of(number), "WriteLock", object_id=item, lock_tree=tree)
 
     @precondition(lambda self: len(self.clients) > 1)
     @rule(number=users)
     def leave(self, number: int) -> None:
-        client = self.clients.pop(self.who(number))
+        client = self.clients.pop(self.user_of(number))
         self.runner.run(client.person.leave())
 
     @precondition(lambda self: hasattr(self, "server"))
@@ -255,18 +255,18 @@ class Edits(RuleBasedStateMachine):
     def release_locks(self) -> None:
         for number in range(len(NAMES)):
             self.lock_time_out(number)
-        for who in sorted(self.clients):
-            for held in self.server.services.locks.write_locked_by(who):
-                assert not isinstance(self.ask(who, "WriteUnlock", object_id=held), Refused)
-            for held in list(self.server.services.locks._reads.get(who, ())):
-                self.ask(who, "ReadUnlock", object_id=held)
+        for user in sorted(self.clients):
+            for held in self.server.services.locks.write_locked_by(user):
+                assert not isinstance(self.ask(user, "WriteUnlock", object_id=held), Refused)
+            for held in list(self.server.services.locks._reads.get(user, ())):
+                self.ask(user, "ReadUnlock", object_id=held)
         assert self.server.services.locks.locked_roots() == []
 
     def stored(self) -> Flat:
-        async def read() -> Picture:
+        async def read() -> DocumentCopy:
             storage = self.server.services.storage
             project = None if self.session.project is None else await storage.project(self.session.project.id)
-            return Picture.of(await storage.scene(self.session.scene.id), project)
+            return DocumentCopy.of(await storage.scene(self.session.scene.id), project)
 
         return flat(self.runner.run(read()))
 
@@ -275,7 +275,7 @@ class Edits(RuleBasedStateMachine):
     def save(self, number: int) -> None:
         self.release_locks()
         request = "SaveScene" if self.session.project is None else "SaveProject"
-        answer = self.single(self.who(number), request)
+        answer = self.ask_checked(self.user_of(number), request)
         assert isinstance(answer, Refused) is (request == "SaveProject" and self.current_items() == self.saved)
         self.saved = self.current_items()
         assert self.stored() == self.saved
@@ -283,16 +283,16 @@ class Edits(RuleBasedStateMachine):
     @rule(number=users, scene=st.booleans())
     def close_and_open(self, number: int, scene: bool) -> None:
         self.release_locks()
-        who = self.who(number)
+        user = self.user_of(number)
         if self.session.scene is not None:
-            answer = self.ask(who, "CloseScene" if self.session.project is None else "CloseProject", force=True)
+            answer = self.ask(user, "CloseScene" if self.session.project is None else "CloseProject", force=True)
             assert not isinstance(answer, Refused), answer
             self.apply_events()
         request, document = ("OpenScene", self.scene_id) if scene else ("OpenProject", self.project_id)
-        answer = self.ask(who, request, id=document)
-        # A project does not open on a scene that lost, by force, an object that the project needs.
+        answer = self.ask(user, request, id=document)
+        # A project cannot be opened after an object that it needs was removed from the scene by force.
         if isinstance(answer, Refused):
-            answer = self.ask(who, "OpenScene", id=self.scene_id)
+            answer = self.ask(user, "OpenScene", id=self.scene_id)
             assert not isinstance(answer, Refused), answer
         self._opened()
 
@@ -301,13 +301,13 @@ class Edits(RuleBasedStateMachine):
         """A killed server leaves only the files that are on the disk now."""
         items_before, changed = self.current_items(), self.session.has_changes
         history = list(self.session.history)
-        left = Path(tempfile.mkdtemp(prefix="machine-")) / "data"
-        copy_at_one_moment(self.directory, left)
+        copied = Path(tempfile.mkdtemp(prefix="machine-")) / "data"
+        copy_at_one_moment(self.directory, copied)
         present = sorted(self.clients)
         self.runner.run(self._close())
         shutil.rmtree(self.directory)
-        shutil.move(left, self.directory)
-        left.parent.rmdir()
+        shutil.move(copied, self.directory)
+        copied.parent.rmdir()
         self.runner.run(self._open())
         assert (self.current_items(), self.session.has_changes) == (items_before, changed)
         assert list(self.session.history) == history
@@ -323,7 +323,7 @@ class Edits(RuleBasedStateMachine):
         current_items = self.current_items()
         self.apply_events()
         for client in self.clients.values():
-            assert flat(client.picture) == current_items, client.name
+            assert flat(client.copy) == current_items, client.name
         assert self.session.has_changes is (current_items != self.saved)
 
     @invariant()
@@ -332,12 +332,12 @@ class Edits(RuleBasedStateMachine):
             return
         locks = self.server.services.locks
         for client in self.clients.values():
-            for key, owner in client.picture.locks.items():
+            for key, owner in client.copy.locks.items():
                 if owner != client.name and key != self.session.project.id and self._exists(key):
                     assert locks.writer_of(key) == owner, (client.name, key, owner)
             for owner, ids in locks.announced().items():
                 if owner != client.name:
-                    assert not [key for key in ids if client.picture.locks.get(key) != owner], (client.name, owner)
+                    assert not [key for key in ids if client.copy.locks.get(key) != owner], (client.name, owner)
 
     def _exists(self, key: str) -> bool:
         return any(self.session.document.find(kind, key) is not None for kind in Kind)
@@ -365,7 +365,7 @@ async def _template(directory: Path) -> None:
         await alice.ask("CloseProject")
 
 
-def test_random_edits(tmp_path: Path) -> None:
+def test_random_edits_keep_clients_locks_and_journal_consistent(tmp_path: Path) -> None:
     Edits.template = tmp_path / "template"
     Edits.template.mkdir()
     asyncio.run(_template(Edits.template))

@@ -5,15 +5,15 @@ from typing import Any
 import pytest
 
 from arcor2_hw.data.events import SceneStateEnum
-from tests.server.document_picture import Picture
+from tests.server.document_picture import DocumentCopy
 from tests.server.session.session_server import Person, Refused, SessionServer
 from tests.server.session.work import ORIGIN, URL, Work
 
 TURNED = {"x": 0.0, "y": 0.0, "z": 1.0, "w": 0.0}
 
 
-def shown(server: SessionServer) -> dict[str, Any]:
-    return Picture.of(server.session.scene, server.session.project).shown()
+def server_content(server: SessionServer) -> dict[str, Any]:
+    return DocumentCopy.of(server.session.scene, server.session.project).content()
 
 
 class Watcher:
@@ -21,15 +21,15 @@ class Watcher:
 
     def __init__(self, server: SessionServer, person: Person) -> None:
         self.server, self.person = server, person
-        self.picture = Picture.of(server.session.scene, server.session.project)
+        self.copy = DocumentCopy.of(server.session.scene, server.session.project)
         person.take()
 
     def apply_events(self) -> list[str]:
         names = []
         for event in self.person.events():
             names.append("/".join(filter(None, (event["event"], event.get("change_type")))))
-            self.picture.see(event)
-        assert self.picture.shown() == shown(self.server)
+            self.copy.apply(event)
+        assert self.copy.content() == server_content(self.server)
         return names
 
 
@@ -157,7 +157,7 @@ def filled(value: Any, ids: dict[str, str]) -> Any:
     return value
 
 
-async def make(person: Person, edit: Edit, ids: dict[str, str]) -> None:
+async def apply_edit(person: Person, edit: Edit, ids: dict[str, str]) -> None:
     request, args, lock, tree = edit
     if lock:
         await person.lock(filled(lock, ids), tree=tree)
