@@ -24,7 +24,7 @@ NATS_SERVER = str(Path(sys.executable).with_name("nats-server"))
 
 
 class Broker:
-    """A broker on one port, also after a restart."""
+    """A broker that uses the same port after a restart."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.port = folder, free_port()
@@ -52,7 +52,7 @@ class Broker:
 
 
 class Mosquitto(Broker):
-    """mosquitto. lines: further lines of its configuration; with them it decides about users itself."""
+    """mosquitto with further `lines` of its configuration, which also decide which users it admits."""
 
     def __init__(self, folder: Path, lines: str = "allow_anonymous true") -> None:
         super().__init__(folder)

@@ -1,7 +1,7 @@
 """A host application of Sparkplug B, and a subscriber to JSON, written only from the specification.
 
 It has its own decoder of Protocol Buffers, so that a mistake in the encoder of the cell cannot cancel itself out.
-`_check` holds what the specification requires of each message of an edge node.
+`_check` asserts the requirements of the specification for each message of an edge node.
 """
 
 import json
@@ -169,8 +169,8 @@ class Host:
 
     def values(self, name: str, device: str = "") -> list[Metric]:
         """Return the received metrics of a name, in order."""
-        of = [each for each in list(self.messages) if each.device == device]
-        return [metric for each in of for metric in each.metrics if metric.name == name]
+        messages = [each for each in list(self.messages) if each.device == device]
+        return [metric for each in messages for metric in each.metrics if metric.name == name]
 
     def _receive(self, received: paho.MQTTMessage) -> None:
         topic = received.topic.split("/")

@@ -1,4 +1,4 @@
-"""Options, sessions, waiting values, host states and topics of the MQTT clients; repeated ends of processes."""
+"""Options, sessions, queued values, host states and topics of the MQTT clients; repeated restarts of processes."""
 
 import asyncio
 import contextlib
@@ -128,7 +128,9 @@ async def test_changes_are_data_and_a_new_type_is_a_new_birth(mosquitto: Broker,
     host.end()
 
 
-async def test_values_wait_for_the_primary_host_and_come_once_as_history(mosquitto: Broker, tmp_path: Path) -> None:
+async def test_values_are_queued_for_the_primary_host_and_sent_once_as_history(
+    mosquitto: Broker, tmp_path: Path
+) -> None:
     host = Host(mosquitto.port, "spBv1.0/plant/+/waiting/#")
     async with publishing(EdgeNode, mosquitto.port, tmp_path, "waiting", "scada") as cell:
         await until(lambda: cell.reports)
@@ -179,7 +181,7 @@ def test_the_oldest_values_of_the_longest_queue_are_dropped() -> None:
     assert queue._count == 0
 
 
-async def test_a_restarted_broker_gets_a_new_birth_and_the_values_in_between(tmp_path: Path) -> None:
+async def test_a_restarted_broker_gets_a_new_birth_and_the_queued_values(tmp_path: Path) -> None:
     broker = Mosquitto(tmp_path)
     host = Host(broker.port, "spBv1.0/plant/#")
     async with publishing(EdgeNode, broker.port, tmp_path, "again", "scada") as cell:
@@ -214,7 +216,7 @@ async def test_the_session_number_continues_after_a_restart(mosquitto: Broker, t
     host.end()
 
 
-async def test_sparkplug_over_nats(nats: Broker, tmp_path: Path) -> None:
+async def test_sparkplug_works_with_the_broker_of_nats(nats: Broker, tmp_path: Path) -> None:
     host = Host(nats.port, "spBv1.0/plant/#")
     async with publishing(EdgeNode, nats.port, tmp_path, "nats", "scada") as cell:
         host.state("scada", True)
@@ -322,7 +324,7 @@ async def test_a_broker_that_does_not_answer_leaves_no_sockets(tmp_path: Path, m
         await until(lambda: ended == len(attempts))
 
 
-async def test_results_wait_for_the_broker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_results_are_queued_until_the_broker_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plain, "MAX_EVENTS", 3)
     broker = Mosquitto(tmp_path)
     broker.end()
@@ -376,7 +378,7 @@ def settings(
         ({"url": "mqtts://broker", "ARCOR2_HW_MQTT_KEY": "/nowhere"}, "both"),
     ],
 )
-def test_wrong_options_are_named(arguments: dict[str, Any], reason: str) -> None:
+def test_invalid_options_are_refused(arguments: dict[str, Any], reason: str) -> None:
     with pytest.raises(InvalidData, match=reason):
         settings(**arguments)
 
@@ -390,23 +392,23 @@ def test_the_address_of_the_broker_is_read() -> None:
     assert settings(names=None) is None
 
 
-async def test_a_process_that_ends_again_and_again_is_an_alarm(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_process_that_ends_repeatedly_raises_an_alarm(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process, "FIRST_PAUSE", 0.0)
     monkeypatch.setattr(process, "MAX_PAUSE", 1.0)
     alarms: Any = SimpleNamespace(raised=[])
     alarms.system = lambda *alarm: alarms.raised.append(alarm)
-    nothing: Any = None
+    unused: Any = None
     ends = 0
 
     async def run(_self: PlantProcess, _inherited: Any) -> None:
         nonlocal ends
         ends += 1
-        if ends == 5:  # this one lasts
+        if ends == 5:  # the fifth process keeps running
             await asyncio.sleep(60)
         raise OSError("no memory")
 
     monkeypatch.setattr(PlantProcess, "_run", run)
-    running = PlantProcess("MQTT process", "arcor2_hw.mqtt", nothing, alarms, "mqtt_ended", nothing, nothing)
+    running = PlantProcess("MQTT process", "arcor2_hw.mqtt", unused, alarms, "mqtt_ended", unused, unused)
     running.start()
     await until(lambda: len(alarms.raised) == 2)
     assert alarms.raised == [("mqtt_ended", True), ("mqtt_ended", False)]
@@ -414,7 +416,7 @@ async def test_a_process_that_ends_again_and_again_is_an_alarm(monkeypatch: pyte
     await running.close()
 
 
-async def test_a_lost_broker_is_an_alarm_until_all_links_are_back(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_lost_broker_raises_an_alarm_until_all_links_are_restored(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("arcor2_server.mqtt.service.ALARM_AFTER", 0.0)
     alarms: Any = SimpleNamespace(raised=[])
     alarms.system = lambda code, active, *text: alarms.raised.append((code, active))

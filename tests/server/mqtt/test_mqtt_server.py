@@ -102,7 +102,7 @@ def newest(host: Host, topic: str) -> Any:
     return found[-1].json if found else None
 
 
-async def test_the_cell_is_born_and_its_devices_follow(cell: Cell) -> None:
+async def test_the_births_of_the_cell_and_its_devices_are_published(cell: Cell) -> None:
     host = cell.host
     (birth,) = await until(lambda: host.of("NBIRTH"))
     assert (birth.value("State"), birth.value("Counts/Good"), birth.value("Program Running")) == ("Stopped", 0, False)
@@ -151,7 +151,7 @@ async def test_a_host_requests_a_rebirth(cell: Cell) -> None:
     assert host.faults == []
 
 
-async def test_a_pulled_cable_is_the_death_of_a_device_and_an_alarm(cell: Cell) -> None:
+async def test_a_pulled_cable_publishes_the_death_of_the_device_and_an_alarm(cell: Cell) -> None:
     host = cell.host
     cell.robot.control.do("unplug")
     await until(lambda: host.of("DDEATH", "arm"))
@@ -174,7 +174,7 @@ async def test_a_pulled_cable_is_the_death_of_a_device_and_an_alarm(cell: Cell) 
     assert host.faults == []
 
 
-async def test_a_killed_process_dies_and_is_born_again(cell: Cell) -> None:
+async def test_a_killed_process_causes_a_death_and_a_new_birth(cell: Cell) -> None:
     host, before = cell.host, cell.host.of("NBIRTH")[-1].value("bdSeq")
     (process,) = cell.processes()
     os.kill(process, signal.SIGKILL)
@@ -187,7 +187,7 @@ async def test_a_killed_process_dies_and_is_born_again(cell: Cell) -> None:
     assert host.faults == []
 
 
-async def test_the_end_of_the_server_is_a_death(cell: Cell) -> None:
+async def test_a_stopped_server_publishes_one_death(cell: Cell) -> None:
     host, deaths = cell.host, len(cell.host.of("NDEATH"))
     session = host.of("NBIRTH")[-1].value("bdSeq")
     await cell.server.stop()

@@ -71,7 +71,7 @@ def test_a_client_that_trusts_the_authority_trusts_the_endpoint(tmp_path: Path) 
     check = ["openssl", "verify", "-x509_strict", "-check_ss_sig", "-crl_check", "-purpose", "sslserver"]
     check += ["-verify_ip", "127.0.0.1", "-CAfile", str(authority.file), "-CRLfile", str(tmp_path / "crl.pem")]
     assert subprocess.run([*check, str(file)], capture_output=True, text=True).stdout == f"{file}: OK\n"
-    # A restart, with and without the authority, keeps it. Another authority, or another name, replaces it.
+    # A restart, with or without the authority, keeps the certificate. Another authority or name replaces it.
     before = file.read_bytes()
     issue_certificate(settings)
     assert own_certificate(tmp_path, socket.gethostname(), hosts)[0].read_bytes() == before
@@ -86,7 +86,7 @@ def test_a_client_that_trusts_the_authority_trusts_the_endpoint(tmp_path: Path) 
     assert key.stat().st_mode & 0o77 == 0
 
 
-def test_a_certificate_that_clients_trust_already_stays(tmp_path: Path) -> None:
+def test_a_certificate_that_clients_already_trust_is_not_replaced(tmp_path: Path) -> None:
     hosts = ["localhost", "127.0.0.1"]
     before = own_certificate(tmp_path, socket.gethostname(), hosts)[0].read_bytes()
     authority = Authority(tmp_path, lambda: hosts)
@@ -139,9 +139,9 @@ async def new_plc(tmp_path: Path) -> tuple[Plc, Runs]:
     parts.active = parts.running = False
     file = cell._file
     runs: Any = Runs()
-    nothing: Any = SimpleNamespace(system=lambda *_: None, note=lambda *_, **__: None)
+    unused: Any = SimpleNamespace(system=lambda *_: None, note=lambda *_, **__: None)
     await file.put(authority=CellAuthority.PLC, jobs=[CellJob(1, "pkg_1")])
-    plc = Plc(cell, file, runs, nothing, nothing, 2.0)
+    plc = Plc(cell, file, runs, unused, unused, 2.0)
     await plc.execute_once(MachineCommand.RESET, 0, "mes", "")
     return plc, runs
 
@@ -196,7 +196,7 @@ def test_a_stream_is_observed_next_to_clients_until_the_host_ends() -> None:
 
 
 class Feed:
-    """Always has changes."""
+    """A feed that always has changes."""
 
     calls = 0
 
@@ -208,11 +208,11 @@ class Feed:
         return m.Update(streams=[bytes(100_000)])
 
 
-async def test_a_process_that_does_not_read_gets_no_queue_of_updates(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_updates_are_not_queued_for_a_process_that_does_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process, "PERIOD", 0.0)
     feed: Any = Feed()
-    nothing: Any = None
-    running = PlantProcess("OPC UA server", "", feed, nothing, "", nothing, nothing)
+    unused: Any = None
+    running = PlantProcess("OPC UA server", "", feed, unused, "", unused, unused)
     ours, theirs = socket.socketpair()
     _, writer = await asyncio.open_unix_connection(sock=ours)
     sending = asyncio.create_task(running._send(writer))
@@ -380,38 +380,42 @@ async def test_values_that_are_not_renewed_become_stale_and_keep_value_and_time(
     assert written.values[-1].StatusCode.is_good()
 
 
-async def test_only_devices_are_read_that_clients_monitor_or_have_just_read(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_only_devices_that_clients_monitor_or_have_just_read_are_observed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     names = {key: (ua.NodeId(f"devices/{key}", 9), ua.NodeId(f"robots/{key}", 9)) for key in ("io", "arm", "off")}
     devices: Any = {
         key: SimpleNamespace(nodes=list(nodes), monitored=False, connected=key != "off") for key, nodes in names.items()
     }
     watched: list[list[str]] = []
-    wanted = interest.MonitoredDevices(devices, watched.append)
-    wanted.update()
+    monitored = interest.MonitoredDevices(devices, watched.append)
+    monitored.update()
     assert watched == [[]]
-    await wanted.need([ua.NodeId(2258), ua.NodeId("cell/Production", 9), ua.NodeId("devices/off/Points/DI1", 9)])
+    await monitored.need([ua.NodeId(2258), ua.NodeId("cell/Production", 9), ua.NodeId("devices/off/Points/DI1", 9)])
     assert watched == [[]]
 
-    reading = asyncio.create_task(wanted.need([ua.NodeId("robots/arm/Axes/j1", 9)]))
+    reading = asyncio.create_task(monitored.need([ua.NodeId("robots/arm/Axes/j1", 9)]))
     await asyncio.sleep(0)
     assert watched[-1] == ["arm"]
-    wanted.arrived(names["arm"][0])
+    monitored.arrived(names["arm"][0])
     await asyncio.sleep(0)
     assert not reading.done()  # the points have arrived, but not the joints
-    wanted.arrived(names["arm"][1])
+    monitored.arrived(names["arm"][1])
     await reading
-    await wanted.need([ua.NodeId("robots/arm/Axes/j2", 9)])  # current already
+    await monitored.need([ua.NodeId("robots/arm/Axes/j2", 9)])  # current already
 
     monkeypatch.setattr(interest, "FIRST_VALUES", 0.0)
-    await wanted.need([ua.NodeId("devices/io/Points/DI1", 9)])  # a device that does not answer delays no client longer
+    await monitored.need(
+        [ua.NodeId("devices/io/Points/DI1", 9)]
+    )  # a device that does not answer delays the client no longer
     assert watched[-1] == ["arm", "io"]
     devices["io"].monitored = True
     later = time.monotonic() + interest.LEASE
     monkeypatch.setattr(interest, "time", SimpleNamespace(monotonic=lambda: later))
-    wanted.update()
+    monitored.update()
     assert watched[-1] == ["io"]
     devices["io"].monitored = False
-    wanted.update()
+    monitored.update()
     assert watched[-1] == []
 
 
@@ -423,8 +427,8 @@ async def test_a_momentary_alarm_is_one_event_and_a_retained_one_ends_with_an_ev
 
     server = SimpleNamespace(iserver=SimpleNamespace(subscription_service=SimpleNamespace(trigger_event=trigger_event)))
     space: Any = SimpleNamespace(server=server, own=lambda *path: ua.NodeId("/".join(path), 1))
-    nothing: Any = None
-    conditions = Conditions(space, lambda alarm: (ua.NodeId("cell", 1), "Cell"), nothing)
+    unused: Any = None
+    conditions = Conditions(space, lambda alarm: (ua.NodeId("cell", 1), "Cell"), unused)
     at = "2026-01-02T03:04:05+00:00"
     lost = AlarmRecord(1, "io-1", "connection_lost", Priority.HIGH, AlarmCategory.CONNECTION, "Lost.", at, 1)
     refused = replace(lost, number=2, kind="plc-4", active=False, retain=False)

@@ -172,7 +172,7 @@ async def command(machine: Node, name: str, *arguments: Any) -> None:
     await machine.call_method(ua.QualifiedName(name, index), *arguments)
 
 
-async def test_only_trusted_clients_with_the_right_user_read(cell: Plant) -> None:
+async def test_only_trusted_clients_with_a_valid_user_can_read(cell: Plant) -> None:
     client = await plant.encrypted(cell.url, cell.files, "Line 7", PIN)
     with pytest.raises(ua.UaStatusCodeError, match="BadSecurityChecksFailed"):
         await plant.connected(client)
@@ -186,7 +186,7 @@ async def test_only_trusted_clients_with_the_right_user_read(cell: Plant) -> Non
         uris = {each.Server.ApplicationUri for each in await client.get_endpoints()}
         assert uris == {f"urn:{socket.gethostname()}:arcor2-hw:opcua"}
         assert len(await plant.typed(await machine_of(client), plant.MACHINERY, "MachineIdentificationType")) == 1
-        with pytest.raises(ua.UaStatusCodeError):  # nobody writes
+        with pytest.raises(ua.UaStatusCodeError):  # the address space is read-only
             await (await client.nodes.server.get_child("0:ServiceLevel")).write_value(
                 ua.Variant(1, ua.VariantType.Byte)
             )
@@ -196,7 +196,7 @@ async def set_mode(client: Client, *arguments: ua.Variant) -> None:
     await command(await unit_of(client), "SetUnitMode", *arguments)
 
 
-async def test_the_mode_is_set_with_the_authority_by_the_role_of_the_screens(cell: Plant) -> None:
+async def test_setting_the_mode_needs_the_authority_and_a_technician(cell: Plant) -> None:
     maintenance, produce = (ua.Variant(number, ua.VariantType.Int32) for number in (2, 1))
     async with cell.connected() as operator, cell.connected("Shift lead") as technician:
         unit = await unit_of(technician)
@@ -300,7 +300,7 @@ async def test_all_objects_have_the_mandatory_members_of_their_types(cell: Plant
         assert [each for root in roots for each in await mandatory.missing(root)] == []
 
 
-async def test_a_pulled_cable_is_a_bad_status_and_an_alarm(cell: Plant) -> None:
+async def test_a_pulled_cable_causes_a_bad_status_and_an_alarm(cell: Plant) -> None:
     async with cell.connected() as client:
         watch = plant.Watch()
         subscription = await client.create_subscription(100, watch)
@@ -370,7 +370,7 @@ async def test_the_client_of_the_how_to_reads_the_state(cell: Plant) -> None:
     assert await code["read_state"](cell.url, *map(str, cell.files), "Line 7", PIN) == "BadStateNotActive"
 
 
-async def test_a_removed_person_commands_nothing_more(cell: Plant) -> None:
+async def test_a_request_of_a_removed_person_is_refused(cell: Plant) -> None:
     async with cell.connected() as client:
         method = await request_method(client)
         assert (await call_request(client, method, "reset 1", 1, 0))[0] == 0

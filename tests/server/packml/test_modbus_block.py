@@ -43,7 +43,7 @@ class Block:
         ("05 0000 ff00", "85 01"),
     ],
 )
-def test_each_function_and_its_refusals(request_pdu: str, expected: str) -> None:
+def test_each_function_is_executed_or_refused(request_pdu: str, expected: str) -> None:
     block = Block()
     assert answer(bytes.fromhex(request_pdu), block, "") == bytes.fromhex(expected)
     assert block.registers == {"06": [0, 0, 0x1234, 0], "10": [0, 5, 6, 0]}.get(expected[:2], [0, 0, 0, 0])
@@ -65,9 +65,9 @@ class _Cell:
 
 
 def plc(tmp_path: Path, life_timeout: float = 60.0) -> Plc:
-    nothing: Any = None
+    unused: Any = None
     cell: Any = _Cell()
-    return Plc(cell, CellFile(tmp_path / "cell-state.json"), nothing, nothing, nothing, life_timeout)
+    return Plc(cell, CellFile(tmp_path / "cell-state.json"), unused, unused, unused, life_timeout)
 
 
 async def test_a_second_plc_and_too_many_requests_are_refused(tmp_path: Path) -> None:

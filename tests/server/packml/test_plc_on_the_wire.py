@@ -50,7 +50,7 @@ def starts(data_dir: Path) -> list[str]:
 
 
 class Master:
-    """A PLC: writes its life counter and its block cyclically, and reads that of the cell."""
+    """A PLC that cyclically writes its registers with a life counter, and reads the registers of the cell."""
 
     def __init__(self, host: str, port: int, request: int = 0) -> None:
         self.address = host, port
@@ -147,7 +147,7 @@ def modbus_write(transaction: int, registers: list[int]) -> bytes:
 async def test_a_plc_starts_jobs_once_and_a_technician_sets_the_authority(tmp_path: Path) -> None:
     data = tmp_path / "data"
     async with cell(data) as client, plc_of(client) as plc:
-        # Without the authority, it starts nothing.
+        # Without the authority, the PLC starts nothing.
         assert (plc[Input.VERSION], plc[Input.STATE], plc[Input.MODE], plc[Input.AUTHORITY]) == (1, S.STOPPED, 1, 1)
         assert await plc.command(C.RESET) is R.NO_AUTHORITY
         await client.granted("SetCellJobs", {"jobs": JOBS})
@@ -229,7 +229,7 @@ async def test_a_plc_starts_jobs_once_and_a_technician_sets_the_authority(tmp_pa
         assert starts(data) == [str(each) for each in (SHORT, FAILING, JAMMED, *[ENDLESS] * 3, SHORT)]
 
 
-async def test_a_lost_answer_a_restart_and_a_frozen_life_counter(tmp_path: Path) -> None:
+async def test_a_job_starts_once_despite_a_lost_answer_a_frozen_life_counter_and_a_restart(tmp_path: Path) -> None:
     data = tmp_path / "data"
     async with cell(data) as client:
         await client.granted("SetCellJobs", {"jobs": JOBS})
@@ -283,4 +283,6 @@ async def test_a_lost_answer_a_restart_and_a_frozen_life_counter(tmp_path: Path)
         plc.registers[1:3] = [C.START, SHORT]  # still with the old request number
         await plc.make_idle()
         assert starts(data) == [str(ENDLESS)]
-        assert (await alarms(client))["plc_request_refused"]["count"] == refused  # it was not even refused
+        assert (await alarms(client))["plc_request_refused"][
+            "count"
+        ] == refused  # the repeated request is not refused either

@@ -49,10 +49,10 @@ class Parts:
         for notify in self.on_state:
             notify()
 
-    def permits(self, how: RunStart) -> bool:
+    def permits(self, start: RunStart) -> bool:
         try:
             for check in self.before_start:
-                check(how)
+                check(start)
         except RequestRefused:
             return False
         return True
@@ -84,11 +84,11 @@ async def test_mode_and_authority_determine_who_may_start(
     with collecting() as changes:
         await cell.set_mode(mode, "")
         await cell.set_authority(authority, "")
-    noted = [("mode", M.PRODUCE, mode), ("authority", A.HUB, authority)]
+    expected = [("mode", M.PRODUCE, mode), ("authority", A.HUB, authority)]
     assert [(each.id, each.before, each.after) for each in changes] == [
-        each for each in noted if each[1] is not each[2]
+        each for each in expected if each[1] is not each[2]
     ]
-    assert [how for how in (OPERATOR, TECHNICIAN, PLC) if parts.permits(how)] == allowed
+    assert [start for start in (OPERATOR, TECHNICIAN, PLC) if parts.permits(start)] == allowed
     [may_go_online] = parts.online.before_start
     if authority is A.PLC:
         with pytest.raises(RequestRefused, match="The PLC has the authority"):
@@ -97,7 +97,7 @@ async def test_mode_and_authority_determine_who_may_start(
         may_go_online()
 
 
-async def test_a_running_program_and_an_online_scene_keep_the_settings(tmp_path: Path) -> None:
+async def test_settings_cannot_change_while_a_program_runs_or_the_scene_is_online(tmp_path: Path) -> None:
     cell, parts = new_cell(tmp_path)
     parts.online.state = SceneStateEnum.STARTED
     with pytest.raises(RequestRefused, match="scene is online"):

@@ -44,8 +44,8 @@ def test_commands_change_the_state_only_as_packml_allows(data: st.DataObject) ->
                 states.command(command, active=program is not P.STOPPED)
             assert states.present is before
         assert states.present in STATES
-        is_at_rest = states.present in (S.STOPPED, S.IDLE, S.COMPLETE, S.ABORTED)
-        assert is_at_rest is (program is P.STOPPED)
+        is_inactive = states.present in (S.STOPPED, S.IDLE, S.COMPLETE, S.ABORTED)
+        assert is_inactive is (program is P.STOPPED)
 
 
 @pytest.mark.parametrize(
@@ -65,6 +65,6 @@ def test_the_end_of_a_run_decides_the_state(end: RunEnd, state: MachineState) ->
     assert states.present is state
 
 
-def test_names_on_the_wire_are_those_of_the_numbers() -> None:
+def test_names_and_numbers_of_states_match() -> None:
     assert {each.name for each in CellStateName} == {each.name for each in STATES}
     assert [each.value for each in CellMode] == ["produce", "maintenance", "manual", "changeover"]
